@@ -1,0 +1,68 @@
+"""Errors that a user can act on, each with the exit code of the program that ends in it."""
+
+from os import PathLike
+
+
+class GyriflowError(Exception):
+    """An error with a message that names what was found, what was expected and what to do.
+
+    Parameters
+    ----------
+    problem
+        What is wrong, as a short clause.
+    path
+        File or folder concerned.
+    found, expected
+        What was there, and what should have been.
+    remedy
+        What the user can do.
+    """
+
+    exit_code = 1
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        path: str | PathLike[str] | None = None,
+        found: object = None,
+        expected: object = None,
+        remedy: str | None = None,
+    ) -> None:
+        parts = [f"{path}: {problem}" if path is not None else problem]
+        if found is not None:
+            parts.append(f"found {found}")
+        if expected is not None:
+            parts.append(f"expected {expected}")
+        message = "; ".join(parts)
+        if remedy is not None:
+            message = f"{message}. {remedy}"
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple:
+        # keyword-only arguments are already part of the message
+        return (type(self), (str(self),))
+
+
+class InputError(GyriflowError):
+    """A file or a configuration that cannot be used."""
+
+    exit_code = 2
+
+
+class MeshError(GyriflowError):
+    """A surface or a mesh that cannot be made good."""
+
+    exit_code = 3
+
+
+class SolverError(GyriflowError):
+    """A folding solve that cannot go on."""
+
+    exit_code = 4
+
+
+class StorageError(GyriflowError):
+    """A file that cannot be written, a disk that is full, a folder in use."""
+
+    exit_code = 5

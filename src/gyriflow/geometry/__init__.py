@@ -1,0 +1,1 @@
+"""Plain geometry: triangle surfaces and tetrahedral meshes as frozen arrays."""

@@ -1,0 +1,166 @@
+"""Triangle surfaces: a frozen pair of arrays, and what can be measured on it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
+    """Returns a read-only (n, width) copy of `values`; ValueError for another shape."""
+    array = np.array(values, dtype=dtype, order="C")
+    if array.ndim != 2 or array.shape[1] != width:
+        raise ValueError(f"expected an (n, {width}) array, found shape {array.shape}")
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """A triangle surface.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float
+        Positions in mm.
+    faces : (m, 3) int
+        Vertex indices, counter-clockwise seen from outside.
+    """
+
+    vertices: Floats
+    faces: Ints
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", frozen(self.vertices, np.float64, 3))
+        object.__setattr__(self, "faces", frozen(self.faces, np.int64, 3))
+        if len(self.faces) and not 0 <= self.faces.min() <= self.faces.max() < len(self.vertices):
+            raise ValueError("a face names a vertex that does not exist")
+
+
+def corners(mesh: TriangleMesh) -> Floats:
+    """Returns the (m, 3, 3) corner positions of the faces in mm."""
+    return mesh.vertices[mesh.faces]
+
+
+def area_vectors(mesh: TriangleMesh) -> Floats:
+    """Returns the (m, 3) face normals with the face areas (mm²) as lengths."""
+    a, b, c = corners(mesh).transpose(1, 0, 2)
+    return 0.5 * np.cross(b - a, c - a)
+
+
+def face_areas(mesh: TriangleMesh) -> Floats:
+    """Returns the (m,) face areas in mm²."""
+    return np.linalg.norm(area_vectors(mesh), axis=1)
+
+
+def area(mesh: TriangleMesh) -> float:
+    """Returns the area in mm²."""
+    return float(face_areas(mesh).sum())
+
+
+def signed_volume(mesh: TriangleMesh) -> float:
+    """Returns the enclosed volume in mm³, negative where the faces look inwards (divergence theorem)."""
+    a, b, c = corners(mesh).transpose(1, 0, 2)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def unit(vectors: Floats) -> Floats:
+    """Returns (n, 3) vectors scaled to length one; zero vectors stay zero."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1.0)
+
+
+def face_normals(mesh: TriangleMesh) -> Floats:
+    """Returns the (m, 3) unit face normals."""
+    return unit(area_vectors(mesh))
+
+
+def scatter_to_vertices(mesh: TriangleMesh, face_values: Floats) -> Floats:
+    """Returns per vertex the sum of (m,) or (m, k) values over its faces."""
+    corner = np.repeat(np.arange(len(mesh.faces)), 3)
+    incidence = sparse.csr_matrix(
+        (np.ones(corner.size), (mesh.faces.ravel(), corner)), shape=(len(mesh.vertices), len(mesh.faces))
+    )
+    return incidence @ face_values
+
+
+def vertex_normals(mesh: TriangleMesh) -> Floats:
+    """Returns the (n, 3) unit vertex normals, the area-weighted mean of the faces around."""
+    return unit(scatter_to_vertices(mesh, area_vectors(mesh)))
+
+
+def vertex_areas(mesh: TriangleMesh) -> Floats:
+    """Returns the (n,) areas in mm² that belong to the vertices: a third of each face around."""
+    return scatter_to_vertices(mesh, face_areas(mesh) / 3.0)
+
+
+def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
+    """Returns the (e, 2) undirected edges, each once and sorted, and the (e,) number of faces at each."""
+    pairs = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return np.unique(pairs, axis=0, return_counts=True)
+
+
+def mean_edge_length(mesh: TriangleMesh) -> float:
+    """Returns the mean edge length in mm."""
+    pairs, _ = edges(mesh)
+    return float(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1), axis=-1).mean())
+
+
+def is_closed(mesh: TriangleMesh) -> bool:
+    """Returns whether every edge has exactly two faces that run along it in opposite directions."""
+    directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    if not len(directed) or len(np.unique(directed, axis=0)) != len(directed):
+        return False
+    _, counts = edges(mesh)
+    return bool((counts == 2).all())
+
+
+def euler_number(mesh: TriangleMesh) -> int:
+    """Returns vertices − edges + faces, counting used vertices only: 2 for each closed surface without handles."""
+    return int(len(np.unique(mesh.faces)) - len(edges(mesh)[0]) + len(mesh.faces))
+
+
+def face_components(mesh: TriangleMesh) -> Ints:
+    """Returns the (m,) number of the connected component of each face, the largest area first (0)."""
+    graph = sparse.coo_matrix(
+        (np.ones(2 * len(mesh.faces)), (mesh.faces[:, [0, 1]].ravel(), mesh.faces[:, [1, 2]].ravel())),
+        shape=(len(mesh.vertices),) * 2,
+    )
+    _, label = connected_components(graph, directed=False)
+    _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
+    order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return rank[component]
+
+
+def submesh(mesh: TriangleMesh, keep: NDArray[np.bool_]) -> tuple[TriangleMesh, Ints]:
+    """Returns the surface of the faces where the (m,) mask `keep` holds, and its vertices' indices in `mesh`."""
+    used, faces = np.unique(mesh.faces[keep], return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3)), used
+
+
+def merged(*meshes: TriangleMesh) -> TriangleMesh:
+    """Returns the surfaces side by side in one, without joining vertices."""
+    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    return TriangleMesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]),
+    )
+
+
+def flipped(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns the surface with every face turned round."""
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def transformed(mesh: TriangleMesh, matrix: ArrayLike) -> TriangleMesh:
+    """Returns the surface moved by a (4, 4) affine matrix; faces are turned where it mirrors."""
+    matrix = np.asarray(matrix, dtype=float)
+    moved = TriangleMesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces)
+    return flipped(moved) if np.linalg.det(matrix[:3, :3]) < 0 else moved
