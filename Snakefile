@@ -1,0 +1,57 @@
+# From fetal brain MRI to folding metrics. Configuration: config/README.md; results: docs/outputs.md.
+import sys
+from pathlib import Path
+
+from snakemake.utils import min_version
+
+min_version("9.0")
+SOURCE = f"{workflow.basedir}/src"
+sys.path.insert(0, SOURCE)
+
+# a configuration given on the command line replaces the demo instead of being mixed with it
+if not workflow.overwrite_configfiles:
+    own = Path("config/config.yaml")
+    demo = own if own.is_file() else Path(workflow.basedir, own)
+
+    configfile: demo
+
+
+report: "workflow/report/workflow.rst"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/input.smk"
+include: "workflow/rules/surface.smk"
+include: "workflow/rules/mesh.smk"
+include: "workflow/rules/growth.smk"
+include: "workflow/rules/folding.smk"
+include: "workflow/rules/metrics.smk"
+include: "workflow/rules/study.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
+
+
+localrules:
+    all,
+    surface,
+    mesh,
+    growth,
+    folding,
+    metrics,
+    figures,
+    report,
+    paper,
+    parameters,
+    html_report,
+
+
+rule all:
+    default_target: True
+    input:
+        rules.surface.input,
+        rules.mesh.input,
+        rules.growth.input,
+        rules.folding.input,
+        rules.metrics.input,
+        rules.figures.input,
+        rules.report.input,

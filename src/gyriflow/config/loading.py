@@ -1,0 +1,190 @@
+"""From plain dictionaries to a validated configuration, with every problem named at once."""
+
+import difflib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from ..errors import InputError
+from .brains import SIDES, Brain
+from .checks import brain_problems, study_problems
+from .folding import FoldingSettings
+from .root import Config
+
+REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
+
+
+def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
+    """Returns the validated configuration, with input files as absolute paths.
+
+    Parameters
+    ----------
+    raw
+        The configuration as read from YAML.
+    base_dir
+        Folder of the configuration file, for relative paths.
+
+    Raises
+    ------
+    InputError
+        Naming all problems at once, each with its key, what was found and what is allowed.
+    """
+    plain = _plain(raw)
+    problems: list[str] = []
+    valid: dict[str, Any] = {}
+    for name, field in Config.model_fields.items():
+        if name in ("brains", "runs", "folding"):
+            continue
+        if name in plain or field.is_required():
+            valid[name] = _validated(field.annotation, plain.get(name, _ABSENT), (name,), problems)
+    problems += [_unknown((key,), key, list(Config.model_fields)) for key in plain if key not in Config.model_fields]
+
+    valid["brains"] = _brains(plain.get("brains", _ABSENT), Path(base_dir), problems)
+    folding = plain.get("folding", {})
+    valid["folding"] = _validated(FoldingSettings, folding, ("folding",), problems)
+    runs = _runs(plain.get("runs"), folding if isinstance(folding, dict) else {}, problems)
+    problems += study_problems(plain.get("brains"), plain.get("start"), runs)
+    if problems:
+        raise InputError(
+            f"the configuration has {len(problems)} problem{'s' if len(problems) > 1 else ''}:\n  "
+            + "\n  ".join(problems)
+            + "\nAll keys are explained in config/README.md"
+        )
+    return Config(**valid, runs=runs)
+
+
+_ABSENT = object()
+
+
+def _plain(value: Any) -> Any:
+    """Returns nested mappings and sequences as plain dictionaries and lists."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _validated(kind: Any, value: Any, path: tuple, problems: list[str]) -> Any:
+    """Returns `value` as the type `kind`, or adds what is wrong with it to `problems` and returns None."""
+    if value is _ABSENT:
+        problems.append(f"{_dotted(path)}: is missing")
+        return None
+    try:
+        return TypeAdapter(kind).validate_python({} if value is None and _is_model(kind) else value)
+    except ValidationError as error:
+        problems += [_described(kind, details, path) for details in error.errors()]
+        return None
+
+
+def _brains(raw: Any, base_dir: Path, problems: list[str]) -> tuple[Brain, ...]:
+    if raw is _ABSENT or not isinstance(raw, list) or not raw:
+        found = "nothing" if raw is _ABSENT else repr(raw)
+        problems.append(f"brains: found {found}; expected a list of brains, each with id, week and a source")
+        return ()
+    brains = []
+    for number, entry in enumerate(raw):
+        where = f"brains[{number}]"
+        problems += brain_problems(entry, where)
+        brains.append(_validated(Brain, _with_files(entry, base_dir, where, problems), ("brains", number), problems))
+    return tuple(brains)
+
+
+def _with_files(entry: Any, base_dir: Path, where: str, problems: list[str]) -> Any:
+    """Returns an entry of `brains` with its files as absolute paths; missing ones are added to `problems`."""
+    if not isinstance(entry, dict):
+        return entry
+    entry = dict(entry)
+    if isinstance(entry.get("hemispheres"), dict):
+        entry["hemispheres"] = dict(entry["hemispheres"])
+        holders = [
+            (entry, "labels", ""),
+            (entry, "pial", ""),
+            *((entry["hemispheres"], s, "hemispheres.") for s in SIDES),
+        ]
+    else:
+        holders = [(entry, "labels", ""), (entry, "pial", "")]
+    for holder, key, prefix in holders:
+        if not isinstance(holder.get(key), str):
+            continue
+        places = [base_dir / Path(holder[key]).expanduser(), Path.cwd() / holder[key]]
+        present = [place for place in places if place.is_file()]
+        holder[key] = str((present or places)[0].resolve())
+        if not present:
+            problems.append(f"{where}.{prefix}{key}: no such file: {places[0]}")
+    return entry
+
+
+def _runs(raw: Any, folding: dict[str, Any], problems: list[str]) -> dict[str, dict[str, Any]]:
+    """Returns each run's settings: `folding` with the run's own on top."""
+    if raw is None or raw == {}:
+        raw = REFERENCE_RUNS
+    if not isinstance(raw, dict):
+        problems.append(f"runs: found {raw!r}; expected names, each with the settings that differ from folding")
+        return {}
+    runs = {}
+    for name, override in raw.items():
+        if override is not None and not isinstance(override, dict):
+            problems.append(f"runs.{name}: found {override!r}; expected settings that differ from folding")
+            continue
+        runs[name] = _merged(folding, override or {})
+        found: list[str] = []
+        _validated(FoldingSettings, runs[name], ("runs", name), found)
+        # what `folding` itself has wrong was already said there
+        known = {problem.removeprefix("folding") for problem in problems if problem.startswith("folding")}
+        problems += [problem for problem in found if problem.removeprefix(f"runs.{name}") not in known]
+    return runs
+
+
+def _merged(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
+    both = dict(base)
+    for key, value in override.items():
+        nested = isinstance(value, dict) and isinstance(base.get(key), dict)
+        both[key] = _merged(base[key], value) if nested else value
+    return both
+
+
+def _dotted(path: tuple) -> str:
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def _described(kind: Any, details: ErrorDetails, path: tuple) -> str:
+    where = (*path, *details["loc"])
+    if details["type"] == "extra_forbidden":
+        return _unknown(where, str(details["loc"][-1]), list(_keys_at(kind, details["loc"][:-1])))
+    if details["type"] == "missing":
+        return f"{_dotted(where)}: is missing"
+    expected = details["msg"].removeprefix("Value error, ").removeprefix("Input should ")
+    return f"{_dotted(where)}: found {details['input']!r}; it should {expected}"
+
+
+def _unknown(where: tuple, key: str, known: list[str]) -> str:
+    nearest = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+    hint = f"did you mean {nearest[0]}?" if nearest else f"known are {', '.join(known)}"
+    return f"{_dotted(where)}: unknown key; {hint}"
+
+
+def _keys_at(kind: Any, path: tuple) -> list[str]:
+    """Returns the known keys of the model that stands at `path` inside the type `kind`."""
+    models = _models(kind)
+    if not models:
+        return []
+    if not path:
+        return list(models[0].model_fields)
+    field = models[0].model_fields.get(str(path[0]))
+    return _keys_at(field.annotation, path[1:]) if field is not None else []
+
+
+def _models(kind: Any) -> list[type[BaseModel]]:
+    if get_origin(kind) in (Union, UnionType):
+        return [model for part in get_args(kind) for model in _models(part)]
+    return [kind] if _is_model(kind) else []
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)

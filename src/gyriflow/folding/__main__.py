@@ -1,0 +1,139 @@
+"""The folding program: `mpiexec -n N python -m gyriflow.folding MESH --params params.yaml --out DIR`."""
+
+import argparse
+import fcntl
+import hashlib
+import os
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import yaml
+from mpi4py import MPI
+
+from ..errors import GyriflowError, InputError, StorageError
+from ..io.files import write_json
+from ..io.tetmeshes import read_tetrahedral_mesh
+from ..step import record_exit_code
+from .output import ZONES, say
+from .parameters import FoldingParameters, parameters_from
+from .simulation import run
+from .zones import ZONE_NAMES, find_zones, refuse_impossible, zone_report
+
+PREDICTED_MIB_PER_RANK = 350
+PREDICTED_KIB_PER_TET = 4.0
+"""Memory of a solve, from runs of 60 k to 450 k elements (see summary.json of any run)."""
+
+
+def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Returns the command line's values."""
+    parser = argparse.ArgumentParser(prog="python -m gyriflow.folding", description=__doc__)
+    parser.add_argument("mesh", type=Path, help="tetrahedral mesh, RAS+ mm (XDMF)")
+    parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    return parser.parse_args(arguments)
+
+
+def read_parameters(path: Path) -> FoldingParameters:
+    """Returns the parameters of a YAML file; InputError where it cannot be read or does not fit."""
+    try:
+        values = yaml.safe_load(path.read_text())
+    except (OSError, yaml.YAMLError) as error:
+        raise InputError(f"cannot be read: {error}", path=path) from None
+    return parameters_from(values)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Holds the folder for this run; StorageError where another run holds it or it cannot be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / ".lock").open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise StorageError(
+                    "another folding run works in this folder", path=folder, remedy="Wait for it or choose another folder."
+                ) from None
+            yield
+    except OSError as error:
+        raise StorageError(f"cannot be written: {error}", path=folder) from None
+
+
+def form_compiler_options(comm: MPI.Comm) -> dict:
+    """Returns options of the form compiler, with a cache of this kind of processor, cleared of torn entries."""
+    flags = next((line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")), "")
+    kind = hashlib.sha256(flags.encode()).hexdigest()[:8]
+    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
+    if comm.rank == 0:
+        cache.mkdir(parents=True, exist_ok=True)
+        for source in cache.glob("*.c"):
+            if not source.with_suffix(".c.cached").exists():
+                # left by a compiler that was killed: everyone would wait for it
+                source.unlink(missing_ok=True)
+    comm.barrier()
+    # -ffast-math would break the checks for numbers that are none
+    return {"cffi_extra_compile_args": ["-O3", "-march=native"], "cache_dir": str(cache), "timeout": 120}
+
+
+def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
+    """Reads, checks, prints what is to be solved, and solves it."""
+    parameters = read_parameters(arguments.params)
+    mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
+    p = parameters
+    zones = find_zones(
+        mesh,
+        fissure_x_mm=p.fissure_x_mm,
+        gap_mm=p.contact.gap_mm,
+        contact=p.contact.kind == "planes",
+        shift_y=p.no_growth.shift_y,
+        shift_z=p.no_growth.shift_z,
+        semi_axes=p.no_growth.semi_axes,
+    )
+    if comm.rank == 0:
+        report = zone_report(mesh, zones, p.thickness_mm)
+        memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024
+        say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")
+        for name in ZONE_NAMES:
+            zone = report["zones"][name]
+            say(f"  {name}: {zone['facets']} facets, {zone['area_mm2']:.0f} mm2")
+        shares = ", ".join(f"{side} {share:.1%}" for side, share in report["clamped_share"].items())
+        say(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
+        through = report["elements_through_cortex"]
+        say(f"  elements through the cortex: {through:.1f}")
+        if through < 2:
+            say(f"warning: fewer than two elements through the cortex ({through:.2f}): folds may be mesh noise")
+        refuse_impossible(mesh, zones)
+        write_json(arguments.out / ZONES, report)
+    comm.barrier()
+    run(comm, mesh, zones, parameters, arguments.out, jit_options=form_compiler_options(comm))
+
+
+def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
+    """Runs `main` under the folder's lock and ends every rank with the exit code of the first error."""
+    try:
+        if comm.rank == 0:
+            with locked(arguments.out):
+                main(comm, arguments)
+        else:
+            main(comm, arguments)
+    except GyriflowError as error:
+        print(f"gyriflow: {error}", file=sys.stderr, flush=True)
+        code = error.exit_code
+    except Exception:
+        traceback.print_exc()
+        code = 1
+    else:
+        return
+    record_exit_code(code)
+    sys.stdout.flush()
+    if comm.size > 1:
+        comm.Abort(code)  # the others may wait in a collective call
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    guarded(MPI.COMM_WORLD, parse())

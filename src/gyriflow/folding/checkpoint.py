@@ -1,0 +1,133 @@
+"""The state of a run between two steps, and its checkpoint: enough to go on after any interruption, on any ranks.
+
+Arrays are in the mesh file's order. A checkpoint names the mesh and the parameters it belongs to by a hash and carries
+a checksum of its own content; one that does not fit or is torn is not used.
+"""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..io.files import replaced
+from .parameters import FoldingParameters
+
+Floats = NDArray[np.float64]
+FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where a run stands: everything that the next step depends on.
+
+    Attributes
+    ----------
+    positions : (n, 3) float
+        In m.
+    time_s : float
+        Time since the start.
+    step_s : float
+        The present time step, smaller than the nominal one after a halving.
+    last, before_last : (n, 3) float
+        Displacements in m of the two last steps; zero where there was none.
+    last_s, before_last_s : float
+        Lengths of the two last steps; zero where there was none.
+    successes : int
+        Steps since the last halving.
+    rows : tuple of dict
+        The step table so far.
+    """
+
+    positions: Floats
+    time_s: float
+    step_s: float
+    last: Floats
+    before_last: Floats
+    last_s: float = 0.0
+    before_last_s: float = 0.0
+    successes: int = 0
+    rows: tuple[dict, ...] = field(default=())
+
+    @classmethod
+    def at_start(cls, positions: Floats, step_s: float) -> "State":
+        """Returns the state before the first step."""
+        return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
+
+    def predicted(self, step_s: float) -> Floats:
+        """Returns the (n, 3) first guess in m for a step of a given length: the rates of the two last steps extended."""
+        if self.last_s == 0:
+            return np.zeros_like(self.last)
+        rate = self.last / self.last_s
+        if self.before_last_s == 0:
+            return rate * step_s
+        slope = (rate - self.before_last / self.before_last_s) / ((self.last_s + self.before_last_s) / 2)
+        return (rate + slope * (self.last_s + step_s) / 2) * step_s
+
+    def after(self, displacement: Floats, step_s: float, row: dict) -> "State":
+        """Returns the state after an accepted step with its (n, 3) displacement in m."""
+        return replace(
+            self,
+            positions=self.positions + displacement,
+            time_s=self.time_s + step_s,
+            last=displacement,
+            before_last=self.last,
+            last_s=step_s,
+            before_last_s=self.last_s,
+            successes=self.successes + 1,
+            rows=(*self.rows, row),
+        )
+
+
+def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters) -> str:
+    """Returns a hash of all that decides the result: the mesh and the parameters, but not the number of ranks."""
+    values = asdict(parameters)
+    del values["ranks"]
+    digest = hashlib.sha256(json.dumps([FORMAT, values], sort_keys=True).encode())
+    digest.update(mesh.vertices.tobytes())
+    digest.update(mesh.tets.tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _checksum(arrays: dict[str, Floats], scalars: str) -> str:
+    digest = hashlib.sha256(scalars.encode())
+    for name in sorted(arrays):
+        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()
+
+
+def write_checkpoint(path: Path, key: str, state: State) -> None:
+    """Writes the state of the run `key`; StorageError where the disk is full or the folder cannot be written."""
+    values = dict(vars(state))
+    arrays = {name: values.pop(name) for name in ("positions", "last", "before_last")}
+    scalars = json.dumps({**values, "key": key}, sort_keys=True)
+    with replaced(path) as temporary, h5py.File(temporary, "w") as file:
+        for name, array in arrays.items():
+            file[name] = array
+        file.attrs["scalars"] = np.void(scalars.encode())  # a table of steps outgrows HDF5's limit for text
+        file.attrs["checksum"] = _checksum(arrays, scalars)
+
+
+def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
+    """Returns the state of the run `key`, or None, and what to tell the user about it (empty: there is none)."""
+    if not path.exists():
+        return None, ""
+    try:
+        with h5py.File(path) as file:
+            arrays = {name: file[name][:] for name in ("positions", "last", "before_last")}
+            scalars = bytes(file.attrs["scalars"]).decode()
+            checksum = file.attrs["checksum"]
+        if _checksum(arrays, scalars) != checksum:
+            raise ValueError("its checksum is wrong")
+        values = json.loads(scalars)
+    except (OSError, KeyError, ValueError) as error:
+        return None, f"the checkpoint {path} is torn ({error}): not used, the run starts anew"
+    if values.pop("key") != key:
+        return None, f"the checkpoint {path} belongs to another mesh or other parameters: not used"
+    values["rows"] = tuple(values["rows"])
+    state = State(**arrays, **values)
+    return state, f"going on from the checkpoint after step {len(state.rows)}"

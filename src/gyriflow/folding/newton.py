@@ -1,0 +1,210 @@
+"""Newton's method for the displacement of one step, with conjugate gradients and algebraic multigrid.
+
+The preconditioner is kept across iterations and steps and rebuilt when it has gone stale. A ladder of further means
+follows when conjugate gradients fail; the rung used is reported.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..errors import SolverError
+from .problem import Problem
+
+RUNGS = ("cg", "cg, preconditioner rebuilt", "minres", "mumps")
+KEPT, REBUILT, MINRES, DIRECT = range(4)
+
+
+@dataclass(frozen=True)
+class NewtonSettings:
+    """Tolerances and limits of the iteration.
+
+    `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side.
+    """
+
+    newton_tolerance: float = 1e-6
+    krylov_tolerance: float = 1e-3
+    max_newton: int = 20
+    max_krylov: int = 300
+    max_backtracks: int = 8
+
+
+@dataclass
+class StepCount:
+    """What a step took."""
+
+    newton: int = 0
+    krylov: int = 0
+    rung: int = KEPT
+    residual: float = np.inf
+    backtracks: int = 0
+
+
+class NotConvergedError(SolverError):
+    """The step was not solved; a smaller one may be."""
+
+
+class NewtonSolver:
+    """Solves for the displacement of one step after the other with objects made once.
+
+    Parameters
+    ----------
+    problem
+        Energy, residual and tangent.
+    settings
+        Tolerances and limits.
+    residual_floor
+        Residual in N below which a step counts as solved whatever its start.
+    """
+
+    def __init__(self, problem: Problem, settings: NewtonSettings, residual_floor: float) -> None:
+        self.problem = problem
+        self.settings = settings
+        self.residual_floor = residual_floor
+        self._residual = problem.new_vector()
+        self._trial = problem.new_vector()
+        self._direction = problem.new_vector()
+        self._fresh_iterations = 0  # Krylov iterations with a new preconditioner
+        self._stale = True
+        self._near_null = rigid_body_modes(problem)
+        self._cg = self._new_krylov("cg", "gamg")
+        self._fallbacks: dict[int, PETSc.KSP] = {}
+
+    def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
+        krylov = PETSc.KSP().create(self.problem.domain.comm)
+        prefix = f"gyriflow_{method}_"
+        options = PETSc.Options(prefix)
+        if preconditioner == "gamg":
+            options["pc_gamg_threshold"] = 0.01
+            options["pc_gamg_aggressive_coarsening"] = 1
+            options["mg_levels_ksp_type"] = "chebyshev"
+            options["mg_levels_ksp_max_it"] = 3
+            options["mg_levels_pc_type"] = "jacobi"
+        krylov.setOptionsPrefix(prefix)
+        krylov.setType(method)
+        krylov.getPC().setType(preconditioner)
+        if preconditioner == "lu":
+            krylov.getPC().setFactorSolverType("mumps")
+        krylov.setTolerances(rtol=self.settings.krylov_tolerance, atol=0.0, max_it=self.settings.max_krylov)
+        krylov.setFromOptions()
+        return krylov
+
+    def _run(self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool) -> tuple[bool, int]:
+        krylov.setOperators(matrix)
+        krylov.getPC().setReusePreconditioner(reuse)
+        krylov.solve(self._residual, self._direction)
+        self._direction.scale(-1.0)
+        finite = bool(np.isfinite(self._direction.norm()))
+        return krylov.getConvergedReason() > 0 and finite, krylov.getIterationNumber()
+
+    def _solve_linear(self, matrix: PETSc.Mat, count: StepCount) -> None:
+        """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
+        for rung in (KEPT, REBUILT, MINRES, DIRECT):
+            if rung == KEPT:
+                if self._stale:
+                    continue
+                solved, iterations = self._run(self._cg, matrix, reuse=True)
+                self._stale = not solved or iterations > 1.5 * self._fresh_iterations + 2
+            elif rung == REBUILT:
+                matrix.setNearNullSpace(self._near_null)
+                solved, iterations = self._run(self._cg, matrix, reuse=False)
+                self._fresh_iterations, self._stale = iterations, not solved
+            else:
+                if rung not in self._fallbacks:
+                    self._fallbacks[rung] = (
+                        self._new_krylov("minres", "jacobi") if rung == MINRES else self._new_krylov("preonly", "lu")
+                    )
+                solved, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
+            count.krylov += iterations
+            count.rung = max(count.rung, rung if rung > REBUILT else KEPT)
+            if solved and self._direction.dot(self._residual) < 0:
+                return
+        raise NotConvergedError("no linear solver found a descent direction")
+
+    def _advance(self, norm: float, count: StepCount) -> float:
+        """Moves along the direction as far as energy and elements allow; returns the new residual norm."""
+        problem, start = self.problem, self.problem.displacement.copy()
+        slope = self._direction.dot(self._residual)
+        before = None
+        self._direction.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+        with self._direction.localForm() as local:
+            direction = local.array_r.reshape(-1, 3).copy()
+        length = 1.0
+        for _ in range(self.settings.max_backtracks):
+            problem.set_displacement(start + length * direction)
+            if problem.smallest_volume_ratio() > 0:
+                trial = problem.residual(self._trial)
+                # slope and residual falling together mean that energy fell: the energy itself is asked only otherwise
+                if np.isfinite(trial) and trial < norm and abs(self._direction.dot(self._trial)) <= 0.9 * abs(slope):
+                    return self._accept(trial)
+                if before is None:
+                    problem.set_displacement(start)
+                    before = problem.energy()
+                    problem.set_displacement(start + length * direction)
+                energy = problem.energy()
+                if np.isfinite(trial) and energy <= before + 1e-4 * length * slope:
+                    return self._accept(trial)
+            length /= 2
+            count.backtracks += 1
+        problem.set_displacement(start)
+        raise NotConvergedError("the line search found no step that lowers the energy")
+
+    def _accept(self, norm: float) -> float:
+        self._residual, self._trial = self._trial, self._residual
+        return norm
+
+    def solve(self, start: NDArray[np.float64]) -> StepCount:
+        """Solves for the displacement from a first guess of shape (k, 3) in m; it is left in the problem.
+
+        Raises
+        ------
+        NotConvergedError
+            Where the residual does not fall below the tolerance.
+        """
+        problem, count = self.problem, StepCount()
+        problem.set_displacement(np.zeros_like(start))
+        at_rest = problem.residual(self._residual)
+        tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
+        norm = at_rest
+        if at_rest > tolerance and start.any():
+            problem.set_displacement(start)
+            if problem.smallest_volume_ratio() > 0:
+                norm = problem.residual(self._residual)
+            if not norm < at_rest:  # also where it is not a number
+                problem.set_displacement(np.zeros_like(start))
+                norm = problem.residual(self._residual)
+        while not norm <= tolerance:
+            if count.newton >= self.settings.max_newton:
+                raise NotConvergedError(
+                    "Newton's method did not converge",
+                    found=f"residual {norm:.2e} N after {count.newton} iterations",
+                    expected=f"at most {tolerance:.2e} N",
+                )
+            count.newton += 1
+            self._solve_linear(problem.tangent(), count)
+            norm = self._advance(norm, count)
+        count.residual = norm / at_rest if at_rest > 0 else 0.0
+        return count
+
+
+def rigid_body_modes(problem: Problem) -> PETSc.NullSpace:
+    """Returns the three translations and three rotations of the current mesh, orthonormal."""
+    domain = problem.domain
+    x = domain.local(domain.positions)[: domain.owned]
+    x = x - domain.positions.mean(axis=0)
+    modes = np.zeros((6, domain.owned, 3))
+    for i in range(3):
+        modes[i, :, i] = 1.0
+        j, k = (i + 1) % 3, (i + 2) % 3
+        modes[3 + i, :, j], modes[3 + i, :, k] = -x[:, k], x[:, j]
+    vectors = []
+    for mode in modes:
+        vector = problem.new_vector()
+        vector.array[:] = mode.ravel()
+        for other in vectors:
+            vector.axpy(-vector.dot(other), other)
+        vector.normalize()
+        vectors.append(vector)
+    return PETSc.NullSpace().create(vectors=vectors, comm=domain.comm)

@@ -1,0 +1,91 @@
+"""What a run leaves: progress lines, frames for ParaView, the step table, and a summary."""
+
+import resource
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ..io.files import write_json, write_table
+from ..io.frames import join_frames, write_frame
+from ..units import MM_PER_M, week_tag
+from .layers import WEIGHT_REACH, PialSearch, cortical_weight
+from .parameters import FoldingParameters
+from .zones import Zones
+
+FRAMES = "frames.h5"
+STEPS = "steps.csv"
+SUMMARY = "summary.json"
+ZONES = "zones.json"
+
+
+def say(text: str) -> None:
+    """Prints a line at once, so that a log follows the run."""
+    print(text, flush=True)
+
+
+def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
+    """Returns the line of a step: week, iterations, displacement, time."""
+    minutes, seconds = divmod(round(seconds_left), 60)
+    return (
+        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  krylov {row['krylov']:3d}  "
+        f"max|u| {row['max_u_mm']:.3f} mm  min J {row['min_J']:.3f}  {row['seconds']:.2f} s  left {minutes}:{seconds:02d}"
+    )
+
+
+def frame_path(folder: Path, week: float) -> Path:
+    """Returns the file of a single frame, kept until the run has ended."""
+    return folder / f"frame-{week_tag(week)}.h5"
+
+
+def save_frame(
+    folder: Path,
+    week: float,
+    positions: NDArray[np.float64],
+    start: NDArray[np.float64],
+    zones: Zones,
+    parameters: FoldingParameters,
+) -> None:
+    """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name."""
+    fields: dict[str, NDArray] = {"positions": positions * MM_PER_M}
+    wanted = set(parameters.fields)
+    if "displacement" in wanted:
+        fields["displacement_mm"] = (positions - start) * MM_PER_M
+    if wanted & {"distance", "cortex_weight", "growth", "shear_modulus", "normal"}:
+        search = PialSearch(fields["positions"], zones.facets)
+        distance = search.distance(fields["positions"], WEIGHT_REACH * parameters.thickness_mm)
+        weight = cortical_weight(distance, parameters.thickness_mm)
+        core, cortex = parameters.shear_modulus_core_pa, parameters.shear_modulus_cortex_pa
+        rate = parameters.growth_rate_per_s * parameters.step_s
+        derived = {
+            "distance": ("distance_to_pial_mm", distance),
+            "cortex_weight": ("cortex_weight", weight),
+            "growth": ("tangential_growth_per_step", rate * weight * zones.growth),
+            "shear_modulus": ("shear_modulus_pa", core * (1 - weight) + cortex * weight),
+        }
+        fields |= {name: values for key, (name, values) in derived.items() if key in wanted}
+        if "normal" in wanted:
+            fields["pial_normal"] = search.nearest_normals(fields["positions"])
+    if "zones" in wanted:
+        zone = np.zeros(len(positions), dtype=np.int32)
+        zone[zones.facets.ravel()] = np.repeat(zones.facet_zone, 3)
+        fields |= {"zone": zone, "growing": zones.growth}
+    write_frame(frame_path(folder, week), week, fields)
+
+
+def finish(
+    out: Path, folder: Path, tets: NDArray[np.int64], weeks: Iterable[float], rows: Iterable[dict], summary: dict
+) -> None:
+    """Writes the final files into `out` from the single frames in `folder`."""
+    join_frames(out / FRAMES, tets, [frame_path(folder, week) for week in weeks])
+    write_table(out / STEPS, pd.DataFrame(list(rows)))
+    write_json(out / SUMMARY, summary)
+
+
+def peak_memory_mib() -> float:
+    """Returns the peak memory of this process in MiB."""
+    unit = 1024 if sys.platform != "darwin" else 1024**2
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

@@ -1,0 +1,234 @@
+"""The time loop: layers, one Newton solve, moved mesh; halved steps where a solve fails; frames at the output weeks."""
+
+import math
+import shutil
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ..errors import SolverError
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
+from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
+from .domain import Domain
+from .layers import WEIGHT_REACH, PialSearch, cortical_weight
+from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError, StepCount
+from .output import finish, peak_memory_mib, progress_line, save_frame, say
+from .parameters import FoldingParameters
+from .problem import Material, Problem
+from .zones import Zones
+
+Floats = NDArray[np.float64]
+STEPS_BEFORE_GROWING = 4
+"""Accepted steps after which a halved time step is doubled again."""
+
+
+class Folding:
+    """A brain that folds: the solver's objects, made once, and one step at a time.
+
+    Parameters
+    ----------
+    comm
+        Communicator of the solve.
+    mesh
+        The brain at the start, RAS+ mm; the whole mesh on every rank.
+    zones, parameters
+        What holds through the run.
+    jit_options
+        Options of the form compiler.
+    quadrature_degree
+        See `Problem`.
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        mesh: TetrahedralMesh,
+        zones: Zones,
+        parameters: FoldingParameters,
+        *,
+        jit_options: dict,
+        quadrature_degree: int = 1,
+    ) -> None:
+        self.parameters = parameters
+        self.zones = zones
+        self.domain = Domain(comm, mesh)
+        material = Material(parameters.poisson_ratio, parameters.contact.penalty_pa_per_m)
+        self.problem = Problem(
+            self.domain, zones, material, quadrature_degree=quadrature_degree, jit_options=jit_options
+        )
+        self._pial = np.unique(zones.facets)
+        self._growth = self.domain.local(zones.growth)
+        edge = float(np.cbrt(self.domain.cell_volumes(self.domain.local(self.domain.positions)).mean()))
+        edge = comm.allreduce(edge, op=MPI.MAX)
+        # far below any force of growth: a brain that does not grow must stay where it is
+        floor = 1e-11 * parameters.shear_modulus_cortex_pa * edge**2 * math.sqrt(len(mesh.vertices))
+        solver = parameters.solver
+        settings = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
+        self.solver = NewtonSolver(self.problem, settings, floor)
+
+    def set_layers(self, step_s: float) -> None:
+        """Sets stiffness, growth increments and normals for a step of the present shape."""
+        p, domain = self.parameters, self.domain
+        thickness = p.thickness_mm * M_PER_MM
+        search = PialSearch(domain.positions, self.zones.facets)
+        nodes = domain.local(domain.positions)
+        weight = cortical_weight(search.distance(nodes, WEIGHT_REACH * thickness), thickness)
+        growing = self._growth * step_s
+        self.problem.set_layers(
+            mu=p.shear_modulus_core_pa * (1 - weight) + p.shear_modulus_cortex_pa * weight,
+            dg=p.growth_rate_per_s * weight * growing,
+            dr=p.radial_growth_rate_per_s * (1 - weight) * growing,
+            normals=search.nearest_normals(nodes[domain.cells].mean(axis=1)),
+        )
+
+    def step(self, state: State, step_s: float) -> tuple[State, StepCount]:
+        """Returns the state after a step of a given length, the mesh moved along.
+
+        Raises
+        ------
+        NotConvergedError
+            Where the step is too large; the mesh is as before.
+        """
+        began = time.monotonic()
+        domain, problem = self.domain, self.problem
+        if domain.positions is not state.positions:
+            domain.place(state.positions)
+        self.set_layers(step_s)
+        count = self.solver.solve(domain.local(state.predicted(step_s)))
+        min_J = problem.smallest_volume_ratio()
+        energy = problem.energy()
+        u = domain.gathered(problem.displacement[: domain.owned])
+        length = np.linalg.norm(u, axis=1) * MM_PER_M
+        row = {
+            "step": len(state.rows) + 1,
+            "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
+            "dt_s": step_s,
+            "newton": count.newton,
+            "krylov": count.krylov,
+            "residual": count.residual,
+            "energy_J": energy,
+            "min_J": min_J,
+            "max_u_mm": float(length.max()),
+            "mean_u_mm": float(length.mean()),
+            "max_u_pial_mm": float(length[self._pial].max()),
+            "mean_u_pial_mm": float(length[self._pial].mean()),
+            "rung": RUNGS[count.rung],
+            "seconds": time.monotonic() - began,
+        }
+        after = state.after(u, step_s, row)
+        domain.place(after.positions)
+        return after, count
+
+
+def advance(folding: Folding, state: State, until_s: float) -> State:
+    """Returns the state after one accepted step towards `until_s`; the step is halved while its solve fails.
+
+    Raises
+    ------
+    SolverError
+        Where the smallest step fails too.
+    """
+    p = folding.parameters
+    smallest = p.step_s / 2**p.solver.max_halvings
+    while True:
+        left = until_s - state.time_s
+        # a remainder of a rounding error's length is no step of its own
+        step_s = left if left < state.step_s * (1 + 1e-9) else state.step_s
+        try:
+            after, _ = folding.step(state, step_s)
+        except NotConvergedError as error:
+            half = min(state.step_s, step_s) / 2
+            if half < smallest * (1 - 1e-9):
+                raise SolverError(
+                    f"the step at GW {p.start_week + state.time_s / SECONDS_PER_GW:.3f} fails even with {step_s:g} s",
+                    found=error,
+                    remedy="The last good state is kept. Fold to an earlier week, refine the mesh, or lower growth.",
+                ) from None
+            if folding.domain.comm.rank == 0:
+                say(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
+            state = replace(state, step_s=half, successes=0)
+            continue
+        if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
+            after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
+        return after
+
+
+def run(
+    comm: MPI.Comm,
+    mesh: TetrahedralMesh,
+    zones: Zones,
+    parameters: FoldingParameters,
+    out: Path,
+    *,
+    jit_options: dict,
+) -> None:
+    """Folds a brain from the first to the last output week and writes the files of DESIGN's folding stage into `out`.
+
+    Goes on from a checkpoint in `out` that belongs to this mesh and these parameters.
+    """
+    began = time.monotonic()
+    folding = Folding(comm, mesh, zones, parameters, jit_options=jit_options)
+    key = run_key(mesh, parameters)
+    folder = out / f"checkpoint-{key}"
+    state, message = comm.bcast(
+        read_checkpoint(folder / "state.h5", key) if comm.rank == 0 else None, root=0
+    )
+    if comm.rank == 0:
+        drop_foreign_checkpoints(out, folder)
+        if message:
+            say(message)
+        remainder = math.remainder((parameters.end_week - parameters.start_week) * SECONDS_PER_GW, parameters.step_s)
+        if abs(remainder) > 1e-6 * parameters.step_s:
+            say(f"step_s {parameters.step_s:g} does not divide the span: the last step before an output is shortened")
+    start = mesh.vertices * M_PER_MM
+    weeks = parameters.output_weeks
+    if state is None:
+        state = State.at_start(start, parameters.step_s)
+        if comm.rank == 0:
+            save_frame(folder, weeks[0], start, start, zones, parameters)
+    first, resumed = len(state.rows), time.monotonic()
+    for week in weeks[1:]:
+        until = (week - parameters.start_week) * SECONDS_PER_GW
+        while state.time_s < until * (1 - 1e-12):
+            state = advance(folding, state, until)
+            if comm.rank == 0:
+                if until - state.time_s < 1e-9 * until:
+                    save_frame(folder, week, state.positions, start, zones, parameters)
+                write_checkpoint(folder / "state.h5", key, state)
+                rate = (time.monotonic() - resumed) / (len(state.rows) - first)
+                steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s
+                say(progress_line(state.rows[-1], parameters.end_week, rate * steps_left))
+    memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
+    if comm.rank == 0:
+        steps = [row["seconds"] for row in state.rows]
+        summary = {
+            "tets": len(mesh.tets),
+            "dofs": 3 * len(mesh.vertices),
+            "pial_faces": len(zones.facets),
+            "ranks": comm.size,
+            "steps": len(steps),
+            "newton": sum(row["newton"] for row in state.rows),
+            "krylov": sum(row["krylov"] for row in state.rows),
+            "seconds": time.monotonic() - began,
+            "seconds_per_step": float(np.median(steps)),
+            "peak_memory_MiB": memory,
+            "min_J": min(row["min_J"] for row in state.rows),
+            "weeks": list(weeks),
+            "resumed_after_step": first,
+        }
+        finish(out, folder, mesh.tets, weeks, state.rows, summary)
+        shutil.rmtree(folder)
+        say(f"folded to GW {parameters.end_week:g} in {len(steps)} steps, {summary['seconds']:.0f} s")
+
+
+def drop_foreign_checkpoints(out: Path, own: Path) -> None:
+    """Removes checkpoints of other meshes or parameters and says so."""
+    for other in sorted(out.glob("checkpoint-*")):
+        if other != own:
+            say(f"{other} belongs to another mesh or other parameters: not used, removed")
+            shutil.rmtree(other, ignore_errors=True)

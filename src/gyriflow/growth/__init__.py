@@ -1,0 +1,1 @@
+"""Growth rates from the areas and volumes of brains of several ages."""

@@ -1,0 +1,84 @@
+"""Files that appear whole or not at all: temporary names and renames, JSON and tables."""
+
+import json
+import math
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from gyriflow.errors import InputError, StorageError
+
+AnyPath = str | PathLike[str]
+
+
+@contextmanager
+def replaced(path: AnyPath) -> Iterator[Path]:
+    """Yields a temporary path beside `path` that takes its place when the block ends well.
+
+    The temporary name is hidden and has the same suffixes. After an error it is removed and an earlier file
+    stays as it was. Missing folders are made. StorageError where the system refuses to write.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{uuid.uuid4().hex[:12]}.{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        raise StorageError(
+            f"cannot be written: {error.strerror or error}",
+            path=path,
+            remedy="Free disk space or choose a folder that can be written (--directory); earlier files are unchanged.",
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _plain(value: Any) -> Any:
+    """Returns `value` in the types of JSON: numpy scalars and arrays unwrapped, non-finite numbers as null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | set | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Path):
+        return str(value)
+    return value
+
+
+def write_json(path: AnyPath, content: Any) -> None:
+    """Writes plain Python and numpy values as JSON; NaN and infinity become null."""
+    text = json.dumps(_plain(content), indent=2, ensure_ascii=False)
+    with replaced(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def read_json(path: AnyPath) -> Any:
+    """Returns the content of a JSON file; InputError where it is missing or torn."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read as JSON: {error}", path=path) from error
+
+
+def write_table(path: AnyPath, table: pd.DataFrame) -> None:
+    """Writes a table as CSV without its index, ten significant digits."""
+    with replaced(path) as temporary:
+        table.to_csv(temporary, index=False, float_format="%.10g")
+
+
+def read_table(path: AnyPath) -> pd.DataFrame:
+    """Returns a CSV table; InputError where it is missing or torn."""
+    try:
+        return pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read as a CSV table: {error}", path=path) from error

@@ -1,0 +1,150 @@
+"""Triangle surfaces (GIFTI, STL, PLY, OBJ) and per-vertex maps (GIFTI), in mm."""
+
+import binascii
+import logging
+import zlib
+from pathlib import Path
+from typing import Literal
+from xml.parsers.expat import ExpatError
+
+import nibabel as nib
+import numpy as np
+import trimesh
+from nibabel.filebasedimages import ImageFileError
+from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
+from numpy.typing import NDArray
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.io.files import AnyPath, replaced
+
+log = logging.getLogger(__name__)
+
+Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
+MESH_SUFFIXES = (".stl", ".ply", ".obj")
+
+
+def read_surface(path: AnyPath) -> TriangleMesh:
+    """Returns the surface of a .gii, .stl, .ply or .obj file, in the file's coordinates and order of corners.
+
+    A GIFTI's coordinate-system matrix is applied. InputError for missing, truncated or empty files, NaN or infinite
+    coordinates, faces that name missing vertices.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("no such file", path=path, expected="a surface (.surf.gii, .stl, .ply, .obj)")
+    if path.suffix.lower() in MESH_SUFFIXES:
+        vertices, faces = _read_with_trimesh(path)
+    else:
+        vertices, faces = _read_gifti_surface(path)
+    bad = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
+    if bad:
+        raise InputError("has NaN or infinite coordinates", path=path, found=f"{bad} vertices", expected="none")
+    whole = np.rint(faces).astype(np.int64)
+    if np.abs(faces - whole).max() > 1e-3 or not 0 <= whole.min() <= whole.max() < len(vertices):
+        raise InputError(
+            "has faces that name vertices which do not exist",
+            path=path,
+            found=f"indices {faces.min():.6g} to {faces.max():.6g}",
+            expected=f"whole numbers from 0 to {len(vertices) - 1}",
+        )
+    return TriangleMesh(vertices, whole)
+
+
+def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
+    """Writes a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
+    suffix = Path(path).suffix.lower()
+    if suffix in MESH_SUFFIXES:
+        body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        with replaced(path) as temporary:
+            body.export(temporary)
+        return
+    if suffix != ".gii":
+        raise InputError("unknown kind of surface file", path=path, expected=".gii, .stl, .ply or .obj")
+    meta = {"GeometricType": "Anatomical"} | ({"AnatomicalStructurePrimary": structure} if structure else {})
+    points = GiftiDataArray(
+        mesh.vertices.astype(np.float32),
+        intent="NIFTI_INTENT_POINTSET",
+        coordsys=GiftiCoordSystem("NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_SCANNER_ANAT", np.eye(4)),
+        meta=GiftiMetaData(meta),
+    )
+    triangles = GiftiDataArray(
+        mesh.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE", meta=GiftiMetaData({"TopologicalType": "Closed"})
+    )
+    with replaced(path) as temporary:
+        nib.save(GiftiImage(darrays=[points, triangles]), temporary)
+
+
+def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Structure | None = None) -> None:
+    """Writes named (n,) per-vertex values as a GIFTI shape file (.shape.gii, float32)."""
+    arrays = [
+        GiftiDataArray(np.asarray(values, np.float32), intent="NIFTI_INTENT_SHAPE", meta=GiftiMetaData({"Name": name}))
+        for name, values in maps.items()
+    ]
+    meta = GiftiMetaData({"AnatomicalStructurePrimary": structure} if structure else {})
+    with replaced(path) as temporary:
+        nib.save(GiftiImage(darrays=arrays, meta=meta), temporary)
+
+
+def read_vertex_maps(path: AnyPath) -> dict[str, NDArray[np.float64]]:
+    """Returns the named per-vertex values of a GIFTI shape file."""
+    image = _load_gifti(path)
+    return {
+        array.meta.get("Name") or f"map {number}": np.asarray(array.data, dtype=float)
+        for number, array in enumerate(image.darrays)
+    }
+
+
+def _load_gifti(path: AnyPath) -> GiftiImage:
+    try:
+        image = nib.load(path)
+    except FileNotFoundError as error:
+        raise InputError("no such file", path=path, expected="a GIFTI file") from error
+    except (ImageFileError, ExpatError, EOFError, OSError, ValueError, AttributeError, zlib.error, binascii.Error) as e:
+        raise InputError(
+            f"cannot be read as GIFTI: {e}",
+            path=path,
+            expected="a whole .gii file",
+            remedy="The file may be truncated or of another kind: copy or download it again.",
+        ) from e
+    if not isinstance(image, GiftiImage):
+        raise InputError("is not a GIFTI file", path=path, found=type(image).__name__, expected="a .gii file")
+    return image
+
+
+def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
+    image = _load_gifti(path)
+    points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
+    triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
+    if len(points) != 1 or len(triangles) != 1 or not len(points[0].data) or not len(triangles[0].data):
+        raise InputError(
+            "holds no surface",
+            path=path,
+            found=f"{len(points)} arrays of points, {len(triangles)} of triangles",
+            expected="one of each (.surf.gii)",
+        )
+    vertices = np.asarray(points[0].data, dtype=float)
+    matrix = points[0].coordsys.xform if points[0].coordsys is not None else None
+    if matrix is not None and not np.allclose(matrix, np.eye(4)):
+        matrix = np.asarray(matrix, dtype=float)
+        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        log.warning("%s: the coordinate-system matrix of the file was applied", path)
+        if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-3):
+            log.warning("%s: that matrix changes sizes (scale or shear)", path)
+    return vertices, np.asarray(triangles[0].data)
+
+
+def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:
+    try:
+        # process=True joins equal vertices: STL stores each corner of each face
+        body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
+        vertices, faces = np.asarray(body.vertices, dtype=float), np.asarray(body.faces)
+    except Exception as error:  # trimesh's readers raise whatever their parsing runs into
+        raise InputError(
+            f"cannot be read as {path.suffix}: {error}",
+            path=path,
+            remedy="The file may be truncated or of another kind: copy or export it again.",
+        ) from error
+    if not len(vertices) or not len(faces):
+        raise InputError("holds no surface", path=path, found=f"{len(vertices)} vertices, {len(faces)} faces")
+    return vertices, faces

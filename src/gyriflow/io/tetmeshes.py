@@ -1,0 +1,110 @@
+"""Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files hold mm."""
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from .files import replaced
+
+XDMF_NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
+XDMF_ATTRIBUTE = {1: "Scalar", 3: "Vector", 9: "Tensor"}
+
+
+def data_item(values: NDArray, where: str) -> str:
+    """Returns the XDMF element that points to `values` stored at `where` ("file.h5:/name")."""
+    shape = " ".join(map(str, values.shape))
+    kind, size = XDMF_NUMBER[values.dtype.kind], values.dtype.itemsize
+    return f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="{size}" Format="HDF">{where}</DataItem>'
+
+
+def attribute(name: str, centre: str, values: NDArray, where: str) -> str:
+    """Returns the XDMF element of a field; `centre` is "Node" or "Cell"."""
+    kind = XDMF_ATTRIBUTE[1 if values.ndim == 1 else values.shape[1]]
+    item = data_item(values, where)
+    return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{item}</Attribute>'
+
+
+def topology(tets: NDArray, where: str) -> str:
+    """Returns the XDMF element of the tetrahedra stored at `where`."""
+    item = data_item(tets, where)
+    return f'<Topology TopologyType="Tetrahedron" NumberOfElements="{len(tets)}">{item}</Topology>'
+
+
+def geometry(points: NDArray, where: str) -> str:
+    """Returns the XDMF element of the points stored at `where`."""
+    return f'<Geometry GeometryType="XYZ">{data_item(points, where)}</Geometry>'
+
+
+def document(grids: str) -> str:
+    """Returns a whole XDMF document around its grids."""
+    return f'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>{grids}</Domain></Xdmf>\n'
+
+
+def write_tetrahedral_mesh(
+    path: str | PathLike[str],
+    mesh: TetrahedralMesh,
+    vertex_fields: Mapping[str, NDArray] | None = None,
+    cell_fields: Mapping[str, NDArray] | None = None,
+) -> None:
+    """Writes `path` (.xdmf) and the .h5 beside it.
+
+    Parameters
+    ----------
+    mesh
+        Vertices in mm.
+    vertex_fields, cell_fields
+        Arrays of shape (n,) or (n, 3) by name.
+    """
+    path = Path(path)
+    data = path.with_suffix(".h5")
+    fields = [("Node", name, np.asarray(values)) for name, values in (vertex_fields or {}).items()]
+    fields += [("Cell", name, np.asarray(values)) for name, values in (cell_fields or {}).items()]
+    with replaced(data) as temporary, h5py.File(temporary, "w") as file:
+        file["tets"] = mesh.tets
+        file["vertices"] = mesh.vertices
+        for centre, name, values in fields:
+            file[f"{centre}/{name}"] = values
+    parts = [
+        topology(mesh.tets, f"{data.name}:/tets"),
+        geometry(mesh.vertices, f"{data.name}:/vertices"),
+        *(attribute(name, centre, values, f"{data.name}:/{centre}/{name}") for centre, name, values in fields),
+    ]
+    with replaced(path) as temporary:
+        temporary.write_text(document(f'<Grid Name="mesh" GridType="Uniform">{"".join(parts)}</Grid>'))
+
+
+def read_tetrahedral_mesh(path: str | PathLike[str]) -> TetrahedralMesh:
+    """Returns the tetrahedra of an XDMF file (or any file that meshio reads), every volume made positive.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, holds no tetrahedra, points that are not numbers, or flat elements.
+    """
+    path = Path(path)
+    try:
+        read = meshio.read(path)
+        points, tets = np.asarray(read.points, dtype=float), read.cells_dict["tetra"]
+    except KeyError:
+        raise InputError("holds no tetrahedra", path=path, found=sorted(read.cells_dict) or "no cells") from None
+    except (Exception, SystemExit) as error:  # meshio leaves through sys.exit on files that it does not know
+        raise InputError(
+            "cannot be read as a tetrahedral mesh", path=path, found=error, expected="XDMF with its .h5 beside it"
+        ) from None
+    wrong = int((~np.isfinite(points)).any(axis=1).sum())
+    if wrong:
+        raise InputError("has points that are not numbers", path=path, found=f"{wrong} of {len(points)}")
+    used, local = np.unique(tets, return_inverse=True)
+    mesh = TetrahedralMesh(points[used], local.reshape(-1, 4))
+    volumes = signed_volumes(mesh)
+    if (volumes == 0).any():
+        raise InputError("has elements without volume", path=path, found=f"{int((volumes == 0).sum())}")
+    turned = np.where((volumes < 0)[:, None], mesh.tets[:, [0, 2, 1, 3]], mesh.tets)
+    return TetrahedralMesh(mesh.vertices, turned)

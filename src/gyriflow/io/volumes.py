@@ -1,0 +1,161 @@
+"""Label volumes in NIfTI (and MGH) files, always in RAS+ mm."""
+
+import logging
+import zlib
+from dataclasses import dataclass
+from typing import Literal
+
+import nibabel as nib
+import numpy as np
+from nibabel.filebasedimages import ImageFileError
+from nibabel.spatialimages import HeaderDataError
+from numpy.typing import NDArray
+
+from gyriflow.errors import InputError
+from gyriflow.io.files import AnyPath, replaced
+
+log = logging.getLogger(__name__)
+
+AffineSource = Literal["auto", "sform", "qform"]
+
+MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
+# two header matrices that place every corner within this part of a voxel say the same thing
+AGREEMENT_VOXELS = 0.1
+ANISOTROPY_WARNED = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class LabelVolume:
+    """A volume of tissue labels.
+
+    Attributes
+    ----------
+    labels : (i, j, k) int32
+        Tissue label of each voxel.
+    affine : (4, 4) float
+        Voxel index to RAS+ position in mm.
+    """
+
+    labels: NDArray[np.int32]
+    affine: NDArray[np.float64]
+
+
+def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto") -> LabelVolume:
+    """Returns the label volume of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
+
+    `affine_from` says which of NIfTI's two matrices counts; "auto" takes the one that is set and refuses two that
+    disagree. InputError for missing or truncated files, values that are no whole numbers, NaN, unclear orientation.
+    """
+    try:
+        image = nib.load(path)
+        values = np.asanyarray(image.dataobj)
+    except FileNotFoundError as error:
+        raise InputError("no such file", path=path, expected="a label volume (.nii, .nii.gz, .mgz)") from error
+    except (ImageFileError, HeaderDataError, EOFError, OSError, ValueError, zlib.error) as error:
+        raise InputError(
+            f"cannot be read as an image: {error}",
+            path=path,
+            expected="a whole label volume (.nii, .nii.gz, .mgz)",
+            remedy="The file may be truncated or of another kind: copy or download it again.",
+        ) from error
+    affine = _nifti_affine(image, affine_from, path) if isinstance(image, nib.Nifti1Image) else image.affine
+    affine = _checked_affine(np.array(affine, dtype=float), path)
+    return LabelVolume(_whole_numbers(_three_axes(values, path), path), affine)
+
+
+def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
+    """Writes a label volume as NIfTI in mm, in the smallest integer type that holds its labels."""
+    labels = volume.labels
+    kind = np.min_scalar_type(int(labels.max(initial=0))) if labels.min(initial=0) >= 0 else np.int32
+    image = nib.Nifti1Image(labels.astype(kind), volume.affine)
+    image.header.set_xyzt_units("mm")
+    image.set_sform(volume.affine, code="scanner")
+    # a quaternion holds no shear: where it cannot say the same as the sform, it stays unset
+    image.set_qform(volume.affine, code="scanner")
+    if not np.allclose(image.get_qform(), volume.affine, atol=1e-3):
+        image.set_qform(None, code="unknown")
+        image.set_sform(volume.affine, code="scanner")
+    with replaced(path) as temporary:
+        nib.save(image, temporary)
+
+
+def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPath) -> NDArray[np.float64]:
+    header = image.header
+    try:
+        matrices = {"sform": header.get_sform(), "qform": header.get_qform()}
+    except (HeaderDataError, ValueError) as error:
+        raise InputError(f"has a broken qform: {error}", path=path, remedy="Set affine_from: sform.") from error
+    codes = {"sform": int(header["sform_code"]), "qform": int(header["qform_code"])}
+    unit = header.get_xyzt_units()[0]
+    if unit == "unknown":
+        log.warning("%s: no unit of length in the header, mm taken", path)
+    scale = np.diag([MM_PER_NIFTI_UNIT[unit]] * 3 + [1.0])
+    if affine_from != "auto":
+        return scale @ matrices[affine_from]
+    given = [name for name, code in codes.items() if code > 0]
+    if not given:
+        raise InputError(
+            "neither qform nor sform is set, so left and right are unknown",
+            path=path,
+            expected="a qform or sform code > 0",
+            remedy="Write the orientation into the file, or say which matrix holds with affine_from: qform or sform.",
+        )
+    if len(given) == 2:
+        shape = np.array(image.shape[:3]) - 1
+        ends = np.array(np.meshgrid(*[[0, n] for n in shape])).reshape(3, -1)
+        apart = matrices["sform"][:3, :3] @ ends - matrices["qform"][:3, :3] @ ends
+        apart += (matrices["sform"] - matrices["qform"])[:3, 3:]
+        voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
+        distance = np.linalg.norm(apart, axis=0).max()
+        if not distance <= AGREEMENT_VOXELS * voxel:
+            raise InputError(
+                f"qform and sform disagree by up to {distance:.3g} {unit}",
+                path=path,
+                found=f"\nqform (code {codes['qform']})\n{matrices['qform']}\n"
+                f"sform (code {codes['sform']})\n{matrices['sform']}\n",
+                expected="the same position of every voxel",
+                remedy="Say which one holds with affine_from: qform or sform.",
+            )
+    return scale @ matrices[given[0]]
+
+
+def _checked_affine(affine: NDArray[np.float64], path: AnyPath) -> NDArray[np.float64]:
+    sizes = np.linalg.norm(affine[:3, :3], axis=0)
+    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
+        raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
+    if sizes.max() > ANISOTROPY_WARNED * sizes.min():
+        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are used as they are", path, *sizes)
+    return affine
+
+
+def _three_axes(values: NDArray, path: AnyPath) -> NDArray:
+    shape = values.shape
+    kept = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
+    if len(kept) != 3 or values.dtype.kind not in "biuf":
+        raise InputError(
+            "is not a volume of labels",
+            path=path,
+            found=f"shape {shape}, type {values.dtype}",
+            expected="three axes (further ones of length 1) of whole numbers",
+            remedy="Give the label volume, not the images of a time series or of a colour map.",
+        )
+    return values.reshape(kept)
+
+
+def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
+    if values.dtype.kind != "f":
+        return values.astype(np.int32)
+    bad = int(np.count_nonzero(~np.isfinite(values)))
+    if bad:
+        raise InputError("has values that are NaN or infinite", path=path, found=f"{bad} voxels", expected="none")
+    rounded = np.rint(values)
+    broken = int(np.count_nonzero(np.abs(values - rounded) > 1e-3))
+    if broken:
+        raise InputError(
+            "has values that are no whole numbers",
+            path=path,
+            found=f"{broken} voxels, for example {values[np.abs(values - rounded) > 1e-3].flat[0]:.4g}",
+            expected="tissue labels",
+            remedy="gyriflow does not segment images: give a tissue label volume.",
+        )
+    return rounded.astype(np.int32)

@@ -1,0 +1,49 @@
+"""YAML files: configurations, read strictly, and the parameters of a run."""
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ..errors import InputError
+from .files import replaced
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """Refuses two equal keys in one mapping, of which YAML would silently keep the last."""
+
+
+def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
+    first: dict[str, int] = {}
+    for key, _ in node.value:
+        line = key.start_mark.line + 1
+        if key.value in first and key.tag != "tag:yaml.org,2002:merge":
+            raise yaml.constructor.ConstructorError(
+                None, None, f"the key {key.value!r} of line {first[key.value]} is there again", key.start_mark
+            )
+        first[str(key.value)] = line
+    loader.flatten_mapping(node)
+    return loader.construct_mapping(node, deep=True)
+
+
+_StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+
+
+def read_yaml(path: str | PathLike[str]) -> Any:
+    """Returns the content of a YAML (or JSON) file; InputError where it is missing, malformed or names a key twice."""
+    try:
+        return yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("cannot be read", path=path, found=error) from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f", line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or str(error)
+        raise InputError(f"is not valid YAML{line}: {problem}", path=path) from error
+
+
+def write_yaml(path: str | PathLike[str], content: Any) -> None:
+    """Writes plain dictionaries, lists and numbers, keys in their order."""
+    with replaced(path) as part:
+        part.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")

@@ -1,0 +1,122 @@
+"""`python -m gyriflow.launch ARG...`: Snakemake with this checkout's workflow, which is what `./run snakemake` calls.
+
+It clears a lock that an interrupted run left (never that of a live run) and ends with the exit code of the first
+failed step. Everything else is Snakemake's own command line.
+"""
+
+import fcntl
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+from .errors import GyriflowError, StorageError
+from .step import EXIT_FILE, INTERRUPTED, recorded_exit_code
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
+LOOKS_ONLY = frozenset({"-n", "--dry-run", "--dryrun", "--nolock", "--summary", "-D", "--detailed-summary", "--rulegraph",
+    "--dag", "--filegraph", "--list-rules", "--list", "-l", "--lint", "-h", "--help", "-v", "--version"})  # fmt: skip
+"""Options under which Snakemake takes no lock."""
+
+
+def hold_lock(directory: Path) -> IO[str] | None:
+    """Returns a file whose lock lives as long as it is open, or None where another process holds it.
+
+    Raises
+    ------
+    StorageError
+        If the folder cannot be written.
+    """
+    path = directory / ".snakemake" / "gyriflow.lock"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.open("a")
+    except OSError as error:
+        raise StorageError("the working directory cannot be written", path=directory, found=error.strerror) from error
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        return None
+    return file
+
+
+def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
+    """Removes Snakemake's locks in a working directory in which no run is live.
+
+    Raises
+    ------
+    StorageError
+        If a run is live there; one that is just ending is waited for.
+    """
+    locks = directory / ".snakemake" / "locks"
+    if not locks.parent.is_dir():
+        return
+    deadline = time.monotonic() + patience_s
+    while (file := hold_lock(directory)) is None:
+        if time.monotonic() > deadline:
+            raise StorageError(
+                "another gyriflow run is live in this working directory",
+                path=directory.resolve(),
+                remedy="Wait for it to end, or give this run a folder of its own with --directory",
+            )
+        time.sleep(0.2)
+    with file:
+        stale = sorted(locks.glob("*.lock"))
+        for lock in stale:
+            lock.unlink()
+    if stale:
+        print("gyriflow: cleared the lock of an interrupted run; going on where it ended", file=sys.stderr)
+
+
+def value_of(arguments: Sequence[str], *names: str) -> str | None:
+    """Returns the value of an option given as `--name value`, `--name=value` or (short) `-nvalue`, the last one given."""
+    found = None
+    for index, argument in enumerate(arguments):
+        for name in names:
+            if argument == name and index + 1 < len(arguments):
+                found = arguments[index + 1]
+            elif name.startswith("--") and argument.startswith(name + "="):
+                found = argument.removeprefix(name + "=")
+            elif not name.startswith("--") and argument.startswith(name) and len(argument) > len(name):
+                found = argument.removeprefix(name)
+    return found
+
+
+def completed(arguments: Sequence[str]) -> list[str]:
+    """Returns Snakemake's arguments with this checkout's Snakefile where the user named none and none lies here."""
+    if value_of(arguments, "--snakefile", "-s") is not None or any(Path(name).is_file() for name in SNAKEFILES):
+        return list(arguments)
+    return ["--snakefile", str(CHECKOUT / "Snakefile"), *arguments]
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs Snakemake and returns the exit code: its own, or that of the first failed step."""
+    from snakemake import cli  # takes a second, which a refused run need not wait for
+
+    directory = Path(value_of(arguments, "--directory", "-d") or ".")
+    if not LOOKS_ONLY.intersection(arguments):
+        clear_stale_lock(directory)
+    # beside the results, where jobs on other machines of a cluster find it too
+    exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
+    os.environ[EXIT_FILE] = str(exit_file)
+    try:
+        cli.main(completed(arguments))
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    recorded = recorded_exit_code(exit_file)
+    exit_file.unlink(missing_ok=True)
+    return (recorded or code) if code else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except GyriflowError as error:
+        print(f"gyriflow: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)

@@ -1,0 +1,1 @@
+"""The mechanics of growing tissue as UFL expressions: symbols as in the paper."""

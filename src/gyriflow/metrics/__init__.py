@@ -1,0 +1,1 @@
+"""Metrics of folding: curvature, spectrum, gyrification, displacement, and distance between surfaces."""

@@ -1,0 +1,191 @@
+"""Pictures of surfaces side by side at one scale, with views, scale bar and colour bar."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ..geometry.triangles import Floats, TriangleMesh
+from .scene import View, half_extents, render
+from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, synthetic_note
+
+_PIXELS_PER_INCH = 300
+_MARGIN = 1.04
+_MAX_COLUMNS = 8
+_END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One surface of a grid: the part that is seen, its (n, 3) or (m, 3) colours, the view and a caption."""
+
+    mesh: TriangleMesh
+    colours: Floats
+    view: View
+    caption: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A row of a grid: its label and its panels, None where there is nothing to show."""
+
+    label: str
+    panels: Sequence[Panel | None]
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Sizes in inches, and the half width in mm that every panel shows."""
+
+    width: float
+    label: float
+    panel: float
+    half_width_mm: float
+
+    @property
+    def inches_per_mm(self) -> float:
+        return self.panel / (2 * self.half_width_mm)
+
+
+def _round_length(limit_mm: float) -> float:
+    """Returns the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
+    decade = 10.0 ** np.floor(np.log10(limit_mm))
+    return float(max(step * decade for step in (1, 2, 5) if step * decade <= limit_mm * (1 + 1e-9)))
+
+
+def _blocks(columns: Sequence[str], rows: Sequence[Row]) -> list[tuple[Sequence[str], list[Row]]]:
+    """Returns the grid cut into blocks of as equal numbers of columns as possible, to stand below each other."""
+    number = -(-len(columns) // _MAX_COLUMNS)
+    size = -(-len(columns) // number)
+    return [
+        (columns[start : start + size], [Row(row.label, row.panels[start : start + size]) for row in rows])
+        for start in range(0, len(columns), size)
+    ]
+
+
+def panel_grid(
+    columns: Sequence[str],
+    rows: Sequence[Row],
+    *,
+    title: str,
+    synthetic: bool,
+    colour_bars: Sequence[tuple[ScalarMappable, str]] = (),
+    legend: Sequence[Patch] = (),
+) -> Figure:
+    """Returns the rows of surfaces under column headings, all at one scale in mm, with a scale bar below.
+
+    More than eight columns go on in a further block below. Each view is named by its row's label, and the letters of
+    its ends stand in the first panel that shows it.
+
+    Parameters
+    ----------
+    colour_bars : colour scales and their labels
+    legend : entries of a legend
+    """
+    shown = [panel for row in rows for panel in row.panels if panel is not None]
+    half_width = _MARGIN * max(half_extents(panel.mesh, panel.view)[0] for panel in shown)
+    blocks = _blocks(columns, rows)
+    most = max(len(heads) for heads, _ in blocks)
+    label_in = 0.42 if any("\n" in row.label for row in rows) else 0.24
+    panel_in = min(1.75, (FULL_WIDTH_IN - label_in) / most)
+    width = max(SINGLE_COLUMN_IN, label_in + most * panel_in)
+    layout = _Layout(width, label_in, panel_in, half_width)
+
+    heading = [line for line in (title, synthetic_note() if synthetic else "") if line]
+    head_in, block_head_in, caption_in, foot_in = 0.1 + 0.16 * len(heading), 0.2, 0.15, 0.66
+    heights = {id(row): _row_height_in(row, layout) for _, part in blocks for row in part}
+    captions = {id(row): caption_in * any(p and p.caption for p in row.panels) for _, part in blocks for row in part}
+    total = head_in + foot_in + len(blocks) * block_head_in + sum(heights.values()) + sum(captions.values())
+
+    figure = Figure(figsize=(width, total))
+    figure.suptitle("\n".join(heading), y=1 - 0.05 / total, va="top")
+    top = total - head_in
+    for heads, part in blocks:
+        for index, head in enumerate(heads):
+            x = (label_in + (index + 0.5) * panel_in) / width
+            figure.text(x, (top - block_head_in / 2) / total, head, ha="center", va="center", fontsize=7)
+        top -= block_head_in
+        for row in part:
+            bottom = top - heights[id(row)]
+            _draw_row(figure, row, layout, bottom=bottom, height=heights[id(row)])
+            top = bottom - captions[id(row)]
+    _draw_scale_bar(figure, layout, {end for panel in shown for end in panel.view.ends})
+    _draw_keys(figure, layout, colour_bars, legend)
+    return figure
+
+
+def _row_height_in(row: Row, layout: _Layout) -> float:
+    halves = [half_extents(panel.mesh, panel.view)[1] for panel in row.panels if panel is not None]
+    # the label is written along the height
+    least = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
+    return max(2 * _MARGIN * max(halves, default=0.0) * layout.inches_per_mm, least)
+
+
+def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, height: float) -> None:
+    total = figure.get_figheight()
+    middle = (bottom + height / 2) / total
+    figure.text(
+        0.5 * layout.label / layout.width, middle, row.label, rotation=90, ha="center", va="center", fontsize=7
+    )
+    half_height = height / layout.inches_per_mm / 2
+    previous = None
+    for index, panel in enumerate(row.panels):
+        if panel is None:
+            continue
+        image = render(
+            panel.mesh,
+            panel.colours,
+            panel.view,
+            half_width_mm=layout.half_width_mm,
+            half_height_mm=half_height,
+            pixels_per_mm=_PIXELS_PER_INCH * layout.inches_per_mm,
+        )
+        x = (layout.label + index * layout.panel) / layout.width
+        axes = figure.add_axes((x, bottom / total, layout.panel / layout.width, height / total))
+        axes.set_label(f"{row.label}, column {index}")
+        axes.imshow(
+            image, extent=(-layout.half_width_mm, layout.half_width_mm, -half_height, half_height), aspect="auto"
+        )
+        axes.set_axis_off()
+        if panel.view != previous:
+            for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):
+                axes.text(place, 1.0, end, transform=axes.transAxes, ha=align, va="top", fontsize=6)  # type: ignore[arg-type]
+        previous = panel.view
+        if panel.caption:
+            axes.text(0.5, -0.01, panel.caption, transform=axes.transAxes, ha="center", va="top", fontsize=6.5)
+
+
+def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
+    total = figure.get_figheight()
+    length = _round_length(1.2 * layout.half_width_mm)
+    axes = figure.add_axes(
+        (layout.label / layout.width, 0.46 / total, length * layout.inches_per_mm / layout.width, 0.04 / total)
+    )
+    axes.set_label("scale bar")
+    axes.set_xlim(0, length)
+    axes.axvspan(0, length, color="black", linewidth=0)
+    axes.set_axis_off()
+    axes.text(0.5, -0.6, f"{length:g} mm", transform=axes.transAxes, ha="center", va="top", fontsize=7)
+    words = ", ".join(f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends)
+    figure.text(layout.label / layout.width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
+
+
+def _draw_keys(
+    figure: Figure, layout: _Layout, colour_bars: Sequence[tuple[ScalarMappable, str]], legend: Sequence[Patch]
+) -> None:
+    total, width = figure.get_figheight(), layout.width
+    # the scale bar takes the first third of the foot
+    start = 0.36 * width
+    for index, (scale, label) in enumerate(colour_bars):
+        share = (width - start - 0.2) / len(colour_bars)
+        place = ((start + index * share + 0.1) / width, 0.5 / total, (share - 0.2) / width, 0.08 / total)
+        bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation="horizontal")
+        bar.set_label(label, labelpad=1)
+        bar.ax.tick_params(pad=1, length=2)
+        bar.outline.set_linewidth(0.5)  # type: ignore[operator]
+    if legend:
+        columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
+        figure.legend(handles=legend, loc="lower right", ncols=columns, bbox_to_anchor=(1.0, 0.0), borderaxespad=0.2)

@@ -1,0 +1,148 @@
+"""One surface seen from one side: cameras, light and off-screen rendering."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyvista as pv
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+from vtkmodules.vtkCommonCore import vtkLogger
+
+from ..geometry.triangles import Floats, TriangleMesh, corners, submesh, vertex_normals
+
+# without a display VTK warns about X before it turns to its off-screen way
+vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+
+Vector = tuple[float, float, float]
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class View:
+    """A side from which a brain in RAS+ mm is seen.
+
+    Attributes
+    ----------
+    name : shown beside the picture
+    towards : unit vector from the brain to the camera
+    up : unit vector that points up in the picture
+    ends : letters of the picture's left and right ends (A anterior, P posterior, L left, R right)
+    hemisphere : "left" or "right" where only that hemisphere is seen, else ""
+    """
+
+    name: str
+    towards: Vector
+    up: Vector
+    ends: tuple[str, str]
+    hemisphere: str = ""
+
+
+VIEWS = {
+    view.name: view
+    for view in (
+        View("left", (-1, 0, 0), (0, 0, 1), ("A", "P")),
+        View("right", (1, 0, 0), (0, 0, 1), ("P", "A")),
+        View("top", (0, 0, 1), (0, 1, 0), ("L", "R")),
+        View("bottom", (0, 0, -1), (0, 1, 0), ("R", "L")),
+        View("front", (0, 1, 0), (0, 0, 1), ("R", "L")),
+        View("back", (0, -1, 0), (0, 0, 1), ("L", "R")),
+        View("left medial", (1, 0, 0), (0, 0, 1), ("P", "A"), "left"),
+        View("right medial", (-1, 0, 0), (0, 0, 1), ("A", "P"), "right"),
+    )
+}
+"""The views by name. In the top view the brain's left is on the picture's left."""
+
+# three lamps fixed to the camera: a raking one that lets folds cast shade, two weak ones that fill the dark side
+_LAMPS = (((-0.7, 1.0, 1.1), 0.80), ((1.0, 0.1, 0.7), 0.30), ((0.0, 0.0, 1.0), 0.20))
+
+
+def picture_axes(view: View) -> tuple[Floats, Floats]:
+    """Returns the unit vectors that point right and up in the picture."""
+    up = np.array(view.up, dtype=float)
+    return np.cross(up, np.array(view.towards, dtype=float)), up
+
+
+def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
+    """Returns half the width and half the height in mm of the surface as seen."""
+    right, up = (np.ptp(mesh.vertices @ axis) / 2 for axis in picture_axes(view))
+    return float(right), float(up)
+
+
+def hemisphere_faces(mesh: TriangleMesh, hemisphere: str, fissure_x_mm: float) -> NDArray[np.bool_]:
+    """Returns a (m,) mask of the faces on one side of the fissure's plane; of all faces for ""."""
+    middle = corners(mesh).mean(axis=1)[:, 0]
+    match hemisphere:
+        case "left":
+            return middle < fissure_x_mm
+        case "right":
+            return middle >= fissure_x_mm
+        case _:
+            return np.ones(len(mesh.faces), dtype=bool)
+
+
+def restricted(
+    mesh: TriangleMesh, colours: Floats, hemisphere: str, fissure_x_mm: float
+) -> tuple[TriangleMesh, Floats]:
+    """Returns one hemisphere of the surface and its part of the (n, 3) vertex or (m, 3) face colours."""
+    if not hemisphere:
+        return mesh, colours
+    keep = hemisphere_faces(mesh, hemisphere, fissure_x_mm)
+    part, vertices = submesh(mesh, keep)
+    return part, colours[vertices] if len(colours) == len(mesh.vertices) else colours[keep]
+
+
+def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
+    """Returns one colour for every vertex, (n, 3) in 0 to 1."""
+    return np.tile(np.array(to_rgb(colour)), (len(mesh.vertices), 1))
+
+
+def render(
+    mesh: TriangleMesh,
+    colours: Floats,
+    view: View,
+    *,
+    half_width_mm: float,
+    half_height_mm: float,
+    pixels_per_mm: float,
+) -> Image:
+    """Returns a picture of the surface in parallel projection, its bounding box in the middle.
+
+    Parameters
+    ----------
+    colours : (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1
+
+    Returns
+    -------
+    (height, width, 3) picture on white
+    """
+    size = [max(2, round(2 * half * pixels_per_mm)) for half in (half_width_mm, half_height_mm)]
+    surface = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces))
+    surface.point_data.active_normals = vertex_normals(mesh)
+    bytes_ = np.clip(np.round(255 * np.asarray(colours)), 0, 255).astype(np.uint8)
+    attributes = surface.point_data if len(bytes_) == len(mesh.vertices) else surface.cell_data
+    attributes["colour"] = bytes_
+    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
+    try:
+        plotter.set_background("white")
+        plotter.add_mesh(
+            surface,
+            scalars="colour",
+            rgb=True,
+            interpolation="phong",
+            ambient=0.30,
+            diffuse=0.75,
+            specular=0.10,
+            specular_power=15,
+        )
+        for position, intensity in _LAMPS:
+            plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
+        middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+        distance = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+        plotter.camera_position = [tuple(middle + distance * np.array(view.towards)), tuple(middle), view.up]
+        plotter.enable_parallel_projection()
+        plotter.parallel_scale = half_height_mm
+        plotter.reset_camera_clipping_range()
+        plotter.enable_anti_aliasing("ssaa")
+        return np.array(plotter.screenshot(return_img=True))[..., :3]
+    finally:
+        plotter.close()

@@ -1,0 +1,155 @@
+"""Charts of the SpAnGy spectra: relative power of the folds' frequency bands."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from ..errors import InputError
+from .style import (
+    FULL_WIDTH_IN,
+    MEASURED,
+    MUTED_COLOUR,
+    REAL_COLOUR,
+    light_grid,
+    new_figure,
+    run_colours,
+    run_legend,
+    simulated_runs,
+    styled,
+    week_axis,
+    week_label,
+)
+
+FOLD_BANDS = (4, 5, 6)
+"""Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
+_FOLDS = {4: "primary folds", 5: "secondary folds", 6: "tertiary folds"}
+_INCOMPLETE_HATCH = "//////"
+
+
+def _with_band_numbers(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
+    """Returns the rows of the bands, written as 4 or "B4", with whole numbers and a column `trusted`."""
+    numbers = spectra["band"].astype(str).str.removeprefix("B").astype(int)
+    chosen = spectra.assign(band=numbers, trusted=spectra["complete"] & spectra["resolved"])
+    return chosen[numbers.isin(bands)]
+
+
+def _untrusted_bars(axes: Axes, bars: Sequence, trusted: Sequence[bool]) -> None:
+    for bar, good in zip(bars, trusted, strict=True):
+        if not good:
+            bar.set(hatch=_INCOMPLETE_HATCH, edgecolor="white", linewidth=0)
+
+
+@styled
+def spectra_chart(
+    spectra: pd.DataFrame,
+    *,
+    week: float,
+    bands: Sequence[int] = FOLD_BANDS,
+    title: str = "",
+    synthetic: bool = False,
+) -> Figure:
+    """Returns the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
+
+    Bars of bands that are cut off or not resolved by the surface are hatched, such stars open.
+
+    Parameters
+    ----------
+    spectra : columns run, week, hemisphere, band, relative_power, complete, resolved
+    week
+        Week in GW.
+
+    Raises
+    ------
+    InputError
+        If the table has no such band at this week.
+    """
+    rows = _with_band_numbers(spectra, bands)
+    rows = rows[(rows["week"] - week).abs() < 1e-6]
+    if rows.empty:
+        raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
+    runs = simulated_runs(rows["run"])
+    colours = run_colours(runs)
+    figure = new_figure(FULL_WIDTH_IN, 3.0, title=title or week_label(week), synthetic=synthetic)
+    panels = figure.subplots(1, 2, sharey=True)
+    width = 0.8 / max(len(runs), 1)
+    for axes, hemisphere in zip(panels, ("left", "right"), strict=True):
+        side = rows[rows["hemisphere"] == hemisphere]
+        for index, run in enumerate(runs):
+            of_run = side[side["run"] == run]
+            position = [bands.index(band) - 0.4 + (index + 0.5) * width for band in of_run["band"]]
+            bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colours[run])
+            _untrusted_bars(axes, list(bars), list(of_run["trusted"]))
+        for _, real in side[side["run"] == MEASURED].iterrows():
+            centre = bands.index(real["band"])
+            axes.hlines(real["relative_power"], centre - 0.42, centre + 0.42, color=REAL_COLOUR, linewidth=0.9)
+            face = REAL_COLOUR if real["trusted"] else "white"
+            axes.plot(centre, real["relative_power"], "*", color=REAL_COLOUR, markerfacecolor=face, markersize=8)
+        axes.set_xticks(range(len(bands)), [f"B{band}\n{_FOLDS.get(band, '')}" for band in bands])
+        axes.set_xlim(-0.5, len(bands) - 0.5)
+        axes.set_title(f"{hemisphere} hemisphere")
+        light_grid(axes)
+    panels[0].set_ylabel("relative power")
+    panels[0].set_ylim(bottom=0)
+    extra = []
+    if not rows["trusted"].all():
+        extra = [Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label="band cut off or not resolved")]
+    run_legend(figure, runs, synthetic=synthetic, measured=(rows["run"] == MEASURED).any(), extra=extra)
+    return figure
+
+
+@styled
+def spectra_weeks_chart(
+    spectra: pd.DataFrame,
+    *,
+    bands: Sequence[int] = FOLD_BANDS,
+    title: str = "",
+    synthetic: bool = False,
+) -> Figure:
+    """Returns the relative power of the bands over weeks: a row per hemisphere, a column per band.
+
+    Runs are lines, measured brains black stars; bands that are cut off or not resolved have open markers.
+
+    Parameters
+    ----------
+    spectra : columns run, week, hemisphere, band, relative_power, complete, resolved
+    """
+    rows = _with_band_numbers(spectra, bands)
+    runs = simulated_runs(rows["run"])
+    colours = run_colours(runs)
+    figure = new_figure(FULL_WIDTH_IN, 4.2, title=title, synthetic=synthetic)
+    panels = figure.subplots(2, len(bands), sharex=True, sharey="col", squeeze=False)
+    for line, hemisphere in zip(panels, ("left", "right"), strict=True):
+        for axes, band in zip(line, bands, strict=True):
+            here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
+            for run in [*runs, MEASURED]:
+                series = here[here["run"] == run].sort_values("week")
+                colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
+                if run != MEASURED:
+                    axes.plot(series["week"], series["relative_power"], color=colour)
+                for trusted, part in series.groupby("trusted"):
+                    face = colour if trusted else "white"
+                    axes.plot(
+                        part["week"],
+                        part["relative_power"],
+                        marker,
+                        color=colour,
+                        markerfacecolor=face,
+                        markersize=size,
+                    )
+            week_axis(axes, rows["week"])
+            axes.set_ylim(bottom=0)
+            light_grid(axes)
+            if hemisphere == "left":
+                axes.set_title(f"B{band}, {_FOLDS[band]}" if band in _FOLDS else f"B{band}")
+                axes.set_xlabel("")
+        line[0].set_ylabel(f"{hemisphere} hemisphere\nrelative power")
+    extra = []
+    if not rows["trusted"].all():
+        hollow = {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}
+        extra = [Line2D([], [], color=MUTED_COLOUR, label="band cut off or not resolved", **hollow)]  # type: ignore[arg-type]
+    run_legend(figure, runs, synthetic=synthetic, measured=(rows["run"] == MEASURED).any(), extra=extra)
+    return figure

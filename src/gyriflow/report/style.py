@@ -1,0 +1,159 @@
+"""The look that all figures share: sizes for print, fonts, colour-blind-safe colours, headings."""
+
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from contextlib import AbstractContextManager
+from functools import wraps
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+SINGLE_COLUMN_IN = 3.5
+"""Width of one column of a journal page, in inches."""
+FULL_WIDTH_IN = 7.2
+"""Width of a journal page, in inches."""
+
+RUN_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31")
+"""Okabe and Ito's colour-blind-safe colours, without black (measured brains) and yellow (too pale on white)."""
+REAL_COLOUR = "#000000"
+MUTED_COLOUR = "#767676"
+SIMULATED_SURFACE_COLOUR = "#8FB4DC"
+REAL_SURFACE_COLOUR = "#EBD6B4"
+
+MEASURED = "real"
+"""The run name of measured brains."""
+
+_SETTINGS = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.formatter.use_mathtext": True,
+    "figure.titlesize": 9.0,
+    "figure.dpi": 200.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.fontsize": 7.0,
+    "legend.title_fontsize": 7.0,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 4.0,
+    "grid.color": "#E2E2E2",
+    "grid.linewidth": 0.5,
+}
+
+
+def style() -> AbstractContextManager[None]:
+    """Returns a context in which matplotlib draws in the project's style; the settings outside stay as they are."""
+    return mpl.rc_context(_SETTINGS)
+
+
+def styled[**P](chart: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Returns `chart` made to draw its figure in the project's style."""
+
+    @wraps(chart)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with style():
+            figure = chart(*args, **kwargs)
+            # ticks are made lazily and would else take the settings that hold when the figure is saved
+            figure.draw_without_rendering()
+            return figure
+
+    return drawn
+
+
+def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool) -> Figure:
+    """Returns an empty figure with its heading; `synthetic` says that the brains shown are made by the phantom."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    heading = "\n".join(line for line in (title, synthetic_note() if synthetic else "") if line)
+    if heading:
+        figure.suptitle(heading)
+    return figure
+
+
+def synthetic_note() -> str:
+    """Returns the words under which brains made by the phantom are shown."""
+    return "synthetic phantom, not a real brain"
+
+
+def measured_name(synthetic: bool) -> str:
+    """Returns what brains that were not simulated are called: real, or phantom where they are synthetic."""
+    return "phantom" if synthetic else "real brain"
+
+
+def week_label(week: float) -> str:
+    """Returns a gestational week as shown, for example "21 GW" or "21.5 GW"."""
+    return f"{week:g} GW"
+
+
+def column_label(key: Hashable) -> str:
+    """Returns the heading of a column: a week, an interval of two weeks, or a name as it is."""
+    match key:
+        case str():
+            return key
+        case (first, last):
+            return f"{first:g}–{last:g} GW"
+        case float() | int():
+            return week_label(key)
+        case _:
+            return str(key)
+
+
+def simulated_runs(runs: Iterable[str]) -> list[str]:
+    """Returns the names of the simulated runs, each once, in the order given."""
+    return [run for run in dict.fromkeys(runs) if run != MEASURED]
+
+
+def run_colours(runs: Iterable[str]) -> dict[str, Any]:
+    """Returns a colour for each run in the order given: distinct ones, or a sequential scale for a long list."""
+    names = list(dict.fromkeys(runs))
+    if len(names) <= len(RUN_COLOURS):
+        return dict(zip(names, RUN_COLOURS, strict=False))
+    scale = mpl.colormaps["viridis"]
+    return {name: scale(0.92 * i / (len(names) - 1)) for i, name in enumerate(names)}
+
+
+def week_axis(axes: Axes, weeks: Iterable[float] | None = None) -> None:
+    """Labels the horizontal axis as gestational weeks with whole weeks as ticks."""
+    axes.set_xlabel("gestational age (GW)")
+    axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
+    if weeks is not None:
+        values = list(weeks)
+        margin = 0.04 * max(max(values) - min(values), 1.0)
+        axes.set_xlim(min(values) - margin, max(values) + margin)
+
+
+def light_grid(axes: Axes, axis: str = "y") -> None:
+    """Draws pale grid lines behind the data."""
+    axes.grid(visible=True, axis=axis)  # type: ignore[arg-type]
+
+
+def run_legend(
+    figure: Figure, runs: Sequence[str], *, synthetic: bool, measured: bool, extra: Sequence[Artist] = ()
+) -> None:
+    """Draws below the panels a legend of the runs, of the measured brains where `measured`, and of what else is given.
+
+    It has as many columns as its longest label allows.
+    """
+    colours = run_colours(runs)
+    handles: list[Artist] = [Line2D([], [], color=colours[run], marker="o", label=run) for run in runs]
+    if measured:
+        name = measured_name(synthetic)
+        handles.append(Line2D([], [], color=REAL_COLOUR, marker="*", markersize=7, linestyle="none", label=name))
+    handles.extend(extra)
+    # a letter of the legend is about 0.065 in wide, the line before it and the gap behind 0.5 in
+    longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / longest)))
+    lines = -(-len(handles) // columns)
+    figure.set_figheight(figure.get_figheight() + 0.15 * (lines - 1))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)

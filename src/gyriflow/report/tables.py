@@ -1,0 +1,145 @@
+"""Tables of a study, and any table as HTML."""
+
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from html import escape
+
+import numpy as np
+import pandas as pd
+
+from .style import MEASURED, measured_name
+
+UNIT_NAMES = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹"}
+
+
+def growth_table(rates: pd.DataFrame) -> pd.DataFrame:
+    """Returns the growth rates with headings and units for print, one row per interval.
+
+    Parameters
+    ----------
+    rates : columns from_week, to_week, area_ratio, rate_per_s, volume_ratio, core_rate_per_s
+    """
+    return pd.DataFrame(
+        {
+            "from (GW)": rates["from_week"],
+            "to (GW)": rates["to_week"],
+            "area ratio": rates["area_ratio"].round(4),
+            "tangential rate (10⁻⁷ s⁻¹)": (1e7 * rates["rate_per_s"]).round(3),
+            "volume ratio": rates["volume_ratio"].round(4),
+            "core rate (10⁻⁷ s⁻¹)": (1e7 * rates["core_rate_per_s"]).round(3),
+        }
+    )
+
+
+def metrics_table(metrics: pd.DataFrame, *, hemisphere: str = "whole", synthetic: bool = False) -> pd.DataFrame:
+    """Returns the metrics per week: a column per run, the measured brain, and each run's difference from it in %.
+
+    Parameters
+    ----------
+    metrics : columns run, week, hemisphere, metric, value, unit
+        `run` is "real" for measured brains; several measured brains of a week give their mean.
+
+    Returns
+    -------
+    DataFrame indexed by metric (with its unit) and week; cells without a value are NaN
+    """
+    rows = metrics[metrics["hemisphere"] == hemisphere]
+    units = rows["unit"].fillna("").map(lambda unit: UNIT_NAMES.get(unit, unit))
+    names = rows["metric"].str.replace("_", " ") + [f" ({unit})" if unit else "" for unit in units]
+    order = list(dict.fromkeys(names))
+    wide = rows.assign(metric=names).pivot_table(
+        index=["metric", "week"], columns="run", values="value", aggfunc="mean", sort=True
+    )
+    wide = wide.reindex(order, level="metric")
+    runs = [run for run in dict.fromkeys(rows["run"]) if run != MEASURED]
+    real = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
+    columns = {measured_name(synthetic): real}
+    for run in runs:
+        columns[run] = wide[run]
+        columns[f"{run}: difference (%)"] = (100 * (wide[run] / real - 1)).round(1)
+    return pd.DataFrame(columns)
+
+
+def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
+    """Returns the parameters of the runs: a row per parameter, a column per run, those that differ first.
+
+    The column "differs" is "yes" for parameters that are not the same in all runs.
+
+    Parameters
+    ----------
+    parameters : {run: {name: value}}
+        Values may be mappings themselves; their names are joined by dots.
+    """
+    flat = pd.DataFrame({run: pd.Series(_flattened(values), dtype=object) for run, values in parameters.items()})
+    shown = flat.map(_shown)
+    differs = shown.nunique(axis=1) > 1
+    shown.insert(0, "differs", np.where(differs, "yes", ""))
+    return shown.loc[[*shown.index[differs], *shown.index[~differs]]].rename_axis("parameter")
+
+
+def summary_table(values: Mapping[str, object]) -> pd.DataFrame:
+    """Returns a two-column table of named values, such as the summary of a mesh or of a folding.
+
+    Parameters
+    ----------
+    values : {name: value}
+        Values may be mappings themselves; their names are joined by dots.
+    """
+    return pd.DataFrame(
+        [(name.replace("_", " "), _shown(value)) for name, value in _flattened(values).items()],
+        columns=["quantity", "value"],
+    )
+
+
+def html_table(table: pd.DataFrame, *, caption: str, digits: int = 4, synthetic: bool = False) -> str:
+    """Returns the table as HTML with its own look, ready to be put in a page.
+
+    Numbers have `digits` significant digits, missing values are dashes, and all text is escaped. The index is shown
+    where it has a name.
+    """
+    named = any(name is not None for name in table.index.names)
+    flat = table.reset_index() if named else table
+    heading = caption + (" (synthetic phantom, not a real brain)" if synthetic else "")
+    styler = (
+        flat.style.format(lambda value: _shown(value, digits), na_rep="–", escape="html")
+        .format_index(lambda name: str(name), axis=1, escape="html")
+        .hide(axis="index")
+        .set_caption(escape(heading))
+        .set_table_styles(_LOOK)
+        .set_table_attributes('class="gyriflow"')
+        .set_uuid(sha256(f"{heading}{flat.columns}".encode()).hexdigest()[:8])
+    )
+    numeric = [name for name in flat.columns if pd.api.types.is_numeric_dtype(flat[name])]
+    return styler.set_properties(subset=numeric, **{"text-align": "right"}).to_html()
+
+
+_LOOK: Sequence = [
+    {"selector": "", "props": "border-collapse: collapse; font: 13px sans-serif; margin: 1em 0"},
+    {"selector": "caption", "props": "caption-side: top; text-align: left; font-weight: bold; padding: 4px 0"},
+    {"selector": "th", "props": "text-align: left; border-bottom: 1px solid #444; padding: 3px 10px"},
+    {"selector": "td", "props": "border-bottom: 1px solid #ddd; padding: 3px 10px"},
+]
+
+
+def _flattened(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
+    flat: dict[str, object] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            flat.update(_flattened(value, f"{prefix}{name}."))
+        else:
+            flat[f"{prefix}{name}"] = value
+    return flat
+
+
+def _shown(value: object, digits: int = 6) -> str:
+    match value:
+        case bool() | np.bool_():
+            return "yes" if value else "no"
+        case float() | np.floating():
+            return "–" if np.isnan(value) else f"{value:.{digits}g}"
+        case None:
+            return "–"
+        case list() | tuple():
+            return ", ".join(_shown(item, digits) for item in value)
+        case _:
+            return str(value)

@@ -1,0 +1,78 @@
+"""What every step of the workflow shares: its log, short messages for errors, and the exit code it hands on.
+
+`python -m gyriflow.step CODE LOG` ends a shell step that failed: it says what the code means and ends in it.
+"""
+
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from .errors import GyriflowError
+
+EXIT_FILE = "GYRIFLOW_EXIT_FILE"
+"""Environment variable with the file in which `gyriflow.launch` looks for the exit code of the first failed step."""
+INTERRUPTED = 130
+KILLED = 137
+
+
+def record_exit_code(code: int) -> None:
+    """Hands an exit code to the launcher, if there is one; of several failures the first counts."""
+    path = os.environ.get(EXIT_FILE)
+    if path:
+        # a step that failed earlier has made the file; where it cannot be made, Snakemake's own code has to do
+        with suppress(OSError), Path(path).open("x") as file:
+            file.write(str(code))
+
+
+def recorded_exit_code(path: Path) -> int | None:
+    """Returns the exit code of the first failed step, or None where none was recorded."""
+    try:
+        return int(path.read_text())
+    except (OSError, ValueError):
+        return None
+
+
+@contextmanager
+def step(log: str) -> Iterator[None]:
+    """Runs a step with its messages in the file `log`.
+
+    A GyriflowError ends the program with its exit code and one message on the terminal and in the log; another error
+    ends it with a traceback there.
+    """
+    logging.basicConfig(
+        level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s", filename=log, filemode="w", force=True
+    )
+    logging.captureWarnings(True)
+    try:
+        yield
+    except GyriflowError as error:
+        logging.error("%s", error)
+        print(f"gyriflow: {error}", file=sys.stderr)
+        record_exit_code(error.exit_code)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        record_exit_code(INTERRUPTED)
+        sys.exit(INTERRUPTED)
+    except Exception:
+        logging.exception("unexpected error")
+        traceback.print_exc()
+        record_exit_code(1)
+        sys.exit(1)
+
+
+def _end_shell_step(code: int, log: str) -> int:
+    if code == KILLED:
+        message = "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
+        print(message, file=sys.stderr)
+        with Path(log).open("a") as file:
+            file.write(message + "\n")
+    record_exit_code(code)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(_end_shell_step(int(sys.argv[1]), sys.argv[2]))

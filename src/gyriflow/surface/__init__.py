@@ -1,0 +1,1 @@
+"""Pial surfaces from label volumes and surface files: posed, closed, clean, split at the fissure."""

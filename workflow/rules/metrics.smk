@@ -1,0 +1,107 @@
+# Metrics of measured and simulated brains, by the same code with the same settings.
+rule measure_real:
+    input:
+        whole="results/{brain}/surface/pial.surf.gii",
+        left="results/{brain}/surface/left.pial.surf.gii",
+        right="results/{brain}/surface/right.pial.surf.gii",
+    output:
+        metrics="results/{brain}/metrics/real/metrics.csv",
+        spectra="results/{brain}/metrics/real/spectra.csv",
+        left="results/{brain}/metrics/real/left.shape.gii",
+        right="results/{brain}/metrics/real/right.shape.gii",
+    log:
+        "results/{brain}/logs/measure_real.log",
+    benchmark:
+        "results/{brain}/benchmarks/measure_real.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        labels=lambda wildcards: {
+            "subject": wildcards.brain,
+            "run": "real",
+            "week": CONFIG.brain(wildcards.brain).week,
+        },
+        settings=CONFIG.metrics.model_dump(),
+        code=code("metrics"),
+    script:
+        "../scripts/measure.py"
+
+
+rule measure_simulated:
+    input:
+        whole=rules.folded_surface.output.whole,
+        left=rules.folded_surface.output.left,
+        right=rules.folded_surface.output.right,
+    output:
+        metrics=f"results/{START}/metrics/{{run}}/week-{{week}}/metrics.csv",
+        spectra=f"results/{START}/metrics/{{run}}/week-{{week}}/spectra.csv",
+        left=f"results/{START}/metrics/{{run}}/week-{{week}}/left.shape.gii",
+        right=f"results/{START}/metrics/{{run}}/week-{{week}}/right.shape.gii",
+    log:
+        f"results/{START}/logs/measure_simulated.{{run}}.week-{{week}}.log",
+    benchmark:
+        f"results/{START}/benchmarks/measure_simulated.{{run}}.week-{{week}}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        labels=lambda wildcards: {
+            "subject": START,
+            "run": wildcards.run,
+            "week": float(wildcards.week),
+        },
+        settings=CONFIG.metrics.model_dump(),
+        code=code("metrics"),
+    script:
+        "../scripts/measure.py"
+
+
+rule displacement:
+    input:
+        rules.simulate.output.frames,
+    output:
+        f"results/{START}/metrics/{{run}}/displacement.csv",
+    log:
+        f"results/{START}/logs/displacement.{{run}}.log",
+    benchmark:
+        f"results/{START}/benchmarks/displacement.{{run}}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        labels=lambda wildcards: {"subject": START, "run": wildcards.run},
+        code=code("metrics"),
+    script:
+        "../scripts/displacement.py"
+
+
+rule run_metrics:
+    input:
+        lambda wildcards: expand(
+            f"results/{START}/metrics/{wildcards.run}/week-{{week}}/{wildcards.table}.csv",
+            week=week_tags(wildcards.run),
+        ),
+    output:
+        f"results/{START}/metrics/{{run}}/{{table}}.csv",
+    log:
+        f"results/{START}/logs/run_metrics.{{run}}.{{table}}.log",
+    benchmark:
+        f"results/{START}/benchmarks/run_metrics.{{run}}.{{table}}.tsv"
+    wildcard_constraints:
+        table="metrics|spectra",
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        code=code(),
+    script:
+        "../scripts/join_tables.py"

@@ -1,0 +1,109 @@
+# What compares the runs of a study with each other and with the measured brains.
+rule similarity:
+    input:
+        simulated=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.pial.surf.gii",
+        real="results/{brain}/surface/pial.surf.gii",
+    output:
+        f"results/{START}/metrics/{{run}}/week-{{week}}/similarity.{{brain}}.csv",
+    log:
+        f"results/{START}/logs/similarity.{{run}}.week-{{week}}.{{brain}}.log",
+    benchmark:
+        f"results/{START}/benchmarks/similarity.{{run}}.week-{{week}}.{{brain}}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    params:
+        labels=lambda wildcards: {
+            "subject": START,
+            "run": wildcards.run,
+            "week": float(wildcards.week),
+            "real": wildcards.brain,
+        },
+        code=code("metrics"),
+    script:
+        "../scripts/similarity.py"
+
+
+def tables_to_join(wildcards):
+    run_tables = [
+        f"results/{START}/metrics/{run}/{wildcards.table}.csv" for run in RUNS
+    ]
+    match wildcards.table:
+        case "displacement":
+            return run_tables
+        case "similarity":
+            return [
+                f"results/{START}/metrics/{run}/week-{week}/similarity.{brain}.csv"
+                for run, week, brain in comparisons()
+            ]
+        case _:
+            return [
+                f"results/{brain}/metrics/real/{wildcards.table}.csv"
+                for brain in BRAINS
+            ] + run_tables
+
+
+rule study_table:
+    input:
+        tables_to_join,
+    output:
+        "results/study/{table}.csv",
+    log:
+        "results/study/logs/study_table.{table}.log",
+    benchmark:
+        "results/study/benchmarks/study_table.{table}.tsv"
+    wildcard_constraints:
+        table="metrics|spectra|displacement|similarity",
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        code=code(),
+    script:
+        "../scripts/join_tables.py"
+
+
+rule study_runs:
+    input:
+        params=expand(rules.parameters.output, run=RUNS),
+        summaries=expand(rules.simulate.output.summary, run=RUNS),
+    output:
+        "results/study/runs.csv",
+    log:
+        "results/study/logs/study_runs.log",
+    benchmark:
+        "results/study/benchmarks/study_runs.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        runs=RUNS,
+        code=code(),
+    script:
+        "../scripts/study_runs.py"
+
+
+STUDY_TABLES = expand(
+    "results/study/{table}.csv",
+    table=[
+        "metrics",
+        "spectra",
+        "displacement",
+        *(["similarity"] if comparisons() else []),
+    ],
+)
+
+
+rule metrics:
+    input:
+        expand(rules.measure_real.output, brain=BRAINS),
+        expand(rules.run_metrics.output, run=RUNS, table=["metrics", "spectra"]),
+        expand(rules.displacement.output, run=RUNS),
+        rules.study_runs.output,
+        STUDY_TABLES,
