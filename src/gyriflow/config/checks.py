@@ -69,7 +69,7 @@ def _run_problems(settings: dict[str, Any], start_week: float | None) -> list[tu
     end_week = _number(settings.get("end_week"))
     if start_week is not None and end_week is not None and end_week <= start_week:
         problems.append(("end_week", f"found {end_week:g}; it should be above the start brain's week, {start_week:g}"))
-    if settings.get("allow_negative_growth") is not True:
+    if settings.get("allow_negative_growth") not in (True, "true"):
         for key in ("growth_rate_per_s", "radial_growth_rate_per_s"):
             rate = _number(settings.get(key, FoldingSettings.model_fields[key].default))
             if rate is not None and rate < 0:

@@ -94,7 +94,5 @@ def continued(values: Floats, known: NDArray[np.bool_], stiffness: sparse.csc_ma
     unknown = np.flatnonzero(~known)
     rows = sparse.csr_matrix(stiffness)[unknown]
     filled = values.copy()
-    filled[unknown] = spsolve(
-        sparse.csc_matrix(rows[:, unknown]), -rows[:, np.flatnonzero(known)] @ values[known]
-    )
+    filled[unknown] = spsolve(sparse.csc_matrix(rows[:, unknown]), -rows[:, np.flatnonzero(known)] @ values[known])
     return filled

@@ -66,7 +66,9 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     done, cut = 0, -spacing
     while done < count:
         wanted = min(MODES_PER_SLICE, 2 * (count - done) + 8)
-        slice_values, slice_functions, end = _next_slice(stiffness, mass, done, cut, cut + 0.5 * wanted * spacing, wanted)
+        slice_values, slice_functions, end = _next_slice(
+            stiffness, mass, done, cut, cut + 0.5 * wanted * spacing, wanted
+        )
         new = min(len(slice_values), count - done)
         values[done : done + new] = slice_values[:new]
         functions[:, done : done + new] = slice_functions[:, :new]

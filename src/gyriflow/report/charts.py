@@ -1,6 +1,7 @@
 """Charts of growth, metrics, solver steps and mesh quality."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -39,7 +40,7 @@ METRIC_TITLES = {
 """The metrics of the overview and their titles."""
 UNIT_TITLES = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹"}
 DIMENSIONLESS = ("", "1", "-")
-HEMISPHERE_LINES = {"whole": "-", "left": "--", "right": ":"}
+HEMISPHERE_LINES: Mapping[str, Literal["-", "--", ":"]] = {"whole": "-", "left": "--", "right": ":"}
 QUALITY_TITLES = {
     "radius_ratio": "radius ratio (1 = regular)",
     "min_dihedral_deg": "smallest dihedral angle (°)",
@@ -81,9 +82,13 @@ def growth_chart(
     area_axes.set_title(f"{measured_name(synthetic)}: area and volume")
 
     scaled = rates["rate_per_s"] * 1e7
-    labels = [column_label((a, b)).removesuffix(" GW") for a, b in zip(rates["from_week"], rates["to_week"], strict=True)]
+    labels = [
+        column_label((a, b)).removesuffix(" GW") for a, b in zip(rates["from_week"], rates["to_week"], strict=True)
+    ]
     bars = rate_axes.bar(labels, scaled, width=0.7, color=RUN_COLOURS[0])
-    rate_axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5 if len(rates) <= 10 else 5, padding=1)
+    rate_axes.bar_label(
+        bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5 if len(rates) <= 10 else 5, padding=1
+    )
     rate_axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
         rate_axes.axhline(
@@ -103,7 +108,7 @@ def growth_chart(
     return figure
 
 
-def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, object]) -> set[str]:
+def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> set[str]:
     """Draws one metric, of the whole brain where it is known, else per hemisphere; returns the hemispheres drawn."""
     drawn = {"whole"} if (rows["hemisphere"] == "whole").any() else {"left", "right"}
     for (run, hemisphere), group in rows[rows["hemisphere"].isin(drawn)].groupby(["run", "hemisphere"], sort=False):
@@ -126,7 +131,7 @@ def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, object])
                 "o",
                 linestyle=HEMISPHERE_LINES[str(hemisphere)],
                 markersize=2.5,
-                color=colours[str(run)],  # type: ignore[arg-type]
+                color=colours[str(run)],
             )
     return drawn
 
@@ -180,7 +185,7 @@ def metrics_chart(
         for side in ("left", "right")
         if side in hemispheres
     ]
-    run_legend(figure, runs, synthetic=synthetic, measured=(metrics["run"] == MEASURED).any(), extra=extra)
+    run_legend(figure, runs, synthetic=synthetic, measured=MEASURED in set(metrics["run"]), extra=extra)
     return figure
 
 

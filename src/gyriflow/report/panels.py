@@ -15,6 +15,9 @@ from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, synthetic_note
 _PIXELS_PER_INCH = 300
 _MARGIN = 1.04
 _MAX_COLUMNS = 8
+_EDGE_IN = 0.1
+# part of the width that the scale bar may take; colour bars follow
+_SCALE_SHARE = 0.36
 _END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
 
 
@@ -38,11 +41,12 @@ class Row:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Sizes in inches, and the half width in mm that every panel shows."""
+    """Sizes in inches, and the half width in mm that every panel shows; `left` is where the first panel begins."""
 
     width: float
-    label: float
+    left: float
     panel: float
+    foot: float
     half_width_mm: float
 
     @property
@@ -92,20 +96,21 @@ def panel_grid(
     label_in = 0.42 if any("\n" in row.label for row in rows) else 0.24
     panel_in = min(1.75, (FULL_WIDTH_IN - label_in) / most)
     width = max(SINGLE_COLUMN_IN, label_in + most * panel_in)
-    layout = _Layout(width, label_in, panel_in, half_width)
+    left_in = label_in + (width - label_in - most * panel_in) / 2
+    layout = _Layout(width, left_in, panel_in, 0.66 if colour_bars or legend else 0.46, half_width)
 
     heading = [line for line in (title, synthetic_note() if synthetic else "") if line]
-    head_in, block_head_in, caption_in, foot_in = 0.1 + 0.16 * len(heading), 0.2, 0.15, 0.66
+    head_in, block_head_in, caption_in = 0.1 + 0.16 * len(heading), 0.2, 0.15
     heights = {id(row): _row_height_in(row, layout) for _, part in blocks for row in part}
     captions = {id(row): caption_in * any(p and p.caption for p in row.panels) for _, part in blocks for row in part}
-    total = head_in + foot_in + len(blocks) * block_head_in + sum(heights.values()) + sum(captions.values())
+    total = head_in + layout.foot + len(blocks) * block_head_in + sum(heights.values()) + sum(captions.values())
 
     figure = Figure(figsize=(width, total))
     figure.suptitle("\n".join(heading), y=1 - 0.05 / total, va="top")
     top = total - head_in
     for heads, part in blocks:
         for index, head in enumerate(heads):
-            x = (label_in + (index + 0.5) * panel_in) / width
+            x = (left_in + (index + 0.5) * panel_in) / width
             figure.text(x, (top - block_head_in / 2) / total, head, ha="center", va="center", fontsize=7)
         top -= block_head_in
         for row in part:
@@ -128,7 +133,7 @@ def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, heigh
     total = figure.get_figheight()
     middle = (bottom + height / 2) / total
     figure.text(
-        0.5 * layout.label / layout.width, middle, row.label, rotation=90, ha="center", va="center", fontsize=7
+        (layout.left - 0.06) / layout.width, middle, row.label, rotation=90, ha="right", va="center", fontsize=7
     )
     half_height = height / layout.inches_per_mm / 2
     previous = None
@@ -143,7 +148,7 @@ def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, heigh
             half_height_mm=half_height,
             pixels_per_mm=_PIXELS_PER_INCH * layout.inches_per_mm,
         )
-        x = (layout.label + index * layout.panel) / layout.width
+        x = (layout.left + index * layout.panel) / layout.width
         axes = figure.add_axes((x, bottom / total, layout.panel / layout.width, height / total))
         axes.set_label(f"{row.label}, column {index}")
         axes.imshow(
@@ -152,7 +157,7 @@ def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, heigh
         axes.set_axis_off()
         if panel.view != previous:
             for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):
-                axes.text(place, 1.0, end, transform=axes.transAxes, ha=align, va="top", fontsize=6)  # type: ignore[arg-type]
+                axes.text(place, 1.0, end, transform=axes.transAxes, ha=align, va="top", fontsize=6)
         previous = panel.view
         if panel.caption:
             axes.text(0.5, -0.01, panel.caption, transform=axes.transAxes, ha="center", va="top", fontsize=6.5)
@@ -160,32 +165,31 @@ def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, heigh
 
 def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
     total = figure.get_figheight()
-    length = _round_length(1.2 * layout.half_width_mm)
-    axes = figure.add_axes(
-        (layout.label / layout.width, 0.46 / total, length * layout.inches_per_mm / layout.width, 0.04 / total)
-    )
+    room_mm = (_SCALE_SHARE * layout.width - 2 * _EDGE_IN) / layout.inches_per_mm
+    length = _round_length(min(1.2 * layout.half_width_mm, room_mm))
+    size = (length * layout.inches_per_mm / layout.width, 0.04 / total)
+    axes = figure.add_axes((_EDGE_IN / layout.width, (layout.foot - 0.2) / total, *size))
     axes.set_label("scale bar")
     axes.set_xlim(0, length)
     axes.axvspan(0, length, color="black", linewidth=0)
     axes.set_axis_off()
-    axes.text(0.5, -0.6, f"{length:g} mm", transform=axes.transAxes, ha="center", va="top", fontsize=7)
+    axes.text(0.0, -0.6, f"{length:g} mm", transform=axes.transAxes, ha="left", va="top", fontsize=7)
     words = ", ".join(f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends)
-    figure.text(layout.label / layout.width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
+    figure.text(_EDGE_IN / layout.width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
 
 
 def _draw_keys(
     figure: Figure, layout: _Layout, colour_bars: Sequence[tuple[ScalarMappable, str]], legend: Sequence[Patch]
 ) -> None:
     total, width = figure.get_figheight(), layout.width
-    # the scale bar takes the first third of the foot
-    start = 0.36 * width
+    start = _SCALE_SHARE * width
     for index, (scale, label) in enumerate(colour_bars):
         share = (width - start - 0.2) / len(colour_bars)
         place = ((start + index * share + 0.1) / width, 0.5 / total, (share - 0.2) / width, 0.08 / total)
         bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation="horizontal")
         bar.set_label(label, labelpad=1)
         bar.ax.tick_params(pad=1, length=2)
-        bar.outline.set_linewidth(0.5)  # type: ignore[operator]
+        bar.outline.set_linewidth(0.5)
     if legend:
         columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
         figure.legend(handles=legend, loc="lower right", ncols=columns, bbox_to_anchor=(1.0, 0.0), borderaxespad=0.2)

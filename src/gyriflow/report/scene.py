@@ -1,13 +1,17 @@
 """One surface seen from one side: cameras, light and off-screen rendering."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import matplotlib as mpl
 import numpy as np
 import pyvista as pv
-from matplotlib.colors import to_rgb
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, to_rgb
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkLogger
 
+from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, corners, submesh, vertex_normals
 
 # without a display VTK warns about X before it turns to its off-screen way
@@ -52,6 +56,8 @@ VIEWS = {
 }
 """The views by name. In the top view the brain's left is on the picture's left."""
 
+_UNKNOWN_COLOUR = (0.72, 0.72, 0.72, 1.0)
+
 # three lamps fixed to the camera: a raking one that lets folds cast shade, two weak ones that fill the dark side
 _LAMPS = (((-0.7, 1.0, 1.1), 0.80), ((1.0, 0.1, 0.7), 0.30), ((0.0, 0.0, 1.0), 0.20))
 
@@ -91,9 +97,31 @@ def restricted(
     return part, colours[vertices] if len(colours) == len(mesh.vertices) else colours[keep]
 
 
+def named_views(names: Sequence[str]) -> list[View]:
+    """Returns the views of these names; InputError for an unknown one."""
+    unknown = [name for name in names if name not in VIEWS]
+    if unknown:
+        raise InputError("unknown view", found=unknown, expected=list(VIEWS))
+    return [VIEWS[name] for name in names]
+
+
 def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
     """Returns one colour for every vertex, (n, 3) in 0 to 1."""
     return np.tile(np.array(to_rgb(colour)), (len(mesh.vertices), 1))
+
+
+def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -> ScalarMappable:
+    """Returns a colour scale; `cut` marks its upper end as passed by some values."""
+    colours = mpl.colormaps[colormap]
+    colours.colorbar_extend = "max" if cut else "neither"  # type: ignore[assignment]
+    return ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
+
+
+def painted(values: Floats, scale: ScalarMappable) -> Floats:
+    """Returns the (n, 3) colours of values, grey where they are not finite."""
+    colours = np.asarray(scale.to_rgba(np.asarray(values, dtype=float)))
+    colours[~np.isfinite(values)] = _UNKNOWN_COLOUR
+    return colours[:, :3]
 
 
 def render(
@@ -116,14 +144,14 @@ def render(
     (height, width, 3) picture on white
     """
     size = [max(2, round(2 * half * pixels_per_mm)) for half in (half_width_mm, half_height_mm)]
-    surface = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces))
+    surface = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     surface.point_data.active_normals = vertex_normals(mesh)
     bytes_ = np.clip(np.round(255 * np.asarray(colours)), 0, 255).astype(np.uint8)
     attributes = surface.point_data if len(bytes_) == len(mesh.vertices) else surface.cell_data
     attributes["colour"] = bytes_
     plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
     try:
-        plotter.set_background("white")
+        plotter.set_background("white")  # type: ignore[arg-type]
         plotter.add_mesh(
             surface,
             scalars="colour",
@@ -141,7 +169,7 @@ def render(
         plotter.camera_position = [tuple(middle + distance * np.array(view.towards)), tuple(middle), view.up]
         plotter.enable_parallel_projection()
         plotter.parallel_scale = half_height_mm
-        plotter.reset_camera_clipping_range()
+        plotter.renderer.ResetCameraClippingRange()
         plotter.enable_anti_aliasing("ssaa")
         return np.array(plotter.screenshot(return_img=True))[..., :3]
     finally:

@@ -96,8 +96,12 @@ def spectra_chart(
     panels[0].set_ylim(bottom=0)
     extra = []
     if not rows["trusted"].all():
-        extra = [Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label="band cut off or not resolved")]
-    run_legend(figure, runs, synthetic=synthetic, measured=(rows["run"] == MEASURED).any(), extra=extra)
+        extra = [
+            Patch(
+                facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label="band cut off or not resolved"
+            )
+        ]
+    run_legend(figure, runs, synthetic=synthetic, measured=MEASURED in set(rows["run"]), extra=extra)
     return figure
 
 
@@ -151,5 +155,5 @@ def spectra_weeks_chart(
     if not rows["trusted"].all():
         hollow = {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}
         extra = [Line2D([], [], color=MUTED_COLOUR, label="band cut off or not resolved", **hollow)]  # type: ignore[arg-type]
-    run_legend(figure, runs, synthetic=synthetic, measured=(rows["run"] == MEASURED).any(), extra=extra)
+    run_legend(figure, runs, synthetic=synthetic, measured=MEASURED in set(rows["run"]), extra=extra)
     return figure

@@ -26,7 +26,7 @@ REAL_SURFACE_COLOUR = "#EBD6B4"
 MEASURED = "real"
 """The run name of measured brains."""
 
-_SETTINGS = {
+_SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.0,

@@ -1,6 +1,6 @@
 """Tables of a study, and any table as HTML."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping
 from hashlib import sha256
 from html import escape
 
@@ -72,8 +72,8 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     """
     flat = pd.DataFrame({run: pd.Series(_flattened(values), dtype=object) for run, values in parameters.items()})
     shown = flat.map(_shown)
-    differs = shown.nunique(axis=1) > 1
-    shown.insert(0, "differs", np.where(differs, "yes", ""))
+    differs = shown.ne(shown.iloc[:, 0], axis=0).any(axis=1)
+    shown.insert(0, "differs", differs.map({True: "yes", False: ""}))
     return shown.loc[[*shown.index[differs], *shown.index[~differs]]].rename_axis("parameter")
 
 
@@ -109,11 +109,11 @@ def html_table(table: pd.DataFrame, *, caption: str, digits: int = 4, synthetic:
         .set_table_attributes('class="gyriflow"')
         .set_uuid(sha256(f"{heading}{flat.columns}".encode()).hexdigest()[:8])
     )
-    numeric = [name for name in flat.columns if pd.api.types.is_numeric_dtype(flat[name])]
+    numeric: list[Hashable] = [name for name in flat.columns if pd.api.types.is_numeric_dtype(flat[name])]
     return styler.set_properties(subset=numeric, **{"text-align": "right"}).to_html()
 
 
-_LOOK: Sequence = [
+_LOOK: list = [
     {"selector": "", "props": "border-collapse: collapse; font: 13px sans-serif; margin: 1em 0"},
     {"selector": "caption", "props": "caption-side: top; text-align: left; font-weight: bold; padding: 4px 0"},
     {"selector": "th", "props": "text-align: left; border-bottom: 1px solid #444; padding: 3px 10px"},

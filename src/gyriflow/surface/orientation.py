@@ -26,7 +26,7 @@ FISSURE_BAND = 0.2
 WIDEST_FISSURE = 0.25
 FEWEST_FISSURE_POINTS = 60
 # the plane of symmetry is kept where the fissure fits it nearly as well as a plane of its own
-CLEARLY_BETTER_MM = 0.15
+CLEARLY_BETTER_MM = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class MidPlane:
     offset : float
         Distance from the origin in mm.
     asymmetry_mm : float
-        Mean distance from the surface to its mirror image.
+        Mean distance from the surface to its image in the plane of best symmetry, without the largest fifth.
     fissure_points : int
         Number of places between facing walls of the fissure that the plane was fitted to; 0 where too few were
         found and the plane is that of mirror symmetry.
@@ -58,14 +58,19 @@ class MidPlane:
 def mid_plane(mesh: TriangleMesh) -> MidPlane:
     """Returns the mid-sagittal plane of a closed, outward surface whose left-right axis is within 60° of x.
 
-    It starts as the plane of best mirror symmetry and is then fitted to the fissure itself: to the middle between
-    medial walls that face each other. In an asymmetric brain the two differ, and the fissure decides.
+    Planes of mirror symmetry are the candidates; each is fitted to the fissure, that is, to the middle between medial
+    walls that face each other. The best has both little asymmetry and much fissure. In an asymmetric brain the plane
+    of symmetry and the fissure differ, and the fissure decides.
     """
     weights = vertex_areas(mesh)
     chosen = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
     sample, tree = mesh.vertices[chosen], cKDTree(mesh.vertices)
-    normal, offset = _symmetry_plane(sample, tree)
-    asymmetry = _mirror_distance(normal, offset, sample, tree, quantile=1.0)
+    candidates = [_fitted_to_fissure(mesh, *plane) for plane in _symmetry_planes(sample, tree)]
+    return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))
+
+
+def _fitted_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry: float) -> MidPlane:
+    """Returns the plane fitted to the fissure near a plane of symmetry, or that plane where it fits nearly as well."""
     middle = fissure_points(mesh, normal, offset)
     fitted = _plane_through(middle, normal, offset)
     if fitted is None:
@@ -78,13 +83,6 @@ def mid_plane(mesh: TriangleMesh) -> MidPlane:
     if before > 0.95 * count and by_symmetry < scatter + CLEARLY_BETTER_MM:
         return MidPlane(normal, offset, asymmetry, before, by_symmetry)
     return MidPlane(*fitted, asymmetry, count, scatter)
-
-
-def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]:
-    """Returns how many points are within 3 mm of the plane, and their root mean square distance to it."""
-    distance = points @ normal - offset
-    near = distance[np.abs(distance) < 3.0]
-    return len(near), float(np.sqrt(np.mean(near**2))) if len(near) else float("inf")
 
 
 def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
@@ -135,8 +133,8 @@ def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
     return matrix, angle
 
 
-def _symmetry_plane(sample: Floats, tree: cKDTree) -> tuple[Floats, float]:
-    """Returns normal and offset of the plane of best mirror symmetry with a normal within 60° of x."""
+def _symmetry_planes(sample: Floats, tree: cKDTree) -> list[tuple[Floats, float, float]]:
+    """Returns normal, offset and asymmetry (mm) of planes of mirror symmetry with normals within 60° of x."""
     centre = sample.mean(axis=0)
     # a Fibonacci lattice on the cap of directions around x
     index = np.arange(DIRECTIONS) + 0.5
@@ -144,9 +142,8 @@ def _symmetry_plane(sample: Floats, tree: cKDTree) -> tuple[Floats, float]:
     turn = np.pi * (1.0 + 5.0**0.5) * index
     radius = np.sqrt(1.0 - along**2)
     directions = np.stack([along, radius * np.cos(turn), radius * np.sin(turn)], axis=1)
-    coarse = sample[::3]
-    scores = np.array([_mirror_distance(n, float(n @ centre), coarse, tree) for n in directions])
-    best = (np.inf, directions[0], 0.0)
+    scores = np.array([_mirror_distance(n, float(n @ centre), sample[::3], tree) for n in directions])
+    planes = []
     for start in _apart(directions, scores):
         base = directions[start]
         aside = np.linalg.svd(base[None])[2][1:]
@@ -161,9 +158,15 @@ def _symmetry_plane(sample: Floats, tree: cKDTree) -> tuple[Floats, float]:
             method="Nelder-Mead",
             options={"initial_simplex": np.vstack([np.zeros(3), 0.1 * np.eye(3)]), "xatol": 1e-4, "fatol": 1e-4},
         )
-        if found.fun < best[0]:
-            best = (float(found.fun), *plane(found.x))
-    return best[1], best[2]
+        planes.append((*plane(found.x), float(found.fun)))
+    return planes
+
+
+def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]:
+    """Returns how many points are within 3 mm of the plane, and their root mean square distance to it."""
+    distance = points @ normal - offset
+    near = distance[np.abs(distance) < 3.0]
+    return len(near), float(np.sqrt(np.mean(near**2))) if len(near) else float("inf")
 
 
 def _apart(directions: Floats, scores: Floats) -> list[int]:
@@ -177,11 +180,11 @@ def _apart(directions: Floats, scores: Floats) -> list[int]:
     return chosen
 
 
-def _mirror_distance(normal: Floats, offset: float, sample: Floats, tree: cKDTree, quantile: float = TRIMMED) -> float:
+def _mirror_distance(normal: Floats, offset: float, sample: Floats, tree: cKDTree) -> float:
     """Returns the mean distance in mm from the mirrored sample to the surface, without the largest ones."""
     mirrored = sample - 2.0 * np.outer(sample @ normal - offset, normal)
     distance, _ = tree.query(mirrored)
-    return float(np.sort(distance)[: int(quantile * len(distance))].mean())
+    return float(np.sort(distance)[: int(TRIMMED * len(distance))].mean())
 
 
 def _plane_through(points: Floats, normal: Floats, offset: float) -> tuple[Floats, float] | None:

@@ -1,0 +1,43 @@
+"""Edge lengths that grow with depth below the surface, on a background mesh for the mesher."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.triangles import TriangleMesh
+
+FINE_DEPTH = 2.5
+"""Depth of the layer of fine elements, in surface edge lengths: just more than the cortex that they must resolve."""
+GROWTH = 0.5
+"""Increase of edge length per depth below the fine layer."""
+
+# the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
+KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
+
+
+def edge_length_at(depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float) -> NDArray[np.float64]:
+    """Returns the wanted edge length in mm at depths in mm below the surface."""
+    below = np.maximum(depth - FINE_DEPTH * surface_edge_mm, 0.0)
+    return np.minimum(surface_edge_mm + GROWTH * below, core_edge_mm)
+
+
+def background_mesh(
+    surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float
+) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
+    """Returns a regular tetrahedral grid around the surface and the wanted edge length in mm at its vertices."""
+    spacing = max(2 * surface_edge_mm, 1.0)
+    low = surface.vertices.min(axis=0) - spacing
+    counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
+    index = np.indices(counts).reshape(3, -1).T
+    points = low + spacing * index
+    number = np.arange(len(points)).reshape(counts)
+    corner = [
+        number[i : counts[0] - 1 + i, j : counts[1] - 1 + j, k : counts[2] - 1 + k].ravel()
+        for i in (0, 1)
+        for j in (0, 1)
+        for k in (0, 1)
+    ]
+    tets = np.concatenate([np.stack([corner[c] for c in tet], axis=1) for tet in KUHN])
+    depth = cKDTree(surface.vertices).query(points)[0]
+    return TetrahedralMesh(points, tets), edge_length_at(depth, surface_edge_mm, core_edge_mm)

@@ -1,0 +1,95 @@
+"""Pictures of the zones and fields that a folding is given."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.triangles import Floats, TriangleMesh, face_areas
+from ..units import CM2_PER_MM2
+from .panels import Panel, Row, panel_grid
+from .scene import colour_scale, named_views, painted, restricted
+from .style import styled
+
+ZONE_VIEWS = ("left", "bottom", "left medial", "right medial")
+ZONES: Mapping[int, tuple[str, str]] = {
+    0: ("free", "#D55E00"),
+    1: ("clamped", "#009E73"),
+    2: ("contact, left", "#0072B2"),
+    3: ("contact, right", "#F0E442"),
+}
+"""Codes of the boundary's zones, their names and colours (red, green, blue and yellow in the paper)."""
+
+
+@styled
+def zones_picture(
+    mesh: TriangleMesh,
+    zones: NDArray[np.integer],
+    *,
+    fissure_x_mm: float,
+    names: Mapping[int, tuple[str, str]] = ZONES,
+    views: Sequence[str] = ZONE_VIEWS,
+    title: str = "",
+    synthetic: bool = False,
+) -> Figure:
+    """Returns the zones of the brain's boundary from several sides, with their areas.
+
+    Parameters
+    ----------
+    zones : (m,) code of each face
+    fissure_x_mm
+        Where the medial views part the hemispheres.
+    names : {code: (name, colour)}
+
+    Raises
+    ------
+    InputError
+        If the number of codes is not the number of faces, or a code has no name.
+    """
+    if len(zones) != len(mesh.faces):
+        raise InputError("zones do not fit the surface", found=f"{len(zones)} codes", expected=f"{len(mesh.faces)}")
+    unknown = sorted(set(np.unique(zones).tolist()) - set(names))
+    if unknown:
+        raise InputError("unknown zone", found=unknown, expected=list(names))
+    table = np.zeros((max(names) + 1, 3))
+    for code, (_, colour) in names.items():
+        table[code] = to_rgb(colour)
+    areas = np.bincount(zones, weights=face_areas(mesh), minlength=max(names) + 1) * CM2_PER_MM2
+    legend = [Patch(color=colour, label=f"{name} {areas[code]:.1f} cm²") for code, (name, colour) in names.items()]
+    columns, rows = _one_row(mesh, table[zones], views, fissure_x_mm)
+    return panel_grid(columns, rows, title=title, synthetic=synthetic, legend=legend)
+
+
+@styled
+def field_picture(
+    mesh: TriangleMesh,
+    values: Floats,
+    *,
+    label: str,
+    fissure_x_mm: float,
+    views: Sequence[str] = ZONE_VIEWS,
+    title: str = "",
+    synthetic: bool = False,
+) -> Figure:
+    """Returns a field at the pial vertices, such as the growth weight, from several sides.
+
+    Parameters
+    ----------
+    values : (n,)
+    label
+        Name and unit, for example "growth weight" or "tangential growth increment (10⁻³)".
+    """
+    scale = colour_scale("viridis", float(np.nanmin(values)), float(np.nanmax(values)))
+    columns, rows = _one_row(mesh, painted(values, scale), views, fissure_x_mm)
+    return panel_grid(columns, rows, title=title, synthetic=synthetic, colour_bars=[(scale, label)])
+
+
+def _one_row(
+    mesh: TriangleMesh, colours: Floats, views: Sequence[str], fissure_x_mm: float
+) -> tuple[list[str], list[Row]]:
+    panels = [Panel(*restricted(mesh, colours, view.hemisphere, fissure_x_mm), view) for view in named_views(views)]
+    return [f"{name} view" for name in views], [Row("", panels)]

@@ -1,0 +1,13 @@
+"""The chart of all bands at one week."""
+
+from gyriflow.io.figures import write_figure
+from gyriflow.io.files import read_table
+from gyriflow.report.spectra import spectra_chart
+from gyriflow.step import step
+
+params = snakemake.params
+with step(snakemake.log[0]):
+    figure = spectra_chart(
+        read_table(snakemake.input[0]), week=params.week, bands=range(1, 7), synthetic=params.synthetic
+    )
+    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

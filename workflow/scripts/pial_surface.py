@@ -1,0 +1,26 @@
+"""The clean pial surface of a brain and of its hemispheres in RAS+ mm, from whatever the brain is given as."""
+
+from gyriflow.io.files import write_json
+from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.step import step
+from gyriflow.surface.labels import SCHEMES
+from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial
+
+files, output, params = list(snakemake.input), snakemake.output, snakemake.params
+with step(snakemake.log[0]):
+    match params.source:
+        case "labels":
+            volume = read_label_volume(files[0], affine_from=params.reading["affine_from"])
+            scheme = SCHEMES[params.reading["scheme"]]
+            surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
+        case "hemispheres":
+            left, right = map(read_surface, files)
+            surface = from_hemispheres(left, right, week=params.week, **params.reading, **params.settings)
+        case "pial":
+            surface = from_pial(read_surface(files[0]), week=params.week, **params.reading, **params.settings)
+    write_surface(output.whole, surface.whole)
+    write_surface(output.left, surface.left, "CortexLeft")
+    write_surface(output.right, surface.right, "CortexRight")
+    write_surface(output.stl, surface.whole)
+    write_json(output.report, {"week": params.week, "fissure_x_mm": surface.fissure_x_mm, **surface.report})

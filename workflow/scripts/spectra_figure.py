@@ -1,0 +1,10 @@
+"""The chart of the fold bands B4 to B6 over the weeks."""
+
+from gyriflow.io.figures import write_figure
+from gyriflow.io.files import read_table
+from gyriflow.report.spectra import spectra_weeks_chart
+from gyriflow.step import step
+
+with step(snakemake.log[0]):
+    figure = spectra_weeks_chart(read_table(snakemake.input[0]), synthetic=snakemake.params.synthetic)
+    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=snakemake.params.dpi)
