@@ -11,7 +11,7 @@ sys.path.insert(0, SOURCE)
 # a configuration given on the command line replaces the demo instead of being mixed with it
 if not workflow.overwrite_configfiles:
     own = Path("config/config.yaml")
-    demo = own if own.is_file() else Path(workflow.basedir, own)
+    demo = own.resolve() if own.is_file() else Path(workflow.basedir, own)
 
     configfile: demo
 

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from .errors import GyriflowError, StorageError
+from .errors import GyriflowError, InputError, StorageError
+from .io.yaml_files import read_yaml
 from .step import EXIT_FILE, INTERRUPTED, recorded_exit_code
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -86,6 +87,24 @@ def value_of(arguments: Sequence[str], *names: str) -> str | None:
     return found
 
 
+def refuse_bad_configfiles(arguments: Sequence[str]) -> None:
+    """Raises InputError where a configuration file of the command line is missing, no YAML, or names a key twice."""
+    given = False
+    for argument in arguments:
+        option, _, value = argument.partition("=")
+        if argument.startswith("-"):
+            given = option in ("--configfile", "--configfiles")
+            argument = value
+        if given and argument:
+            try:
+                read_yaml(argument)
+            except InputError as error:
+                remedy = (
+                    "" if Path(argument).exists() else ". Targets stand before --configfile, or after another option"
+                )
+                raise InputError(f"configuration {error}{remedy}") from error
+
+
 def completed(arguments: Sequence[str]) -> list[str]:
     """Returns Snakemake's arguments with this checkout's Snakefile where the user named none and none lies here."""
     if value_of(arguments, "--snakefile", "-s") is not None or any(Path(name).is_file() for name in SNAKEFILES):
@@ -95,11 +114,12 @@ def completed(arguments: Sequence[str]) -> list[str]:
 
 def main(arguments: Sequence[str]) -> int:
     """Runs Snakemake and returns the exit code: its own, or that of the first failed step."""
-    from snakemake import cli  # takes a second, which a refused run need not wait for
-
+    refuse_bad_configfiles(arguments)
     directory = Path(value_of(arguments, "--directory", "-d") or ".")
     if not LOOKS_ONLY.intersection(arguments):
         clear_stale_lock(directory)
+    from snakemake import cli  # takes a second, which a refused run need not wait for
+
     # beside the results, where jobs on other machines of a cluster find it too
     exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
     os.environ[EXIT_FILE] = str(exit_file)

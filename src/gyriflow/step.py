@@ -44,7 +44,11 @@ def step(log: str) -> Iterator[None]:
     ends it with a traceback there.
     """
     logging.basicConfig(
-        level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s", filename=log, filemode="w", force=True
+        level=logging.INFO,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+        filename=log,
+        filemode="w",
+        force=True,
     )
     logging.captureWarnings(True)
     try:
@@ -66,7 +70,9 @@ def step(log: str) -> Iterator[None]:
 
 def _end_shell_step(code: int, log: str) -> int:
     if code == KILLED:
-        message = "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
+        message = (
+            "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
+        )
         print(message, file=sys.stderr)
         with Path(log).open("a") as file:
             file.write(message + "\n")

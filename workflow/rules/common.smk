@@ -24,9 +24,10 @@ def validated_config():
         base = Path.cwd()
         for path in workflow.configfiles:
             # Snakemake's own reading keeps the last of two equal keys
-            content = read_yaml(path)
+            file = Path(workflow.workdir_init, path)
+            content = read_yaml(file)
             if isinstance(content, dict) and "brains" in content:
-                base = Path(path).resolve().parent
+                base = file.resolve().parent
         return load(config, base)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)

@@ -32,6 +32,12 @@ rule metrics_figure:
             labels={"figure": "metrics over the weeks"},
         ),
         pdf=f"{FIGURES}/metrics.pdf",
+        table=report(
+            "results/study/metrics_table.html",
+            caption="../report/metrics_table.rst",
+            category="Metrics",
+            labels={"figure": "metrics, table"},
+        ),
     log:
         "results/study/logs/metrics_figure.log",
     benchmark:
@@ -118,7 +124,7 @@ rule displacement_figure:
             "results/study/displacement_table.html",
             caption="../report/displacement_table.rst",
             category="Folding",
-            labels={"figure": "displacement table"},
+            labels={"figure": "displacement per week, table"},
         ),
     log:
         "results/study/logs/displacement_figure.log",
@@ -277,7 +283,7 @@ rule zones_figure:
     input:
         mesh=rules.tetrahedralise.output.mesh,
         data=rules.tetrahedralise.output.data,
-        params=rules.parameters.output,
+        params=rules.parameters.output[0],
     output:
         png=report(
             f"{FIGURES}/zones.{{run}}.png",

@@ -58,7 +58,7 @@ rule simulate:
 rule folded_surface:
     input:
         frames=rules.simulate.output.frames,
-        params=rules.parameters.output,
+        params=rules.parameters.output[0],
     output:
         whole=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.pial.surf.gii",
         left=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.left.pial.surf.gii",

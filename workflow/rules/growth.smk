@@ -40,6 +40,12 @@ rule growth_figure:
             labels={"figure": "cortical growth rates"},
         ),
         pdf=f"results/{START}/growth/growth.pdf",
+        table=report(
+            f"results/{START}/growth/rates.html",
+            caption="../report/growth_table.rst",
+            category="Brains and growth",
+            labels={"figure": "growth rates, table"},
+        ),
     log:
         f"results/{START}/logs/growth_figure.log",
     benchmark:

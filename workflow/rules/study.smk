@@ -72,7 +72,13 @@ rule study_runs:
         params=expand(rules.parameters.output, run=RUNS),
         summaries=expand(rules.simulate.output.summary, run=RUNS),
     output:
-        "results/study/runs.csv",
+        csv="results/study/runs.csv",
+        table=report(
+            "results/study/runs.html",
+            caption="../report/runs_table.rst",
+            category="Folding",
+            labels={"figure": "parameters and summaries of the runs"},
+        ),
     log:
         "results/study/logs/study_runs.log",
     benchmark:
@@ -84,7 +90,7 @@ rule study_runs:
         runtime=5,
     params:
         runs=RUNS,
-        code=code(),
+        code=code("report"),
     script:
         "../scripts/study_runs.py"
 

@@ -1,16 +1,14 @@
-"""The chart of areas, volumes and growth rates."""
+"""The chart of areas, volumes and growth rates, and the table of the rates."""
 
-from gyriflow.io.figures import write_figure
+from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_table
 from gyriflow.report.charts import growth_chart
+from gyriflow.report.tables import growth_table, html_table
 from gyriflow.step import step
 
-params = snakemake.params
+output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
-    figure = growth_chart(
-        read_table(snakemake.input.areas),
-        read_table(snakemake.input.rates),
-        folding_rate_per_s=params.folding_rate_per_s,
-        synthetic=params.synthetic,
-    )
-    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)
+    areas, rates = read_table(snakemake.input.areas), read_table(snakemake.input.rates)
+    figure = growth_chart(areas, rates, folding_rate_per_s=params.folding_rate_per_s, synthetic=params.synthetic)
+    write_figure(output.png, output.pdf, figure, dpi=params.dpi)
+    write_html(output.table, html_table(growth_table(rates), caption="Growth rates", synthetic=params.synthetic))

@@ -1,10 +1,14 @@
-"""The chart of metrics over the weeks."""
+"""The chart of metrics over the weeks, and their table."""
 
-from gyriflow.io.figures import write_figure
+from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_table
 from gyriflow.report.charts import metrics_chart
+from gyriflow.report.tables import html_table, metrics_table
 from gyriflow.step import step
 
+output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
-    figure = metrics_chart(read_table(snakemake.input[0]), synthetic=snakemake.params.synthetic)
-    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=snakemake.params.dpi)
+    metrics = read_table(snakemake.input[0])
+    write_figure(output.png, output.pdf, metrics_chart(metrics, synthetic=params.synthetic), dpi=params.dpi)
+    table = metrics_table(metrics, synthetic=params.synthetic)
+    write_html(output.table, html_table(table, caption="Metrics of whole brains", synthetic=params.synthetic))

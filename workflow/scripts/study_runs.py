@@ -1,15 +1,18 @@
-"""Parameters and summaries of all runs, a row each."""
+"""Parameters and summaries of all runs: a row each, and as a table for the report."""
 
 import pandas as pd
 
+from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.report.tables import html_table, runs_table
 from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0]):
-    rows = [
-        {"run": run, **read_yaml(params), **read_json(summary)}
+    runs = {
+        run: {**read_yaml(params), **read_json(summary)}
         for run, params, summary in zip(snakemake.params.runs, files.params, files.summaries, strict=True)
-    ]
-    write_table(snakemake.output[0], pd.json_normalize(rows))
+    }
+    write_table(snakemake.output.csv, pd.json_normalize([{"run": run, **values} for run, values in runs.items()]))
+    write_html(snakemake.output.table, html_table(runs_table(runs), caption="Parameters and summaries of the runs"))

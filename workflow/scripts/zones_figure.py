@@ -5,7 +5,7 @@ from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.report.renders import zones_picture
+from gyriflow.report.zones import zones_picture
 from gyriflow.step import step
 
 with step(snakemake.log[0]):

@@ -17,7 +17,7 @@ class PhantomSettings(Settings):
 
     voxel_mm: float = setting(0.8, "mm", "Edge of the isotropic voxels.", ge=0.3, le=2.0)
     seed: int = setting(0, "", "Seed of the folds' random pattern.", ge=0)
-    cortex_mm: float = setting(1.6, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
+    cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
 
 
 class HemisphereFiles(Settings):

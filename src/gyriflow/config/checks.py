@@ -6,6 +6,8 @@ from typing import Any
 from .brains import SOURCES
 from .folding import FoldingSettings
 
+PHANTOM_WEEKS = (21, 36)
+"""Gestational weeks of which synthetic brains can be made."""
 RESERVED_BRAINS = ("study", "report")
 """Folders of results that belong to no brain."""
 RESERVED_RUNS = ("real",)
@@ -26,6 +28,9 @@ def brain_problems(raw: Any, where: str) -> list[str]:
     for key, sources in {"scheme": ("labels",), "affine_from": ("labels",), "coordinates": SOURCES[1:3]}.items():
         if key in raw and len(given) == 1 and given[0] not in sources:
             problems.append(f"{where}.{key}: has no meaning with {given[0]}; only with {' or '.join(sources)}")
+    week = _number(raw.get("week"))
+    if "phantom" in given and week is not None and not PHANTOM_WEEKS[0] <= week <= PHANTOM_WEEKS[1]:
+        problems.append(f"{where}.week: found {week:g}; a phantom's should be {PHANTOM_WEEKS[0]} to {PHANTOM_WEEKS[1]}")
     return problems
 
 

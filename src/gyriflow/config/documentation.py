@@ -74,7 +74,14 @@ def _row(name: str, field: FieldInfo) -> str:
         for key, text in BOUNDS.items()
         if getattr(bound, key, None) is not None
     ]
-    cells = [f"`{name}`", _type_name(field.annotation), unit, _default(field), ", ".join(bounds), field.description or ""]
+    cells = [
+        f"`{name}`",
+        _type_name(field.annotation),
+        unit,
+        _default(field),
+        ", ".join(bounds),
+        field.description or "",
+    ]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

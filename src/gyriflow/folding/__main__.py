@@ -2,8 +2,6 @@
 
 import argparse
 import fcntl
-import hashlib
-import os
 import sys
 import traceback
 from collections.abc import Iterator
@@ -62,23 +60,6 @@ def locked(folder: Path) -> Iterator[None]:
         raise StorageError(f"cannot be written: {error}", path=folder) from None
 
 
-def form_compiler_options(comm: MPI.Comm) -> dict:
-    """Returns options of the form compiler, with a cache of this kind of processor, cleared of torn entries."""
-    flags = next((line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")), "")
-    kind = hashlib.sha256(flags.encode()).hexdigest()[:8]
-    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
-    if comm.rank == 0:
-        cache.mkdir(parents=True, exist_ok=True)
-        for source in cache.glob("*.c"):
-            if not source.with_suffix(".c.cached").exists():
-                # left by a compiler that was killed: everyone would wait for it
-                source.unlink(missing_ok=True)
-    comm.barrier()
-    # -ffast-math would break the checks for numbers that are none
-    return {"cffi_extra_compile_args": ["-O3", "-march=native"], "cache_dir": str(cache), "timeout": 120}
-
-
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Reads, checks, prints what is to be solved, and solves it."""
     parameters = read_parameters(arguments.params)
@@ -109,7 +90,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         refuse_impossible(mesh, zones)
         write_json(arguments.out / ZONES, report)
     comm.barrier()
-    run(comm, mesh, zones, parameters, arguments.out, jit_options=form_compiler_options(comm))
+    run(comm, mesh, zones, parameters, arguments.out)
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:

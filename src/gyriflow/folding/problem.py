@@ -17,6 +17,7 @@ from ..mechanics.growth_tensor import inverse_growth_tensor
 from ..mechanics.kinematics import deformation_gradient, elastic_deformation
 from ..mechanics.neo_hookean import bulk_to_shear_ratio, strain_energy_density
 from ..units import M_PER_MM
+from .compilation import form_compiler
 from .domain import Domain
 from .zones import CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, Zones
 
@@ -40,8 +41,6 @@ class Problem:
         The mesh, its fixed zones, and constants.
     quadrature_degree
         1 takes stiffness and growth at the centre of each element; higher degrees take them as linear in it.
-    jit_options
-        Options of the form compiler.
 
     Attributes
     ----------
@@ -49,9 +48,7 @@ class Problem:
         The displacement of the step in m, the unknown.
     """
 
-    def __init__(
-        self, domain: Domain, zones: Zones, material: Material, *, quadrature_degree: int = 1, jit_options: dict
-    ) -> None:
+    def __init__(self, domain: Domain, zones: Zones, material: Material, *, quadrature_degree: int = 1) -> None:
         self.domain = domain
         mesh = domain.mesh
         self.u = dolfinx.fem.Function(domain.space)
@@ -78,9 +75,10 @@ class Problem:
             energy += contact_energy_density(x, planes[1], +1, penalty) * ds(RIGHT_CONTACT)
         residual = ufl.derivative(energy, self.u)
         tangent = ufl.derivative(residual, self.u)
-        self._energy, self._residual, self._tangent = (
-            dolfinx.fem.form(form, jit_options=jit_options) for form in (energy, residual, tangent)
-        )
+        with form_compiler(domain.comm) as options:
+            self._energy, self._residual, self._tangent = (
+                dolfinx.fem.form(form, jit_options=options) for form in (energy, residual, tangent)
+            )
 
         clamped = np.zeros(len(domain.positions), dtype=bool)
         clamped[zones.vertices_of(CLAMPED)] = True

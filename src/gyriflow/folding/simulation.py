@@ -38,8 +38,6 @@ class Folding:
         The brain at the start, RAS+ mm; the whole mesh on every rank.
     zones, parameters
         What holds through the run.
-    jit_options
-        Options of the form compiler.
     quadrature_degree
         See `Problem`.
     """
@@ -51,16 +49,13 @@ class Folding:
         zones: Zones,
         parameters: FoldingParameters,
         *,
-        jit_options: dict,
         quadrature_degree: int = 1,
     ) -> None:
         self.parameters = parameters
         self.zones = zones
         self.domain = Domain(comm, mesh)
         material = Material(parameters.poisson_ratio, parameters.contact.penalty_pa_per_m)
-        self.problem = Problem(
-            self.domain, zones, material, quadrature_degree=quadrature_degree, jit_options=jit_options
-        )
+        self.problem = Problem(self.domain, zones, material, quadrature_degree=quadrature_degree)
         self._pial = np.unique(zones.facets)
         self._growth = self.domain.local(zones.growth)
         edge = float(np.cbrt(self.domain.cell_volumes(self.domain.local(self.domain.positions)).mean()))
@@ -164,15 +159,13 @@ def run(
     zones: Zones,
     parameters: FoldingParameters,
     out: Path,
-    *,
-    jit_options: dict,
 ) -> None:
     """Folds a brain from the first to the last output week and writes the files of DESIGN's folding stage into `out`.
 
     Goes on from a checkpoint in `out` that belongs to this mesh and these parameters.
     """
     began = time.monotonic()
-    folding = Folding(comm, mesh, zones, parameters, jit_options=jit_options)
+    folding = Folding(comm, mesh, zones, parameters)
     key = run_key(mesh, parameters)
     folder = out / f"checkpoint-{key}"
     state, message = comm.bcast(

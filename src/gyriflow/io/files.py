@@ -4,7 +4,7 @@ import json
 import math
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,8 @@ def replaced(path: AnyPath) -> Iterator[Path]:
             remedy="Free disk space or choose a folder that can be written (--directory); earlier files are unchanged.",
         ) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _plain(value: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Literal
 import nibabel as nib
 import numpy as np
 from nibabel.filebasedimages import ImageFileError
-from nibabel.spatialimages import HeaderDataError
+from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
 
 from gyriflow.errors import InputError
@@ -48,6 +48,8 @@ def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto") -> Labe
     """
     try:
         image = nib.load(path)
+        if not isinstance(image, SpatialImage):
+            raise InputError("is no volume", path=path, found=type(image).__name__, expected="a label volume")
         values = np.asanyarray(image.dataobj)
     except FileNotFoundError as error:
         raise InputError("no such file", path=path, expected="a label volume (.nii, .nii.gz, .mgz)") from error
@@ -58,9 +60,9 @@ def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto") -> Labe
             expected="a whole label volume (.nii, .nii.gz, .mgz)",
             remedy="The file may be truncated or of another kind: copy or download it again.",
         ) from error
+    labels = _whole_numbers(_three_axes(values, path), path)
     affine = _nifti_affine(image, affine_from, path) if isinstance(image, nib.Nifti1Image) else image.affine
-    affine = _checked_affine(np.array(affine, dtype=float), path)
-    return LabelVolume(_whole_numbers(_three_axes(values, path), path), affine)
+    return LabelVolume(labels, _checked_affine(np.array(affine, dtype=float), path))
 
 
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:

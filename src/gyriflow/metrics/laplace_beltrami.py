@@ -9,7 +9,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import MeshError, SolverError
-from ..geometry.triangles import Floats, TriangleMesh
+from ..geometry.triangles import Floats, Ints, TriangleMesh
 
 MODES_PER_SLICE = 80
 """Modes asked of ARPACK per shift. Between 40 and 160 the time differs by a fifth."""
@@ -66,9 +66,7 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     done, cut = 0, -spacing
     while done < count:
         wanted = min(MODES_PER_SLICE, 2 * (count - done) + 8)
-        slice_values, slice_functions, end = _next_slice(
-            stiffness, mass, done, cut, cut + 0.5 * wanted * spacing, wanted
-        )
+        slice_values, slice_functions, end = _next_slice(stiffness, mass, done, cut, spacing, wanted)
         new = min(len(slice_values), count - done)
         values[done : done + new] = slice_values[:new]
         functions[:, done : done + new] = slice_functions[:, :new]
@@ -100,9 +98,10 @@ def _factorise(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: flo
 
 
 def _next_slice(
-    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, done: int, cut: float, shift: float, wanted: int
+    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, done: int, cut: float, spacing: float, wanted: int
 ) -> tuple[Floats, Floats, float]:
-    """Returns the eigenvalues from `cut`, below which `done` lie, to a gap above `shift`; their functions; the gap."""
+    """Returns the eigenvalues above `cut`, below which `done` lie, up to a gap; their functions; the gap."""
+    shift = cut + 0.5 * wanted * spacing
     factors, below = _factorise(stiffness, mass, shift)
     while below - done > wanted:  # the spectrum is denser than expected
         shift = cut + (shift - cut) * 0.5 * wanted / (below - done)
@@ -110,11 +109,13 @@ def _next_slice(
 
     # the modes nearest to the shift: as many above it as there are between the cut and it, and a few more
     number = max(2 * (below - done), wanted) + 8
-    values, functions = _nearest(stiffness, mass, factors, shift, number, np.empty(0), np.empty((mass.shape[0], 0)))
-    above = np.flatnonzero(values > shift)
-    upper = above[len(above) // 2 : -1]
-    widest = upper[np.argmax(values[upper + 1] - values[upper])]
-    end = 0.5 * (values[widest] + values[widest + 1])
+    values: Floats = np.empty(0)
+    functions: Floats = np.empty((mass.shape[0], 0))
+    gaps: Ints = np.empty(0, dtype=np.int64)
+    while not len(gaps):  # mostly once; equal eigenvalues, as on a sphere, leave no gap among few
+        values, functions = _nearest(stiffness, mass, factors, shift, number, values, functions)
+        gaps = np.flatnonzero((values[:-1] > shift) & (np.diff(values) > 0.1 * spacing))
+    end = 0.5 * (values[gaps[-1]] + values[gaps[-1] + 1])
 
     expected = count_below(stiffness, mass, end) - done
     for _ in range(4):
@@ -122,9 +123,11 @@ def _next_slice(
         missing = expected - np.count_nonzero(inside)
         if missing == 0:
             return values[inside], functions[:, inside], end
-        values, functions = _nearest(stiffness, mass, factors, shift, abs(missing) + 8, values, functions)
+        if missing < 0:
+            break
+        values, functions = _nearest(stiffness, mass, factors, shift, missing + 8, values, functions)
     raise SolverError(
-        f"modes are missing between λ = {cut:g} and {end:g} mm⁻²",
+        f"the number of modes is wrong between λ = {cut:g} and {end:g} mm⁻²",
         found=expected - missing,
         expected=expected,
         remedy="Remesh the surface: slivers make its spectrum inexact",

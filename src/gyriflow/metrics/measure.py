@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..errors import MeshError
 from ..geometry.triangles import TriangleMesh, area, mean_edge_length, signed_volume, vertex_areas
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import Curvature, continued, curvature
@@ -67,6 +68,8 @@ def measure_brain(
         a tenth of its vertices.
     spangy_wavelength
         The formula of Weyl's number, see `spangy.weyl_number`.
+
+    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
     rows = [("whole", *row) for row in _global_metrics(whole)]
     rows += [("whole", *row) for row in _curvature_means(whole, curvature(whole, rings=curvature_radius))]
@@ -96,8 +99,16 @@ Row = tuple[str, float, str]
 
 
 def _global_metrics(mesh: TriangleMesh) -> list[Row]:
+    volume_mm3 = signed_volume(capped(mesh))
+    if volume_mm3 <= 0:
+        raise MeshError(
+            "the faces of the surface look inwards",
+            found=f"volume {volume_mm3 * ML_PER_MM3:.3g} mL",
+            expected="a positive volume",
+            remedy="Turn the faces round",
+        )
     return [
-        ("volume", signed_volume(capped(mesh)) * ML_PER_MM3, "mL"),
+        ("volume", volume_mm3 * ML_PER_MM3, "mL"),
         ("area", area(mesh) * CM2_PER_MM2, "cm2"),
         ("gyrification_index", gyrification_index(mesh, convex_hull(mesh)), "1"),
         ("gyrification_index_envelope", gyrification_index(mesh, envelope(mesh)), "1"),
@@ -128,11 +139,12 @@ def _spectrum(
 
 def _spectrum_metrics(analysis: Spectrum, proxy: SpangyProxy) -> list[Row]:
     unit = "mm2" if proxy == "shape_index" else "1"
+    bands = analysis.bands
     rows: list[Row] = []
-    for band in analysis.bands.itertuples():
-        rows.append((f"spangy_B{band.band}_power", float(band.power), unit))
-        if band.band > 0:
-            rows.append((f"spangy_B{band.band}_relative_power", float(band.relative_power), "1"))
+    for band, power, share in zip(bands["band"], bands["power"], bands["relative_power"], strict=True):
+        rows.append((f"spangy_B{band}_power", float(power), unit))
+        if band > 0:
+            rows.append((f"spangy_B{band}_relative_power", float(share), "1"))
     return [
         *rows,
         ("spangy_modes", float(len(analysis.eigenvalues)), "1"),

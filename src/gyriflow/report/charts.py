@@ -19,6 +19,7 @@ from .style import (
     RUN_COLOURS,
     SINGLE_COLUMN_IN,
     column_label,
+    from_zero,
     light_grid,
     measured_name,
     new_figure,
@@ -71,14 +72,14 @@ def growth_chart(
     known = areas.sort_values("week")
     area_axes.plot(known["week"], known["area_cm2"], "o-", color=RUN_COLOURS[0])
     area_axes.set_ylabel("pial area (cm²)", color=RUN_COLOURS[0])
-    area_axes.set_ylim(bottom=0)
+    from_zero(area_axes)
     week_axis(area_axes, known["week"])
     light_grid(area_axes)
     volume_axes = area_axes.twinx()
     volume_axes.spines["right"].set_visible(True)
     volume_axes.plot(known["week"], known["volume_ml"], "s--", color=RUN_COLOURS[1])
     volume_axes.set_ylabel("volume (mL)", color=RUN_COLOURS[1])
-    volume_axes.set_ylim(bottom=0)
+    from_zero(volume_axes)
     area_axes.set_title(f"{measured_name(synthetic)}: area and volume")
 
     scaled = rates["rate_per_s"] * 1e7
@@ -105,6 +106,9 @@ def growth_chart(
     if len(labels) > 6:
         rate_axes.tick_params(axis="x", rotation=45)
     rate_axes.margins(y=0.12)
+    # room for three bars at least, else a single one fills the panel
+    spare = max(0.0, 3 - len(labels)) / 2
+    rate_axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
     return figure
 
 
@@ -215,13 +219,13 @@ def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False
         axes.set_ylabel(label)
         light_grid(axes)
         if len(columns) > 1:
-            axes.set_ylim(bottom=0)
+            from_zero(axes)
             axes.legend(loc="lower right", ncols=len(columns), bbox_to_anchor=(1.0, 0.98), borderaxespad=0)
     for axes in panels[:2]:
-        axes.set_ylim(bottom=0)
+        from_zero(axes)
         axes.yaxis.get_major_locator().set_params(integer=True, nbins=5)
     panels[2].axhline(0, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
-    panels[4].set_ylim(bottom=0)
+    from_zero(panels[4])
     figure.align_ylabels(panels)
     week_axis(panels[4], week)
     unusual = steps[steps["rung"] != steps["rung"].mode().iloc[0]]

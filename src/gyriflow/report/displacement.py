@@ -4,7 +4,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from .style import FULL_WIDTH_IN, MUTED_COLOUR, light_grid, new_figure, run_colours, run_legend, styled, week_axis
+from .style import (
+    FULL_WIDTH_IN,
+    MUTED_COLOUR,
+    from_zero,
+    light_grid,
+    new_figure,
+    run_colours,
+    run_legend,
+    styled,
+    week_axis,
+)
 
 _PAPER = "FetalFoldSim"
 _MEASURED = "Wang et al. 2021"
@@ -89,7 +99,7 @@ def displacement_chart(
             axes.plot(middle, rows[column], "o-", color=colours[run], label=run)
         axes.set_title(f"{label} |u| per interval, {nodes} nodes")
         axes.set_ylabel("displacement (mm)")
-        axes.set_ylim(bottom=0)
+        from_zero(axes)
         week_axis(axes, [*ends["from_week"], *ends["to_week"]])
         axes.set_xlabel("gestational age (GW), middle of the interval")
         light_grid(axes)

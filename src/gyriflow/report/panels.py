@@ -54,7 +54,7 @@ class _Layout:
         return self.panel / (2 * self.half_width_mm)
 
 
-def _round_length(limit_mm: float) -> float:
+def round_length(limit_mm: float) -> float:
     """Returns the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
     decade = 10.0 ** np.floor(np.log10(limit_mm))
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= limit_mm * (1 + 1e-9)))
@@ -166,7 +166,7 @@ def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, heigh
 def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
     total = figure.get_figheight()
     room_mm = (_SCALE_SHARE * layout.width - 2 * _EDGE_IN) / layout.inches_per_mm
-    length = _round_length(min(1.2 * layout.half_width_mm, room_mm))
+    length = round_length(min(1.2 * layout.half_width_mm, room_mm))
     size = (length * layout.inches_per_mm / layout.width, 0.04 / total)
     axes = figure.add_axes((_EDGE_IN / layout.width, (layout.foot - 0.2) / total, *size))
     axes.set_label("scale bar")

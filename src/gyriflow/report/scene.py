@@ -167,8 +167,8 @@ def render(
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
         distance = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
         plotter.camera_position = [tuple(middle + distance * np.array(view.towards)), tuple(middle), view.up]
-        plotter.enable_parallel_projection()
-        plotter.parallel_scale = half_height_mm
+        plotter.camera.parallel_projection = True
+        plotter.camera.parallel_scale = half_height_mm
         plotter.renderer.ResetCameraClippingRange()
         plotter.enable_anti_aliasing("ssaa")
         return np.array(plotter.screenshot(return_img=True))[..., :3]

@@ -14,6 +14,7 @@ from .style import (
     MEASURED,
     MUTED_COLOUR,
     REAL_COLOUR,
+    from_zero,
     light_grid,
     new_figure,
     run_colours,
@@ -26,7 +27,7 @@ from .style import (
 
 FOLD_BANDS = (4, 5, 6)
 """Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
-_FOLDS = {4: "primary folds", 5: "secondary folds", 6: "tertiary folds"}
+_FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
 _INCOMPLETE_HATCH = "//////"
 
 
@@ -89,11 +90,12 @@ def spectra_chart(
             face = REAL_COLOUR if real["trusted"] else "white"
             axes.plot(centre, real["relative_power"], "*", color=REAL_COLOUR, markerfacecolor=face, markersize=8)
         axes.set_xticks(range(len(bands)), [f"B{band}\n{_FOLDS.get(band, '')}" for band in bands])
+        axes.set_xlabel("SpAnGy band, and the folds that go with it")
         axes.set_xlim(-0.5, len(bands) - 0.5)
         axes.set_title(f"{hemisphere} hemisphere")
         light_grid(axes)
     panels[0].set_ylabel("relative power")
-    panels[0].set_ylim(bottom=0)
+    from_zero(panels[0])
     extra = []
     if not rows["trusted"].all():
         extra = [
@@ -145,12 +147,13 @@ def spectra_weeks_chart(
                         markersize=size,
                     )
             week_axis(axes, rows["week"])
-            axes.set_ylim(bottom=0)
             light_grid(axes)
             if hemisphere == "left":
-                axes.set_title(f"B{band}, {_FOLDS[band]}" if band in _FOLDS else f"B{band}")
+                axes.set_title(f"B{band}, {_FOLDS[band]} folds" if band in _FOLDS else f"B{band}")
                 axes.set_xlabel("")
         line[0].set_ylabel(f"{hemisphere} hemisphere\nrelative power")
+    for axes in panels[0]:
+        from_zero(axes)
     extra = []
     if not rows["trusted"].all():
         hollow = {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}

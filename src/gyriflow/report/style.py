@@ -1,5 +1,6 @@
 """The look that all figures share: sizes for print, fonts, colour-blind-safe colours, headings."""
 
+import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from functools import wraps
@@ -64,10 +65,7 @@ def styled[**P](chart: Callable[P, Figure]) -> Callable[P, Figure]:
     @wraps(chart)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
         with style():
-            figure = chart(*args, **kwargs)
-            # ticks are made lazily and would else take the settings that hold when the figure is saved
-            figure.draw_without_rendering()
-            return figure
+            return chart(*args, **kwargs)
 
     return drawn
 
@@ -131,6 +129,14 @@ def week_axis(axes: Axes, weeks: Iterable[float] | None = None) -> None:
         values = list(weeks)
         margin = 0.04 * max(max(values) - min(values), 1.0)
         axes.set_xlim(min(values) - margin, max(values) + margin)
+
+
+def from_zero(axes: Axes) -> None:
+    """Makes the vertical axis begin at zero and end a little above the data of all panels that share it."""
+    tops = [panel.dataLim.ymax for panel in axes.get_shared_y_axes().get_siblings(axes)]
+    # panels without data have an infinite top
+    top = max((top for top in tops if math.isfinite(top)), default=0.0)
+    axes.set_ylim(0, 1.07 * top if top > 0 else 1.0)
 
 
 def light_grid(axes: Axes, axis: str = "y") -> None:

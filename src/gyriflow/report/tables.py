@@ -9,7 +9,7 @@ import pandas as pd
 
 from .style import MEASURED, measured_name
 
-UNIT_NAMES = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹"}
+UNIT_NAMES = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
 
 
 def growth_table(rates: pd.DataFrame) -> pd.DataFrame:

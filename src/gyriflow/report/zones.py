@@ -21,8 +21,9 @@ ZONES: Mapping[int, tuple[str, str]] = {
     1: ("clamped", "#009E73"),
     2: ("contact, left", "#0072B2"),
     3: ("contact, right", "#F0E442"),
+    4: ("between the planes", "#CC79A7"),
 }
-"""Codes of the boundary's zones, their names and colours (red, green, blue and yellow in the paper)."""
+"""Codes of the boundary's zones, their names and colours (near the paper's red, green, blue, yellow and purple)."""
 
 
 @styled

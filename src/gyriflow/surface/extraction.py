@@ -1,5 +1,7 @@
 """The pial surface of a mask of voxels, as an isosurface of the smoothed mask."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -7,22 +9,28 @@ from skimage.measure import marching_cubes
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
+from gyriflow.surface.topology import unambiguous, without_handles
 
 PAD_VOXELS = 6
 LEVEL = 0.5
+# slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
+EDGE_SLOPE = 0.4
+# a part of this size of the largest is kept: two hemispheres that do not touch
+COMPARABLE = 0.2
 
 
-def cropped(mask: NDArray[np.bool_], pad: int = PAD_VOXELS) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-    """Returns the (i, j, k) mask cut to its contents with `pad` empty voxels around, and its (3,) first index."""
+def cropped(mask: NDArray[np.bool_]) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
+    """Returns the slices that cut an (i, j, k) volume to the mask's contents, and the (3,) first index of the cut
+    volume once it has been padded with `PAD_VOXELS`.
+    """
     box = ndimage.find_objects(mask.astype(np.uint8))[0]
-    first = np.array([side.start for side in box]) - pad
-    return np.pad(mask[box], pad), first
+    return box, np.array([side.start for side in box]) - PAD_VOXELS
 
 
 def shifted_affine(affine: NDArray[np.float64], first: NDArray[np.int64]) -> NDArray[np.float64]:
     """Returns the affine of a volume that was cut (or padded) so that it begins at voxel `first`."""
-    moved = affine.copy()
-    moved[:3, 3] += affine[:3, :3] @ first
+    moved = np.array(affine, dtype=float)
+    moved[:3, 3] += moved[:3, :3] @ first
     return moved
 
 
@@ -31,18 +39,41 @@ def smoothed_mask(mask: NDArray[np.bool_], smoothing_voxels: float) -> NDArray[n
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
-def main_parts(mask: NDArray[np.bool_], comparable: float = 0.2) -> tuple[NDArray[np.bool_], int, int]:
+def main_parts(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int, int]:
     """Returns the mask's largest part and those of comparable size, filled, without the other parts.
 
-    Two hemispheres that do not touch are both kept: a part counts as comparable from `comparable` of the largest.
     The second and third value are the number of parts dropped and the number of voxels in them.
     """
     number, count = ndimage.label(mask)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0
-    kept = sizes >= comparable * sizes.max()
+    kept = sizes >= COMPARABLE * sizes.max()
+    kept[0] = False
     dropped = ~kept & (sizes > 0)
     return ndimage.binary_fill_holes(kept[number]), int(dropped.sum()), int(sizes[dropped].sum())
+
+
+def made_simple(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Returns the field with a level set of main parts only, without cavities and handles, and a report."""
+    inside = field > LEVEL
+    if not inside.any():
+        raise MeshError(
+            "nothing is left of the mask after smoothing",
+            remedy="The structure is thinner than the smoothing: lower smoothing_voxels, or check the labels.",
+        )
+    kept, parts, voxels = main_parts(inside)
+    field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)).astype(np.float32)
+    repair = without_handles(field)
+    return unambiguous(repair.field), {
+        "parts_dropped": parts,
+        "voxels_dropped": voxels,
+        "voxels_filled": int((kept & ~inside).sum()),
+        "bridges_cut": repair.bridges_cut,
+        "voxels_cut_from_bridges": repair.voxels_cut,
+        "tunnels_filled": repair.tunnels_filled,
+        "voxels_filled_in_tunnels": repair.voxels_filled,
+        "handles_left": repair.handles_left,
+    }
 
 
 def isosurface(field: NDArray[np.float32], affine: NDArray[np.float64]) -> TriangleMesh:

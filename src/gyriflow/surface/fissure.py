@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.surface.extraction import EDGE_SLOPE
 from gyriflow.surface.orientation import MidPlane, fissure_points
 
 Floats = NDArray[np.float64]
@@ -19,8 +20,6 @@ BEND_MM = 4.0
 FURTHEST_MM = 5.0
 # cortex that stays on the tissue which joins the hemispheres
 FLOOR_MM = 1.2
-# slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
-EDGE_SLOPE = 0.4
 
 
 @dataclass(frozen=True, eq=False)

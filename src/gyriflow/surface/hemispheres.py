@@ -1,48 +1,153 @@
-"""Left and right: a whole surface split at the fissure, two hemispheres merged without crossing."""
+"""Left and right: a whole surface split at the fissure, two hemispheres brought side by side without crossing."""
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas, submesh
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas, signed_volume, submesh
+
+Floats = NDArray[np.float64]
+# left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
+MOST_UNEQUAL = 1.15
+FURTHEST_APART_MM = 10.0
+# distance to the mirror image, relative to the brain's length, beyond which hemispheres are not in one pose
+MOST_ASYMMETRIC = 0.03
 
 
-def left_faces(mesh: TriangleMesh, fissure_x_mm: float) -> NDArray[np.bool_]:
-    """Returns the (m,) mask of the faces of the left hemisphere: x below the fissure in RAS+.
+def left_faces(mesh: TriangleMesh, heights: Floats) -> NDArray[np.bool_]:
+    """Returns the (m,) mask of the faces of the left hemisphere.
 
-    Patches that bulge over the fissure are given back to the hemisphere that surrounds them, so that each
-    hemisphere is in one piece for each closed surface it has a part of.
+    `heights` (m,) are the distances of the faces from the fissure, negative on the left. Patches that bulge over the
+    fissure are given back to the hemisphere that surrounds them, so that each hemisphere is in one piece for each
+    closed surface that it has a part of.
     """
-    side = corners(mesh)[:, :, 0].mean(axis=1) < fissure_x_mm
-    directed = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    face = np.repeat(np.arange(len(mesh.faces)), 3)
-    order = np.lexsort(directed.T)
-    same = (directed[order][1:] == directed[order][:-1]).all(axis=1)
-    a, b = face[order][:-1][same], face[order][1:][same]
+    side = heights < 0
+    a, b = _neighbours(mesh)
     surface = _components(a, b, len(side))
-    areas = face_areas(mesh)
     within = side[a] == side[b]
     piece = _components(a[within], b[within], len(side))
-    size = np.bincount(piece, weights=areas)
+    size = np.bincount(piece, weights=face_areas(mesh))
+    result = side.copy()
     for number in np.unique(surface):
-        for value in (True, False):
-            pieces = np.unique(piece[(surface == number) & (side == value)])
-            largest = pieces[np.argmax(size[pieces])] if len(pieces) else -1
-            small = np.isin(piece, pieces) & (piece != largest) & (size[piece] < 0.5 * size[largest])
-            side = np.where(small, not value, side)
-    return side
+        for left in (True, False):
+            mine = np.unique(piece[(surface == number) & (side == left)])
+            if len(mine):
+                strays = mine[size[mine] < 0.2 * size[mine].max()]
+                result[np.isin(piece, strays)] = not left
+    return result
 
 
 def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
     """Returns the left and the right hemisphere's pial surfaces; together they have every face of `mesh` once.
 
-    They are open where a connected brain is cut at the fissure.
+    The fissure is the plane x = `fissure_x_mm` in RAS+. The parts are open where a connected brain is cut.
     """
-    left = left_faces(mesh, fissure_x_mm)
+    return parted(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
+
+
+def parted(mesh: TriangleMesh, left: NDArray[np.bool_]) -> tuple[TriangleMesh, TriangleMesh]:
+    """Returns the surfaces of the faces where the (m,) mask holds, and of the others.
+
+    InputError where one of the two has no face.
+    """
+    if left.all() or not left.any():
+        raise InputError(
+            "the brain lies on one side of the interhemispheric fissure",
+            found=f"{int(left.sum())} of {len(left)} faces on the left",
+            expected="two hemispheres",
+            remedy="Give both hemispheres, in RAS+ or LPS coordinates as named in the config.",
+        )
     return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
 
 
-def _components(a: NDArray, b: NDArray, count: int) -> NDArray:
+def require_pair(left: TriangleMesh, right: TriangleMesh) -> None:
+    """Raises InputError where two surfaces in RAS+ can't be the left and right hemisphere of one brain.
+
+    Their centroids must be in order (left is the smaller x), their volumes within 15 % of each other.
+    """
+    x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
+    if x_left >= x_right:
+        raise InputError(
+            "the left hemisphere lies to the right of the right one",
+            found=f"centroids at x = {x_left:.1f} (left) and {x_right:.1f} mm (right)",
+            expected="left at the smaller x (RAS+)",
+            remedy="The files are swapped, or their coordinates are LPS: set coordinates: lps.",
+        )
+    volumes = signed_volume(left), signed_volume(right)
+    if max(volumes) > MOST_UNEQUAL * min(volumes):
+        raise InputError(
+            "the hemispheres are too different in size to be of one brain",
+            found=f"{volumes[0] / 1e3:.1f} mL (left) and {volumes[1] / 1e3:.1f} mL (right)",
+            expected=f"volumes within {100 * (MOST_UNEQUAL - 1):.0f} % of each other",
+            remedy="Give both hemispheres of the same subject and week.",
+        )
+
+
+def least_gap(left: TriangleMesh, right: TriangleMesh) -> float:
+    """Returns the least distance in mm between two closed surfaces, negative by the depth where they overlap."""
+    gaps = []
+    for one, other in ((left, right), (right, left)):
+        inward = igl.fast_winding_number(other.vertices, other.faces, one.vertices) > 0.5
+        distance = np.sqrt(igl.point_mesh_squared_distance(one.vertices, other.vertices, other.faces)[0])
+        gaps.append(float(np.where(inward, -distance, distance).min()))
+    return min(gaps)
+
+
+def require_common_pose(asymmetry_mm: float, length_mm: float) -> None:
+    """Raises InputError where two hemispheres together are no mirror images of each other in any plane.
+
+    `asymmetry_mm` is the mean distance to the mirror image, `length_mm` the brain's length.
+    """
+    if asymmetry_mm > MOST_ASYMMETRIC * length_mm:
+        raise InputError(
+            "the hemispheres are not posed as one brain",
+            found=f"{asymmetry_mm:.1f} mm between the surface and its mirror image",
+            expected=f"at most {MOST_ASYMMETRIC * length_mm:.1f} mm",
+            remedy="Give both hemispheres of one subject in the same coordinates.",
+        )
+
+
+def set_apart(
+    left: TriangleMesh, right: TriangleMesh, gap_mm: float, to_right: Floats
+) -> tuple[TriangleMesh, TriangleMesh, float]:
+    """Returns the hemispheres moved apart, each by the same, until they are `gap_mm` from each other.
+
+    They move along the direction `to_right` (3,), a unit vector from left to right.
+
+    The third value is the distance in mm by which each was moved; 0 where the gap was there already.
+    InputError where more than 10 mm would be needed.
+    """
+    moved = 0.0
+    gap = least_gap(left, right)
+    while gap < gap_mm:
+        # the shortest way out of an overlap is rarely along this direction, so more than one step may be needed
+        step = max(0.5 * (gap_mm - gap), 0.05)
+        moved += step
+        if moved > FURTHEST_APART_MM:
+            raise InputError(
+                "the hemispheres overlap too much to be of one brain in one pose",
+                found=f"an overlap beyond {2 * FURTHEST_APART_MM:g} mm",
+                expected="hemispheres side by side",
+                remedy="Give both hemispheres of one subject and week, in the same coordinates.",
+            )
+        left = TriangleMesh(left.vertices - step * to_right, left.faces)
+        right = TriangleMesh(right.vertices + step * to_right, right.faces)
+        gap = least_gap(left, right)
+    return left, right, moved
+
+
+def _neighbours(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Returns the two faces at each inner edge."""
+    pairs = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    face = np.repeat(np.arange(len(mesh.faces)), 3)
+    order = np.lexsort(pairs.T)
+    same = (pairs[order][1:] == pairs[order][:-1]).all(axis=1)
+    return face[order][:-1][same], face[order][1:][same]
+
+
+def _components(a: NDArray[np.int64], b: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     graph = sparse.coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
     return connected_components(graph, directed=False)[1]

@@ -135,6 +135,28 @@ def cerebrum_mask(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
     return np.isin(labels, scheme.cerebrum)
 
 
+def require_sides(
+    labels: NDArray[np.integer], scheme: LabelScheme, affine: NDArray[np.float64], to_right: NDArray[np.float64]
+) -> None:
+    """Raises InputError where labels of the left hemisphere lie to the right of those of the right hemisphere.
+
+    `to_right` (3,) is the direction from left to right in the coordinates that the (4, 4) affine leads to.
+    """
+    if not scheme.left:
+        return
+    left, right = (
+        float(to_right @ affine[:3, :3] @ np.argwhere(np.isin(labels, side)).mean(axis=0))
+        for side in (scheme.left, scheme.right)
+    )
+    if left >= right:
+        raise InputError(
+            "labels of the left hemisphere lie on the right",
+            found=f"{left - right:.1f} mm to the right of those of the right hemisphere",
+            expected="left at the smaller x (RAS+)",
+            remedy="The volume's affine mirrors the brain, or the scheme's sides are swapped.",
+        )
+
+
 def _listed(numbers: list[int]) -> str:
     shown = ", ".join(map(str, numbers[:20]))
     return f"{shown}, … ({len(numbers)} in all)" if len(numbers) > 20 else shown

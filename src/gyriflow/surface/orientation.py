@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gyriflow.geometry.triangles import TriangleMesh, unit, vertex_areas, vertex_normals
+from gyriflow.geometry.triangles import TriangleMesh, vertex_areas, vertex_normals
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -126,8 +126,8 @@ def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
     angle = float(np.degrees(np.arccos(np.clip(plane.normal[0], -1.0, 1.0))))
     if angle < LEAST_TILT_DEG:
         return matrix, 0.0
-    axis = unit(np.cross(plane.normal, [1.0, 0.0, 0.0]))
-    turn = Rotation.from_rotvec(np.radians(angle) * axis).as_matrix()
+    axis = np.cross(plane.normal, [1.0, 0.0, 0.0])
+    turn = Rotation.from_rotvec(np.radians(angle) * axis / np.linalg.norm(axis)).as_matrix()
     matrix[:3, :3] = turn
     matrix[:3, 3] = centre - turn @ centre
     return matrix, angle
@@ -145,21 +145,23 @@ def _symmetry_planes(sample: Floats, tree: cKDTree) -> list[tuple[Floats, float,
     scores = np.array([_mirror_distance(n, float(n @ centre), sample[::3], tree) for n in directions])
     planes = []
     for start in _apart(directions, scores):
-        base = directions[start]
-        aside = np.linalg.svd(base[None])[2][1:]
-
-        def plane(x: Floats, base: Floats = base, aside: Floats = aside) -> tuple[Floats, float]:
-            normal = unit(base + x[:2] @ aside)
-            return normal, float(normal @ centre) + 10.0 * x[2]
-
+        base, aside = directions[start], np.linalg.svd(directions[start][None])[2][1:]
         found = minimize(
-            lambda x, plane=plane: _mirror_distance(*plane(x), sample, tree),
+            lambda x, *frame: _mirror_distance(*_plane_near(x, *frame), sample, tree),
             np.zeros(3),
+            args=(base, aside, centre),
             method="Nelder-Mead",
             options={"initial_simplex": np.vstack([np.zeros(3), 0.1 * np.eye(3)]), "xatol": 1e-4, "fatol": 1e-4},
         )
-        planes.append((*plane(found.x), float(found.fun)))
+        planes.append((*_plane_near(found.x, base, aside, centre), float(found.fun)))
     return planes
+
+
+def _plane_near(x: Floats, base: Floats, aside: Floats, centre: Floats) -> tuple[Floats, float]:
+    """Returns the plane with its normal turned from `base` by x[:2] radians, and moved from `centre` by 10 x[2] mm."""
+    normal = np.asarray(base + x[:2] @ aside, dtype=float)
+    normal /= np.linalg.norm(normal)
+    return normal, float(normal @ centre) + 10.0 * float(x[2])
 
 
 def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]:

@@ -2,29 +2,40 @@
 
 import logging
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
+    corners,
     euler_number,
-    face_components,
+    is_closed,
     mean_edge_length,
+    merged,
     signed_volume,
     transformed,
 )
-from gyriflow.surface.extraction import cropped, isosurface, main_parts, shifted_affine, smoothed_mask
-from gyriflow.surface.hemispheres import split
-from gyriflow.surface.labels import LabelScheme, cerebrum_mask
+from gyriflow.surface.extraction import PAD_VOXELS, cropped, isosurface, made_simple, shifted_affine, smoothed_mask
+from gyriflow.surface.fissure import fissure_between, opened
+from gyriflow.surface.hemispheres import least_gap, left_faces, parted, require_common_pose, require_pair, set_apart
+from gyriflow.surface.labels import LabelScheme, cerebrum_mask, require_sides
 from gyriflow.surface.orientation import MidPlane, mid_plane, upright
-from gyriflow.surface.repair import remeshed, self_intersections, smoothed
-from gyriflow.surface.topology import unambiguous, without_handles
+from gyriflow.surface.remaking import remade
+from gyriflow.surface.remeshing import evened, self_intersecting_faces
+from gyriflow.surface.repair import cleaned, pieces
+from gyriflow.surface.size import require_plausible_size
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
 log = logging.getLogger(__name__)
+
+Coordinates = Literal["ras", "lps"]
+LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
+# beyond this part of the brain's width the mid-sagittal plane is doubtful
+DOUBTFUL_ASYMMETRY = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +49,7 @@ class PialSurface:
     left, right
         The hemispheres' parts of it, open where a connected brain is cut at the fissure.
     fissure_x_mm
-        Where the interhemispheric fissure is.
+        Where the interhemispheric fissure is: the plane x = const between the hemispheres.
     report
         What was found and done, in plain values for JSON.
     """
@@ -60,34 +71,190 @@ def from_labels(
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
     max_hole_mm: float = 3.0,
+    fissure_mm: float = 1.5,
 ) -> PialSurface:
-    mask, first = cropped(cerebrum_mask(labels, scheme))
+    """Returns the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
+
+    The cerebrum's mask is smoothed (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an
+    isosurface, which is smoothed, remeshed to `edge_length_mm` and turned so that the mid-sagittal plane is
+    x = const. Where the scheme tells cortex from the tissue inside and cortex labels of both sides touch, the fissure
+    is opened to `fissure_mm`. `max_hole_mm` plays no part: an isosurface has no holes.
+    InputError for labels that don't fit the scheme or the week, MeshError where the surface stays tangled.
+    """
+    mask = cerebrum_mask(labels, scheme)
+    volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
+    box, first = cropped(mask)
+    extents = np.linalg.norm(affine[:3, :3], axis=0) * [side.stop - side.start for side in box]
+    require_plausible_size(volume, extents, week)
+    report: dict[str, Any] = {"source": "labels", "scheme": scheme.name, "mask_volume_mL": volume * ML_PER_MM3}
+    mask, tissue = np.pad(mask[box], PAD_VOXELS), np.pad(labels[box], PAD_VOXELS)
     affine = shifted_affine(affine, first)
     field = smoothed_mask(mask, smoothing_voxels)
-    kept, parts, voxels = main_parts(field > 0.5)
-    field = np.where(kept, np.maximum(field, 0.501), np.minimum(field, 0.499)).astype(np.float32)
-    repair = without_handles(field)
-    raw = isosurface(unambiguous(repair.field), affine)
-    clean = remeshed(smoothed(raw, smoothing_iterations), edge_length_mm)
-    plane = mid_plane(raw)
-    return _posed(clean, plane, {"source": "labels"})
+    core = mask & ~np.isin(tissue, scheme.cortex)
+    # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
+    walls = isosurface(smoothed_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
+    plane = mid_plane(walls)
+    require_sides(tissue, scheme, affine, plane.normal)
+    fissure = fissure_between(walls, plane)
+    if scheme.cortex:
+        shut = field
+        field = opened(field, affine, core, fissure, fissure_mm)
+        voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
+        report["fissure_opened_mL"] = float((shut - field).sum(dtype=float) * voxel_ml)
+    field, report["topology"] = made_simple(field)
+    mesh = _even(isosurface(field, affine), smoothing_iterations, edge_length_mm, report)
+    left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
+    return _posed(mesh, left, plane, report, week)
 
 
-def _posed(mesh: TriangleMesh, plane: MidPlane, report: dict[str, Any]) -> PialSurface:
+def from_hemispheres(
+    left: TriangleMesh,
+    right: TriangleMesh,
+    *,
+    week: float,
+    coordinates: Coordinates = "ras",
+    gap_mm: float = 0.5,
+    edge_length_mm: float = 1.0,
+    smoothing_iterations: int = 10,
+    max_hole_mm: float = 3.0,
+) -> PialSurface:
+    """Returns the pial surface of a brain from closed surfaces of its hemispheres.
+
+    The surfaces are repaired (holes up to `max_hole_mm`), smoothed, remeshed to `edge_length_mm`, turned together so
+    that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each other.
+    InputError where they are swapped, of different size or not of the week's size; MeshError where one can't be made
+    a closed surface without handles and intersections.
+    """
+    report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
+    left, report["repair_left"] = _hemisphere(_in_ras(left, coordinates), max_hole_mm)
+    right, report["repair_right"] = _hemisphere(_in_ras(right, coordinates), max_hole_mm)
+    both = merged(left, right)
+    require_plausible_size(signed_volume(both), np.ptp(both.vertices, axis=0), week)
+    require_pair(left, right)
+    left = _even(left, smoothing_iterations, edge_length_mm, report, "mesh_left")
+    right = _even(right, smoothing_iterations, edge_length_mm, report, "mesh_right")
+    plane = mid_plane(merged(left, right))
+    require_common_pose(plane.asymmetry_mm, float(np.ptp(both.vertices, axis=0).max()))
+    report["gap_before_mm"] = least_gap(left, right)
+    left, right, moved = set_apart(left, right, gap_mm, plane.normal)
+    report["moved_apart_mm"] = moved
+    if moved > 0:
+        _warn(report, f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm")
+        plane = mid_plane(merged(left, right))
+    mesh = merged(left, right)
+    return _posed(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, report, week)
+
+
+def from_pial(
+    mesh: TriangleMesh,
+    *,
+    week: float,
+    coordinates: Coordinates = "ras",
+    edge_length_mm: float = 1.0,
+    smoothing_iterations: int = 10,
+    max_hole_mm: float = 3.0,
+) -> PialSurface:
+    """Returns the pial surface of a brain from one closed surface, of one piece or one for each hemisphere.
+
+    It is repaired (holes up to `max_hole_mm`), smoothed, remeshed to `edge_length_mm` and turned so that the
+    mid-sagittal plane is x = const. InputError where it is not of the week's size, MeshError where it can't be made
+    closed and free of handles and intersections.
+    """
+    report: dict[str, Any] = {"source": "pial", "coordinates": coordinates}
+    mesh, report["repair"] = cleaned(_in_ras(mesh, coordinates), max_hole_mm)
+    require_plausible_size(signed_volume(mesh), np.ptp(mesh.vertices, axis=0), week)
+    mesh = _even(mesh, smoothing_iterations, edge_length_mm, report)
+    plane = mid_plane(mesh)
+    fissure = fissure_between(mesh, plane)
+    left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
+    return _posed(mesh, left, plane, report, week)
+
+
+def _hemisphere(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+    """Returns the largest piece of a surface, clean, and the repairs."""
+    mesh, repairs = cleaned(mesh, max_hole_mm)
+    largest, *others = pieces(mesh)
+    repairs["pieces"], repairs["pieces_dropped"] = 1, repairs["pieces_dropped"] + len(others)
+    repairs["area_dropped_mm2"] += sum(area(piece) for piece in others)
+    return largest, repairs
+
+
+def _in_ras(mesh: TriangleMesh, coordinates: Coordinates) -> TriangleMesh:
+    return transformed(mesh, LPS_TO_RAS) if coordinates == "lps" else mesh
+
+
+def _even(
+    mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float, report: dict[str, Any], name: str = "mesh"
+) -> TriangleMesh:
+    """Returns the surface smoothed and remeshed, each piece a sphere that does not cut itself.
+
+    Where the triangles can't be repaired, the surface is made anew through voxels of half an edge length.
+    """
+    even, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
+    if _faults(even):
+        _warn(report, f"the surface was made anew through voxels, since it had {_faults(even)}")
+        mesh, report["topology"] = remade(mesh, 0.5 * edge_length_mm)
+        even, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
+    if _faults(even):
+        raise MeshError(
+            "the surface could not be made good",
+            found=_faults(even),
+            expected="closed pieces of Euler number 2 that do not cut themselves",
+            remedy="Look at the labels or the surface there; more smoothing or shorter edges may help.",
+        )
+    return even
+
+
+def _faults(mesh: TriangleMesh) -> str:
+    """Returns what keeps the surface from being closed spheres without intersections; empty where nothing does."""
+    euler = [euler_number(piece) for piece in pieces(mesh)]
+    cutting = int(self_intersecting_faces(mesh).sum())
+    found = [
+        "edges without two faces" if not is_closed(mesh) else "",
+        f"Euler numbers {euler}" if any(number != 2 for number in euler) else "",
+        f"{cutting} faces that cut others" if cutting else "",
+    ]
+    return ", ".join(fault for fault in found if fault)
+
+
+def _posed(
+    mesh: TriangleMesh, is_left: NDArray[np.bool_], plane: MidPlane, report: dict[str, Any], week: float
+) -> PialSurface:
+    """Returns the surface with its mid-sagittal plane turned to x = const, its hemispheres and the whole report."""
     matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
     whole = transformed(mesh, matrix)
-    on_plane = matrix[:3, :3] @ (plane.offset * plane.normal) + matrix[:3, 3]
-    # on a plane that stayed slightly tilted, where it passes the brain's centre
+    left, right = parted(whole, is_left)
+    # where the plane, which may have kept a tilt below half a degree, passes the brain's centre
     normal = matrix[:3, :3] @ plane.normal
-    centre = whole.vertices.mean(axis=0)
-    fissure = float((normal @ on_plane - normal[1:] @ centre[1:]) / normal[0])
-    left, right = split(whole, fissure)
+    offset = plane.offset + normal @ matrix[:3, 3]
+    fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
+    width = float(np.ptp(whole.vertices[:, 0]))
+    if plane.fissure_points == 0:
+        _warn(report, "no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
+    if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * width:
+        _warn(report, f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
+    parts = {"whole": whole, "left": left, "right": right}
     report |= {
-        "pose": matrix.tolist(), "rotation_deg": angle, "fissure_x_mm": fissure, 
-        "fissure_points": plane.fissure_points, "fissure_scatter_mm": plane.scatter_mm, "asymmetry_mm": plane.asymmetry_mm,
-        "area_cm2": {n: area(m) * CM2_PER_MM2 for n, m in (("whole", whole), ("left", left), ("right", right))},
+        "week": week,
+        "pose": matrix.tolist(),
+        "rotation_deg": angle,
+        "fissure_x_mm": fissure_x,
+        "fissure_points": plane.fissure_points,
+        "fissure_scatter_mm": plane.scatter_mm,
+        "asymmetry_mm": plane.asymmetry_mm,
+        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items()},
         "volume_mL": signed_volume(whole) * ML_PER_MM3,
+        "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
+        "vertices": len(whole.vertices),
+        "faces": len(whole.faces),
+        "mean_edge_mm": mean_edge_length(whole),
+        "pieces": len(pieces(whole)),
         "euler_number": euler_number(whole),
-        "self_intersections": self_intersections(whole),
     }
-    return PialSurface(whole, left, right, fissure, report)
+    report.setdefault("warnings", [])
+    return PialSurface(whole, left, right, fissure_x, report)
+
+
+def _warn(report: dict[str, Any], message: str) -> None:
+    log.warning(message)
+    report.setdefault("warnings", []).append(message)

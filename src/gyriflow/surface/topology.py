@@ -90,20 +90,29 @@ def without_handles(field: NDArray[np.float32]) -> TopologyRepair:
 def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     """Returns the field with diagonal neighbours set apart, so that its isosurface joins voxels by faces only.
 
-    Where inside and outside voxels alternate around the four corners of a square, marching cubes decides by the
-    values which of the two pairs is joined; these values are moved so that it never is the inside one.
+    Where inside and outside voxels alternate around a square, or two opposite corners of a cube differ from the
+    other six, marching cubes decides by the values what is joined; these values are moved so that it never is the
+    inside.
     """
     mask = field > 0.5
-    alternating = np.zeros_like(mask)
+    doubtful = np.zeros_like(mask)
     for first, second in ((0, 1), (0, 2), (1, 2)):
-        corner = np.moveaxis(mask, (first, second), (0, 1))
-        flags = np.moveaxis(alternating, (first, second), (0, 1))
-        a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
-        crossed = (a == c) & (b == d) & (a != b)
+        inside = np.moveaxis(mask, (first, second), (0, 1))
+        flags = np.moveaxis(doubtful, (first, second), (0, 1))
+        a, b, c, d = inside[:-1, :-1], inside[1:, :-1], inside[1:, 1:], inside[:-1, 1:]
+        alternating = (a == c) & (b == d) & (a != b)
         for view in (flags[:-1, :-1], flags[1:, :-1], flags[1:, 1:], flags[:-1, 1:]):
-            view |= crossed
-    apart = np.where(mask, np.minimum(field, 0.75), np.minimum(field, 0.05))
-    return np.where(alternating, apart, field).astype(np.float32)
+            view |= alternating
+    ends = (slice(None, -1), slice(1, None))
+    count = sum(mask[i, j, k].astype(np.int8) for i in ends for j in ends for k in ends)
+    for j in (0, 1):
+        for k in (0, 1):
+            low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
+            opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
+            for corner in np.ndindex(2, 2, 2):
+                doubtful[tuple(ends[side] for side in corner)] |= opposite
+    apart = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
+    return np.where(doubtful, apart, field).astype(np.float32)
 
 
 def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:

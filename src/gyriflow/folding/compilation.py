@@ -1,0 +1,50 @@
+"""The form compiler's cache: one for each kind of processor, one compilation at a time, no torn entries."""
+
+import fcntl
+import hashlib
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mpi4py import MPI
+
+# -ffast-math would break the checks for numbers that are none
+COMPILER_ARGUMENTS = ["-O3", "-march=native"]
+
+
+@contextmanager
+def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
+    """Yields the options of the form compiler; forms are to be made inside the block, by all ranks.
+
+    Rank 0 holds the cache for the block, since concurrent runs share it and a compilation that was killed leaves a
+    source file for which everyone would wait.
+    """
+    flags = next((line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")), "")
+    kind = hashlib.sha256(flags.encode()).hexdigest()[:8]
+    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
+    options = {"cffi_extra_compile_args": COMPILER_ARGUMENTS, "cache_dir": str(cache)}
+    if comm.rank == 0:
+        cache.mkdir(parents=True, exist_ok=True)
+        with (cache / "lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            drop_torn_entries(cache)
+            comm.barrier()
+            yield options
+            comm.barrier()
+    else:
+        comm.barrier()
+        yield options
+        comm.barrier()
+
+
+def drop_torn_entries(cache: Path) -> None:
+    """Removes the files of every form that lacks its source, its library, or the mark that both are whole."""
+    names = {path.name.split(".")[0] for path in cache.glob("libffcx_*")}
+    for name in names:
+        whole = (cache / f"{name}.c").exists() and (cache / f"{name}.c.cached").exists()
+        if not (whole and any(cache.glob(f"{name}.*.so"))):
+            for path in cache.glob(f"{name}.*"):
+                path.unlink(missing_ok=True)

@@ -1,0 +1,1 @@
+"""Synthetic fetal brains for the demo and the tests."""

@@ -1,0 +1,40 @@
+"""Whether a cerebrum has a plausible size for its week: catches files in metres, micrometres or centimetres."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyriflow.errors import InputError
+from gyriflow.units import ML_PER_MM3
+
+# cerebral volume (mL) at 25.4 and 36.6 GW: the atlas of Fidon et al. 2021 (doi 10.5281/zenodo.5524312) and the growth
+# by 230 % between these weeks found by Clouchoux et al. 2012 (doi 10.1016/j.ajog.2011.10.002)
+EARLY, LATE = (25.4, 92.0), (36.6, 304.0)
+# from small fetuses with pathologies to adults, and the log-linear growth is a coarse one
+LEAST, MOST = 0.2, 6.0
+UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
+
+
+def expected_volume_ml(week: float) -> float:
+    """Returns the coarse volume of a cerebrum (mL) at a gestational week, growing exponentially."""
+    rate = np.log(LATE[1] / EARLY[1]) / (LATE[0] - EARLY[0])
+    return float(EARLY[1] * np.exp(rate * (week - EARLY[0])))
+
+
+def require_plausible_size(volume_mm3: float, extents_mm: NDArray[np.float64], week: float) -> None:
+    """Raises InputError where a cerebrum's volume is out of all proportion for its week, with a guess of the unit.
+
+    `extents_mm` (3,) is only told. The bounds are wide: a fifth to six times the published volume.
+    """
+    expected = expected_volume_ml(week)
+    volume = volume_mm3 * ML_PER_MM3
+    if LEAST <= volume / expected <= MOST:
+        return
+    guess = next((u for u, mm in UNITS_MM.items() if LEAST <= volume * mm**3 / expected <= MOST), None)
+    raise InputError(
+        f"the cerebrum's size is not that of week {week:g}",
+        found=f"{volume:.3g} mL, {' x '.join(f'{extent:.3g}' for extent in extents_mm)} mm",
+        expected=f"{LEAST * expected:.0f} to {MOST * expected:.0f} mL",
+        remedy=f"The file seems to be in {guess}: give it in mm, or with its unit in the header."
+        if guess
+        else "Check the file's unit, its week, and which labels make the cerebrum.",
+    )

@@ -1,0 +1,58 @@
+"""Small folding problems for the tests under MPI."""
+
+import numpy as np
+from mpi4py import MPI
+from shapes import box_mesh
+
+from gyriflow.folding.domain import Domain
+from gyriflow.folding.problem import Material, Problem
+from gyriflow.folding.zones import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT, Zones
+from gyriflow.geometry.tetrahedra import boundary_faces
+
+COMM = MPI.COMM_WORLD
+MATERIAL = Material(poisson_ratio=0.45, penalty_pa_per_m=5e5)
+
+
+def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
+    """Returns a box in mm whose inner vertices are moved at random (seeded): no symmetry helps."""
+    mesh = box_mesh(cells, size)
+    inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
+    vertices = mesh.vertices.copy()
+    vertices[inner] += np.random.default_rng(3).uniform(-by, by, (len(inner), 3))
+    return type(mesh)(vertices, mesh.tets)
+
+
+def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=None, planes=(-0.5, 0.5)):
+    """Returns zones by conditions on the facets' centroids in mm."""
+    facets, _ = boundary_faces(mesh)
+    centre = mesh.vertices[facets].mean(axis=1)
+    zone = np.full(len(facets), FREE)
+    zone[clamped(centre)] = CLAMPED
+    if left is not None:
+        zone[left(centre)] = LEFT_CONTACT
+    if right is not None:
+        zone[right(centre)] = RIGHT_CONTACT
+    return Zones(facets, zone, np.ones(len(mesh.vertices)), 0.0, planes)
+
+
+def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=1):
+    """Returns a problem with layers that are uniform, or nodal functions of the position in m."""
+    domain = Domain(COMM, mesh)
+    problem = Problem(domain, zones, MATERIAL, quadrature_degree=degree)
+    x = domain.local(domain.positions)
+
+    def nodal(value):
+        return value(x) if callable(value) else np.full(len(x), value)
+
+    centres = x[domain.cells].mean(axis=1)
+    normal = np.tile([0.0, 0.0, 1.0], (len(centres), 1)) if normals is None else normals(centres)
+    problem.set_layers(nodal(mu), nodal(dg), nodal(dr), normal)
+    return problem
+
+
+def smooth_displacement(domain, size=1e-3):
+    """Returns a smooth displacement of the local nodes in m that does not depend on the ranks."""
+    x = domain.local(domain.positions) * 1e3
+    return size * np.stack(
+        [np.sin(0.3 * x[:, 1] + 0.1), np.cos(0.25 * x[:, 2]) - 0.4 * x[:, 0] / 8, np.sin(0.2 * x[:, 0] * x[:, 1] / 4)], axis=1
+    )

@@ -1,0 +1,75 @@
+"""Growth with known answers, and what the mesh does between steps."""
+
+import numpy as np
+import pytest
+from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
+
+from gyriflow.folding.domain import Domain
+from gyriflow.geometry.tetrahedra import signed_volumes
+
+
+def test_isotropic_growth_of_a_free_body_is_free_of_stress():
+    mesh = distorted_box()
+    problem = problem_on(mesh, zones_of(mesh), dg=0.1, dr=0.1)
+    stretched = 0.1 * problem.domain.local(problem.domain.positions)
+    problem.set_displacement(stretched)
+    assert problem.energy() == pytest.approx(0.0, abs=1e-16)
+    grown = problem.residual(problem.new_vector())
+    problem.set_displacement(np.zeros_like(stretched))
+    assert grown <= 1e-12 * problem.residual(problem.new_vector())
+
+
+def test_tangential_growth_stretches_across_the_normal_only():
+    mesh = distorted_box()
+    oblique = np.array([1.0, 2.0, 2.0]) / 3
+    problem = problem_on(
+        mesh, zones_of(mesh), dg=0.2, dr=-0.05, normals=lambda c: np.tile(oblique, (len(c), 1))
+    )
+    along = np.outer(oblique, oblique)
+    growth = 1.2 * (np.eye(3) - along) + 0.95 * along
+    x = problem.domain.local(problem.domain.positions)
+    problem.set_displacement(x @ (growth - np.eye(3)).T)
+    assert problem.energy() == pytest.approx(0.0, abs=1e-16)
+
+
+def test_the_direction_of_the_normal_does_not_matter():
+    mesh = distorted_box()
+    energies = []
+    for sign in (1, -1):
+        problem = problem_on(mesh, zones_of(mesh), dg=0.2, normals=lambda c, s=sign: np.tile([0.0, 0.6 * s, 0.8 * s], (len(c), 1)))
+        problem.set_displacement(smooth_displacement(problem.domain))
+        energies.append(problem.energy())
+    assert energies[0] == pytest.approx(energies[1], rel=1e-14)
+
+
+def test_energy_of_a_known_stretch():
+    # Fe = diag(1.2, 1, 1): tr(FeᵀFe) = 3.44, Je = 1.2
+    mesh = distorted_box()
+    problem = problem_on(mesh, zones_of(mesh), mu=1000.0)
+    x = problem.domain.local(problem.domain.positions)
+    problem.set_displacement(x * [0.2, 0.0, 0.0])
+    bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
+    density = 500.0 * (3.44 * 1.2 ** (-2 / 3) - 3) + bulk / 2 * 0.04
+    assert problem.energy() == pytest.approx(density * 288e-9, rel=1e-12)
+
+
+def test_gathering_and_placing_keep_every_vertex_in_its_place():
+    mesh = distorted_box()
+    domain = Domain(COMM, mesh)
+    np.testing.assert_allclose(domain.gathered(domain.local(domain.positions)[: domain.owned]), mesh.vertices * 1e-3)
+    moved = domain.positions * 1.5 + [0.1, 0.2, 0.3]
+    domain.place(moved)
+    volumes = domain.cell_volumes(domain.local(moved))
+    total = COMM.allreduce(float(volumes.sum()))
+    assert total == pytest.approx(1.5**3 * signed_volumes(mesh).sum() * 1e-9, rel=1e-12)
+    used = domain.mesh.geometry.x[domain.mesh.geometry.dofmap].mean(axis=1)
+    np.testing.assert_allclose(used, moved[domain.vertex_of_node[domain.cells]].mean(axis=1), rtol=1e-12)
+
+
+def test_facet_tags_reach_the_right_facets():
+    mesh = distorted_box()
+    zones = zones_of(mesh, left=lambda c: c[:, 0] < -3.99, right=lambda c: c[:, 0] > 3.99)
+    domain = Domain(COMM, mesh)
+    tags = domain.local_facets(zones.facets, zones.facet_zone)
+    counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
+    np.testing.assert_array_equal(counts, np.bincount(zones.facet_zone, minlength=5))

@@ -1,0 +1,180 @@
+"""Consistency of energy, residual and tangent, the patch test, and the rungs of the linear solver."""
+
+import numpy as np
+import pytest
+from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
+from petsc4py import PETSc
+
+from gyriflow.folding.newton import DIRECT, KEPT, MINRES, NewtonSettings, NewtonSolver, NotConvergedError
+
+AFFINE = np.array([[0.06, 0.02, -0.01], [0.03, -0.05, 0.02], [0.0, 0.04, 0.03]])
+
+
+def everywhere(centre):
+    return np.ones(len(centre), bool)
+
+
+def at_the_bottom(centre):
+    return centre[:, 2] < -2.99
+
+
+def growing_problem(contact=False, **changes):
+    mesh = distorted_box()
+    # walls that stand on the wrong side of their planes: contact acts from the start
+    walls = {"left": lambda c: c[:, 0] < -3.99, "right": lambda c: c[:, 0] > 3.99, "planes": (-5.0, 5.0)}
+    zones = zones_of(mesh, at_the_bottom, **(walls if contact else {}))
+    layers = {"mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3), "dg": lambda x: 0.004 + 0.4 * x[:, 2], "dr": 0.002} | changes
+    return problem_on(mesh, zones, **layers)
+
+
+def test_affine_displacement_of_a_uniform_body_is_in_equilibrium_inside():
+    mesh = distorted_box()
+    problem = problem_on(mesh, zones_of(mesh, everywhere))
+    x = problem.domain.local(problem.domain.positions)
+    problem.set_displacement(x @ AFFINE.T)
+    residual = problem.new_vector()
+    # all boundary nodes are clamped, so only inner forces are left; compare with the traction on a free body
+    inner = problem.residual(residual)
+    free = problem_on(mesh, zones_of(mesh))
+    free.set_displacement(x @ AFFINE.T)
+    assert inner <= 1e-10 * free.residual(free.new_vector())
+
+
+def test_newton_finds_the_affine_displacement_again():
+    mesh = distorted_box()
+    problem = problem_on(mesh, zones_of(mesh, everywhere))
+    domain = problem.domain
+    exact = domain.local(domain.positions) @ AFFINE.T
+    inner = np.ones(len(domain.positions), bool)
+    inner[np.unique(zones_of(mesh).facets)] = False
+    moved = exact + domain.local(inner)[:, None] * smooth_displacement(domain, 1e-4)
+    problem.set_displacement(moved)
+    residual, direction = problem.new_vector(), problem.new_vector()
+    krylov = PETSc.KSP().create(COMM)
+    krylov.setType("preonly")
+    krylov.getPC().setType("lu")
+    krylov.getPC().setFactorSolverType("mumps")
+    for _ in range(6):
+        problem.residual(residual)
+        krylov.setOperators(problem.tangent())
+        krylov.solve(residual, direction)
+        problem.vector.axpy(-1.0, direction)
+        problem.vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+    error = np.abs(problem.displacement - exact).max()
+    assert error <= 1e-10 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("degree", [1, 3])
+def test_residual_is_the_derivative_of_the_energy_and_tangent_that_of_the_residual(degree):
+    problem = growing_problem(contact=True, degree=degree)
+    domain = problem.domain
+    clamped = problem.clamps[0].dof_indices()[0]
+    u = smooth_displacement(domain, 2e-4)  # small beside the penetration: contact acts at either side of a difference
+    v = np.ascontiguousarray(smooth_displacement(domain, 1e-4)[:, [2, 0, 1]])
+    v.reshape(-1)[clamped] = 0.0
+    direction, residual, other = (problem.new_vector() for _ in range(3))
+    direction.array[:] = v[: domain.owned].ravel()
+    problem.set_displacement(u)
+    energy = problem.energy()
+    problem.residual(residual)
+    slope = residual.dot(direction)
+    tangent = problem.tangent()
+    change = problem.new_vector()
+    tangent.mult(direction, change)
+    steps = np.array([0.4, 0.2, 0.1, 0.05])
+    energy_error, residual_error = [], []
+    for h in steps:
+        problem.set_displacement(u + h * v)
+        energy_error.append(abs(problem.energy() - energy - h * slope))
+        problem.residual(other)
+        other.axpy(-1.0, residual)
+        other.axpy(-h, change)
+        residual_error.append(other.norm())
+    for error in (energy_error, residual_error):
+        rates = np.diff(np.log(error)) / np.diff(np.log(steps))
+        assert rates == pytest.approx(2.0, abs=0.15), (error, rates)
+
+
+def test_contact_pushes_back_with_the_penalty_pressure():
+    mesh = distorted_box()
+    zones = zones_of(mesh, right=lambda c: c[:, 0] > 3.99, planes=(-5.0, 4.5))
+    without = problem_on(mesh, zones_of(mesh))
+    with_contact = problem_on(mesh, zones)
+    total = []
+    for problem in (with_contact, without):
+        residual = problem.new_vector()
+        problem.set_displacement(np.zeros_like(problem.displacement))
+        problem.residual(residual)
+        total.append(COMM.allreduce(float(residual.array.reshape(-1, 3)[:, 0].sum())))
+    # the wall at 4 mm stands 0.5 mm beyond a plane that the right hemisphere may not pass to the left
+    assert total[0] - total[1] == pytest.approx(-5e5 * 0.5e-3 * 36e-6, rel=1e-10)
+
+
+def test_a_body_that_does_not_grow_does_not_move():
+    problem = growing_problem(dg=0.0, dr=0.0)
+    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=1e-15)
+    count = solver.solve(np.zeros_like(problem.displacement))
+    assert count.newton == 0
+    assert (problem.displacement == 0).all()
+
+
+def test_newton_converges_quadratically_with_tight_linear_solves():
+    problem = growing_problem()
+    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-12, krylov_tolerance=1e-10), residual_floor=0.0)
+    count = solver.solve(np.zeros_like(problem.displacement))
+    assert count.newton <= 7
+    assert count.residual <= 1e-12
+
+
+@pytest.mark.parametrize("rung", [MINRES, DIRECT])
+def test_a_lower_rung_takes_over_where_the_upper_ones_fail(rung, monkeypatch):
+    problem = growing_problem()
+    solver = NewtonSolver(problem, NewtonSettings(krylov_tolerance=1e-6), residual_floor=0.0)
+    honest = solver._run
+
+    def failing(krylov, matrix, reuse):
+        solved, iterations = honest(krylov, matrix, reuse)
+        failed = krylov is solver._cg or (rung == DIRECT and krylov.getType() == "minres")
+        return solved and not failed, iterations
+
+    monkeypatch.setattr(solver, "_run", failing)
+    count = solver.solve(np.zeros_like(problem.displacement))
+    assert count.rung == rung
+    by_ladder = problem.displacement.copy()
+    reference = growing_problem()
+    plain = NewtonSolver(reference, NewtonSettings(krylov_tolerance=1e-6), residual_floor=0.0)
+    assert plain.solve(np.zeros_like(by_ladder)).rung == KEPT
+    assert np.abs(by_ladder - reference.displacement).max() <= 1e-5 * np.abs(by_ladder).max()
+
+
+def test_a_failed_solve_says_so():
+    problem = growing_problem()
+    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-14, max_newton=1), residual_floor=0.0)
+    with pytest.raises(NotConvergedError, match="after 1 iterations"):
+        solver.solve(np.zeros_like(problem.displacement))
+
+
+def test_the_energy_never_rises_from_one_iterate_to_the_next():
+    problem = growing_problem(dg=lambda x: 0.05 + 5 * x[:, 2])
+    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-10, krylov_tolerance=1e-8), residual_floor=0.0)
+    energies = []
+    advance = solver._advance
+
+    def recorded(norm, count):
+        energies.append(problem.energy())
+        return advance(norm, count)
+
+    solver._advance = recorded
+    solver.solve(np.zeros_like(problem.displacement))
+    energies.append(problem.energy())
+    assert len(energies) > 2
+    assert (np.diff(energies) <= 1e-12 * abs(energies[0])).all()
+
+
+def test_an_inverting_first_guess_is_dropped():
+    problem = growing_problem()
+    guess = np.zeros_like(problem.displacement)
+    guess[:, 2] = -2.0 * problem.domain.local(problem.domain.positions)[:, 2]
+    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
+    assert solver.solve(guess).residual <= 1e-6
+    assert problem.smallest_volume_ratio() > 0

@@ -1,0 +1,166 @@
+"""The folding program as users start it: outputs, ranks, interruptions, and how it ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from shapes import ellipsoid_mesh
+
+from gyriflow.io.files import read_json
+from gyriflow.io.frames import read_field, read_positions, read_weeks
+from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+
+TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
+WEEK = {"start_week": 21.0, "end_week": 21.5, "output_weeks": [21.0, 21.25, 21.5], "fissure_x_mm": 0.0, "thickness_mm": 3.0}
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory):
+    path = tmp_path_factory.mktemp("mesh") / "brain.xdmf"
+    write_tetrahedral_mesh(path, ellipsoid_mesh(8, (20.0, 26.0, 18.0)))
+    return path
+
+
+def command(mesh, out, ranks=1, **changes):
+    params = out.parent / f"{out.name}.yaml"
+    params.write_text(yaml.safe_dump(WEEK | changes))
+    program = [sys.executable, "-m", "gyriflow.folding", str(mesh), "--params", str(params), "--out", str(out)]
+    return ["mpiexec", "-n", str(ranks), *program]
+
+
+def fold(mesh, out, ranks=1, **changes):
+    return subprocess.run(
+        command(mesh, out, ranks, **changes), capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def tight_run(mesh, tmp_path_factory):
+    out = tmp_path_factory.mktemp("tight") / "out"
+    done = fold(mesh, out, solver=TIGHT)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out
+
+
+def test_a_run_leaves_every_file_and_nothing_else(tight_run):
+    assert {p.name for p in tight_run.iterdir()} == {
+        ".lock", "frames.h5", "frames.xdmf", "steps.csv", "summary.json", "zones.json"
+    }  # fmt: skip
+    assert read_weeks(tight_run / "frames.h5") == [21.0, 21.25, 21.5]
+    steps = pd.read_csv(tight_run / "steps.csv")
+    assert steps["week"].iloc[-1] == pytest.approx(21.5)
+    assert (steps["min_J"] > 0).all()
+    moved = read_positions(tight_run / "frames.h5", 21.5) - read_positions(tight_run / "frames.h5", 21.0)
+    np.testing.assert_allclose(moved, read_field(tight_run / "frames.h5", 21.5, "displacement_mm"), atol=1e-12)
+    assert read_json(tight_run / "summary.json")["steps"] == len(steps)
+
+
+def test_every_output_week_is_hit_although_steps_do_not_divide_it(tight_run):
+    weeks = pd.read_csv(tight_run / "steps.csv")["week"].to_numpy()
+    for week in (21.25, 21.5):
+        assert np.abs(weeks - week).min() < 1e-12
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_the_result_does_not_depend_on_the_number_of_ranks(mesh, tight_run, tmp_path, ranks):
+    assert fold(mesh, tmp_path / "out", ranks, solver=TIGHT).returncode == 0
+    one, more = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, tmp_path / "out"))
+    largest = np.linalg.norm(one - read_positions(tight_run / "frames.h5", 21.0), axis=1).max()
+    assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
+
+
+def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(mesh, tight_run, tmp_path):
+    assert fold(mesh, tmp_path / "out", 2).returncode == 0
+    one, other = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, tmp_path / "out"))
+    assert np.linalg.norm(other - one, axis=1).max() <= 1e-3
+
+
+def killed_after(step, arguments):
+    """Starts the program, kills it with its ranks when it has printed a step, and returns what it printed."""
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+        printed = []
+        for line in process.stdout:
+            printed.append(line)
+            if f"step {step:4d}" in line:
+                os.killpg(process.pid, signal.SIGKILL)
+                break
+        # Open MPI's daemon puts ranks into groups of their own
+        subprocess.run(["pkill", "-KILL", "-f", arguments[-1]], check=False)
+    return "".join(printed)
+
+
+@pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 3)])
+def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, tight_run, tmp_path, first, then):
+    out = tmp_path / "out"
+    printed = killed_after(3, command(mesh, out, first, solver=TIGHT))
+    assert not (out / "frames.h5").exists(), printed
+    time.sleep(0.2)
+    again = fold(mesh, out, then, solver=TIGHT)
+    assert again.returncode == 0, again.stderr
+    assert "going on from the checkpoint after step" in again.stdout
+    assert read_json(out / "summary.json")["resumed_after_step"] >= 3
+    one, more = (read_positions(folder / "frames.h5", 21.5) for folder in (tight_run, out))
+    largest = np.linalg.norm(one - read_positions(out / "frames.h5", 21.0), axis=1).max()
+    assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
+    assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(tight_run / "steps.csv"))
+
+
+def test_a_checkpoint_of_other_parameters_is_not_used(mesh, tmp_path):
+    out = tmp_path / "out"
+    killed_after(2, command(mesh, out))
+    done = fold(mesh, out, thickness_mm=2.5)
+    assert done.returncode == 0
+    assert "another mesh or other parameters: not used" in done.stdout
+    assert "going on" not in done.stdout
+
+
+def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
+    done = fold(mesh, tmp_path / "out", 2, growth_rate_per_s=0.0)
+    assert done.returncode == 0
+    frames = tmp_path / "out" / "frames.h5"
+    assert (read_field(frames, 21.5, "displacement_mm") == 0).all()
+
+
+def test_a_step_that_is_far_too_long_is_halved_and_the_run_goes_on(mesh, tmp_path):
+    done = fold(mesh, tmp_path / "out", step_s=302400.0, growth_rate_per_s=3e-6, solver={"max_halvings": 8})
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "trying" in done.stdout
+    steps = pd.read_csv(tmp_path / "out" / "steps.csv")
+    assert steps["dt_s"].min() < 151200
+    assert (steps["min_J"] > 0).all()
+
+
+def test_at_the_smallest_step_the_run_ends_with_the_last_good_state_kept(mesh, tmp_path):
+    out = tmp_path / "out"
+    hard = {"growth_rate_per_s": 2e-5, "solver": {"max_halvings": 0, "max_newton": 3}}
+    done = fold(mesh, out, 2, **hard)
+    assert done.returncode == 4, done.stdout + done.stderr
+    assert "fails even with 43200 s" in done.stderr
+    assert not (out / "frames.h5").exists()
+
+
+def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):
+    out = tmp_path / "out"
+    slow = command(mesh, out, end_week=30.0, output_weeks=[21.0, 30.0])
+    with subprocess.Popen(slow, stdout=subprocess.PIPE, text=True, start_new_session=True) as first:
+        next(line for line in first.stdout if "step" in line)
+        second = fold(mesh, out)
+        os.killpg(first.pid, signal.SIGKILL)
+        subprocess.run(["pkill", "-KILL", "-f", str(out)], check=False)
+    assert second.returncode == 5
+    assert "another folding run works in this folder" in second.stderr
+
+
+def test_bad_parameters_end_in_code_two(mesh, tmp_path):
+    done = fold(mesh, tmp_path / "out", 2, thicknes_mm=1.0)
+    assert done.returncode == 2
+    assert "thicknes_mm" in done.stderr
+    missing = fold(tmp_path / "none.xdmf", tmp_path / "out")
+    assert missing.returncode == 2
+    assert "none.xdmf" in missing.stderr

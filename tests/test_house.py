@@ -1,0 +1,294 @@
+"""The house rules, checked on the source itself: import arrows, open files, sizes, names, and lists that must agree."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "gyriflow"
+
+ROOMS = {"config", "io", "phantom", "surface", "growth", "mesh", "mechanics", "folding", "metrics", "report"}
+PLAIN = {"geometry", "units", "errors"}
+EXCEPTIONS = {"folding": {"mechanics", "io"}}
+"""What a room may import besides itself and the plain modules: the solve is a program of its own."""
+PROGRAMS = {"launch", "step"}
+"""The shell around the rooms: how a workflow starts and how a step ends. So is the `__main__.py` of a room."""
+
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
+RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
+
+OPENING_NAMES = {"open"}
+OPENING_METHODS = {
+    *("open", "read_text", "read_bytes", "write_text", "write_bytes", "tofile", "to_filename", "savefig"),
+    *("to_csv", "to_json", "to_hdf", "to_parquet", "to_pickle", "load_new_mesh", "save_current_mesh"),
+}
+OPENING_FUNCTIONS = {
+    "numpy": {"load", "save", "savez", "savez_compressed", "loadtxt", "savetxt", "genfromtxt", "fromfile", "memmap"},
+    "pandas": {"read_csv", "read_json", "read_hdf", "read_parquet", "read_table", "read_pickle"},
+    "nibabel": {"load", "save"},
+    "trimesh": {"load", "load_mesh"},
+    "pyvista": {"read", "save_meshio", "get_reader"},
+    "meshio": {"read", "write"},
+    "h5py": {"File"},
+    "shutil": {"copy", "copyfile", "move"},
+}
+
+
+def room_of(path: Path) -> str:
+    """Returns the room (or the plain module) that a source file belongs to."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def is_program(path: Path) -> bool:
+    """Returns whether a source file is a program rather than part of a room."""
+    return room_of(path) in PROGRAMS or path.name == "__main__.py"
+
+
+def rooms_imported(path: Path) -> set[str]:
+    """Returns the rooms and plain modules of gyriflow that a source file imports, at the top or inside functions."""
+    package = ["gyriflow", *path.relative_to(PACKAGE).parts[:-1]]
+    modules = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            modules += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            base = ".".join([*base, *([node.module] if node.module else [])])
+            modules += [f"{base}.{alias.name}" for alias in node.names]
+    return {module.split(".")[1] for module in modules if module.startswith("gyriflow.")} - {"__version__"}
+
+
+def makes_buffer(node: ast.AST) -> bool:
+    """Returns whether an expression makes a buffer in memory that looks like a file."""
+    return isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("BytesIO", "StringIO"))
+
+
+def opened_files(path: Path) -> list[str]:
+    """Returns the calls of a source file that open files, as `line: name`."""
+    tree = ast.parse(path.read_text())
+    modules = {
+        alias.asname or alias.name: alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import)
+        for alias in node.names
+    }
+    in_memory = {
+        target.id
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and makes_buffer(node.value)
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+    found = []
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        if node.args and (makes_buffer(node.args[0]) or getattr(node.args[0], "id", None) in in_memory):
+            continue
+        match node.func:
+            case ast.Name(id=name) if name in OPENING_NAMES:
+                found.append(f"{node.lineno}: {name}")
+            case ast.Attribute(value=ast.Name(id=owner), attr=name) if owner in modules:
+                if name in OPENING_FUNCTIONS.get(modules[owner], set()) | {"open"}:
+                    found.append(f"{node.lineno}: {owner}.{name}")
+            case ast.Attribute(attr=name) if name in OPENING_METHODS:
+                found.append(f"{node.lineno}: .{name}")
+    return found
+
+
+def code_lines(path: Path) -> int:
+    """Returns the number of lines that are neither blank nor comments."""
+    return sum(bool(line.strip()) and not line.strip().startswith("#") for line in path.read_text().splitlines())
+
+
+def short(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def test_every_source_file_has_a_place():
+    assert {room_of(path) for path in SOURCES} - {"__init__"} <= ROOMS | PLAIN | PROGRAMS
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=short)
+def test_rooms_import_only_plain_modules(path):
+    room = room_of(path)
+    allowed = PLAIN if room in PLAIN else PLAIN | {room} | EXCEPTIONS.get(room, set())
+    if is_program(path):
+        allowed |= PROGRAMS | {"io"}
+    assert rooms_imported(path) <= allowed
+
+
+def test_mechanics_is_ufl_only():
+    imported = {
+        name.split(".")[0]
+        for path in (PACKAGE / "mechanics").glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        for name in (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module]
+            if isinstance(node, ast.ImportFrom) and not node.level
+            else []
+        )
+    }
+    assert imported <= {"ufl", "collections", "dataclasses", "typing", "math"}
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in SOURCES if room_of(p) not in {"io", "folding"} and not is_program(p)], ids=short
+)
+def test_only_io_and_folding_open_files(path):
+    assert opened_files(path) == []
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=short)
+def test_source_files_are_short(path):
+    assert len(path.read_text().splitlines()) < 300
+
+
+def test_snakefile_is_short():
+    assert len((ROOT / "Snakefile").read_text().splitlines()) < 80
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=short)
+def test_scripts_are_thin(path):
+    assert 5 <= code_lines(path) <= 25
+
+
+def test_no_vague_names():
+    vague = re.compile(r"(^|_)(utils?|helpers?|managers?|misc|pipelines?)($|_)|V\d$", re.IGNORECASE)
+    names = [(short(path), path.stem) for path in [*SOURCES, *SCRIPTS, *RULE_FILES]]
+    for path in [*SOURCES, *SCRIPTS]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef | ast.FunctionDef):
+                names.append((short(path), node.name))
+                names += [(short(path), part) for part in re.findall(r"[A-Z][a-z]+", node.name)]
+    assert [(path, name) for path, name in names if vague.search(name)] == []
+
+
+def rules() -> dict[str, str]:
+    """Returns the text of every rule by name."""
+    text = "\n".join(path.read_text() for path in RULE_FILES)
+    return dict(re.findall(r"^rule (\w+):\n((?:(?:[ \t].*)?\n)*)", text + "\n", flags=re.MULTILINE))
+
+
+def test_every_rule_has_a_log_a_benchmark_an_environment_and_resources():
+    working = {name: body for name, body in rules().items() if re.search(r"^    output:", body, flags=re.MULTILINE)}
+    assert len(working) > 5
+    missing = [
+        f"{name}: {keyword}"
+        for name, body in working.items()
+        for keyword in ("log", "benchmark", "conda", "resources")
+        if not re.search(rf"^    {keyword}:", body, flags=re.MULTILINE)
+    ]
+    assert missing == []
+
+
+def test_every_script_is_used_and_there():
+    named = {name for body in rules().values() for name in re.findall(r"\.\./scripts/(\w+\.py)", body)}
+    assert named == {path.name for path in SCRIPTS}
+
+
+def test_every_caption_is_used_and_there():
+    named = {name for body in rules().values() for name in re.findall(r"\.\./report/(\w+\.rst)", body)}
+    assert named | {"workflow.rst"} == {path.name for path in (ROOT / "workflow" / "report").glob("*.rst")}
+
+
+def listed(path: Path) -> list[str]:
+    """Returns the entries of a list of packages."""
+    return [entry for line in path.read_text().splitlines() if (entry := line.split("#")[0].strip())]
+
+
+def test_conda_environment_has_the_same_python_packages():
+    environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
+    (pip,) = [entry["pip"] for entry in environment["dependencies"] if isinstance(entry, dict)]
+    assert pip == listed(ROOT / "envs" / "requirements.txt")
+
+
+def test_conda_environment_holds_no_path():
+    # Snakemake copies the file, so `-e .` and `-r requirements.txt` would point nowhere
+    text = (ROOT / "envs" / "gyriflow.yaml").read_text()
+    assert re.findall(r"^\s*- (?:-\w|\.|/).*", text, flags=re.MULTILINE) == []
+
+
+@pytest.mark.parametrize("recipe", ["Dockerfile", "gyriflow.def"])
+def test_images_are_made_from_the_same_lists(recipe):
+    text = (ROOT / "envs" / recipe).read_text()
+    assert "envs/debian.txt" in text
+    assert "envs/requirements.txt" in text
+    own = re.findall(r"install (?:-\S+ )*([\w.=-]+)", text)
+    assert set(own) <= {"-r", "--no-install-recommends"}
+    assert [package for package in listed(ROOT / "envs" / "debian.txt") if package in text.split()] == []
+
+
+def test_images_and_launcher_use_the_same_debian():
+    (suite,) = re.findall(r"^suite=(\w+)", (ROOT / "run").read_text(), flags=re.MULTILINE)
+    assert suite == "trixie"
+    assert "FROM debian:13\n" in (ROOT / "envs" / "Dockerfile").read_text()
+    assert "From: debian:13\n" in (ROOT / "envs" / "gyriflow.def").read_text()
+
+
+def test_citation_has_the_version_of_the_package():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    (version,) = re.findall(r'__version__ = "(.+)"', (PACKAGE / "__init__.py").read_text())
+    assert citation["version"] == version
+    assert f"## {version}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_links_in_the_documentation_lead_somewhere():
+    pages = [ROOT / "README.md", ROOT / "config" / "README.md", *(ROOT / "docs").glob("*.md")]
+    broken = [
+        f"{short(page)}: {target}"
+        for page in pages
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text())
+        if not target.startswith("http") and not (page.parent / target).exists()
+    ]
+    assert broken == []
+
+
+@pytest.mark.parametrize(
+    ("code", "rooms"),
+    [
+        ("from ..geometry.triangles import TriangleMesh", {"geometry"}),
+        ("from .repair import clean", {"surface"}),
+        ("from .. import units", {"units"}),
+        ("import gyriflow.io.files", {"io"}),
+        ("def f():\n    from gyriflow.mesh import quality", {"mesh"}),
+        ("import numpy", set()),
+    ],
+)
+def test_imports_are_read_right(tmp_path, monkeypatch, code, rooms):
+    source = tmp_path / "surface" / "labels.py"
+    source.parent.mkdir()
+    source.write_text(code)
+    monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
+    assert rooms_imported(source) == rooms
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "open('a')",
+        "Path('a').read_text()",
+        "import numpy as np\nnp.load('a')",
+        "import nibabel as nib\nnib.save(x, 'a')",
+        "figure.savefig('a.png')",
+        "import h5py\nwith h5py.File('a'): pass",
+    ],
+)
+def test_opened_files_are_seen(tmp_path, code):
+    source = tmp_path / "a.py"
+    source.write_text(code)
+    assert len(opened_files(source)) == 1
+
+
+def test_buffers_in_memory_are_no_files(tmp_path):
+    source = tmp_path / "a.py"
+    source.write_text(
+        "import io\nimport numpy as np\nsent = io.BytesIO()\nnp.savez(sent, a=1)\nnp.load(io.BytesIO(b''))"
+    )
+    assert opened_files(source) == []

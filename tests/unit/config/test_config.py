@@ -1,0 +1,220 @@
+"""A configuration is used as a whole or refused as a whole, with every problem named."""
+
+from pathlib import Path
+
+import pytest
+from gyriflow.config import load
+from gyriflow.config.folding import output_weeks
+from gyriflow.errors import InputError
+
+
+def study(**changes):
+    """Returns a valid configuration of two phantoms with changes on its top level."""
+    return {
+        "brains": [
+            {"id": "a", "week": 21, "phantom": {}},
+            {"id": "b", "week": 22.5, "phantom": {"voxel_mm": 1.0}},
+        ],
+        "start": "a",
+        "folding": {"end_week": 24},
+    } | changes
+
+
+def problems(raw, base_dir="."):
+    """Returns the lines of the message with which a configuration is refused."""
+    with pytest.raises(InputError) as caught:
+        load(raw, base_dir)
+    first, *lines, _ = str(caught.value).splitlines()
+    assert first.startswith(f"the configuration has {len(lines)} problem")
+    return [line.strip() for line in lines]
+
+
+def test_defaults_are_the_reference_values():
+    config = load(study())
+    run = config.runs["reference"]
+    assert (run.thickness_mm, run.poisson_ratio, run.growth_rate_per_s, run.step_s) == (1.5, 0.45, 2e-7, 43200)
+    assert config.start_week == 21
+    assert config.weeks("reference") == [21, 22, 23, 24]
+    assert [brain.source for brain in config.brains] == ["phantom", "phantom"]
+
+
+def test_all_mistakes_are_named_at_once():
+    found = problems(study(folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}, metric={}))
+    assert found == [
+        "metric: unknown key; did you mean metrics?",
+        "folding.poisson_ratio: found 0.5; it should be less than 0.5",
+        "folding.thicknes_mm: unknown key; did you mean thickness_mm?",
+        "folding.end_week: found 20; it should be above the start brain's week, 21",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "bound"),
+    [
+        ("poisson_ratio", 0.5, "less than 0.5"),
+        ("thickness_mm", 0, "greater than 0"),
+        ("step_s", -1, "greater than 0"),
+        ("step_s", "fast", "number"),
+        ("step_s", True, "number"),
+        ("growth_rate_per_s", float("nan"), "finite"),
+        ("ranks", 1.5, "integer"),
+        ("fields", ["stress"], "'displacement'"),
+        ("contact", {"kind": "walls"}, "'planes' or 'none'"),
+    ],
+)
+def test_a_value_out_of_bounds_is_refused_with_the_bound(key, value, bound):
+    (line,) = problems(study(folding={"end_week": 24, key: value}))
+    assert line.startswith(f"folding.{key}")
+    assert bound in line
+
+
+def test_missing_keys_are_named():
+    assert problems({}) == [
+        "start: is missing",
+        "brains: found nothing; expected a list of brains, each with id, week and a source",
+        "folding.end_week: is missing",
+    ]
+
+
+def test_runs_are_validated_whole_on_top_of_folding():
+    config = load(
+        study(
+            folding={"end_week": 24, "solver": {"max_newton": 9, "max_halvings": 2}},
+            runs={"reference": None, "thick": {"thickness_mm": 3, "solver": {"max_newton": 7}}},
+        )
+    )
+    assert config.runs["thick"].solver.max_newton == 7
+    assert config.runs["thick"].solver.max_halvings == 2
+    assert config.runs["reference"].thickness_mm == 1.5
+
+
+def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
+    found = problems(study(folding={"end_week": 24, "step_s": 0}, runs={"x": {"poison_ratio": 0.4}, "y": {}}))
+    assert found == [
+        "folding.step_s: found 0; it should be greater than 0",
+        "runs.x.poison_ratio: unknown key; did you mean poisson_ratio?",
+    ]
+
+
+@pytest.mark.parametrize("name", ["real", "a b", "../x", ""])
+def test_a_run_name_that_would_break_paths_or_tables_is_refused(name):
+    (line,) = problems(study(runs={name: {}}))
+    assert line.startswith(f"runs.{name}")
+
+
+def test_a_run_that_ends_before_the_start_is_refused():
+    assert problems(study(runs={"x": {"end_week": 21}, "y": {}})) == [
+        "runs.x.end_week: found 21; it should be above the start brain's week, 21"
+    ]
+
+
+def test_negative_growth_only_where_it_is_allowed_by_name():
+    folding = {"end_week": 24, "growth_rate_per_s": -1e-8}
+    assert "allow_negative_growth" in problems(study(folding=folding))[0]
+    assert load(study(folding=folding | {"allow_negative_growth": True})).folding.growth_rate_per_s == -1e-8
+
+
+def test_a_brain_needs_exactly_one_source_of_its_own_id():
+    brains = [
+        {"id": "a", "week": 21, "phantom": {}, "pial": "x.gii"},
+        {"id": "a", "week": 22},
+        {"id": "study", "week": 23, "phantom": {}},
+    ]
+    found = problems(study(brains=brains))
+    assert "brains[0]: found pial and phantom as its source; expected exactly one of" in found[0]
+    assert any(line.startswith("brains[1]: found none as its source") for line in found)
+    assert "brains: 2 brains have the id a; ids are unique" in found
+    assert "brains: the id study is reserved; choose another" in found
+
+
+def test_an_unknown_start_and_a_week_of_no_fetus_are_refused():
+    brains = [{"id": "a", "week": 20, "phantom": {}}, {"id": "c", "week": 50, "pial": __file__}]
+    assert problems(study(brains=brains, start="b")) == [
+        "brains[0].week: found 20; a phantom's should be 21 to 36",
+        "brains[1].week: found 50; it should be less than or equal to 45",
+        "start: found 'b'; expected the id of a brain: a, c",
+    ]
+
+
+def test_files_are_found_beside_the_configuration_and_missing_ones_named(tmp_path):
+    (tmp_path / "left.gii").touch()
+    (tmp_path / "labels.nii.gz").touch()
+    brains = [
+        {"id": "a", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"},
+        {"id": "b", "week": 22, "hemispheres": {"left": "left.gii", "right": "right.gii"}},
+        {"id": "c", "week": 22, "labels": "labels.nii.gz"},
+    ]
+    assert problems(study(brains=brains), tmp_path) == [
+        f"brains[1].hemispheres.right: no such file: {tmp_path / 'right.gii'}",
+        "brains[2].scheme: is missing; it says what the labels of brains[2].labels mean",
+    ]
+    config = load(study(brains=brains[:1]), tmp_path)
+    assert config.brains[0].files == [str(tmp_path / "labels.nii.gz")]
+
+
+def test_keys_that_mean_nothing_for_a_source_are_refused():
+    brains = [{"id": "a", "week": 21, "phantom": {}, "coordinates": "lps"}]
+    assert "coordinates: has no meaning with phantom" in problems(study(brains=brains))[0]
+
+
+def test_numbers_that_yaml_reads_as_text_are_numbers():
+    assert load(study(folding={"end_week": "24", "growth_rate_per_s": "2e-7"})).folding.growth_rate_per_s == 2e-7
+
+
+@pytest.mark.parametrize(
+    ("end", "every", "weeks"),
+    [
+        (24, 1, [21, 22, 23, 24]),
+        (23.5, 1, [21, 22, 23, 23.5]),
+        (21.3, 0.1, [21, 21.1, 21.2, 21.3]),
+        (22, 5, [21, 22]),
+    ],
+)
+def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
+    assert output_weeks(21, end, every) == pytest.approx(weeks)
+
+
+def test_a_validated_configuration_written_out_is_valid_again():
+    config = load(study(runs={"x": {"thickness_mm": 2}}))
+    assert load(config.model_dump(mode="json", exclude_defaults=True)) == config
+
+
+def test_label_schemes_are_those_of_the_surface_room():
+    from typing import get_args
+
+    from gyriflow.config.brains import Scheme
+    from gyriflow.surface.labels import SCHEMES
+
+    assert set(get_args(Scheme)) == set(SCHEMES)
+
+
+def test_weeks_and_defaults_of_phantoms_are_those_of_the_phantom_room():
+    import inspect
+
+    from gyriflow.config.brains import PhantomSettings
+    from gyriflow.config.checks import PHANTOM_WEEKS
+    from gyriflow.phantom.brain import FIRST_WEEK, LAST_WEEK, phantom_labels
+
+    assert PHANTOM_WEEKS == (FIRST_WEEK, LAST_WEEK)
+    defaults = {name: p.default for name, p in inspect.signature(phantom_labels).parameters.items() if name != "week"}
+    assert PhantomSettings().model_dump() == defaults
+
+
+def test_parameters_of_a_run_are_what_the_folding_program_reads():
+    from gyriflow.folding.parameters import FoldingParameters, parameters_from
+
+    config = load(study())
+    settings = config.runs["reference"].model_dump(mode="json", exclude={"ranks"})
+    weeks = config.weeks("reference")
+    read = parameters_from({"start_week": weeks[0], "output_weeks": weeks, "fissure_x_mm": 0.0, **settings})
+    # the same defaults stand in both places
+    assert read == FoldingParameters(
+        start_week=21.0, end_week=24.0, fissure_x_mm=0.0, output_weeks=(21.0, 22.0, 23.0, 24.0)
+    )
+
+
+def test_the_page_of_all_keys_is_current():
+    from gyriflow.config.documentation import documentation
+
+    page = Path(__file__).parents[3] / "config" / "README.md"
+    assert page.read_text() == documentation(), "run ./run python -m gyriflow.config"

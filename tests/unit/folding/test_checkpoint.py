@@ -1,0 +1,98 @@
+"""State and checkpoint."""
+
+import h5py
+import numpy as np
+import pytest
+from shapes import box_mesh
+
+from gyriflow.errors import InputError
+from gyriflow.folding.checkpoint import State, read_checkpoint, run_key, write_checkpoint
+from gyriflow.folding.parameters import FoldingParameters, parameters_from
+
+VALUES = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 22.0]}
+
+
+def some_state():
+    state = State.at_start(np.zeros((4, 3)), 100.0)
+    rng = np.random.default_rng(1)
+    for i in range(3):
+        state = state.after(rng.normal(size=(4, 3)), 100.0, {"step": i + 1, "week": 21.0 + i, "rung": "cg"})
+    return state
+
+
+def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
+    # exact for positions that are quadratic in time, whatever the steps
+    def at(t):
+        return np.full((2, 3), 3.0 * t + 0.5 * t**2)
+
+    times = [0.0, 1.0, 1.5, 3.0]
+    state = State.at_start(at(0.0), 1.0)
+    for before, after in zip(times[:2], times[1:3], strict=True):
+        state = state.after(at(after) - at(before), after - before, {})
+    np.testing.assert_allclose(state.predicted(1.5), at(3.0) - at(1.5), rtol=1e-13)
+
+
+def test_equal_steps_give_twice_the_last_less_the_one_before():
+    state = some_state()
+    np.testing.assert_allclose(state.predicted(100.0), 2 * state.last - state.before_last, rtol=1e-12)
+
+
+def test_a_checkpoint_comes_back_as_it_was(tmp_path):
+    state = some_state()
+    write_checkpoint(tmp_path / "state.h5", "key", state)
+    read, message = read_checkpoint(tmp_path / "state.h5", "key")
+    assert "after step 3" in message
+    for name, value in vars(state).items():
+        np.testing.assert_array_equal(getattr(read, name), value) if name != "rows" else None
+    assert read.rows == state.rows
+
+
+def test_a_checkpoint_of_another_run_is_not_used(tmp_path):
+    write_checkpoint(tmp_path / "state.h5", "key", some_state())
+    read, message = read_checkpoint(tmp_path / "state.h5", "other")
+    assert read is None
+    assert "another mesh or other parameters" in message
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed"])
+def test_a_torn_checkpoint_is_not_used(tmp_path, damage):
+    path = tmp_path / "state.h5"
+    write_checkpoint(path, "key", some_state())
+    if damage == "cut":
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    else:
+        with h5py.File(path, "a") as file:
+            file["last"][0, 0] = 7.0
+    read, message = read_checkpoint(path, "key")
+    assert read is None
+    assert "torn" in message
+
+
+def test_no_checkpoint_says_nothing(tmp_path):
+    assert read_checkpoint(tmp_path / "state.h5", "key") == (None, "")
+
+
+def test_the_key_knows_mesh_and_parameters_but_not_ranks():
+    mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
+    base = parameters_from(VALUES)
+    assert run_key(mesh, base) == run_key(mesh, parameters_from(VALUES | {"ranks": 7}))
+    assert run_key(mesh, base) != run_key(mesh, parameters_from(VALUES | {"thickness_mm": 2.0}))
+    assert run_key(mesh, base) != run_key(box_mesh((1, 1, 1), (1.0, 1.0, 1.1)), base)
+
+
+def test_defaults_are_the_papers_reference_values():
+    p = FoldingParameters(21.0, 36.0, 0.0, (21.0, 36.0))
+    assert (p.thickness_mm, p.shear_modulus_cortex_pa, p.shear_modulus_core_pa, p.poisson_ratio) == (1.5, 1500, 300, 0.45)
+    assert (p.growth_rate_per_s, p.contact.penalty_pa_per_m, p.step_s) == (2e-7, 5e5, 43200)
+
+
+def test_unknown_parameters_are_all_named():
+    with pytest.raises(InputError, match="thicknes, twice"):
+        parameters_from(VALUES | {"thicknes": 1, "twice": 2})
+    with pytest.raises(InputError, match=r"contact\.gap"):
+        parameters_from(VALUES | {"contact": {"gap": 1}})
+
+
+def test_parameters_out_of_bounds_are_all_named():
+    with pytest.raises(InputError, match=r"thickness_mm.*poisson_ratio.*allow_negative_growth"):
+        parameters_from(VALUES | {"thickness_mm": 0.0, "poisson_ratio": 0.5, "growth_rate_per_s": -1e-7})

@@ -1,0 +1,61 @@
+"""Distances, cortical weight and normals."""
+
+import numpy as np
+import pytest
+from shapes import box_mesh, ellipsoid_mesh
+
+from gyriflow.folding.layers import WEIGHT_REACH, PialSearch, cortical_weight
+from gyriflow.geometry.tetrahedra import boundary_faces
+
+
+def search_of(mesh):
+    return PialSearch(mesh.vertices, boundary_faces(mesh)[0])
+
+
+def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
+    weight = cortical_weight(np.array([0.0, 1.5, 3.0, 1e6]), 1.5)
+    np.testing.assert_allclose(weight, [1 / (1 + np.exp(-10)), 0.5, 1 / (1 + np.exp(10)), 0.0], rtol=1e-12, atol=1e-300)
+
+
+def test_weight_beyond_its_reach_does_not_matter():
+    assert cortical_weight(np.array([WEIGHT_REACH * 2.0]), 2.0)[0] < 1e-12
+
+
+def test_distance_is_to_the_triangles_not_to_the_vertices():
+    # one coarse cell: the middle of a wall is far from every vertex
+    search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
+    points = np.array([[0.0, 0.0, 0.0], [4.0, 1.0, 2.0], [0.0, -3.0, 0.0]])
+    np.testing.assert_allclose(search.distance(points), [5.0, 1.0, 2.0], atol=1e-12)
+
+
+def test_pial_vertices_have_distance_zero():
+    mesh = ellipsoid_mesh(4, (20.0, 30.0, 25.0))
+    search = search_of(mesh)
+    assert (search.distance(mesh.vertices)[search.pial] == 0).all()
+
+
+def test_beyond_reach_the_distance_is_that_of_the_nearest_vertex():
+    search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
+    assert search.distance(np.zeros((1, 3)), reach=1.0)[0] == pytest.approx(np.sqrt(75))
+
+
+def test_normals_on_a_ball_point_outwards_and_have_length_one():
+    mesh = ellipsoid_mesh(8, (10.0, 10.0, 10.0))
+    search = search_of(mesh)
+    points = 9.0 * search.surface.vertices / 10.0
+    normals = search.nearest_normals(points)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, rtol=1e-12)
+    assert np.einsum("ij,ij->i", normals, points / 9.0).min() > 0.97
+
+
+def test_ties_do_not_depend_on_the_order_of_points_or_vertices():
+    # the centre of a box is as far from all eight corners
+    mesh = box_mesh((1, 1, 1), (2.0, 2.0, 2.0))
+    facets = boundary_faces(mesh)[0]
+    order = np.random.default_rng(0).permutation(len(mesh.vertices))
+    place = np.argsort(order)
+    same = PialSearch(mesh.vertices[order], place[facets])
+    centre = np.zeros((1, 3))
+    np.testing.assert_array_equal(
+        PialSearch(mesh.vertices, facets).nearest_normals(centre), same.nearest_normals(centre)
+    )

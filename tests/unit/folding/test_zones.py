@@ -1,0 +1,111 @@
+"""Contact, clamped and growing zones on an ellipsoid, whose answer is known by symmetry."""
+
+import numpy as np
+import pytest
+from shapes import box_mesh, ellipsoid_mesh
+
+from gyriflow.errors import InputError, MeshError
+from gyriflow.folding.zones import (
+    BETWEEN_PLANES,
+    CLAMPED,
+    LEFT_CONTACT,
+    RIGHT_CONTACT,
+    find_zones,
+    inside_ellipsoid,
+    refuse_impossible,
+    zone_report,
+)
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
+
+DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift_y": 0.05, "shift_z": -0.15, "semi_axes": (0.35, 0.40, 0.50)}
+
+
+@pytest.fixture(scope="module")
+def brain():
+    return ellipsoid_mesh(12, (20.0, 26.0, 18.0))
+
+
+def test_the_ellipsoid_stands_where_the_design_puts_it():
+    box = np.array([[-10.0, -20.0, -30.0], [10.0, 20.0, 30.0]])
+    centre = np.array([0.0, 0.05 * 40, -0.15 * 60])
+    tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])
+    points = np.concatenate([box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)])
+    inside = inside_ellipsoid(points, 0.05, -0.15, (0.35, 0.40, 0.50))
+    assert inside.tolist() == [False, False, True, True, True, False, False, False]
+
+
+def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
+    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    x = brain.vertices[zones.facets, 0]
+    left, right = x[zones.facet_zone == LEFT_CONTACT], x[zones.facet_zone == RIGHT_CONTACT]
+    assert len(left)
+    assert left.min() > -5.0
+    assert left.max() <= -0.625
+    np.testing.assert_allclose(np.sort(left.ravel()), np.sort(-right.ravel()), atol=1e-9)
+
+
+def test_the_fissure_need_not_be_at_zero(brain):
+    moved = TetrahedralMesh(brain.vertices + [7.0, 0.0, 0.0], brain.tets)
+    a = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    b = find_zones(moved, fissure_x_mm=7.0, **DEFAULTS)
+    np.testing.assert_array_equal(a.facet_zone, b.facet_zone)
+    np.testing.assert_array_equal(a.growth, b.growth)
+
+
+def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
+    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    clamped = zones.vertices_of(CLAMPED)
+    assert len(clamped)
+    assert inside_ellipsoid(brain.vertices, 0.05, -0.15, (0.35, 0.40, 0.50))[clamped].all()
+    assert (zones.growth[clamped] == 0).all()
+
+
+def test_tissue_that_bridges_the_planes_does_not_grow():
+    # a vertex between the planes under the pial surface: its elements are the bridge
+    mesh = ellipsoid_mesh(6, (20.0, 26.0, 18.0))
+    zones = find_zones(mesh, fissure_x_mm=0.0, **(DEFAULTS | {"semi_axes": (0.01, 0.01, 0.01)}))
+    top = np.argmax(mesh.vertices[:, 2])
+    assert zones.growth[top] == 0
+    assert zones.growth[np.argmax(mesh.vertices[:, 0])] == 1
+
+
+def test_without_contact_there_are_no_contact_zones(brain):
+    zones = find_zones(brain, fissure_x_mm=0.0, **(DEFAULTS | {"contact": False}))
+    assert not np.isin(zones.facet_zone, [LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES]).any()
+
+
+def test_the_report_adds_up(brain):
+    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    report = zone_report(brain, zones, 3.0)
+    assert sum(zone["facets"] for zone in report["zones"].values()) == len(zones.facets)
+    assert report["initial_penetration_mm"] == 0
+    assert report["clamped_share"]["left"] == pytest.approx(report["clamped_share"]["right"], rel=0.05)
+
+
+def test_elements_through_the_cortex_of_a_box():
+    box = box_mesh((8, 8, 8), (8.0, 8.0, 8.0))
+    zones = find_zones(box, fissure_x_mm=0.0, **DEFAULTS)
+    # a cell of 1 mm has three edges of 1, three of √2 shared with neighbours, and one of √3
+    assert 1.5 < zone_report(box, zones, 2.0)["elements_through_cortex"] < 2.0
+
+
+def test_a_brain_without_clamped_facets_is_refused(brain):
+    zones = find_zones(brain, fissure_x_mm=0.0, **(DEFAULTS | {"semi_axes": (0.1, 0.1, 0.1)}))
+    with pytest.raises(InputError, match="no facet is clamped"):
+        refuse_impossible(brain, zones)
+
+
+def test_a_floating_part_is_refused(brain):
+    far = box_mesh((2, 2, 2), (2.0, 2.0, 2.0))
+    both = TetrahedralMesh(
+        np.concatenate([brain.vertices, far.vertices + [0.0, 0.0, 24.0]]),
+        np.concatenate([brain.tets, far.tets + len(brain.vertices)]),
+    )
+    zones = find_zones(both, fissure_x_mm=0.0, **DEFAULTS)
+    with pytest.raises(MeshError, match="1 of 2 parts"):
+        refuse_impossible(both, zones)
+
+
+def test_a_fissure_outside_the_brain_is_refused(brain):
+    with pytest.raises(InputError, match="outside the brain"):
+        refuse_impossible(brain, find_zones(brain, fissure_x_mm=50.0, **DEFAULTS))

@@ -1,0 +1,62 @@
+"""Growth rates of areas and volumes made with known rates."""
+
+import numpy as np
+import pytest
+
+from gyriflow.errors import InputError
+from gyriflow.growth.rates import growth_rates
+
+WEEK_S = 604_800.0
+
+
+def test_rates_are_those_the_areas_were_made_with() -> None:
+    rate, core_rate = 2e-7, 1.2e-7
+    areas = [9000.0, 9000.0 * (1 + rate * WEEK_S) ** 2]
+    volumes = [45_000.0, 45_000.0 * (1 + core_rate * WEEK_S) ** 3]
+    table = growth_rates([21, 22], areas, volumes)
+    assert table.columns.tolist() == [
+        "from_week",
+        "to_week",
+        "area_ratio",
+        "rate_per_s",
+        "volume_ratio",
+        "core_rate_per_s",
+    ]
+    row = table.iloc[0]
+    assert row["rate_per_s"] == pytest.approx(rate)
+    assert row["core_rate_per_s"] == pytest.approx(core_rate)
+    assert row["area_ratio"] == pytest.approx(areas[1] / areas[0])
+
+
+def test_a_gap_uses_the_true_time() -> None:
+    table = growth_rates([21, 23.5], [100.0, 144.0], [1000.0, 1728.0])
+    assert table["rate_per_s"][0] == pytest.approx(0.2 / (2.5 * WEEK_S))
+    assert table["core_rate_per_s"][0] == pytest.approx(0.2 / (2.5 * WEEK_S))
+
+
+def test_weeks_in_any_order() -> None:
+    table = growth_rates([23, 21, 22], [144.0, 100.0, 121.0], [3.0, 1.0, 2.0])
+    assert table["from_week"].tolist() == [21, 22]
+    assert table["to_week"].tolist() == [22, 23]
+    np.testing.assert_allclose(table["rate_per_s"], [0.1 / WEEK_S, (12 / 11 - 1) / WEEK_S])
+    np.testing.assert_allclose(table["volume_ratio"], [2.0, 1.5])
+
+
+def test_shrinking_is_negative() -> None:
+    assert growth_rates([21, 22], [121.0, 100.0], [1.0, 1.0])["rate_per_s"][0] < 0
+
+
+@pytest.mark.parametrize(
+    ("weeks", "areas", "volumes", "match"),
+    [
+        ([21, 21, 22], [1.0, 1.1, 1.2], [1.0, 1.1, 1.2], "week 21 more than once"),
+        ([21], [1.0], [1.0], "at least two"),
+        ([], [], [], "at least two"),
+        ([21, 22], [1.0, 0.0], [1.0, 1.1], "areas_mm2"),
+        ([21, 22], [1.0, 1.1], [1.0, float("nan")], "volumes_mm3"),
+        ([21, 22], [1.0], [1.0, 1.1], "needs an area"),
+    ],
+)
+def test_refused(weeks: list[float], areas: list[float], volumes: list[float], match: str) -> None:
+    with pytest.raises(InputError, match=match):
+        growth_rates(weeks, areas, volumes)

@@ -1,0 +1,68 @@
+"""Files appear whole or not at all."""
+
+import errno
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gyriflow.errors import InputError, StorageError
+from gyriflow.io.files import read_json, read_table, replaced, write_json, write_table
+
+
+def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
+    path = tmp_path / "new" / "a.surf.gii"
+    with replaced(path) as temporary:
+        temporary.write_text("whole")
+        assert not path.exists()
+        assert temporary.parent == path.parent
+        assert temporary.name.startswith(".")
+        assert temporary.name.endswith(".surf.gii")
+    assert path.read_text() == "whole"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("earlier")
+    with pytest.raises(ZeroDivisionError), replaced(path) as temporary:
+        temporary.write_text("half")
+        _ = 1 / 0
+    assert path.read_text() == "earlier"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
+    path = tmp_path / "a.csv"
+    with pytest.raises(StorageError, match=r"a\.csv.*No space left") as caught, replaced(path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert caught.value.exit_code == 5
+
+
+def test_folder_that_cannot_be_made_is_a_storage_error(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError):
+        write_json(tmp_path / "file" / "a.json", {})
+
+
+def test_json_unwraps_numpy_and_has_no_nan(tmp_path):
+    path = tmp_path / "a.json"
+    write_json(path, {"n": np.int64(3), "x": [np.float32(0.5), np.nan, np.inf], "m": np.eye(2), "ok": np.True_})
+    assert read_json(path) == {"n": 3, "x": [0.5, None, None], "m": [[1.0, 0.0], [0.0, 1.0]], "ok": True}
+    assert "NaN" not in path.read_text()
+
+
+def test_torn_or_missing_json_and_table_are_input_errors(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps({"a": 1})[:-1])
+    for name in ("a.json", "b.json"):
+        with pytest.raises(InputError, match=name):
+            read_json(tmp_path / name)
+    with pytest.raises(InputError, match=r"b\.csv"):
+        read_table(tmp_path / "b.csv")
+
+
+def test_table_comes_back(tmp_path):
+    table = pd.DataFrame({"subject": ["a", "b"], "value": [1 / 3, 1e-12]})
+    write_table(tmp_path / "a.csv", table)
+    pd.testing.assert_frame_equal(read_table(tmp_path / "a.csv"), table, rtol=1e-9)

@@ -1,0 +1,141 @@
+"""Label volumes: whatever their storage, units and headers, the same positions in RAS+ mm, or a refusal."""
+
+import logging
+
+import nibabel as nib
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gyriflow.errors import InputError
+from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
+
+AFFINE = np.array([[0.8, 0, 0, -10], [0, 0.9, 0, 5], [0, 0, 1.0, 20], [0, 0, 0, 1.0]])
+
+
+@pytest.fixture
+def labels():
+    values = np.zeros((4, 5, 6), dtype=np.int16)
+    values[1, 2, 3], values[3, 4, 5] = 7, 2
+    return values
+
+
+def saved(path, values, affine=AFFINE, unit="mm", sform=1, qform=1, qform_affine=None):
+    image = nib.Nifti1Image(values, None)
+    image.header.set_xyzt_units(unit)
+    image.header.set_sform(affine, code=sform)
+    image.header.set_qform(affine if qform_affine is None else qform_affine, code=qform)
+    nib.save(image, path)
+    return path
+
+
+def position(volume, label):
+    return volume.affine[:3, :3] @ np.argwhere(volume.labels == label)[0] + volume.affine[:3, 3]
+
+
+@pytest.mark.parametrize("order", ["LAS", "LPS", "PIR", "SRA", "RAS"])
+def test_storage_order_does_not_move_the_brain(tmp_path, labels, order):
+    image = nib.Nifti1Image(labels, AFFINE)
+    turn = nib.orientations.ornt_transform(nib.io_orientation(AFFINE), nib.orientations.axcodes2ornt(order))
+    nib.save(image.as_reoriented(turn), tmp_path / "a.nii.gz")
+    volume = read_label_volume(tmp_path / "a.nii.gz")
+    for label, index in ((7, (1, 2, 3)), (2, (3, 4, 5))):
+        assert position(volume, label) == pytest.approx(AFFINE[:3, :3] @ index + AFFINE[:3, 3], abs=1e-4)
+
+
+def test_oblique_affine_is_kept_whole(tmp_path, labels):
+    oblique = np.eye(4)
+    oblique[:3, :3] = Rotation.from_euler("xyz", [20, -30, 40], degrees=True).as_matrix() @ AFFINE[:3, :3]
+    volume = read_label_volume(saved(tmp_path / "a.nii", labels, oblique))
+    assert volume.affine == pytest.approx(oblique, abs=1e-5)
+
+
+@pytest.mark.parametrize(("unit", "per_mm"), [("mm", 1.0), ("meter", 1e-3), ("micron", 1e3)])
+def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
+    stored = np.diag([per_mm] * 3 + [1.0]) @ AFFINE
+    volume = read_label_volume(saved(tmp_path / "a.nii", labels, stored, unit))
+    assert volume.affine == pytest.approx(AFFINE, rel=1e-5)
+
+
+def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
+    other = AFFINE.copy()
+    other[0, 3] = 33.0
+    path = saved(tmp_path / "a.nii", labels, qform_affine=other)
+    with pytest.raises(InputError, match=r"(?s)a\.nii.*qform.*33.*sform.*-10.*affine_from") as caught:
+        read_label_volume(path)
+    assert caught.value.exit_code == 2
+    assert read_label_volume(path, "qform").affine[0, 3] == pytest.approx(33.0)
+    assert read_label_volume(path, "sform").affine[0, 3] == pytest.approx(-10.0)
+
+
+@pytest.mark.parametrize(("sform", "qform"), [(1, 0), (0, 1)])
+def test_of_two_matrices_the_one_that_is_set_counts(tmp_path, labels, sform, qform):
+    wrong = np.diag([3.0, 3.0, 3.0, 1.0])
+    path = saved(tmp_path / "a.nii", labels, AFFINE if sform else wrong, "mm", sform, qform, AFFINE if qform else wrong)
+    assert read_label_volume(path).affine == pytest.approx(AFFINE, abs=1e-5)
+
+
+def test_no_orientation_at_all_is_refused(tmp_path, labels):
+    with pytest.raises(InputError, match="left and right are unknown"):
+        read_label_volume(saved(tmp_path / "a.nii", labels, sform=0, qform=0))
+
+
+def test_singleton_axis_and_whole_floats_are_accepted(tmp_path, labels):
+    path = saved(tmp_path / "a.nii", labels[..., None].astype(np.float32))
+    assert np.array_equal(read_label_volume(path).labels, labels)
+
+
+@pytest.mark.parametrize("values", [np.zeros((3, 3, 3, 2), np.int16), np.zeros((3, 3), np.int16)])
+def test_other_numbers_of_axes_are_refused(tmp_path, values):
+    with pytest.raises(InputError, match="three axes"):
+        read_label_volume(saved(tmp_path / "a.nii", values))
+
+
+def test_grey_values_are_no_labels(tmp_path, labels):
+    values = labels.astype(np.float32)
+    values[0, 0, :2] = 0.4
+    with pytest.raises(InputError, match=r"2 voxels, for example 0\.4.*does not segment"):
+        read_label_volume(saved(tmp_path / "a.nii", values))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_nan_and_infinity_are_counted(tmp_path, labels, value):
+    values = labels.astype(np.float32)
+    values[0, 0, :3] = value
+    with pytest.raises(InputError, match=r"a\.nii.*3 voxels"):
+        read_label_volume(saved(tmp_path / "a.nii", values))
+
+
+@pytest.mark.parametrize("kept", [0.2, 0.6, 0.95])
+def test_truncated_file_is_named(tmp_path, kept):
+    values = np.random.default_rng(0).integers(0, 9, (20, 20, 20)).astype(np.int16)
+    whole = saved(tmp_path / "a.nii.gz", values).read_bytes()
+    (tmp_path / "torn.nii.gz").write_bytes(whole[: int(kept * len(whole))])
+    with pytest.raises(InputError, match=r"torn\.nii\.gz"):
+        read_label_volume(tmp_path / "torn.nii.gz")
+
+
+def test_missing_and_foreign_files_are_named(tmp_path):
+    (tmp_path / "text.nii").write_text("no image")
+    for name in ("text.nii", "none.nii"):
+        with pytest.raises(InputError, match=name):
+            read_label_volume(tmp_path / name)
+
+
+def test_flat_voxels_are_used_with_a_warning(tmp_path, labels, caplog):
+    flat = np.diag([0.8, 0.8, 3.0, 1.0])
+    with caplog.at_level(logging.WARNING):
+        volume = read_label_volume(saved(tmp_path / "a.nii", labels, flat))
+    assert volume.affine == pytest.approx(flat, abs=1e-5)
+    assert "0.8 x 0.8 x 3 mm" in caplog.text
+
+
+@pytest.mark.parametrize("shear", [0.0, 0.2])
+def test_written_volume_comes_back(tmp_path, labels, shear):
+    affine = AFFINE.copy()
+    affine[0, 2] = shear
+    write_label_volume(tmp_path / "a.nii.gz", LabelVolume(labels.astype(np.int32), affine))
+    back = read_label_volume(tmp_path / "a.nii.gz")
+    assert np.array_equal(back.labels, labels)
+    assert back.affine == pytest.approx(affine, abs=1e-5)
+    assert nib.load(tmp_path / "a.nii.gz").get_data_dtype() == np.uint8

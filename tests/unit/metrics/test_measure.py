@@ -1,0 +1,127 @@
+"""All metrics of brains made of spheres, closed and cut, and of two real hemispheres."""
+
+import json
+import os
+from pathlib import Path
+
+import nibabel as nib
+import numpy as np
+import pytest
+import trimesh
+
+from gyriflow.errors import MeshError
+from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh, transformed
+from gyriflow.metrics.measure import BrainMetrics, measure_brain
+
+DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).resolve().parents[4] / "shared/data"))
+
+
+def shifted(mesh: TriangleMesh, x: float) -> TriangleMesh:
+    return transformed(mesh, [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
+    rows = metrics.table.query("hemisphere == @hemisphere and metric == @metric")
+    assert len(rows) == 1
+    return float(rows["value"].iloc[0])
+
+
+@pytest.fixture(scope="module")
+def apart() -> BrainMetrics:
+    """A brain of two spheres of 20 and 25 mm."""
+    left, right = (trimesh.creation.icosphere(subdivisions=4, radius=radius) for radius in (20.0, 25.0))
+    left, right = TriangleMesh(left.vertices, left.faces), TriangleMesh(right.vertices, right.faces)
+    left, right = shifted(left, -21.0), shifted(right, 26.0)
+    return measure_brain(merged(left, right), left, right, spangy_modes=60)
+
+
+@pytest.fixture(scope="module")
+def cut() -> BrainMetrics:
+    """A sphere of 25 mm cut in two, along edges of the octahedron that it is made from."""
+    shape = trimesh.Trimesh(
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]],
+        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
+    )
+    for _ in range(5):
+        shape = shape.subdivide()
+    whole = TriangleMesh(25.0 * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None], shape.faces)
+    on_right = whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0
+    left, right = submesh(whole, ~on_right)[0], submesh(whole, on_right)[0]
+    return measure_brain(whole, left, right, spangy_modes=60)
+
+
+def test_two_spheres(apart: BrainMetrics) -> None:
+    for name, radius in (("left", 20.0), ("right", 25.0)):
+        assert value(apart, name, "volume") == pytest.approx(4 / 3 * np.pi * radius**3 / 1000, rel=0.01)
+        assert value(apart, name, "area") == pytest.approx(4 * np.pi * radius**2 / 100, rel=0.01)
+        assert value(apart, name, "gyrification_index") == pytest.approx(1.0)
+        assert value(apart, name, "gyrification_index_envelope") == pytest.approx(1.0, abs=0.01)
+        assert value(apart, name, "mean_shape_index") == pytest.approx(1.0, abs=0.01)
+        assert value(apart, name, "mean_curvedness") == pytest.approx(1 / radius, rel=0.02)
+        assert value(apart, name, "sulcal_area_share") == 0.0
+        # Weyl's number by the paper's formula is 8192/2π, whatever the radius
+        assert value(apart, name, "weyl_number") == pytest.approx(8192 / (2 * np.pi), rel=0.01)
+        assert value(apart, name, "spangy_modes") == 60
+    for metric in ("volume", "area"):
+        both = value(apart, "left", metric) + value(apart, "right", metric)
+        assert value(apart, "whole", metric) == pytest.approx(both)
+
+
+def test_maps_and_spectra(apart: BrainMetrics) -> None:
+    assert set(apart.maps) == {"left", "right"}
+    assert {name: len(values) for name, values in apart.maps["left"].items()} == dict.fromkeys(
+        ["shape_index", "curvedness", "mean_curvature", "gaussian_curvature", "spangy_dominant_band"], 2562
+    )
+    assert apart.spectra["hemisphere"].tolist() == ["left"] * 7 + ["right"] * 7
+    assert apart.spectra["band"].tolist() == [*range(7), *range(7)]
+    assert set(apart.spectra["weyl_formula"]) == {"paper"}
+    # the shape index of a sphere is the constant 1: all its power is in B0, 1² times the area
+    assert value(apart, "left", "spangy_B0_power") == pytest.approx(4 * np.pi * 20.0**2, rel=0.02)
+    assert value(apart, "left", "spangy_captured_share") == pytest.approx(1.0, abs=1e-3)
+
+
+def test_cut_is_left_out(cut: BrainMetrics) -> None:
+    for name in ("left", "right"):
+        assert value(cut, name, "area") == pytest.approx(0.5 * value(cut, "whole", "area"), rel=1e-3)
+        assert value(cut, name, "volume") == pytest.approx(0.5 * value(cut, "whole", "volume"), rel=1e-3)
+        assert value(cut, name, "gyrification_index") == pytest.approx(1.0, abs=0.02)
+        assert value(cut, name, "gyrification_index_envelope") == pytest.approx(1.0, abs=0.03)
+        assert value(cut, name, "mean_shape_index") == pytest.approx(value(cut, "whole", "mean_shape_index"), abs=0.01)
+        assert value(cut, name, "mean_curvedness") == pytest.approx(1 / 25.0, rel=0.02)
+        # nothing of the cut's edge in the spectrum
+        total = cut.spectra.query("hemisphere == @name and band > 0")["power"].sum()
+        assert total < 1e-3 * value(cut, name, "spangy_B0_power")
+
+
+def test_table_is_tidy(apart: BrainMetrics) -> None:
+    assert apart.table.columns.tolist() == ["hemisphere", "metric", "value", "unit"]
+    assert not apart.table.duplicated(["hemisphere", "metric"]).any()
+    units = apart.table.drop_duplicates("metric").set_index("metric")["unit"]
+    assert units[["volume", "area", "mean_curvedness", "spangy_B4_power"]].tolist() == ["mL", "cm2", "1/mm", "mm2"]
+
+
+def test_inside_out_is_refused() -> None:
+    shape = trimesh.creation.icosphere(subdivisions=2, radius=20.0)
+    mesh = TriangleMesh(shape.vertices, shape.faces)
+    with pytest.raises(MeshError, match="look inwards"):
+        measure_brain(flipped(mesh), mesh, mesh)
+
+
+@pytest.mark.skipif(not (DATA / "hemispheres").is_dir(), reason=f"no example hemispheres in {DATA}")
+def test_real_hemispheres() -> None:
+    folder = DATA / "hemispheres"
+    truth = json.loads((folder / "truth.json").read_text())
+    meshes = {}
+    for side in ("left", "right"):
+        name = f"fetal.week23.{side}.pial.surf.gii"
+        arrays = nib.load(folder / name).darrays
+        mesh = transformed(TriangleMesh(arrays[0].data, arrays[1].data), truth[name]["to_ras"])
+        meshes[side] = flipped(mesh) if truth[name]["inside_out"] else mesh
+    metrics = measure_brain(merged(*meshes.values()), **meshes, spangy_modes=40)
+    for side in ("left", "right"):
+        known = truth[f"fetal.week23.{side}.pial.surf.gii"]
+        assert value(metrics, side, "area") == pytest.approx(known["area_cm2"], rel=1e-4)
+        assert value(metrics, side, "volume") == pytest.approx(known["volume_mL"], rel=1e-4)
+        assert 0.9 < value(metrics, side, "gyrification_index") < 1.3
+        assert 0 < value(metrics, side, "mean_shape_index") < 0.6  # gyri prevail on a young brain
+        assert all(np.isfinite(values).all() for values in metrics.maps[side].values())

@@ -1,0 +1,72 @@
+"""Distances between surfaces of known distance and motion."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.metrics.similarity import distances, rigid_alignment, surface_distance
+
+
+def brain_like(subdivisions: int = 4) -> TriangleMesh:
+    """Returns an ellipsoid with a bump, so that only one pose fits."""
+    shape = trimesh.creation.icosphere(subdivisions=subdivisions)
+    direction = shape.vertices
+    bump = 1 + 0.25 * np.exp(-8 * ((direction - np.array([0.6, 0.64, 0.48])) ** 2).sum(axis=1))
+    return TriangleMesh(direction * bump[:, None] * [20.0, 28.0, 16.0], shape.faces)
+
+
+def sphere(radius: float) -> TriangleMesh:
+    shape = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    return TriangleMesh(shape.vertices, shape.faces)
+
+
+def motion(degrees: float, shift: list[float]) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_rotvec(np.array([0.3, 0.5, 0.8]) / 0.99 * degrees, degrees=True).as_matrix()
+    matrix[:3, 3] = shift
+    return matrix
+
+
+def test_alignment_takes_a_motion_back() -> None:
+    mesh = brain_like()
+    matrix = motion(12.0, [8.0, -5.0, 3.0])
+    found = rigid_alignment(transformed(mesh, matrix), mesh)
+    np.testing.assert_allclose(found @ matrix, np.eye(4), atol=0.03)
+    result = surface_distance(transformed(mesh, matrix), mesh)
+    assert result["symmetric_mean_mm"] < 0.02
+    assert result["hausdorff95_mm"] < 0.05
+    assert result["rotation_deg"] == pytest.approx(12.0, rel=0.02)
+
+
+def test_distance_does_not_depend_on_the_triangles() -> None:
+    result = surface_distance(brain_like(3), brain_like(4))
+    assert result["symmetric_mean_mm"] < 0.25  # the coarse one lies inside by the sag of its triangles
+    assert result["rotation_deg"] < 1.0
+
+
+def test_spheres_of_different_radius() -> None:
+    result = surface_distance(sphere(20.0), sphere(22.0))
+    assert result["symmetric_mean_mm"] == pytest.approx(2.0, abs=0.05)
+    assert result["hausdorff95_mm"] == pytest.approx(2.0, abs=0.05)
+    there, back = distances(sphere(20.0), sphere(22.0)), distances(sphere(22.0), sphere(20.0))
+    assert there.max() < 2.01
+    assert back.min() > 1.99
+
+
+def test_hausdorff_sees_what_the_mean_does_not() -> None:
+    smooth = sphere(25.0)
+    tall = smooth.vertices.copy()
+    cap = tall[:, 2] > 25.0 * np.cos(np.arccos(1 - 2 * 0.08))  # 8 % of the sphere's area
+    tall[cap] *= 1.2
+    result = surface_distance(TriangleMesh(tall, smooth.faces), smooth)
+    assert result["symmetric_mean_mm"] < 1.0
+    assert result["hausdorff95_mm"] > 3.0
+
+
+def test_same_in_both_orders() -> None:
+    a, b = brain_like(), transformed(sphere(22.0), motion(0.0, [5.0, 0.0, 0.0]))
+    there, back = surface_distance(a, b), surface_distance(b, a)
+    assert there["symmetric_mean_mm"] == pytest.approx(back["symmetric_mean_mm"], rel=0.02)
+    assert there["hausdorff95_mm"] == pytest.approx(back["hausdorff95_mm"], rel=0.02)

@@ -1,0 +1,154 @@
+"""Band limits, powers and dominant bands of proxies whose spectrum is known."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy import sparse
+
+from gyriflow.errors import MeshError
+from gyriflow.geometry.triangles import TriangleMesh, area, merged, transformed
+from gyriflow.metrics.laplace_beltrami import Modes, laplacian, lowest_modes
+from gyriflow.metrics.spangy import (
+    bands_of_modes,
+    first_eigenvalue,
+    number_of_modes,
+    spectrum,
+    weyl_number,
+)
+
+
+@pytest.fixture(scope="module")
+def shape() -> TriangleMesh:
+    sphere = trimesh.creation.icosphere(subdivisions=4)
+    return TriangleMesh(sphere.vertices * [35.0, 25.0, 20.0], sphere.faces)
+
+
+@pytest.fixture(scope="module")
+def solved(shape: TriangleMesh):
+    stiffness, mass = laplacian(shape)
+    return lowest_modes(stiffness, mass, 200), mass
+
+
+def test_bands_are_half_open() -> None:
+    values = np.array([0.0, 2.0, 7.999, 8.0, 31.0, 32.0, 2.0 * 4**5, 2.0 * 4**6 - 1e-9, 2.0 * 4**6])
+    np.testing.assert_array_equal(bands_of_modes(values), [0, 1, 1, 2, 2, 3, 6, 6, -1])
+
+
+def test_weyl_numbers_of_a_sphere() -> None:
+    # A = 4πR², λ1 = 2/R²: N = A·4⁶·λ1/4π = 8192, and 2π times fewer by the paper's λmax
+    assert weyl_number(4 * np.pi * 30.0**2, 2 / 30.0**2, "textbook") == 8192
+    assert weyl_number(4 * np.pi * 30.0**2, 2 / 30.0**2, "paper") == round(8192 / (2 * np.pi))
+    assert number_of_modes(4 * np.pi * 30.0**2, 5000, 2 / 30.0**2, "paper") == 500
+
+
+def test_power_of_one_mode_is_in_its_band(solved) -> None:
+    modes, mass = solved
+    band = bands_of_modes(modes.eigenvalues)
+    mode = np.flatnonzero(band == 3)[4]
+    found = spectrum(5.0 * modes.functions[:, mode], modes, mass, edge_length_mm=1.0)
+    power = found.bands.set_index("band")["power"]
+    assert power[3] == pytest.approx(25.0)
+    assert power.drop(3).sum() == pytest.approx(0.0, abs=1e-9)
+    assert found.captured == pytest.approx(1.0)
+    proxy = modes.functions[:, mode]
+    clear = np.abs(proxy) > 1e-6
+    np.testing.assert_array_equal(found.dominant_band[clear], np.where(proxy > 0, 3, -3)[clear])
+
+
+def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
+    modes, mass = solved
+    band = bands_of_modes(modes.eigenvalues)
+    slow, fast = (modes.functions[:, np.flatnonzero(band == k)[1]] for k in (1, 3))
+    proxy = 10.0 * slow + fast
+    found = spectrum(proxy, modes, mass, edge_length_mm=1.0).dominant_band
+    expected = np.where(proxy > 0, np.where(10 * slow > fast, 1, 3), np.where(10 * slow < fast, -1, -3))
+    clear = np.abs(proxy) > 1e-3
+    np.testing.assert_array_equal(found[clear], expected[clear])
+
+
+def test_parseval_with_all_modes() -> None:
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    mesh = TriangleMesh(sphere.vertices * [35.0, 25.0, 20.0], sphere.faces)
+    stiffness, mass = laplacian(mesh)
+    modes = lowest_modes(stiffness, mass, len(mesh.vertices))
+    proxy = np.random.default_rng(1).standard_normal(len(mesh.vertices))
+    found = spectrum(proxy, modes, mass, edge_length_mm=1.0)
+    assert found.captured == pytest.approx(1.0, rel=1e-10)
+    beyond = np.sum(found.coefficients[found.band == -1] ** 2)
+    assert np.nansum(found.bands["power"]) + beyond == pytest.approx(proxy @ (mass @ proxy), rel=1e-10)
+
+
+def test_relative_power_leaves_the_mean_out_and_sums_to_one(shape, solved) -> None:
+    modes, mass = solved
+    proxy = np.sin(shape.vertices[:, 0] / 4.0) + shape.vertices[:, 2] / 20.0
+    tables = [spectrum(proxy + offset, modes, mass, edge_length_mm=1.0).bands for offset in (0.0, 100.0)]
+    assert np.isnan(tables[0]["relative_power"][0])
+    assert tables[0]["relative_power"].sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(tables[0]["relative_power"], tables[1]["relative_power"], atol=1e-9)
+    assert tables[1]["power"][0] == pytest.approx(tables[0]["power"][0] + 100.0**2 * area(shape), rel=0.05)
+
+
+def test_bands_scale_with_the_brain(shape, solved) -> None:
+    modes, mass = solved
+    proxy = np.sin(shape.vertices[:, 0] / 4.0)
+    small = spectrum(proxy, modes, mass, edge_length_mm=1.0).bands
+    stiffness, mass = laplacian(transformed(shape, np.diag([2.0, 2.0, 2.0, 1.0])))
+    large = spectrum(proxy, lowest_modes(stiffness, mass, 200), mass, edge_length_mm=2.0).bands
+    np.testing.assert_allclose(large["wavelength_min_mm"], 2 * small["wavelength_min_mm"])
+    np.testing.assert_allclose(large["power"], 4 * small["power"], rtol=1e-6)
+    np.testing.assert_array_equal(large["modes"], small["modes"])
+
+
+def test_wavelengths_and_flags(solved) -> None:
+    modes, mass = solved
+    edge = 2.0
+    bands = spectrum(modes.functions[:, 3], modes, mass, edge_length_mm=edge).bands.set_index("band")
+    longest = 2 * np.pi / np.sqrt(modes.eigenvalues[1])
+    assert bands["wavelength_max_mm"][1] == pytest.approx(longest)
+    for k in range(1, 7):
+        assert bands["wavelength_min_mm"][k] == pytest.approx(longest / 2**k)
+        assert bands["complete"][k] == (modes.eigenvalues[1] * 4**k <= modes.eigenvalues[-1])
+        assert bands["resolved"][k] == (longest / 2**k >= 6 * edge)
+    assert bands["complete"][3]
+    assert not bands["complete"][4]
+    assert bands["modes"][6] == 0
+    assert np.isnan(bands["power"][6])
+
+
+def test_agrees_with_slam_once_its_slip_is_undone(shape, solved) -> None:
+    modes, mass = solved
+    proxy = np.sin(shape.vertices[:, 0] / 4.0) + np.cos(shape.vertices[:, 1] / 3.0)
+    found = spectrum(proxy, modes, mass, edge_length_mm=1.0)
+    values, squares = modes.eigenvalues, found.coefficients**2
+    # slam's formula: bands up to the last complete one, then the rest of the modes without the very last
+    complete = int(np.log2(values[-1] / values[1]) / 2)
+    for k in range(complete):
+        inside = (values >= values[1] * 4**k) & (values <= values[1] * 4 ** (k + 1))
+        assert found.bands["power"][k + 1] == pytest.approx(squares[inside].sum())
+    rest = squares[values > values[1] * 4**complete][:-1].sum()
+    assert found.bands["power"][complete + 1] == pytest.approx(rest + squares[-1])
+    assert squares[-1] > 0
+
+
+def test_no_band_is_lost_when_the_proxy_is_zero(solved) -> None:
+    modes, mass = solved
+    found = spectrum(np.zeros(mass.shape[0]), modes, mass, edge_length_mm=1.0)
+    assert found.bands["power"].sum() == 0
+    assert found.bands["relative_power"].sum() == 0
+
+
+def test_two_pieces_are_refused(shape) -> None:
+    apart = transformed(shape, [[1, 0, 0, 100], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    with pytest.raises(MeshError, match="one piece"):
+        first_eigenvalue(*laplacian(merged(shape, apart)))
+
+
+def test_first_eigenvalue_of_a_sphere() -> None:
+    sphere = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
+    assert first_eigenvalue(*laplacian(TriangleMesh(sphere.vertices, sphere.faces))) == pytest.approx(0.02, rel=0.01)
+
+
+def test_modes_are_what_the_bands_are_counted_on() -> None:
+    modes = Modes(np.array([0.0, 1.0, 3.9, 4.0]), np.eye(4))
+    found = spectrum(np.array([1.0, 2.0, 3.0, 4.0]), modes, sparse.identity(4, format="csc"), edge_length_mm=0.1)
+    np.testing.assert_allclose(found.bands["power"][:3], [1.0, 4.0 + 9.0, 16.0])

@@ -1,0 +1,209 @@
+"""Charts hold what the tables say."""
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from gyriflow.errors import InputError
+from gyriflow.report.charts import growth_chart, metrics_chart, quality_histogram, steps_chart
+from gyriflow.report.spectra import spectra_chart, spectra_weeks_chart
+
+AREAS = pd.DataFrame(
+    {"subject": ["a", "c", "b"], "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
+)
+RATES = pd.DataFrame({"from_week": [21.0, 22.0], "to_week": [22.0, 23.0], "rate_per_s": [1.2e-7, -0.3e-7]})
+
+
+def words(figure: Figure) -> list[str]:
+    """Returns all texts that a figure shows."""
+    return [text.get_text() for text in figure.findobj(mpl.text.Text) if text.get_visible() and text.get_text()]
+
+
+def line_of(axes, colour) -> np.ndarray:
+    """Returns the (n, 2) data of the lines of a colour."""
+    return np.concatenate([line.get_xydata() for line in axes.lines if mpl.colors.same_color(line.get_color(), colour)])
+
+
+def metric_rows(run: str, hemisphere: str, metric: str, values: dict[float, float], unit: str) -> pd.DataFrame:
+    columns = {"subject": "s", "run": run, "week": list(values), "hemisphere": hemisphere, "metric": metric}
+    return pd.DataFrame({**columns, "value": list(values.values()), "unit": unit})
+
+
+def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: bool = True) -> list[pd.DataFrame]:
+    return [
+        pd.DataFrame(
+            {
+                "run": run,
+                "week": week,
+                "hemisphere": side,
+                "band": list(power),
+                "relative_power": [factor * value for value in power.values()],
+                "complete": complete,
+                "resolved": True,
+            }
+        )
+        for side, factor in (("left", 1.0), ("right", 0.5))
+    ]
+
+
+def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
+    figure = growth_chart(AREAS, RATES, folding_rate_per_s=2e-7)
+    area_axes, rate_axes, volume_axes = figure.axes
+    assert [bar.get_height() for bar in rate_axes.patches] == pytest.approx([1.2, -0.3])
+    assert "10⁻⁷ s⁻¹" in rate_axes.get_ylabel()
+    assert [label.get_text() for label in rate_axes.get_xticklabels()] == ["21–22", "22–23"]
+    assert line_of(rate_axes, "#D55E00")[:, 1] == pytest.approx([2.0, 2.0])
+    assert area_axes.lines[0].get_xydata().tolist() == [[21, 100], [22, 115], [23, 130]]
+    assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
+
+
+def test_growth_chart_without_a_folding_has_no_line_of_it():
+    assert not any("folding" in text for text in words(growth_chart(AREAS, RATES)))
+
+
+def test_phantom_is_called_synthetic_and_never_real():
+    metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
+    for figure in (growth_chart(AREAS, RATES, synthetic=True), metrics_chart(metrics, synthetic=True)):
+        shown = words(figure)
+        assert any("synthetic phantom" in text for text in shown)
+        assert "real brain" not in shown
+    assert not any("synthetic" in text for text in words(growth_chart(AREAS, RATES)))
+
+
+def test_settings_outside_stay_and_fonts_inside_are_the_same_when_saved(tmp_path):
+    before = dict(mpl.rcParams)
+    figure = growth_chart(AREAS, RATES)
+    assert dict(mpl.rcParams) == before
+    figure.savefig(tmp_path / "chart.png")
+    assert {label.get_fontsize() for axes in figure.axes for label in axes.get_xticklabels()} == {7.0}
+
+
+def test_metrics_of_runs_are_lines_and_measured_ones_black_stars():
+    metrics = pd.concat(
+        [
+            metric_rows("thin", "whole", "area", {22.0: 110.0, 21.0: 100.0}, "cm2"),
+            metric_rows("real", "whole", "area", {21.0: 99.0, 22.0: 120.0}, "cm2"),
+            metric_rows("thin", "left", "area", {21.0: 50.0}, "cm2"),
+        ]
+    )
+    figure = metrics_chart(metrics)
+    (axes,) = figure.axes
+    assert axes.get_title() == "pial area (cm²)"
+    assert line_of(axes, "#0072B2").tolist() == [[21, 100], [22, 110]]
+    (stars,) = [line for line in axes.lines if line.get_marker() == "*"]
+    assert stars.get_color() == "#000000"
+    assert stars.get_linestyle() == "None"
+    assert stars.get_xydata().tolist() == [[21, 99], [22, 120]]
+    assert {"thin", "real brain"} <= set(words(figure))
+
+
+def test_a_metric_of_hemispheres_only_is_drawn_for_both():
+    metrics = pd.concat(
+        [
+            metric_rows("thin", "left", "mean_curvedness", {21.0: 0.1, 22.0: 0.2}, "1/mm"),
+            metric_rows("thin", "right", "mean_curvedness", {21.0: 0.3, 22.0: 0.4}, "1/mm"),
+        ]
+    )
+    figure = metrics_chart(metrics)
+    assert {line.get_linestyle(): line.get_ydata().tolist() for line in figure.axes[0].lines} == {
+        "--": [0.1, 0.2],
+        ":": [0.3, 0.4],
+    }
+    assert {"left hemisphere", "right hemisphere"} <= set(words(figure))
+
+
+def test_metrics_chart_refuses_a_table_without_its_metrics():
+    with pytest.raises(InputError, match=r"no metric to draw.*spam"):
+        metrics_chart(metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""))
+
+
+def test_many_runs_have_distinct_colours_and_a_legend_within_the_figure():
+    runs = [f"thickness_{i}_with_a_long_name" for i in range(12)]
+    figure = metrics_chart(
+        pd.concat([metric_rows(run, "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2") for run in runs])
+    )
+    (axes,) = figure.axes
+    assert len({str(line.get_color()) for line in axes.lines}) == 12
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
+
+
+def test_steps_are_drawn_and_unusual_rungs_marked():
+    count = 6
+    steps = pd.DataFrame(
+        {
+            "week": 21 + np.arange(count) / 14,
+            "newton": [2, 1, 1, 3, 1, 1],
+            "krylov": [20, 10, 11, 60, 12, 12],
+            "min_J": np.linspace(0.99, 0.7, count),
+            "max_u_mm": 0.3,
+            "mean_u_mm": 0.05,
+            "rung": ["cg", "cg", "cg", "minres", "cg", "cg"],
+            "seconds": np.arange(1.0, count + 1),
+        }
+    )
+    figure = steps_chart(steps)
+    newton, krylov, jacobian, displacement, seconds = figure.axes
+    assert newton.lines[0].get_ydata().tolist() == [2, 1, 1, 3, 1, 1]
+    assert newton.lines[1].get_xydata().tolist() == [[steps["week"][3], 3]]
+    assert newton.lines[1].get_label() == "rung: minres"
+    assert krylov.lines[0].get_ydata().tolist() == steps["krylov"].tolist()
+    assert jacobian.lines[0].get_ydata().min() == pytest.approx(0.7)
+    assert [line.get_label() for line in displacement.lines] == ["max", "mean"]
+    assert seconds.lines[0].get_ydata().sum() == 21
+    assert "(s)" in seconds.get_ylabel()
+
+
+def test_quality_histogram_counts_every_element_once():
+    quality = pd.DataFrame(
+        {"radius_ratio": [0.05, 0.5, 0.9], "min_dihedral_deg": [3, 40, 60], "max_dihedral_deg": [90, 100, 170]}
+    )
+    figure = quality_histogram(quality, min_radius_ratio=0.1)
+    for axes in figure.axes:
+        assert axes.patches[0].get_data().values.sum() == 3
+    assert figure.axes[0].lines[0].get_xdata() == pytest.approx([0.1, 0.1])
+
+
+def test_quality_histogram_takes_ready_classes():
+    classes = {"edges": [0.0, 0.5, 1.0], "counts": [1, 7]}
+    figure = quality_histogram(dict.fromkeys(("radius_ratio", "min_dihedral_deg", "max_dihedral_deg"), classes))
+    assert figure.axes[1].patches[0].get_data().values.tolist() == [1, 7]
+    assert "8 elements" in figure.axes[0].get_title()
+
+
+def test_spectra_bars_are_the_relative_powers_of_each_side():
+    rows = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15})]
+    spectra = pd.concat([*rows, *spectrum_rows("thin", 27.0, {4: 0.9})])
+    left, right = spectra_chart(spectra, week=28.0).axes
+    assert [bar.get_height() for bar in left.patches] == pytest.approx([0.2, 0.3, 0.1])
+    assert [bar.get_height() for bar in right.patches] == pytest.approx([0.1, 0.15, 0.05])
+    assert [line.get_xydata()[0].tolist() for line in left.lines] == [[0, 0.25], [1, 0.15]]
+    assert not any(bar.get_hatch() for bar in left.patches)
+
+
+def test_bands_that_are_cut_off_are_hatched_and_written_as_b6_too():
+    rows = [*spectrum_rows("thin", 28.0, {5: 0.2}), *spectrum_rows("thin", 28.0, {6: 0.1}, complete=False)]
+    spectra = pd.concat(rows)
+    spectra["band"] = "B" + spectra["band"].astype(str)
+    figure = spectra_chart(spectra, week=28.0)
+    assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, True]
+    assert any("cut off" in text for text in words(figure))
+
+
+def test_spectra_chart_refuses_a_week_without_spectra():
+    with pytest.raises(InputError, match=r"no spectrum at 30 GW; found \[28.0\]"):
+        spectra_chart(pd.concat(spectrum_rows("thin", 28.0, {4: 0.2})), week=30.0)
+
+
+def test_spectra_over_weeks_have_a_row_per_side_and_a_column_per_band():
+    kinds = [("thin", 22.0), ("thin", 21.0), ("real", 22.0), ("real", 21.0)]
+    rows = [frame for run, week in kinds for frame in spectrum_rows(run, week, {4: week / 100})]
+    figure = spectra_weeks_chart(pd.concat(rows), bands=(4, 5))
+    assert len(figure.axes) == 4
+    assert figure.axes[0].lines[0].get_xydata().tolist() == [[21, 0.21], [22, 0.22]]
+    assert figure.axes[2].lines[0].get_ydata().tolist() == pytest.approx([0.105, 0.11])
+    assert {line.get_marker() for line in figure.axes[0].lines} == {"None", "o", "*"}
+    assert all(axes.get_ylim()[0] == 0 and axes.get_ylim()[1] > 0.22 for axes in figure.axes)

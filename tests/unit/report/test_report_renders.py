@@ -1,0 +1,208 @@
+"""Pictures show the right side, at one scale, in the colours of their values."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
+from gyriflow.geometry.triangles import TriangleMesh, merged
+from gyriflow.report.panels import round_length
+from gyriflow.report.renders import displacement_maps, runs_comparison, scalar_maps, weekly_comparison
+from gyriflow.report.scene import VIEWS, render, uniform_colours
+from gyriflow.report.sections import cross_section
+from gyriflow.report.zones import field_picture, zones_picture
+
+
+def box(size: tuple[float, float, float], middle: tuple[float, float, float] = (0, 0, 0)) -> TriangleMesh:
+    """Returns a closed box of the given size in mm."""
+    unit = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
+    return TriangleMesh(unit * size + np.array(middle), np.array(faces))
+
+
+def picture(figure: Figure, number: int = 0) -> np.ndarray:
+    """Returns the pixels of a panel."""
+    return np.asarray([axes for axes in figure.axes if axes.images][number].images[0].get_array())
+
+
+def covered(image: np.ndarray) -> np.ndarray:
+    """Returns which pixels are not background."""
+    return (image < 250).any(axis=-1)
+
+
+def words(figure: Figure) -> set[str]:
+    return {text.get_text() for text in figure.findobj(Text)}
+
+
+@pytest.mark.parametrize(("name", "size"), [("left", (30, 20)), ("top", (10, 30)), ("front", (10, 20))])
+def test_a_view_shows_the_right_extents_in_mm(name, size):
+    mesh = box((10, 30, 20), (100, -50, 7))
+    image = render(
+        mesh, uniform_colours(mesh, "#ff0000"), VIEWS[name], half_width_mm=20, half_height_mm=20, pixels_per_mm=4
+    )
+    seen = covered(image)
+    assert image.shape == (160, 160, 3)
+    assert np.ptp(np.flatnonzero(seen.any(axis=0))) / 4 == pytest.approx(size[0], abs=1)
+    assert np.ptp(np.flatnonzero(seen.any(axis=1))) / 4 == pytest.approx(size[1], abs=1)
+
+
+@pytest.mark.parametrize("name", ["left", "right", "top", "bottom", "front", "back"])
+def test_the_letters_of_a_view_are_where_they_say(name):
+    mesh = merged(*(box((4, 4, 4), place) for place in [(-15, 0, 0), (15, 0, 0), (0, 15, 0), (0, -15, 0), (0, 0, 0)]))
+    palette = {"L": (1, 0, 0), "R": (0, 1, 0), "A": (0, 0, 1), "P": (1, 1, 0), "": (0.5, 0.5, 0.5)}
+    colours = np.repeat([palette[key] for key in ("L", "R", "A", "P", "")], 12, axis=0).astype(float)
+    image = render(mesh, colours, VIEWS[name], half_width_mm=20, half_height_mm=20, pixels_per_mm=4).astype(float)
+    found = []
+    for columns in (slice(0, 40), slice(-40, None)):
+        part = image[:, columns]
+        tone = part[covered(part)].mean(axis=0)
+        tone /= np.linalg.norm(tone)
+        found.append(max("LRAP", key=lambda key: tone @ np.array(palette[key]) / np.linalg.norm(palette[key])))
+    assert tuple(found) == VIEWS[name].ends
+
+
+def test_up_is_superior_and_in_the_top_view_anterior():
+    mesh = merged(box((20, 20, 20)), box((5, 5, 5), (0, 0, 30)), box((5, 5, 5), (0, 30, 0)))
+    for name in ("left", "top"):
+        image = render(
+            mesh, uniform_colours(mesh, "#ff0000"), VIEWS[name], half_width_mm=30, half_height_mm=30, pixels_per_mm=2
+        )
+        width = covered(image).sum(axis=1)
+        assert 0 < width[:20].max() < width[-20:].max()
+
+
+def test_weekly_comparison_has_a_panel_per_brain_and_leaves_gaps():
+    small, large = box((20, 30, 20)), box((25, 36, 25))
+    figure = weekly_comparison({22.0: small, 23.5: large}, {22.0: small}, views=("left", "top"), title="run thin")
+    panels = [axes.get_label() for axes in figure.axes if axes.images]
+    assert len(panels) == 6
+    assert "real brain\nleft view, column 0" in panels
+    assert "real brain\nleft view, column 1" not in panels
+    assert {"22 GW", "23.5 GW", "run thin", "simulated\ntop view", "A", "P", "L", "R"} <= words(figure)
+    assert covered(picture(figure, 0)).sum() < covered(picture(figure, 1)).sum()
+
+
+def test_all_panels_have_one_scale_and_the_bar_its_length():
+    figure = weekly_comparison({22.0: box((20, 30, 20))}, {22.0: box((60, 80, 60))}, views=("left", "top"))
+    axes = [axes for axes in figure.axes if axes.images]
+    scales = [np.ptp(each.get_xlim()) / each.get_window_extent().width for each in axes]
+    scales += [np.ptp(each.get_ylim()) / each.get_window_extent().height for each in axes]
+    assert scales == pytest.approx([scales[0]] * len(scales))
+    (bar,) = [each for each in figure.axes if each.get_label() == "scale bar"]
+    length = np.ptp(bar.get_xlim())
+    assert f"{length:g} mm" in words(figure)
+    assert length / bar.get_window_extent().width == pytest.approx(scales[0])
+
+
+def test_simulated_and_measured_brains_differ_in_colour_and_the_phantom_is_named():
+    mesh = box((20, 30, 20))
+    figure = weekly_comparison({22.0: mesh}, {22.0: mesh}, views=("left",), synthetic=True)
+    simulated, measured = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
+    assert simulated[2] > simulated[0]
+    assert measured[0] > measured[2]
+    assert "phantom\nleft view" in words(figure)
+    assert any("synthetic phantom" in text for text in words(figure))
+    assert not any("real brain\n" in text for text in words(figure))
+
+
+def test_many_weeks_go_on_below():
+    mesh = box((20, 30, 20))
+    figure = weekly_comparison({float(week): mesh for week in range(21, 31)}, {}, views=("left",))
+    places = [axes.get_position() for axes in figure.axes if axes.images]
+    assert len({round(place.y0, 6) for place in places}) == 2
+    assert max(place.x1 for place in places) <= 1
+
+
+def test_runs_stand_side_by_side_with_the_measured_brain_last():
+    mesh = box((20, 30, 20))
+    figure = runs_comparison({"thin": mesh, "thick": mesh}, mesh, views=("top",))
+    assert {"thin", "thick", "real brain", "top view"} <= words(figure)
+    assert len([axes for axes in figure.axes if axes.images]) == 3
+
+
+def test_displacement_maps_share_their_colour_scale():
+    mesh = box((20, 30, 20))
+    maps = {(22.0, 23.0): (mesh, np.full(8, 4.0)), (21.0, 22.0): (mesh, np.full(8, 1.0))}
+    figure = displacement_maps(maps, views=("left",))
+    (bar,) = [axes for axes in figure.axes if "displacement" in axes.get_xlabel()]
+    assert bar.get_xlim() == (0.0, 4.0)
+    assert "(mm)" in bar.get_xlabel()
+    assert {"21–22 GW", "22–23 GW", "max 1.00, mean 1.00 mm", "max 4.00, mean 4.00 mm"} <= words(figure)
+    first, second = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
+    # viridis: blue at a quarter, yellow at the upper end
+    assert first[2] > first[0]
+    assert second[0] > second[2]
+
+
+def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
+    mesh = box((20, 30, 20))
+    maps = {"simulated": {28.0: (mesh, np.full(8, 0.7))}, "real brain": {28.0: (mesh, np.full(8, -0.7))}}
+    figure = scalar_maps(maps, quantity="shape_index", views=("left",))
+    (bar,) = [axes for axes in figure.axes if "shape index" in axes.get_xlabel()]
+    assert bar.get_xlim() == (-1.0, 1.0)
+    gyri, sulci = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
+    assert gyri[0] > gyri[2]
+    assert sulci[2] > sulci[0]
+
+
+def test_an_unknown_quantity_or_view_is_refused():
+    mesh = box((20, 30, 20))
+    with pytest.raises(InputError, match="unknown quantity; found depth"):
+        scalar_maps({"simulated": {28.0: (mesh, np.zeros(8))}}, quantity="depth")
+    with pytest.raises(InputError, match=r"unknown view.*lateral"):
+        weekly_comparison({21.0: mesh}, {}, views=("lateral",))
+
+
+def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
+    brain = merged(box((10, 30, 20), (-6, 0, 0)), box((10, 30, 20), (6, 0, 0)))
+    zones = np.repeat([1, 3], 12)
+    figure = zones_picture(brain, zones, fissure_x_mm=0.0, views=("left medial", "right medial"))
+    # a box of 10 × 30 × 20 mm has 22 cm²
+    assert {"clamped 22.0 cm²", "contact, right 22.0 cm²", "free 0.0 cm²"} <= words(figure)
+    left, right = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
+    assert left[1] > left[0]
+    assert right[0] > 2 * right[2]
+
+
+def test_zones_that_do_not_fit_are_refused():
+    mesh = box((20, 30, 20))
+    with pytest.raises(InputError, match="found 3 codes; expected 12"):
+        zones_picture(mesh, np.zeros(3, int), fissure_x_mm=0.0)
+    with pytest.raises(InputError, match=r"unknown zone; found \[9\]"):
+        zones_picture(mesh, np.full(12, 9), fissure_x_mm=0.0)
+
+
+def test_field_picture_names_the_field():
+    figure = field_picture(box((20, 30, 20)), np.linspace(0, 2, 8), label="growth (1)", fissure_x_mm=0.0)
+    (bar,) = [axes for axes in figure.axes if axes.get_xlabel() == "growth (1)"]
+    assert bar.get_xlim() == (0.0, 2.0)
+
+
+def test_cross_section_has_the_area_and_values_of_the_cut():
+    corner = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10], [10, 10, 10]], dtype=float)
+    mesh = TetrahedralMesh(corner, np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
+    figure = cross_section(mesh, np.array([3.0, 7.0]), label="shear modulus (Pa)", plane="axial", at_mm=5.0)
+    (drawn,) = [item for item in figure.axes[0].collections if item.get_array() is not None]
+    paths = [path.vertices[:3] for path in drawn.get_paths()]
+    (u, v) = (np.array([path[k] - path[0] for path in paths]) for k in (1, 2))
+    areas = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    values = np.asarray(drawn.get_array())
+    assert areas[values == 3].sum() == pytest.approx(12.5)
+    assert set(values) == {3.0, 7.0}
+    assert "axial section at z = 5.0 mm" in words(figure)
+
+
+def test_a_section_beside_the_mesh_or_wrong_values_are_refused():
+    mesh = TetrahedralMesh(np.eye(4, 3), np.array([[3, 0, 1, 2]]))
+    with pytest.raises(InputError, match="misses the mesh; found 5 mm"):
+        cross_section(mesh, np.zeros(1), label="x", at_mm=5.0)
+    with pytest.raises(InputError, match="do not fit the mesh; found 9 values"):
+        cross_section(mesh, np.zeros(9), label="x")
+
+
+@pytest.mark.parametrize(("limit", "length"), [(55, 50), (50, 50), (49, 20), (0.7, 0.5), (9.9, 5)])
+def test_scale_bars_haveround_lengths(limit, length):
+    assert round_length(limit) == pytest.approx(length)

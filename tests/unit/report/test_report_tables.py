@@ -1,0 +1,113 @@
+"""Tables hold the published values, differences and escaped text."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gyriflow.report.displacement import displacement_chart, displacement_summary, displacement_table
+from gyriflow.report.tables import growth_table, html_table, metrics_table, runs_table, summary_table
+
+NORMS = pd.DataFrame(
+    {
+        "run": "thin",
+        "from_week": [21.0, 21.0, 25.0],
+        "to_week": [22.0, 22.0, 26.0],
+        "nodes": ["all", "pial", "all"],
+        "max_mm": [3.31, 3.31, 2.5],
+        "mean_mm": [0.57, 0.8, 0.5],
+    }
+)
+
+
+def test_displacement_stands_beside_the_papers_values():
+    table = displacement_table(NORMS).set_index(["source", "from_week", "nodes"])
+    assert table.loc[("thin", 21.0, "pial"), "mean_mm"] == 0.8
+    paper = table.xs("FetalFoldSim")
+    assert paper["max_mm"].tolist() == [2.51, 2.22, 2.37, 2.57]
+    assert paper["mean_mm"].tolist() == [0.42, 0.40, 0.38, 0.40]
+    measured = table.xs("Wang et al. 2021")
+    assert measured["max_mm"].tolist() == [1.24, 2.29, 3.65, 5.79]
+    assert measured["mean_mm"].tolist() == [0.45, 0.88, 1.91, 3.03]
+
+
+def test_displacement_summary_has_a_column_per_interval_and_dashes_where_nothing_is_known():
+    summary = displacement_summary(NORMS)
+    assert list(summary.columns) == ["21–22 GW", "22–23 GW", "23–24 GW", "24–25 GW", "25–26 GW"]
+    assert summary.loc[("thin", "all"), "21–22 GW"] == "3.31 / 0.57"
+    assert summary.loc[("thin", "all"), "22–23 GW"] == "–"
+    assert summary.loc[("FetalFoldSim", "all"), "24–25 GW"] == "2.57 / 0.40"
+
+
+def test_displacement_chart_draws_the_chosen_nodes_at_the_middle_of_the_interval():
+    figure = displacement_chart(NORMS, nodes="all")
+    lines = {line.get_label(): line.get_xydata().tolist() for line in figure.axes[1].lines}
+    assert lines["thin"] == [[21.5, 0.57], [25.5, 0.5]]
+    assert lines["FetalFoldSim"][0] == [21.5, 0.42]
+
+
+def test_growth_table_is_in_units_of_1e_7():
+    rates = pd.DataFrame(
+        {
+            "from_week": [21.0],
+            "to_week": [22.0],
+            "area_ratio": [1.1],
+            "rate_per_s": [1.234e-7],
+            "volume_ratio": [1.2],
+            "core_rate_per_s": [0.5e-7],
+        }
+    )
+    assert growth_table(rates)["tangential rate (10⁻⁷ s⁻¹)"].tolist() == [1.234]
+
+
+def test_metrics_table_gives_the_difference_from_the_measured_brain():
+    metrics = pd.DataFrame(
+        [
+            ("thin", 22.0, "whole", "area", 110.0, "cm2"),
+            ("thin", 23.0, "whole", "area", 150.0, "cm2"),
+            ("real", 22.0, "whole", "area", 100.0, "cm2"),
+            ("thin", 22.0, "left", "area", 55.0, "cm2"),
+            ("thin", 22.0, "whole", "gyrification_index", 1.2, "1"),
+        ],
+        columns=["run", "week", "hemisphere", "metric", "value", "unit"],
+    )
+    table = metrics_table(metrics)
+    assert table.loc[("area (cm²)", 22.0), "thin"] == 110.0
+    assert table.loc[("area (cm²)", 22.0), "thin: difference (%)"] == pytest.approx(10.0)
+    assert np.isnan(table.loc[("area (cm²)", 23.0), "real brain"])
+    assert table.loc[("gyrification index", 22.0), "thin"] == 1.2
+    assert "phantom" in metrics_table(metrics, synthetic=True)
+
+
+def test_metrics_table_without_measured_brains_has_no_differences():
+    metrics = pd.DataFrame(
+        [("thin", 22.0, "whole", "area", 110.0, "cm2")],
+        columns=["run", "week", "hemisphere", "metric", "value", "unit"],
+    )
+    assert metrics_table(metrics)["thin: difference (%)"].isna().all()
+
+
+def test_runs_table_puts_what_differs_first():
+    table = runs_table(
+        {
+            "reference": {"poisson_ratio": 0.45, "contact": {"gap_mm": 2.5}, "thickness_mm": 1.5},
+            "thin": {"poisson_ratio": 0.45, "contact": {"gap_mm": 2.0}, "thickness_mm": 1.5},
+        }
+    )
+    assert table.index.tolist() == ["contact.gap_mm", "poisson_ratio", "thickness_mm"]
+    assert table["differs"].tolist() == ["yes", "", ""]
+    assert table.loc["contact.gap_mm", "thin"] == "2"
+
+
+def test_summary_table_flattens_and_names():
+    table = summary_table({"pial_faces": 12, "clamped": {"left": 0.25}, "converged": True})
+    assert table.to_numpy().tolist() == [["pial faces", "12"], ["clamped.left", "0.25"], ["converged", "yes"]]
+
+
+def test_html_is_escaped_named_and_the_same_each_time():
+    table = pd.DataFrame({"run <b>": ["a & b"], "value": [1 / 3]})
+    html = html_table(table, caption="x < y", synthetic=True)
+    assert "a &amp; b" in html
+    assert "run &lt;b&gt;" in html
+    assert "x &lt; y (synthetic phantom, not a real brain)" in html
+    assert "0.3333<" in html
+    assert html == html_table(table, caption="x < y", synthetic=True)

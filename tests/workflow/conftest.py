@@ -1,0 +1,97 @@
+"""The workflow in a folder of its own: a copy of the checkout, so that editing the sources meanwhile changes nothing."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+
+CHECKOUT = Path(__file__).parents[2]
+SMALL_STUDY = {
+    "brains": [
+        {"id": "a", "week": 21, "phantom": {"voxel_mm": 1.5}},
+        {"id": "b", "week": 22, "phantom": {"voxel_mm": 1.5}},
+    ],
+    "start": "a",
+    "folding": {"end_week": 22},
+    "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
+}
+
+
+@dataclass(frozen=True)
+class Workflow:
+    """A copy of the checkout and a working directory for its results."""
+
+    checkout: Path
+    directory: Path
+
+    def command(self, *arguments: str) -> list[str]:
+        """Returns the command that `./run snakemake` runs."""
+        return [sys.executable, "-m", "gyriflow.launch", *arguments]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return os.environ | {"PYTHONPATH": str(self.checkout / "src")}
+
+    def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Runs the launcher in the working directory."""
+        return subprocess.run(
+            self.command(*arguments),
+            cwd=self.directory,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+
+    def jobs(self, *arguments: str) -> dict[str, int]:
+        """Returns the number of jobs per rule that a dry run plans."""
+        outcome = self.run("-n", *arguments)
+        assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+        if "Nothing to be done" in outcome.stdout + outcome.stderr:
+            return {}
+        _, _, table = (outcome.stdout + outcome.stderr).partition("Job stats:")
+        table, _, _ = table.partition("\ntotal")
+        return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, flags=re.MULTILINE)}
+
+    def write(self, name: str, config: dict) -> str:
+        """Writes a configuration into the working directory and returns its name."""
+        (self.directory / name).write_text(yaml.safe_dump(config))
+        return name
+
+
+@pytest.fixture(scope="session")
+def checkout_copy(tmp_path_factory):
+    copy = tmp_path_factory.mktemp("checkout")
+    for name in ("src", "workflow", "config", "profiles", "envs"):
+        shutil.copytree(CHECKOUT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(CHECKOUT / "Snakefile", copy)
+    return copy
+
+
+@pytest.fixture
+def workflow(checkout_copy, tmp_path):
+    return Workflow(checkout_copy, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def finished(checkout_copy, tmp_path_factory):
+    """A small study whose results count as made: empty files with the records that Snakemake keeps of real ones."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("finished"))
+    workflow.write("study.yaml", SMALL_STUDY)
+    summary = workflow.run("--configfile", "study.yaml", "--forceall", "--summary").stdout
+    files = [line.split("\t")[0] for line in summary.splitlines()[1:]]
+    assert "results/report/report.html" in files
+    for file in files:
+        path = workflow.directory / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    touched = workflow.run("--cores", "1", "--touch", "--forceall", "--configfile", "study.yaml")
+    assert touched.returncode == 0, touched.stderr
+    return workflow

@@ -1,0 +1,112 @@
+"""Which jobs the workflow plans, for whole studies and after one parameter changed."""
+
+import copy
+import os
+from pathlib import Path
+
+import pytest
+
+from .conftest import CHECKOUT, SMALL_STUDY
+
+ATLAS = Path(os.environ.get("GYRIFLOW_DATA", CHECKOUT.parent / "shared" / "data")) / "spina_bifida_atlas"
+
+
+def test_the_demo_is_planned_from_any_folder(workflow):
+    jobs = workflow.jobs()
+    assert jobs["pial_surface"] == jobs["phantom"] == jobs["measure_real"] > 1
+    assert jobs["simulate"] >= 1
+    assert jobs["html_report"] == 1
+
+
+@pytest.mark.parametrize(
+    ("target", "present", "absent"),
+    [
+        ("surface", "pial_surface", "tetrahedralise"),
+        ("mesh", "tetrahedralise", "simulate"),
+        ("growth", "growth_figure", "tetrahedralise"),
+        ("folding", "folded_surface", "measure_simulated"),
+        ("metrics", "study_table", "metrics_figure"),
+        ("figures", "weekly_figure", "html_report"),
+        ("paper", "displacement_maps", "steps_figure"),
+    ],
+)
+def test_a_stage_is_a_target_and_plans_no_later_stage(workflow, target, present, absent):
+    jobs = workflow.jobs(target)
+    assert present in jobs
+    assert absent not in jobs
+
+
+@pytest.mark.skipif(not ATLAS.is_dir(), reason=f"no atlas in {ATLAS}")
+def test_the_atlas_example_is_planned(workflow):
+    text = (CHECKOUT / "config" / "examples" / "spina-bifida-atlas.yaml").read_text()
+    text = text.replace("../../../shared/data/spina_bifida_atlas", str(ATLAS))
+    (workflow.directory / "atlas.yaml").write_text(text)
+    jobs = workflow.jobs("--configfile", "atlas.yaml")
+    assert "phantom" not in jobs
+    assert (jobs["pial_surface"], jobs["simulate"], jobs["measure_simulated"], jobs["similarity"]) == (9, 1, 9, 8)
+
+
+def test_one_brain_alone_is_folded_without_growth_rates(workflow):
+    alone = SMALL_STUDY | {"brains": SMALL_STUDY["brains"][:1]}
+    jobs = workflow.jobs("--configfile", workflow.write("alone.yaml", alone))
+    assert jobs["simulate"] == 2
+    assert not {"growth_rates", "similarity"} & set(jobs)
+
+
+def changed(section, **values):
+    study = copy.deepcopy(SMALL_STUDY)
+    study[section] = study.get(section, {}) | values
+    return study
+
+
+def test_nothing_is_to_be_done_after_all_was_made(finished):
+    assert finished.jobs("--configfile", "study.yaml") == {}
+
+
+SIMULATED = {
+    "parameters",
+    "simulate",
+    "zones_figure",
+    "steps_figure",
+    "weekly_figure",
+    "displacement_maps",
+    "displacement",
+}
+EITHER_WAY = {"study_table", "metrics_figure", "html_report", "all"}
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "rerun", "kept"),
+    [
+        ("metrics", {"curvature_radius": 4}, {"measure_real": 2, "measure_simulated": 4}, {"simulate", "similarity"}),
+        (
+            "runs",
+            {"thick": {"thickness_mm": 3.5}},
+            {"simulate": 1, "measure_simulated": 2},
+            {"pial_surface", "measure_real"},
+        ),
+        ("mesh", {"core_edge_mm": 3.0}, {"tetrahedralise": 1, "simulate": 2}, {"pial_surface", "measure_real"}),
+        ("report", {"dpi": 100}, {"weekly_figure": 2, "growth_figure": 1}, {"study_table", "simulate"}),
+        ("surface", {"edge_length_mm": 1.5}, {"pial_surface": 2, "tetrahedralise": 1}, {"phantom"}),
+        # settings that matter for other kinds of input only, and the number of ranks, which changes no result
+        ("surface", {"gap_mm": 1.0}, {"html_report": 1}, {"pial_surface"}),
+        ("folding", {"ranks": 1}, {"html_report": 1}, {"simulate", "parameters"}),
+    ],
+)
+def test_exactly_what_depends_on_a_changed_parameter_runs_again(finished, section, values, rerun, kept):
+    name = finished.write(f"{section}-{next(iter(values))}.yaml", changed(section, **values))
+    jobs = finished.jobs("--configfile", name)
+    assert {rule: jobs.get(rule, 0) for rule in rerun} == rerun
+    assert not kept & set(jobs)
+
+
+def test_a_change_of_a_rooms_code_reruns_what_uses_it(finished):
+    source = finished.checkout / "src" / "gyriflow" / "metrics" / "similarity.py"
+    before = source.read_bytes()
+    try:
+        source.write_bytes(before + b"\n# changed\n")
+        jobs = finished.jobs("--configfile", "study.yaml")
+    finally:
+        source.write_bytes(before)
+    assert "similarity" in jobs
+    assert not {"pial_surface", "simulate"} & set(jobs)

@@ -1,0 +1,113 @@
+"""What `./run snakemake` does around Snakemake: refused configurations, locks, exit codes."""
+
+import subprocess
+
+import pytest
+from gyriflow.errors import StorageError
+from gyriflow.launch import clear_stale_lock, completed, hold_lock, value_of
+
+from .conftest import SMALL_STUDY
+
+
+def message(outcome):
+    assert "Traceback" not in outcome.stderr
+    return outcome.stderr
+
+
+def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
+    study = SMALL_STUDY | {"folding": {"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}}
+    outcome = workflow.run("-n", "--configfile", workflow.write("study.yaml", study))
+    assert outcome.returncode == 2
+    said = message(outcome)
+    assert "the configuration has 3 problems" in said
+    assert "folding.poisson_ratio: found 0.5; it should be less than 0.5" in said
+    assert "folding.thicknes_mm: unknown key; did you mean thickness_mm?" in said
+    assert "folding.end_week: found 20; it should be above the start brain's week, 21" in said
+
+
+def test_two_runs_of_one_name_are_refused(workflow):
+    (workflow.directory / "twice.yaml").write_text("runs:\n  x: {}\n  x: {}\n")
+    outcome = workflow.run("-n", "--configfile", "twice.yaml")
+    assert outcome.returncode == 2
+    assert "line 3: the key 'x' of line 2 is there again" in message(outcome)
+
+
+def test_a_configuration_that_is_not_there_is_named(workflow):
+    outcome = workflow.run("-n", "--configfile", "none.yaml")
+    assert outcome.returncode == 2
+    assert "none.yaml: cannot be read" in message(outcome)
+
+
+def test_a_given_configuration_replaces_the_demo_and_its_files_are_beside_it(workflow, tmp_path):
+    folder = tmp_path / "my study"
+    folder.mkdir()
+    (folder / "labels.nii.gz").touch()
+    brains = [{"id": "x", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"}]
+    name = workflow.write("my study/study.yaml", SMALL_STUDY | {"brains": brains, "start": "x"})
+    outcome = workflow.run("-n", "surface", "--configfile", name, "--directory", "elsewhere")
+    assert outcome.returncode == 0, outcome.stderr
+    assert str(folder / "labels.nii.gz") in outcome.stdout + outcome.stderr
+    assert "phantom" not in outcome.stdout + outcome.stderr
+
+
+def test_the_code_of_the_first_failed_step_is_handed_on(workflow):
+    (workflow.directory / "labels.nii.gz").write_bytes(b"not an image")
+    brains = [{"id": "x", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"}]
+    name = workflow.write("study.yaml", SMALL_STUDY | {"brains": brains, "start": "x"})
+    outcome = workflow.run("--cores", "1", "surface", "--configfile", name)
+    assert outcome.returncode == 2
+    assert "labels.nii.gz" in message(outcome)
+    assert "labels.nii.gz" in (workflow.directory / "results" / "x" / "logs" / "pial_surface.log").read_text()
+    assert not list((workflow.directory / ".snakemake").glob("gyriflow-exit-*"))
+
+
+def stale(directory):
+    lock = directory / ".snakemake" / "locks" / "0.output.lock"
+    lock.parent.mkdir(parents=True)
+    lock.write_text("results/a/surface/pial.surf.gii\n")
+    return lock
+
+
+def test_a_stale_lock_is_cleared(tmp_path, capsys):
+    lock = stale(tmp_path)
+    clear_stale_lock(tmp_path)
+    assert not lock.exists()
+    assert "cleared the lock" in capsys.readouterr().err
+
+
+def test_a_live_lock_is_not_cleared_but_refused(tmp_path):
+    lock = stale(tmp_path)
+    with hold_lock(tmp_path), pytest.raises(StorageError, match="another gyriflow run is live"):
+        clear_stale_lock(tmp_path, patience_s=0.1)
+    assert lock.exists()
+
+
+def test_a_run_beside_a_live_one_is_refused_with_5_but_may_look(workflow):
+    holder = subprocess.Popen(
+        [*workflow.command()[:1], "-c", "from gyriflow.launch import hold_lock; from pathlib import Path;"
+         "lock = hold_lock(Path('.')); print('held', flush=True); input()"],
+        cwd=workflow.directory, env=workflow.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert holder.stdout.readline() == "held\n"
+        refused = workflow.run("--cores", "1", "surface")
+        assert refused.returncode == 5
+        assert "another gyriflow run is live" in message(refused)
+        assert workflow.jobs("surface")
+    finally:
+        holder.communicate("\n")
+
+
+def test_an_option_is_found_however_it_is_written():
+    assert value_of(["-n", "--directory", "a"], "--directory", "-d") == "a"
+    assert value_of(["--directory=a", "-d", "b"], "--directory", "-d") == "b"
+    assert value_of(["-da"], "--directory", "-d") == "a"
+    assert value_of(["--dry-run"], "--directory", "-d") is None
+
+
+def test_the_checkouts_workflow_is_taken_where_none_is_named_or_at_hand(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert completed(["-n"])[0] == "--snakefile"
+    assert completed(["-s", "x", "-n"]) == ["-s", "x", "-n"]
+    (tmp_path / "Snakefile").touch()
+    assert completed(["-n"]) == ["-n"]

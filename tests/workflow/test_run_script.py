@@ -1,0 +1,352 @@
+"""./run itself: what it executes, what it hands on, and that its set-up can be interrupted. No environment is made."""
+
+import hashlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RUN = ROOT / "run"
+
+CONDA = r"""#!/bin/bash
+# stands in for conda or micromamba: notes its arguments, makes an environment that holds one program
+echo "$*" >> "$RECORD"
+case "$*" in
+    *hook*)
+        name=$(basename "$0")
+        echo "$name() { export CONDA_PREFIX=\$2; export PATH=\$2/bin:\$PATH; }" ;;
+    *create*)
+        if [ -e "$RECORD.fails" ]; then echo "PackagesNotFoundError: no such thing"; exit 1; fi
+        while [ "$1" != -p ]; do shift; done
+        if [ -e "$2/half" ]; then echo "something was left behind"; exit 1; fi
+        mkdir -p "$2/bin"
+        touch "$2/half"
+        sleep "${SECONDS_TO_CREATE:-0}"
+        rm "$2/half"
+        printf '#!/bin/sh\necho "from the environment: $*"\n' > "$2/bin/tool"
+        chmod +x "$2/bin/tool" ;;
+esac
+"""
+
+MOUNT = f"""#!{sys.executable}
+# the tree has no mount
+import ctypes, sys
+libc = ctypes.CDLL(None, use_errno=True)
+*how, source, place = sys.argv[1:]
+kind, flags, data = None, 0, None
+if how[0] in ("--bind", "--rbind"):
+    flags = 4096 | (16384 if how[0] == "--rbind" else 0)
+else:
+    kind = how[1].encode()
+    data = how[3].encode() if len(how) > 2 else None
+sys.exit(libc.mount(source.encode(), place.encode(), kind, flags, data) and ctypes.get_errno())
+"""
+
+
+@pytest.fixture
+def outside(tmp_path):
+    """Returns the variables of a shell outside of any environment, with a stand-in for conda first on PATH."""
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    conda = programs / "conda"
+    conda.write_text(CONDA)
+    conda.chmod(0o755)
+    env = {name: value for name, value in os.environ.items() if name not in {"VIRTUAL_ENV", "CONDA_PREFIX"}}
+    env |= {
+        "PATH": f"{programs}:{env['PATH']}",
+        "GYRIFLOW_CACHE": str(tmp_path / "cache"),
+        "RECORD": str(tmp_path / "record"),
+    }
+    return env
+
+
+def run(*command, env=None, **options):
+    return subprocess.run([RUN, *command], env=env, capture_output=True, text=True, timeout=60, **options)
+
+
+def start(*command, env):
+    """Starts ./run with signals as a shell starts it, whatever they are here."""
+    return subprocess.Popen(
+        [RUN, *command],
+        env=env,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: [signal.signal(s, signal.SIG_DFL) for s in (signal.SIGINT, signal.SIGTERM)],
+    )
+
+
+def wait_until(condition, seconds=20.0):
+    """Returns whether a condition came true in time."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def running(word):
+    """Returns the processes that have a word in their command line."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (process / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if word.encode() in command and int(process.name) != os.getpid():
+            found.append(process.name)
+    return found
+
+
+# --- inside an environment -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("code", [0, 1, 7])
+def test_exit_code_is_handed_on(code):
+    assert run("bash", "-c", f"exit {code}").returncode == code
+
+
+def test_unknown_command():
+    done = run("no-such-command")
+    assert done.returncode == 127
+    assert "no-such-command" in done.stderr
+
+
+def test_without_a_command_it_says_how_it_is_used():
+    done = run()
+    assert done.returncode == 2
+    assert done.stderr.startswith("gyriflow: usage: ./run CMD")
+    assert done.stdout == ""
+
+
+def test_inside_the_environment_it_becomes_the_command():
+    process = start("bash", "-c", "echo $$", env=None)
+    out, err = process.communicate(timeout=30)
+    assert int(out) == process.pid
+    assert err == ""
+
+
+def test_nested():
+    assert run(RUN, RUN, "echo", "deep").stdout == "deep\n"
+
+
+def test_settings():
+    done = run("bash", "-c", "echo $OMP_NUM_THREADS $OPENBLAS_NUM_THREADS $OMPI_MCA_btl $PYTHONPATH")
+    assert done.stdout.split() == ["1", "1", "self,sm", str(ROOT / "src")]
+
+
+def test_settings_of_the_user_stand():
+    done = run("bash", "-c", "echo $OMP_NUM_THREADS", env=os.environ | {"OMP_NUM_THREADS": "3"})
+    assert done.stdout == "3\n"
+
+
+def test_stdin_is_handed_on():
+    assert run("cat", input="hello").stdout == "hello"
+
+
+def test_closed_stdin():
+    done = subprocess.run(["bash", "-c", f"exec '{RUN}' cat <&-"], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_arguments_reach_the_command_as_they_are():
+    assert run("printf", "%s|", "a b", "", "*", "$HOME", "'").stdout == "a b||*|$HOME|'|"
+
+
+def test_in_a_folder_of_an_unusual_name(tmp_path):
+    here = tmp_path / "a b'é"
+    shutil.copytree(ROOT / "envs", here / "envs")
+    shutil.copy(RUN, here)
+    link = tmp_path / "link"
+    link.symlink_to(here / "run")
+    for launcher in (here / "run", link):
+        done = subprocess.run(
+            [launcher, "bash", "-c", "echo $PYTHONPATH; pwd"], cwd=here, capture_output=True, text=True
+        )
+        assert done.stdout.splitlines() == [str(here / "src"), str(here)]
+
+
+# --- conda ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "create", "hook"),
+    [
+        ("conda", "env create", "shell.bash hook"),
+        ("mamba", "env create --yes", "shell hook --shell bash"),
+        ("micromamba", "create --yes", "shell hook --shell bash"),
+    ],
+)
+def test_conda_environment_is_made_once_and_activated(outside, tmp_path, name, create, hook):
+    (tmp_path / "programs" / "conda").rename(tmp_path / "programs" / name)
+    first = run("tool", "1", env=outside)
+    second = run("bash", "-c", "tool 2; exit 5", env=outside)
+    assert (first.stdout, first.returncode) == ("from the environment: 1\n", 0)
+    assert (second.stdout, second.returncode) == ("from the environment: 2\n", 5)
+    assert "making the environment" in first.stderr
+    assert second.stderr == ""
+    tag = hashlib.sha256((ROOT / "envs" / "gyriflow.yaml").read_bytes()).hexdigest()[:12]
+    prefix = tmp_path / "cache" / f"conda-{tag}" / "conda"
+    assert (tmp_path / "record").read_text().splitlines() == [
+        f"{create} -p {prefix} -f {ROOT}/envs/gyriflow.yaml",
+        hook,
+        hook,
+    ]
+
+
+def test_signals_reach_a_command_in_conda(outside):
+    process = start("bash", "-c", "trap 'echo stopped; exit 9' TERM; echo up; while :; do sleep 0.1; done", env=outside)
+    assert process.stdout.readline() == "up\n"
+    process.send_signal(signal.SIGTERM)
+    assert process.stdout.read() == "stopped\n"
+    assert process.wait(20) == 9
+
+
+def test_failing_set_up_shows_why_and_is_tried_again(outside, tmp_path):
+    fails = tmp_path / "record.fails"
+    fails.touch()
+    done = run("tool", env=outside)
+    assert done.returncode == 2
+    assert "setting up failed at 'create_conda'" in done.stderr
+    assert "PackagesNotFoundError: no such thing" in done.stderr
+    assert done.stdout == ""
+    fails.unlink()
+    assert run("tool", "now", env=outside).stdout == "from the environment: now\n"
+
+
+def test_folder_that_cannot_be_made(outside, tmp_path):
+    (tmp_path / "file").touch()
+    done = run("tool", env=outside | {"GYRIFLOW_CACHE": str(tmp_path / "file" / "cache")})
+    assert done.returncode == 2
+    assert "set GYRIFLOW_CACHE" in done.stderr
+
+
+def test_two_at_once_make_one_environment(outside, tmp_path):
+    slow = outside | {"SECONDS_TO_CREATE": "2"}
+    first = start("tool", "first", env=slow)
+    assert wait_until((tmp_path / "record").exists)
+    second = start("tool", "second", env=slow)
+    results = [process.communicate(timeout=30) for process in (first, second)]
+    assert [out for out, _ in results] == ["from the environment: first\n", "from the environment: second\n"]
+    assert "waiting for it" in results[1][1]
+    assert sum("create" in line for line in (tmp_path / "record").read_text().splitlines()) == 1
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
+def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_path, number, code):
+    process = start("tool", "first", env=outside | {"SECONDS_TO_CREATE": "987.25"})
+    assert wait_until(lambda: running("987.25"))
+    process.send_signal(number)
+    assert process.wait(20) == code
+    if number != signal.SIGKILL:
+        assert "the same command goes on" in process.stderr.read()
+        assert not running("987.25")
+    # after SIGKILL the stand-in is gone, yet not what it had started: the next run waits for that
+    for orphan in running("987.25"):
+        os.kill(int(orphan), signal.SIGTERM)
+    assert run("tool", "again", env=outside).stdout == "from the environment: again\n"
+
+
+def test_interrupted_while_waiting_for_another(outside, tmp_path):
+    first = start("tool", "first", env=outside | {"SECONDS_TO_CREATE": "3"})
+    assert wait_until((tmp_path / "record").exists)
+    second = start("tool", "second", env=outside)
+    assert "waiting" in second.stderr.readline()
+    second.send_signal(signal.SIGINT)
+    assert second.wait(2) == 130
+    assert first.communicate(timeout=30)[0] == "from the environment: first\n"
+
+
+# --- the Debian tree, entered once more by chroot from inside itself -------------------------------------------
+
+
+@pytest.fixture
+def tree(outside, tmp_path):
+    """Returns the variables of a shell in which ./run has to enter the Debian tree that the tests run in."""
+    venv = Path(os.environ.get("VIRTUAL_ENV", "/nowhere"))
+    (recipe,) = re.findall(r"^recipe=(\d+)", RUN.read_text(), flags=re.MULTILINE)
+    lists = [(ROOT / "envs" / name).read_bytes() for name in ("debian.txt", "requirements.txt")]
+    tag = hashlib.sha256(b"".join(lists) + f"{recipe}\n".encode()).hexdigest()[:12]
+    if venv.parent.name != f"debian-{tag}" or os.getuid() != 0:
+        pytest.skip("not in the Debian tree of this checkout, or not root")
+    programs = tmp_path / "programs"
+    (programs / "conda").unlink()
+    stand_ins = {
+        "apt-cache": "#!/bin/sh\n# knows no dolfinx\n",
+        "bwrap": "#!/bin/sh\necho 'bwrap: no rights here' >&2; exit 1\n",
+        "mount": MOUNT,
+    }
+    for name, text in stand_ins.items():
+        (programs / name).write_text(text)
+        (programs / name).chmod(0o755)
+    env = outside | {"GYRIFLOW_CACHE": str(venv.parents[1]), "PATH": f"{programs}:/usr/bin:/bin:/usr/sbin"}
+    probe = run("true", env=env)
+    if probe.returncode:
+        pytest.skip(f"a chroot cannot be entered here: {probe.stderr}")
+    return env
+
+
+@pytest.mark.parametrize("code", [0, 7])
+def test_tree_hands_on_exit_code_and_stdin(tree, code):
+    done = run("bash", "-c", f"cat; exit {code}", env=tree, input="hello")
+    assert (done.stdout, done.returncode, done.stderr) == ("hello", code, "")
+
+
+def test_tree_keeps_the_folder(tree, tmp_path):
+    here = tmp_path / "a b"
+    here.mkdir()
+    assert run("bash", "-c", "pwd; touch made", env=tree, cwd=here).stdout == f"{here}\n"
+    assert (here / "made").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_tree_hands_on_signals(tree, number):
+    code = (
+        "import signal, sys, time\n"
+        f"signal.signal({int(number)}, lambda *_: (print('stopped', flush=True), sys.exit(9)))\n"
+        "print('up', flush=True)\n"
+        "time.sleep(60)"
+    )
+    process = start("python", "-c", code, env=tree)
+    assert process.stdout.readline() == "up\n"
+    process.send_signal(number)
+    assert process.stdout.read() == "stopped\n"
+    assert process.wait(20) == 9
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_tree_leaves_nothing_behind(tree, number):
+    process = start("bash", "-c", "sleep 976.25 & echo up; wait", env=tree)
+    assert process.stdout.readline() == "up\n"
+    process.send_signal(number)
+    assert process.wait(20) == (-9 if number == signal.SIGKILL else 128 + number)
+    assert wait_until(lambda: not running("976.25"), 5)
+
+
+def test_two_mpi_runs_in_trees_do_not_meet(tree):
+    # both have the same process ids, by which Open MPI names its files
+    code = (
+        "from mpi4py import MPI; import time\n"
+        "for _ in range(20): MPI.COMM_WORLD.allreduce(1); time.sleep(0.05)\n"
+        "MPI.COMM_WORLD.rank or print(MPI.COMM_WORLD.allreduce(1) if MPI.COMM_WORLD.size == 1 else 'done')"
+    )
+    both = [start("mpiexec", "-n", "2", "python", "-c", code, env=tree) for _ in range(2)]
+    for process in both:
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, out) == (0, "done\n"), err
+
+
+def test_snakemake_goes_through_the_launcher(tmp_path):
+    done = run("snakemake", "--version", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.split(".")[0] == "9"
+    assert sys.version_info >= (3, 12)
