@@ -2,8 +2,8 @@
 
     ./run python benchmarks/folding_step.py MESH --steps 6 --ranks 2
 
-MESH is any tetrahedral mesh in mm (XDMF), untagged. The paper's set-up: MUMPS LU, relaxation 0.8, start from the last
-displacement, residual 1e-6 relative or 1e-9 absolute, quadrature degree 3; with the same field updates and BLAS as ours.
+MESH is any tetrahedral mesh in mm (XDMF), untagged. The paper's set-up: MUMPS LU, relaxation 0.8, start from the
+last displacement, residual 1e-6 relative or 1e-9 absolute, quadrature degree 3; field updates and BLAS are ours.
 Both start from the same shape and do the same steps. The first step of either, which compiles and sets up, is not
 counted. The last line is one JSON object.
 """

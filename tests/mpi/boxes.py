@@ -54,5 +54,6 @@ def smooth_displacement(domain, size=1e-3):
     """Returns a smooth displacement of the local nodes in m that does not depend on the ranks."""
     x = domain.local(domain.positions) * 1e3
     return size * np.stack(
-        [np.sin(0.3 * x[:, 1] + 0.1), np.cos(0.25 * x[:, 2]) - 0.4 * x[:, 0] / 8, np.sin(0.2 * x[:, 0] * x[:, 1] / 4)], axis=1
+        [np.sin(0.3 * x[:, 1] + 0.1), np.cos(0.25 * x[:, 2]) - 0.4 * x[:, 0] / 8, np.sin(0.2 * x[:, 0] * x[:, 1] / 4)],
+        axis=1,
     )

@@ -22,9 +22,7 @@ def test_isotropic_growth_of_a_free_body_is_free_of_stress():
 def test_tangential_growth_stretches_across_the_normal_only():
     mesh = distorted_box()
     oblique = np.array([1.0, 2.0, 2.0]) / 3
-    problem = problem_on(
-        mesh, zones_of(mesh), dg=0.2, dr=-0.05, normals=lambda c: np.tile(oblique, (len(c), 1))
-    )
+    problem = problem_on(mesh, zones_of(mesh), dg=0.2, dr=-0.05, normals=lambda c: np.tile(oblique, (len(c), 1)))
     along = np.outer(oblique, oblique)
     growth = 1.2 * (np.eye(3) - along) + 0.95 * along
     x = problem.domain.local(problem.domain.positions)
@@ -36,7 +34,9 @@ def test_the_direction_of_the_normal_does_not_matter():
     mesh = distorted_box()
     energies = []
     for sign in (1, -1):
-        problem = problem_on(mesh, zones_of(mesh), dg=0.2, normals=lambda c, s=sign: np.tile([0.0, 0.6 * s, 0.8 * s], (len(c), 1)))
+        problem = problem_on(
+            mesh, zones_of(mesh), dg=0.2, normals=lambda c, s=sign: np.tile([0.0, 0.6 * s, 0.8 * s], (len(c), 1))
+        )
         problem.set_displacement(smooth_displacement(problem.domain))
         energies.append(problem.energy())
     assert energies[0] == pytest.approx(energies[1], rel=1e-14)

@@ -23,7 +23,11 @@ def growing_problem(contact=False, **changes):
     # walls that stand on the wrong side of their planes: contact acts from the start
     walls = {"left": lambda c: c[:, 0] < -3.99, "right": lambda c: c[:, 0] > 3.99, "planes": (-5.0, 5.0)}
     zones = zones_of(mesh, at_the_bottom, **(walls if contact else {}))
-    layers = {"mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3), "dg": lambda x: 0.004 + 0.4 * x[:, 2], "dr": 0.002} | changes
+    layers = {
+        "mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3),
+        "dg": lambda x: 0.004 + 0.4 * x[:, 2],
+        "dr": 0.002,
+    } | changes
     return problem_on(mesh, zones, **layers)
 
 

@@ -17,7 +17,13 @@ from gyriflow.io.frames import read_field, read_positions, read_weeks
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
-WEEK = {"start_week": 21.0, "end_week": 21.5, "output_weeks": [21.0, 21.25, 21.5], "fissure_x_mm": 0.0, "thickness_mm": 3.0}
+WEEK = {
+    "start_week": 21.0,
+    "end_week": 21.5,
+    "output_weeks": [21.0, 21.25, 21.5],
+    "fissure_x_mm": 0.0,
+    "thickness_mm": 3.0,
+}
 
 
 @pytest.fixture(scope="module")

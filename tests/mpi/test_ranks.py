@@ -11,7 +11,19 @@ import pytest
 @pytest.mark.parametrize("cases", ["solver_cases.py", "growth_cases.py"])
 def test_cases_hold_on(ranks, cases):
     path = Path(__file__).with_name(cases)
-    command = ["mpiexec", "-n", str(ranks), sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", str(path)]
+    command = [
+        "mpiexec",
+        "-n",
+        str(ranks),
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-x",
+        "-p",
+        "no:cacheprovider",
+        str(path),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == ranks, done.stdout

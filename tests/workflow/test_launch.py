@@ -3,6 +3,7 @@
 import subprocess
 
 import pytest
+
 from gyriflow.errors import StorageError
 from gyriflow.launch import clear_stale_lock, completed, hold_lock, value_of
 

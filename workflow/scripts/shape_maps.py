@@ -14,7 +14,8 @@ files, params = snakemake.input, snakemake.params
 
 def brains(weeks, surfaces, maps):
     """Returns by week the two hemispheres as one surface with its shape index; all left files come first."""
-    halves = [(read_surface(path), read_vertex_maps(values)["shape_index"]) for path, values in zip(surfaces, maps)]
+    files = zip(surfaces, maps, strict=True)
+    halves = [(read_surface(surface), read_vertex_maps(values)["shape_index"]) for surface, values in files]
     pairs = zip(weeks, halves[: len(weeks)], halves[len(weeks) :], strict=True)
     return {week: (merged(a, b), np.concatenate([of_a, of_b])) for week, (a, of_a), (b, of_b) in pairs}
 

@@ -54,7 +54,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
             + "\n  ".join(problems)
             + "\nAll keys are explained in config/README.md"
         )
-    return Config(**valid, runs=runs)
+    return Config(**valid | {"runs": runs})
 
 
 _ABSENT = object()

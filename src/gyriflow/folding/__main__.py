@@ -53,7 +53,9 @@ def locked(folder: Path) -> Iterator[None]:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise StorageError(
-                    "another folding run works in this folder", path=folder, remedy="Wait for it or choose another folder."
+                    "another folding run works in this folder",
+                    path=folder,
+                    remedy="Wait for it or choose another folder.",
                 ) from None
             yield
     except OSError as error:

@@ -59,7 +59,7 @@ class State:
         return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
 
     def predicted(self, step_s: float) -> Floats:
-        """Returns the (n, 3) first guess in m for a step of a given length: the rates of the two last steps extended."""
+        """Returns the (n, 3) first guess in m for a step of a given length: the two last steps' rates extended."""
         if self.last_s == 0:
             return np.zeros_like(self.last)
         rate = self.last / self.last_s

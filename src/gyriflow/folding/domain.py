@@ -44,9 +44,7 @@ class Domain:
         cells = mesh.tets if comm.rank == 0 else np.empty((0, 4), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
         partitioner = dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.none)
-        self.mesh = dolfinx.mesh.create_mesh(
-            comm, cells=cells, x=points, e=ufl.Mesh(element), partitioner=partitioner
-        )
+        self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element), partitioner=partitioner)
         self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", 1, (3,)))
         self.cells = self.space.dofmap.list
         self.owned = self.space.dofmap.index_map.size_local
@@ -55,8 +53,7 @@ class Domain:
         self._geometry_node[self.cells.ravel()] = self.mesh.geometry.dofmap.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
         self.cell_of_file = self.mesh.topology.original_cell_index[: len(self.cells)]
-        counts = np.array(comm.allgather(self.owned))
-        self._counts = counts * 3
+        self._counts = [3 * owned for owned in comm.allgather(self.owned)]
         self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.owned]))
 
     def gathered(self, owned_values: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Cortex and core: distance to the pial surface, cortical weight, stiffness and growth fields of a step.
 
-Plain NumPy on whole arrays. Every rank builds the same search structures from the same pial positions, so that fields do
-not depend on the number of ranks.
+Plain NumPy on whole arrays. Every rank builds the same search structures from the same pial positions, so that fields
+do not depend on the number of ranks.
 """
 
 import igl

@@ -199,7 +199,7 @@ def rigid_body_modes(problem: Problem) -> PETSc.NullSpace:
         modes[i, :, i] = 1.0
         j, k = (i + 1) % 3, (i + 2) % 3
         modes[3 + i, :, j], modes[3 + i, :, k] = -x[:, k], x[:, j]
-    vectors = []
+    vectors: list[PETSc.Vec] = []
     for mode in modes:
         vector = problem.new_vector()
         vector.array[:] = mode.ravel()

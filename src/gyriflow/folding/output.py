@@ -31,8 +31,9 @@ def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
     """Returns the line of a step: week, iterations, displacement, time."""
     minutes, seconds = divmod(round(seconds_left), 60)
     return (
-        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  krylov {row['krylov']:3d}  "
-        f"max|u| {row['max_u_mm']:.3f} mm  min J {row['min_J']:.3f}  {row['seconds']:.2f} s  left {minutes}:{seconds:02d}"
+        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  "
+        f"krylov {row['krylov']:3d}  max|u| {row['max_u_mm']:.3f} mm  min J {row['min_J']:.3f}  "
+        f"{row['seconds']:.2f} s  left {minutes}:{seconds:02d}"
     )
 
 

@@ -65,9 +65,7 @@ class Problem:
         dx = ufl.dx(metadata={"quadrature_degree": quadrature_degree})
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": 2})
 
-        Fe = elastic_deformation(
-            deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
-        )
+        Fe = elastic_deformation(deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N))
         energy = strain_energy_density(Fe, self._mu, ratio * self._mu) * dx
         x = ufl.SpatialCoordinate(mesh)[0] + self.u[0]
         if len(zones.vertices_of(LEFT_CONTACT)) or len(zones.vertices_of(RIGHT_CONTACT)):

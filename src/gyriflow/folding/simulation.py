@@ -160,7 +160,7 @@ def run(
     parameters: FoldingParameters,
     out: Path,
 ) -> None:
-    """Folds a brain from the first to the last output week and writes the files of DESIGN's folding stage into `out`.
+    """Folds a brain from the first to the last output week and writes frames, step table and summary into `out`.
 
     Goes on from a checkpoint in `out` that belongs to this mesh and these parameters.
     """
@@ -168,9 +168,7 @@ def run(
     folding = Folding(comm, mesh, zones, parameters)
     key = run_key(mesh, parameters)
     folder = out / f"checkpoint-{key}"
-    state, message = comm.bcast(
-        read_checkpoint(folder / "state.h5", key) if comm.rank == 0 else None, root=0
-    )
+    state, message = comm.bcast(read_checkpoint(folder / "state.h5", key) if comm.rank == 0 else None, root=0)
     if comm.rank == 0:
         drop_foreign_checkpoints(out, folder)
         if message:

@@ -126,8 +126,9 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
             side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
         },
         "growing_vertices": int((zones.growth > 0).sum()),
-        "initial_penetration_mm": float(max(0.0, *(gap.max() for gap in beyond if gap.size)) if any(
-            gap.size for gap in beyond) else 0.0),
+        "initial_penetration_mm": float(
+            max(0.0, *(gap.max() for gap in beyond if gap.size)) if any(gap.size for gap in beyond) else 0.0
+        ),
         "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
     }
 

@@ -13,7 +13,7 @@ Ints = NDArray[np.int64]
 
 def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
     """Returns a read-only (n, width) copy of `values`; ValueError for another shape."""
-    array = np.array(values, dtype=dtype, order="C")
+    array: NDArray = np.array(values, dtype=dtype, order="C")
     if array.ndim != 2 or array.shape[1] != width:
         raise ValueError(f"expected an (n, {width}) array, found shape {array.shape}")
     array.flags.writeable = False
@@ -80,7 +80,7 @@ def face_normals(mesh: TriangleMesh) -> Floats:
     return unit(area_vectors(mesh))
 
 
-def scatter_to_vertices(mesh: TriangleMesh, face_values: Floats) -> Floats:
+def scatter_to_vertices(mesh: TriangleMesh, face_values: NDArray) -> Floats:
     """Returns per vertex the sum of (m,) or (m, k) values over its faces."""
     corner = np.repeat(np.arange(len(mesh.faces)), 3)
     incidence = sparse.csr_matrix(
@@ -96,7 +96,8 @@ def vertex_normals(mesh: TriangleMesh) -> Floats:
 
 def vertex_areas(mesh: TriangleMesh) -> Floats:
     """Returns the (n,) areas in mm² that belong to the vertices: a third of each face around."""
-    return scatter_to_vertices(mesh, face_areas(mesh) / 3.0)
+    areas: Floats = scatter_to_vertices(mesh, face_areas(mesh)) / 3.0
+    return areas
 
 
 def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:

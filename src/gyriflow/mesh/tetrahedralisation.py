@@ -1,12 +1,14 @@
 """Filling a closed surface with tetrahedra by fTetWild (pytetwild), in a process of its own with a time limit.
 
-`python -m gyriflow.mesh.tetrahedralisation` is that process: arrays in on standard input, arrays out on standard output.
+`python -m gyriflow.mesh.tetrahedralisation` is that process: arrays come in on standard input and leave on standard
+output.
 """
 
 import io
 import os
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 
@@ -66,9 +68,17 @@ def _in_own_process(arrays: dict, time_limit_s: float) -> TetrahedralMesh:
     sent = io.BytesIO()
     np.savez(sent, **arrays)
     try:
-        process = subprocess.run(
-            [sys.executable, "-m", __name__], input=sent.getvalue(), capture_output=True, timeout=time_limit_s, check=False
-        )
+        # the mesher leaves a file in its working folder
+        with tempfile.TemporaryDirectory() as folder:
+            process = subprocess.run(
+                [sys.executable, "-m", __name__],
+                input=sent.getvalue(),
+                capture_output=True,
+                timeout=time_limit_s,
+                check=False,
+                cwd=folder,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            )
     except subprocess.TimeoutExpired as expired:
         log = (expired.stderr or b"").decode(errors="replace")[-1000:]
         raise MeshError(

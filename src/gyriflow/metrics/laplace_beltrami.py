@@ -15,7 +15,8 @@ MODES_PER_SLICE = 80
 """Modes asked of ARPACK per shift. Between 40 and 160 the time differs by a fifth."""
 
 DENSE_VERTICES = 600
-"""Up to this size LAPACK solves the whole problem."""
+DENSE_VERTICES_MANY_MODES = 3000
+"""Up to these sizes LAPACK solves the problem as a whole; the second where over a third of all modes are wanted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +56,10 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     a slice lacks, as happens where many are equal, are looked for beside those found. SolverError if one stays missing.
     """
     size = stiffness.shape[0]
-    if not 1 <= count <= size:
-        raise SolverError("impossible number of modes", found=count, expected=f"1 to {size}, the number of vertices")
-    if size <= DENSE_VERTICES or count > size // 3:
+    largest = size if size <= DENSE_VERTICES_MANY_MODES else size // 2
+    if not 1 <= count <= largest:
+        raise SolverError("impossible number of modes", found=count, expected=f"1 to {largest} for {size} vertices")
+    if size <= DENSE_VERTICES or (size <= DENSE_VERTICES_MANY_MODES and count > size // 3):
         values, functions = linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1))
         return Modes(values, functions)
 

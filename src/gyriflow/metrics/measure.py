@@ -58,7 +58,7 @@ def measure_brain(
     left, right
         The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure. A cut
         counts for the volume only. It is left out of area, gyrification, curvature and spectrum, and curvature within
-        `curvature_radius` rings of it out of the means.
+        `curvature_radius` rings of it out of the means. The means of the whole are those over both hemispheres.
     curvature_radius
         Rings of neighbours that curvature is fitted to.
     spangy_proxy
@@ -71,13 +71,13 @@ def measure_brain(
 
     MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
-    rows = [("whole", *row) for row in _global_metrics(whole)]
-    rows += [("whole", *row) for row in _curvature_means(whole, curvature(whole, rings=curvature_radius))]
+    bends = [curvature(mesh, rings=curvature_radius) for mesh in (left, right)]
+    whole_rows = [*_global_metrics(whole), *_curvature_means([left, right], bends)]
+    rows = [("whole", *row) for row in whole_rows]
     maps, spectra = {}, []
-    for name, mesh in (("left", left), ("right", right)):
-        bend = curvature(mesh, rings=curvature_radius)
+    for name, mesh, bend in zip(("left", "right"), (left, right), bends, strict=True):
         analysis, weyl = _spectrum(mesh, bend, spangy_proxy, spangy_modes, spangy_wavelength)
-        own = _global_metrics(mesh) + _curvature_means(mesh, bend) + _spectrum_metrics(analysis, spangy_proxy)
+        own = _global_metrics(mesh) + _curvature_means([mesh], [bend]) + _spectrum_metrics(analysis, spangy_proxy)
         rows += [(name, *row) for row in [*own, ("weyl_number", float(weyl), "1")]]
         maps[name] = {
             "shape_index": bend.shape_index,
@@ -115,12 +115,14 @@ def _global_metrics(mesh: TriangleMesh) -> list[Row]:
     ]
 
 
-def _curvature_means(mesh: TriangleMesh, bend: Curvature) -> list[Row]:
-    weights = vertex_areas(mesh) * bend.reliable
+def _curvature_means(meshes: list[TriangleMesh], bends: list[Curvature]) -> list[Row]:
+    weights = np.concatenate([vertex_areas(m) * bend.reliable for m, bend in zip(meshes, bends, strict=True)])
+    shape_index = np.concatenate([bend.shape_index for bend in bends])
+    curvedness = np.concatenate([bend.curvedness for bend in bends])
     return [
-        ("mean_shape_index", float(np.average(bend.shape_index, weights=weights)), "1"),
-        ("mean_curvedness", float(np.average(bend.curvedness, weights=weights)), "1/mm"),
-        ("sulcal_area_share", float(np.average(bend.shape_index < 0, weights=weights)), "1"),
+        ("mean_shape_index", float(np.average(shape_index, weights=weights)), "1"),
+        ("mean_curvedness", float(np.average(curvedness, weights=weights)), "1/mm"),
+        ("sulcal_area_share", float(np.average(shape_index < 0, weights=weights)), "1"),
     ]
 
 

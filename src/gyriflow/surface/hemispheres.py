@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 MOST_UNEQUAL = 1.15
 FURTHEST_APART_MM = 10.0
 # distance to the mirror image, relative to the brain's length, beyond which hemispheres are not in one pose
-MOST_ASYMMETRIC = 0.03
+MOST_ASYMMETRIC = 0.02
 
 
 def left_faces(mesh: TriangleMesh, heights: Floats) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from gyriflow.config import load
 from gyriflow.config.folding import output_weeks
 from gyriflow.errors import InputError

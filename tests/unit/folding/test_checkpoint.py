@@ -82,7 +82,12 @@ def test_the_key_knows_mesh_and_parameters_but_not_ranks():
 
 def test_defaults_are_the_papers_reference_values():
     p = FoldingParameters(21.0, 36.0, 0.0, (21.0, 36.0))
-    assert (p.thickness_mm, p.shear_modulus_cortex_pa, p.shear_modulus_core_pa, p.poisson_ratio) == (1.5, 1500, 300, 0.45)
+    assert (p.thickness_mm, p.shear_modulus_cortex_pa, p.shear_modulus_core_pa, p.poisson_ratio) == (
+        1.5,
+        1500,
+        300,
+        0.45,
+    )
     assert (p.growth_rate_per_s, p.contact.penalty_pa_per_m, p.step_s) == (2e-7, 5e5, 43200)
 
 

@@ -1,6 +1,7 @@
 """Configurations are read strictly."""
 
 import pytest
+
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml, write_yaml
 

@@ -105,3 +105,9 @@ def test_a_mode_that_stays_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) 
 def test_vertex_without_a_face_is_refused() -> None:
     with pytest.raises(MeshError, match="without a face"):
         laplacian(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], [[0, 1, 2]]))
+
+
+def test_more_modes_than_a_surface_has_are_refused() -> None:
+    stiffness, mass = laplacian(ellipsoid(2))
+    with pytest.raises(SolverError, match="found 163; expected 1 to 162"):
+        lowest_modes(stiffness, mass, 163)

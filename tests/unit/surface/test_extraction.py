@@ -27,7 +27,7 @@ def test_ball_has_its_area_volume_and_place(ball, signs):
     assert is_closed(surface)
     assert signed_volume(surface) == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.03)
     assert area(surface) == pytest.approx(4 * np.pi * radius**2, rel=0.02)
-    assert surface.vertices.mean(axis=0) == pytest.approx(affine[:3, :3] @ [17.5] * 3 + affine[:3, 3], abs=0.05)
+    assert surface.vertices.mean(axis=0) == pytest.approx(affine[:3, :3] @ np.full(3, 17.5) + affine[:3, 3], abs=0.05)
 
 
 def test_cropping_does_not_move_the_brain(ball):

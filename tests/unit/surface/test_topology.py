@@ -30,7 +30,7 @@ def test_ball_torus_and_hollow_ball_have_known_handles():
     assert handles(ball) == 0
     assert handles(torus) == 1
     assert handles(ball & ~(x**2 + y**2 + z**2 < 9)) == 0
-    assert handles(ball | np.roll(torus, 0)) == 0
+    assert handles(np.concatenate([torus, torus])) == 2
 
 
 def test_thin_bridge_across_a_sulcus_is_cut():
@@ -40,7 +40,7 @@ def test_thin_bridge_across_a_sulcus_is_cut():
     repair = without_handles(field(mask))
     assert (repair.handles_left, repair.bridges_cut, repair.tunnels_filled) == (0, 1, 0)
     assert repair.voxels_cut == 1
-    assert not ndimage.binary_opening(repair.field > 0.5)[16, 9, 8:12].any()
+    assert (repair.field > 0.5)[16, 9, 8:12].sum() == 3
 
 
 def test_narrow_tunnel_is_filled():

@@ -1,0 +1,36 @@
+"""Tetrahedral meshes and their boundary."""
+
+import numpy as np
+import pytest
+from shapes import box_mesh, ellipsoid_mesh
+
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
+from gyriflow.geometry.triangles import area, euler_number, is_closed, signed_volume
+
+
+def test_boundary_of_a_box_is_its_surface_outward():
+    mesh = box_mesh((2, 3, 4), (2.0, 3.0, 4.0))
+    surface, used = boundary_surface(mesh)
+    assert area(surface) == pytest.approx(52.0)
+    assert signed_volume(surface) == pytest.approx(24.0)
+    assert is_closed(surface)
+    assert euler_number(surface) == 2
+    np.testing.assert_array_equal(mesh.vertices[used], surface.vertices)
+
+
+def test_volumes_add_up_and_are_positive():
+    mesh = ellipsoid_mesh(6, (2.0, 3.0, 4.0))
+    volumes = signed_volumes(mesh)
+    assert (volumes > 0).all()
+    assert volumes.sum() == pytest.approx(signed_volume(boundary_surface(mesh)[0]))
+
+
+def test_an_inverted_element_has_negative_volume():
+    corner = TetrahedralMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3], [1, 0, 2, 3]])
+    np.testing.assert_allclose(signed_volumes(corner), [1 / 6, -1 / 6])
+
+
+def test_each_boundary_face_names_its_element():
+    mesh = box_mesh((2, 2, 2), (1.0, 1.0, 1.0))
+    faces, elements = boundary_faces(mesh)
+    assert all(set(face) <= set(mesh.tets[element]) for face, element in zip(faces, elements, strict=True))

@@ -1,0 +1,294 @@
+"""Whole pial surfaces from each kind of input: closed spheres, posed, honest in size, split at the fissure."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    euler_number,
+    flipped,
+    is_closed,
+    signed_volume,
+    submesh,
+    transformed,
+)
+from gyriflow.io.surfaces import read_surface
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
+from gyriflow.surface.labels import SCHEMES
+from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial
+from gyriflow.surface.remeshing import self_intersecting_faces
+from gyriflow.surface.repair import pieces
+from gyriflow.surface.size import require_plausible_size
+
+DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
+ATLAS = SCHEMES["spina-bifida-atlas"]
+LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+QUICK = {"edge_length_mm": 1.5}
+
+
+def atlas_volume(week):
+    path = DATA / "spina_bifida_atlas" / f"week{week}_labels.nii.gz"
+    if not path.exists():
+        pytest.skip(f"no example data: {path} is missing (GYRIFLOW_DATA names its folder)")
+    return read_label_volume(path)
+
+
+@pytest.fixture(scope="module")
+def volume():
+    return phantom_labels(24.0, voxel_mm=1.2)
+
+
+@pytest.fixture(scope="module")
+def phantom(volume):
+    return from_labels(*volume, ATLAS, week=24.0, **QUICK)
+
+
+@pytest.fixture(scope="module")
+def halves(volume):
+    """The phantom's left and right hemispheres as closed surfaces a millimetre apart, in RAS+."""
+    labels, affine = volume
+    x = affine[0, 2] * np.arange(labels.shape[2]) + affine[0, 3] - CENTRE_MM[0]
+    sides = []
+    for keep in (x < -0.6, x > 0.6):
+        mask = np.isin(labels, ATLAS.cerebrum) & keep
+        sides.append(from_binary(mask, affine))
+    return sides
+
+
+def from_binary(mask, affine):
+    return isosurface(made_simple(smoothed_mask(mask, 1.0))[0], affine)
+
+
+def require_sound(surface, surfaces=1):
+    whole = surface.whole
+    assert is_closed(whole)
+    assert [euler_number(piece) for piece in pieces(whole)] == [2] * surfaces
+    assert all(signed_volume(piece) > 0 for piece in pieces(whole))
+    assert not self_intersecting_faces(whole).any()
+    assert len(surface.left.faces) + len(surface.right.faces) == len(whole.faces)
+    assert surface.left.vertices[:, 0].mean() < surface.fissure_x_mm < surface.right.vertices[:, 0].mean()
+    assert area(surface.left) + area(surface.right) == pytest.approx(area(whole))
+    json.dumps(surface.report, allow_nan=False)
+
+
+def test_phantom_surface_is_sound_and_of_the_masks_volume(phantom):
+    require_sound(phantom)
+    report = phantom.report
+    expected = report["mask_volume_mL"] - report["fissure_opened_mL"]
+    assert report["volume_mL"] == pytest.approx(expected, rel=0.015)
+    assert report["volume_mL"] == pytest.approx(signed_volume(phantom.whole) / 1e3)
+    assert phantom.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
+    assert report["rotation_deg"] < 1.0
+
+
+@pytest.mark.parametrize("week", [21.0, 29.5, 36.0])
+def test_phantoms_of_all_ages_are_sound(week):
+    surface = from_labels(*phantom_labels(week, voxel_mm=1.0), ATLAS, week=week, **QUICK)
+    require_sound(surface)
+    assert not surface.report["warnings"]
+
+
+def test_areas_of_phantoms_grow_faster_than_their_size():
+    young, old = (
+        from_labels(*phantom_labels(week, voxel_mm=1.2), ATLAS, week=week, **QUICK).whole for week in (22.0, 34.0)
+    )
+    assert area(old) / area(young) > 1.1 * (signed_volume(old) / signed_volume(young)) ** (2 / 3)
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 45), (40, -30, 10)])
+def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom, turn):
+    labels, affine = volume
+    oblique = np.eye(4)
+    oblique[:3, :3] = Rotation.from_euler("xyz", turn, degrees=True).as_matrix()
+    turned = from_labels(labels, oblique @ affine, ATLAS, week=24.0, **QUICK)
+    require_sound(turned)
+    for part in ("whole", "left", "right"):
+        assert turned.report["area_cm2"][part] == pytest.approx(phantom.report["area_cm2"][part], rel=0.005)
+    normal = np.array(turned.report["pose"])[:3, :3] @ oblique[:3, 0]
+    assert np.degrees(np.arccos(normal[0])) < 1.0
+
+
+def test_storage_order_makes_no_difference(volume, phantom):
+    labels, affine = volume
+    reversed_ = affine @ np.diag([1.0, -1.0, 1.0, 1.0])
+    reversed_[:3, 3] += affine[:3, 1] * (labels.shape[1] - 1)
+    same = from_labels(labels[:, ::-1], reversed_, ATLAS, week=24.0, **QUICK)
+    assert same.report["area_cm2"]["whole"] == pytest.approx(phantom.report["area_cm2"]["whole"], rel=0.003)
+    assert same.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.1)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e-3, "metres"), (1e3, "micrometres"), (0.1, "centimetres")])
+def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, unit):
+    labels, affine = volume
+    scale = np.diag([factor] * 3 + [1.0])
+    with pytest.raises(InputError, match=f"seems to be in {unit}"):
+        from_labels(labels, scale @ affine, ATLAS, week=24.0)
+    with pytest.raises(InputError, match=f"seems to be in {unit}"):
+        from_pial(transformed(phantom.whole, scale), week=24.0, max_hole_mm=3.0)
+    with pytest.raises(InputError, match=f"seems to be in {unit}"):
+        from_hemispheres(*(transformed(half, scale) for half in halves), week=24.0)
+
+
+@pytest.mark.parametrize(("week", "volume_ml"), [(21, 25.0), (21, 90.0), (29, 110.0), (36, 500.0), (36, 1300.0)])
+def test_small_large_and_adult_brains_pass(week, volume_ml):
+    require_plausible_size(volume_ml * 1e3, np.ones(3), week)
+
+
+def test_hemispheres_are_merged_apart_and_whole(halves):
+    surface = from_hemispheres(*halves, week=24.0, **QUICK)
+    require_sound(surface, surfaces=2)
+    assert surface.report["moved_apart_mm"] == 0.0
+    assert is_closed(surface.left)
+    assert signed_volume(surface.whole) == pytest.approx(sum(map(signed_volume, halves)), rel=0.01)
+    assert surface.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
+    assert least_gap(*pieces(surface.whole)) > 0.5
+
+
+def test_hemispheres_in_lps_and_inside_out_are_the_same_brain(halves):
+    left, right = (flipped(transformed(half, LPS)) for half in halves)
+    surface = from_hemispheres(left, right, week=24.0, coordinates="lps", **QUICK)
+    require_sound(surface, surfaces=2)
+    assert surface.report["repair_left"]["pieces_turned_outward"] == 1
+    assert surface.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
+
+
+def test_overlapping_hemispheres_are_moved_apart(halves):
+    left = TriangleMesh(halves[0].vertices + [2.5, 0, 0], halves[0].faces)
+    surface = from_hemispheres(left, halves[1], week=24.0, gap_mm=0.8, **QUICK)
+    require_sound(surface, surfaces=2)
+    assert surface.report["gap_before_mm"] < 0
+    assert 0.5 < surface.report["moved_apart_mm"] < 2.0
+    assert least_gap(*pieces(surface.whole)) == pytest.approx(0.8, abs=0.15)
+    assert any("moved apart" in warning for warning in surface.report["warnings"])
+
+
+def test_swapped_hemispheres_are_refused(halves):
+    with pytest.raises(InputError, match="swapped"):
+        from_hemispheres(*reversed(halves), week=24.0)
+
+
+def test_hemispheres_of_different_weeks_are_refused(halves):
+    centre = halves[1].vertices.mean(axis=0)
+    larger = TriangleMesh((halves[1].vertices - centre) * 1.06 + centre, halves[1].faces)
+    with pytest.raises(InputError, match="too different in size"):
+        from_hemispheres(halves[0], larger, week=24.0)
+
+
+def test_hemispheres_in_different_poses_are_refused(halves):
+    centre = halves[1].vertices.mean(axis=0)
+    turn = Rotation.from_euler("x", 60, degrees=True).as_matrix()
+    tilted = TriangleMesh((halves[1].vertices - centre) @ turn.T + centre, halves[1].faces)
+    with pytest.raises(InputError, match="not posed as one brain"):
+        from_hemispheres(halves[0], tilted, week=24.0, **QUICK)
+
+
+def test_pial_surface_with_a_small_hole_is_closed(phantom):
+    near = np.linalg.norm(phantom.whole.vertices[phantom.whole.faces].mean(axis=1) - phantom.whole.vertices[0], axis=1)
+    holed, _ = submesh(phantom.whole, near > 1.5)
+    surface = from_pial(transformed(holed, LPS), week=24.0, coordinates="lps", max_hole_mm=6.0, **QUICK)
+    require_sound(surface)
+    assert surface.report["repair"]["holes_closed"] == 1
+    assert area(surface.whole) == pytest.approx(area(phantom.whole), rel=0.02)
+    assert surface.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.2)
+
+
+def test_pial_surface_that_cuts_itself_is_made_anew(phantom):
+    vertices = phantom.whole.vertices.copy()
+    # the left hemisphere's medial wall pushed through the right one's
+    wall = (np.abs(vertices[:, 0] - phantom.fissure_x_mm) < 3.0) & (vertices[:, 0] < phantom.fissure_x_mm)
+    wall &= vertices[:, 2] > CENTRE_MM[2] + 10.0
+    vertices[wall, 0] += 4.0
+    tangled = TriangleMesh(vertices, phantom.whole.faces)
+    assert self_intersecting_faces(tangled).sum() > 20
+    surface = from_pial(tangled, week=24.0, **QUICK)
+    require_sound(surface)
+    assert signed_volume(surface.whole) == pytest.approx(signed_volume(tangled), rel=0.03)
+
+
+def test_split_gives_bulges_back_to_their_hemisphere(phantom):
+    vertices = phantom.whole.vertices.copy()
+    fissure = phantom.fissure_x_mm
+    # a patch of the left medial wall that bulges over the fissure
+    patch = np.linalg.norm(vertices - [fissure - 1.5, CENTRE_MM[1] + 20, CENTRE_MM[2] + 10], axis=1) < 4.0
+    patch &= vertices[:, 0] < fissure
+    assert patch.sum() > 5
+    vertices[patch, 0] += 2.0
+    mesh = TriangleMesh(vertices, phantom.whole.faces)
+    left, right = split(mesh, fissure)
+    assert len(pieces(left)) == len(pieces(right)) == 1
+    assert len(left.faces) + len(right.faces) == len(mesh.faces)
+    assert left.vertices[:, 0].max() > fissure + 0.3
+
+
+def test_face_on_each_side_belongs_to_that_side():
+    square = TriangleMesh([[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]], [[0, 2, 3], [1, 3, 2]])
+    assert left_faces(square, np.array([-0.3, 0.3])).tolist() == [True, False]
+
+
+def test_gap_between_balls_is_known():
+    sphere = trimesh.creation.icosphere(subdivisions=3, radius=5.0)
+    one = TriangleMesh(sphere.vertices - [6.0, 0, 0], sphere.faces)
+    other = TriangleMesh(sphere.vertices + [6.0, 0, 0], sphere.faces)
+    assert least_gap(one, other) == pytest.approx(2.0, abs=0.05)
+    closer = TriangleMesh(other.vertices - [4.0, 0, 0], other.faces)
+    assert least_gap(one, closer) == pytest.approx(-2.0, abs=0.1)
+    apart_one, apart_other, moved = set_apart(one, closer, 1.0, np.array([1.0, 0, 0]))
+    assert moved == pytest.approx(1.5, abs=0.1)
+    assert least_gap(apart_one, apart_other) == pytest.approx(1.0, abs=0.1)
+
+
+def test_sides_of_a_scheme_that_contradict_the_affine_are_refused(volume):
+    labels, affine = volume
+    x = affine[0, 2] * np.arange(labels.shape[2]) + affine[0, 3] - CENTRE_MM[0]
+    scheme = SCHEMES["dhcp-19"]
+    twins = {1: (5, 6), 2: (7, 8), 5: (3, 4), 6: (14, 15)}
+    sided = np.zeros_like(labels)
+    for number, (left, right) in twins.items():
+        sided = np.where(labels == number, np.where(x < 0, left, right), sided)
+    sided[labels == 8] = 5
+    # the tissues that the phantom does not have, a voxel each
+    inner = np.argwhere(sided == 5)[:: max(1, int((sided == 5).sum()) // 10)]
+    for number, place in zip(sorted(set(scheme.cerebrum) - set(np.unique(sided))), inner, strict=False):
+        sided[tuple(place)] = number
+    assert from_labels(sided, affine, scheme, week=24.0, **QUICK).fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.5)
+    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0]) @ affine
+    with pytest.raises(InputError, match="left hemisphere lie on the right"):
+        from_labels(sided, mirrored, scheme, week=24.0, **QUICK)
+
+
+@pytest.mark.parametrize("week", [21, 26, 29])
+def test_real_atlas_labels_give_sound_surfaces(week):
+    volume = atlas_volume(week)
+    surface = from_labels(volume.labels, volume.affine, ATLAS, week=float(week))
+    require_sound(surface)
+    report = surface.report
+    expected = report["mask_volume_mL"] - report["fissure_opened_mL"]
+    assert report["volume_mL"] == pytest.approx(expected, rel=0.01)
+    # this atlas is mirror-symmetric about x = 0
+    assert surface.fissure_x_mm == pytest.approx(0.0, abs=0.1)
+    assert report["area_cm2"]["left"] == pytest.approx(report["area_cm2"]["right"], rel=0.02)
+
+
+def test_real_labels_and_hemispheres_of_a_week_agree():
+    folder = DATA / "hemispheres"
+    if not folder.exists():
+        pytest.skip(f"no example data: {folder} is missing (GYRIFLOW_DATA names its folder)")
+    left, right = (read_surface(folder / f"fetal.week21.{side}.pial.surf.gii") for side in ("left", "right"))
+    surface = from_hemispheres(left, right, week=21.0, coordinates="lps")
+    require_sound(surface, surfaces=2)
+    # truth.json of the example data: 49.40 and 49.44 cm², 23.01 and 23.04 mL
+    assert surface.report["area_cm2"]["left"] == pytest.approx(49.40, rel=0.01)
+    assert surface.report["area_cm2"]["right"] == pytest.approx(49.44, rel=0.01)
+    assert surface.report["volume_mL"] == pytest.approx(46.05, rel=0.005)
+    assert surface.fissure_x_mm == pytest.approx(0.0, abs=0.1)
