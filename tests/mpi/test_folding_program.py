@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import namedtuple
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,9 @@ import pytest
 import yaml
 from shapes import ellipsoid_mesh
 
+from gyriflow.errors import StorageError
+from gyriflow.folding.__main__ import require_space
+from gyriflow.folding.parameters import parameters_from
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
@@ -161,6 +165,16 @@ def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):
         subprocess.run(["pkill", "-KILL", "-f", str(out)], check=False)
     assert second.returncode == 5
     assert "another folding run works in this folder" in second.stderr
+
+
+def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
+    brain, parameters = ellipsoid_mesh(4, (20.0, 26.0, 18.0)), parameters_from(WEEK)
+    room = namedtuple("usage", "total used free")
+    monkeypatch.setattr("shutil.disk_usage", lambda path: room(10**9, 0, 10**9))
+    require_space(tmp_path, brain, parameters)
+    monkeypatch.setattr("shutil.disk_usage", lambda path: room(10**9, 10**9, 1000))
+    with pytest.raises(StorageError, match="no room for this run"):
+        require_space(tmp_path, brain, parameters)
 
 
 def test_bad_parameters_end_in_code_two(mesh, tmp_path):

@@ -2,6 +2,7 @@
 
 import argparse
 import fcntl
+import shutil
 import sys
 import traceback
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import yaml
 from mpi4py import MPI
 
 from ..errors import GyriflowError, InputError, StorageError
+from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
 from ..io.tetmeshes import read_tetrahedral_mesh
 from ..step import record_exit_code
@@ -20,8 +22,8 @@ from .parameters import FoldingParameters, parameters_from
 from .simulation import run
 from .zones import ZONE_NAMES, find_zones, refuse_impossible, zone_report
 
-PREDICTED_MIB_PER_RANK = 350
-PREDICTED_KIB_PER_TET = 4.0
+PREDICTED_MIB_PER_RANK = 180
+PREDICTED_KIB_PER_TET = 3.0
 """Memory of a solve, from runs of 60 k to 450 k elements (see summary.json of any run)."""
 
 
@@ -62,6 +64,23 @@ def locked(folder: Path) -> Iterator[None]:
         raise StorageError(f"cannot be written: {error}", path=folder) from None
 
 
+def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters) -> None:
+    """Raises StorageError where the disk has no room for the run's frames, kept twice while they are joined."""
+    values_per_vertex = 3 + 3 * len(parameters.fields)
+    frame = 8 * values_per_vertex * len(mesh.vertices)
+    checkpoint = 2 * 8 * 9 * len(mesh.vertices)
+    needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 16 * len(mesh.tets)
+    free = shutil.disk_usage(out).free
+    if free < needed:
+        raise StorageError(
+            "the disk has no room for this run",
+            path=out,
+            found=f"{free / 2**20:.0f} MiB free",
+            expected=f"{needed / 2**20:.0f} MiB",
+            remedy="Free space, choose another --directory, or write fewer weeks or fields.",
+        )
+
+
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Reads, checks, prints what is to be solved, and solves it."""
     parameters = read_parameters(arguments.params)
@@ -90,6 +109,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         if through < 2:
             say(f"warning: fewer than two elements through the cortex ({through:.2f}): folds may be mesh noise")
         refuse_impossible(mesh, zones)
+        require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / ZONES, report)
     comm.barrier()
     run(comm, mesh, zones, parameters, arguments.out)

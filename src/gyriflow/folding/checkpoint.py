@@ -108,7 +108,8 @@ def write_checkpoint(path: Path, key: str, state: State) -> None:
     with replaced(path) as temporary, h5py.File(temporary, "w") as file:
         for name, array in arrays.items():
             file[name] = array
-        file.attrs["scalars"] = np.void(scalars.encode())  # a table of steps outgrows HDF5's limit for text
+        # a data set, since the table of steps outgrows HDF5's limit for attributes
+        file["scalars"] = np.frombuffer(scalars.encode(), dtype=np.uint8)
         file.attrs["checksum"] = _checksum(arrays, scalars)
 
 
@@ -119,7 +120,7 @@ def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
     try:
         with h5py.File(path) as file:
             arrays = {name: file[name][:] for name in ("positions", "last", "before_last")}
-            scalars = bytes(file.attrs["scalars"]).decode()
+            scalars = file["scalars"][:].tobytes().decode()
             checksum = file.attrs["checksum"]
         if _checksum(arrays, scalars) != checksum:
             raise ValueError("its checksum is wrong")

@@ -152,7 +152,7 @@ def _cerebrum(points: list[Floats], shape: Shape, seed: int) -> tuple[Mask, Floa
     shell = inside & (depth < shape.fold_depth + shape.late_fold_depth + shape.sylvian_depth)
     inside[shell] = depth[shell] > _sulcal_depth((u[shell], v[shell], w[shell]), shape, seed)
     # a fissure that bends to and fro: with this frequency, a root of tan k = k, it has no tilt on the whole
-    middle = 0.03 * half[0] * np.sin(4.493 * y / half[1])
+    middle = 0.01 * half[0] * np.sin(4.493 * y / half[1])
     slit = (np.abs(x - middle) < 0.5 * shape.fissure) & ~_joint(y / half[1], z / half[2])
     return inside & ~slit, depth
 

@@ -19,6 +19,7 @@ from gyriflow.geometry.triangles import (
     signed_volume,
     submesh,
 )
+from gyriflow.surface.remeshing import self_intersecting_faces
 
 # vertices closer than this are one vertex
 SAME_MM = 1e-5
@@ -33,7 +34,7 @@ def cleaned(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[
     `max_hole_mm` across closed, faces turned outward, small pieces and pieces inside others dropped.
     MeshError for larger holes and for surfaces that stay open.
     """
-    report: dict[str, Any] = {}
+    report: dict[str, Any] = {"faces_that_cut_others": int(self_intersecting_faces(mesh).sum())}
     mesh = _without_doubles(mesh, report)
     mesh = _manifold(mesh, report)
     mesh = _main_pieces(mesh, report)

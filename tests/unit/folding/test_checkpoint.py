@@ -12,10 +12,10 @@ from gyriflow.folding.parameters import FoldingParameters, parameters_from
 VALUES = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 22.0]}
 
 
-def some_state():
+def some_state(steps=3):
     state = State.at_start(np.zeros((4, 3)), 100.0)
     rng = np.random.default_rng(1)
-    for i in range(3):
+    for i in range(steps):
         state = state.after(rng.normal(size=(4, 3)), 100.0, {"step": i + 1, "week": 21.0 + i, "rung": "cg"})
     return state
 
@@ -45,6 +45,11 @@ def test_a_checkpoint_comes_back_as_it_was(tmp_path):
     for name, value in vars(state).items():
         np.testing.assert_array_equal(getattr(read, name), value) if name != "rows" else None
     assert read.rows == state.rows
+
+
+def test_a_long_table_of_steps_fits(tmp_path):
+    write_checkpoint(tmp_path / "state.h5", "key", some_state(3000))
+    assert len(read_checkpoint(tmp_path / "state.h5", "key")[0].rows) == 3000
 
 
 def test_a_checkpoint_of_another_run_is_not_used(tmp_path):

@@ -26,9 +26,14 @@ def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
 def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("earlier")
-    with pytest.raises(ZeroDivisionError), replaced(path) as temporary:
-        temporary.write_text("half")
-        _ = 1 / 0
+
+    def stopped_half_way():
+        with replaced(path) as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped_half_way()
     assert path.read_text() == "earlier"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -14,7 +14,7 @@ from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface, 
 @pytest.fixture
 def ball():
     sphere = trimesh.creation.icosphere(subdivisions=2, radius=10.0)
-    return TriangleMesh(sphere.vertices + [30.0, -20.0, 5.0], sphere.faces)
+    return TriangleMesh(sphere.vertices - [-30.0, 20.0, -5.0], sphere.faces)
 
 
 def gifti(path, vertices, faces, matrix=None, face_type=np.int32):
