@@ -27,6 +27,7 @@ include: "workflow/rules/growth.smk"
 include: "workflow/rules/folding.smk"
 include: "workflow/rules/metrics.smk"
 include: "workflow/rules/study.smk"
+include: "workflow/rules/run_figures.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 

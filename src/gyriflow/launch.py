@@ -6,10 +6,12 @@ failed step. Everything else is Snakemake's own command line.
 
 import fcntl
 import os
+import signal
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from types import FrameType
 from typing import IO
 
 from .errors import GyriflowError, InputError, StorageError
@@ -18,8 +20,10 @@ from .step import EXIT_FILE, INTERRUPTED, recorded_exit_code
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
-LOOKS_ONLY = frozenset({"-n", "--dry-run", "--dryrun", "--nolock", "--summary", "-D", "--detailed-summary", "--rulegraph",
-    "--dag", "--filegraph", "--list-rules", "--list", "-l", "--lint", "-h", "--help", "-v", "--version"})  # fmt: skip
+LOOKS_ONLY = frozenset(
+    ("-n", "--dry-run", "--dryrun", "--nolock", "--summary", "-D", "--detailed-summary", "--rulegraph", "--dag")
+    + ("--filegraph", "--list-rules", "--list", "-l", "--lint", "-h", "--help", "-v", "--version")
+)
 """Options under which Snakemake takes no lock."""
 
 
@@ -51,11 +55,9 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
     Raises
     ------
     StorageError
-        If a run is live there; one that is just ending is waited for.
+        If a run is live there (one that is just ending is waited for), or the folder cannot be written.
     """
     locks = directory / ".snakemake" / "locks"
-    if not locks.parent.is_dir():
-        return
     deadline = time.monotonic() + patience_s
     while (file := hold_lock(directory)) is None:
         if time.monotonic() > deadline:
@@ -74,7 +76,7 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
 
 
 def value_of(arguments: Sequence[str], *names: str) -> str | None:
-    """Returns the value of an option given as `--name value`, `--name=value` or (short) `-nvalue`, the last one given."""
+    """Returns the last value of an option given as `--name value`, `--name=value` or (short) `-nvalue`."""
     found = None
     for index, argument in enumerate(arguments):
         for name in names:
@@ -123,6 +125,13 @@ def main(arguments: Sequence[str]) -> int:
     # beside the results, where jobs on other machines of a cluster find it too
     exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
     os.environ[EXIT_FILE] = str(exit_file)
+    interrupts: list[int] = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        interrupts.append(number)
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, interrupt)
     try:
         cli.main(completed(arguments))
     except SystemExit as end:
@@ -131,6 +140,9 @@ def main(arguments: Sequence[str]) -> int:
         code = INTERRUPTED
     recorded = recorded_exit_code(exit_file)
     exit_file.unlink(missing_ok=True)
+    if code and interrupts:
+        print("gyriflow: interrupted; the same command goes on from here", file=sys.stderr)
+        return INTERRUPTED
     return (recorded or code) if code else 0
 
 

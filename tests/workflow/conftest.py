@@ -1,4 +1,4 @@
-"""The workflow in a folder of its own: a copy of the checkout, so that editing the sources meanwhile changes nothing."""
+"""The workflow from a copy of the checkout, so that editing the sources meanwhile changes nothing."""
 
 import os
 import re

@@ -99,6 +99,13 @@ def test_a_run_beside_a_live_one_is_refused_with_5_but_may_look(workflow):
         holder.communicate("\n")
 
 
+def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
+    (workflow.directory / "file").touch()
+    outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")
+    assert outcome.returncode == 5
+    assert "file/below: the working directory cannot be written" in message(outcome)
+
+
 def test_an_option_is_found_however_it_is_written():
     assert value_of(["-n", "--directory", "a"], "--directory", "-d") == "a"
     assert value_of(["--directory=a", "-d", "b"], "--directory", "-d") == "b"

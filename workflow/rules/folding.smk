@@ -51,6 +51,8 @@ rule simulate:
         folder=subpath(output.steps, parent=True),
         code=code("folding", "mechanics"),
     shell:
+        # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
+        "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
         "{resources.mpi} -n {resources.tasks} python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
         " --out {params.folder:q} 2>&1 | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
 

@@ -4,7 +4,7 @@ SURFACE_SETTINGS = {
         "smoothing_voxels",
         "edge_length_mm",
         "smoothing_iterations",
-        "max_hole_mm",
+        "fissure_mm",
     ),
     "hemispheres": ("gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"),
     "pial": ("edge_length_mm", "smoothing_iterations", "max_hole_mm"),

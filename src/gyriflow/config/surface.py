@@ -17,6 +17,11 @@ class SurfaceSettings(Settings):
     max_hole_mm: float = setting(
         3.0, "mm", "Holes up to this diameter are closed; larger ones are errors.", ge=0, le=20
     )
+    fissure_mm: float = setting(
+        1.5, "mm",
+        "Width to which the fissure between the hemispheres is opened where a label volume shows none; 0 leaves it.",
+        ge=0, le=5,
+    )  # fmt: skip
     gap_mm: float = setting(
         0.5, "mm", "Width of the fissure that is kept where two hemisphere surfaces would touch.", ge=0, le=5
     )

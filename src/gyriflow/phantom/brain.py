@@ -25,7 +25,8 @@ PROPORTIONS = np.array([0.75, 1.0, 0.77])
 # where the brain's centre lies in the world, off the origin on purpose
 CENTRE_MM = np.array([4.3, -12.7, 8.9])
 MARGIN_MM = 6.0
-COARSE_MM = 2.0
+# voxels for finding the size: fine across the fissure
+COARSE_MM = (0.4, 2.4, 2.4)
 # the volume is stored with axes that point posterior, inferior, right, on purpose: columns of the affine
 STORED_AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 # the flat underside of the cerebrum, in half heights below the centre, and how much higher it is in front
@@ -96,10 +97,10 @@ def phantom_labels(
     # sizes are found on a coarse grid; folds and fissure keep theirs, so this takes two rounds
     for _ in range(2):
         points = _grid(shape, COARSE_MM)
-        volume = float(_cerebrum(points, shape, seed)[0].sum()) * COARSE_MM**3 * ML_PER_MM3
+        volume = float(_cerebrum(points, shape, seed)[0].sum()) * np.prod(COARSE_MM) * ML_PER_MM3
         factor = (cerebral_volume_ml(week) / volume) ** (1 / 3)
         shape = Shape(**{**vars(shape), "half_length": shape.half_length * factor})
-    points = _grid(shape, voxel_mm)
+    points = _grid(shape, (voxel_mm,) * 3)
     labels = _tissues(points, shape, seed, voxel_mm, cortex_mm)
     # from axes R, A, S to P, I, R
     stored = labels[:, ::-1, ::-1].transpose(1, 2, 0)
@@ -110,11 +111,11 @@ def phantom_labels(
     return np.ascontiguousarray(stored, dtype=np.int32), affine
 
 
-def _grid(shape: Shape, voxel_mm: float) -> list[Floats]:
+def _grid(shape: Shape, voxel_mm: tuple[float, ...]) -> list[Floats]:
     """Returns open x, y, z coordinates (RAS, mm from the brain's centre) of a grid around the whole brain."""
-    half = shape.half_length * PROPORTIONS * np.array([1.12, 1.12, 1.12]) + MARGIN_MM
+    half = shape.half_length * PROPORTIONS * 1.12 + MARGIN_MM
     below = half + np.array([0.0, 0.0, 0.45 * shape.half_length])
-    axes = [np.arange(-low, high, voxel_mm, dtype=np.float32) for low, high in zip(below, half, strict=True)]
+    axes = [np.arange(-a, b, step, dtype=np.float32) for a, b, step in zip(below, half, voxel_mm, strict=True)]
     return list(np.meshgrid(*axes, indexing="ij", sparse=True))
 
 

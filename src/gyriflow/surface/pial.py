@@ -19,8 +19,16 @@ from gyriflow.geometry.triangles import (
     signed_volume,
     transformed,
 )
-from gyriflow.surface.extraction import PAD_VOXELS, cropped, isosurface, made_simple, shifted_affine, smoothed_mask
-from gyriflow.surface.fissure import fissure_between, opened
+from gyriflow.surface.extraction import (
+    PAD_VOXELS,
+    cropped,
+    isosurface,
+    made_simple,
+    refined,
+    shifted_affine,
+    smoothed_mask,
+)
+from gyriflow.surface.fissure import Fissure, fissure_between, opened
 from gyriflow.surface.hemispheres import least_gap, left_faces, parted, require_common_pose, require_pair, set_apart
 from gyriflow.surface.labels import LabelScheme, cerebrum_mask, require_sides
 from gyriflow.surface.orientation import MidPlane, mid_plane, upright
@@ -70,7 +78,6 @@ def from_labels(
     smoothing_voxels: float = 1.0,
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
-    max_hole_mm: float = 3.0,
     fissure_mm: float = 1.5,
 ) -> PialSurface:
     """Returns the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
@@ -78,7 +85,7 @@ def from_labels(
     The cerebrum's mask is smoothed (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an
     isosurface, which is smoothed, remeshed to `edge_length_mm` and turned so that the mid-sagittal plane is
     x = const. Where the scheme tells cortex from the tissue inside and cortex labels of both sides touch, the fissure
-    is opened to `fissure_mm`. `max_hole_mm` plays no part: an isosurface has no holes.
+    is opened to `fissure_mm` (0: left shut).
     InputError for labels that don't fit the scheme or the week, MeshError where the surface stays tangled.
     """
     mask = cerebrum_mask(labels, scheme)
@@ -96,11 +103,8 @@ def from_labels(
     plane = mid_plane(walls)
     require_sides(tissue, scheme, affine, plane.normal)
     fissure = fissure_between(walls, plane)
-    if scheme.cortex:
-        shut = field
-        field = opened(field, affine, core, fissure, fissure_mm)
-        voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
-        report["fissure_opened_mL"] = float((shut - field).sum(dtype=float) * voxel_ml)
+    if scheme.cortex and fissure_mm > 0:
+        field, affine, report["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm)
     field, report["topology"] = made_simple(field)
     mesh = _even(isosurface(field, affine), smoothing_iterations, edge_length_mm, report)
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
@@ -168,6 +172,25 @@ def from_pial(
     fissure = fissure_between(mesh, plane)
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
     return _posed(mesh, left, plane, report, week)
+
+
+def _with_fissure(
+    field: NDArray[np.float32], affine: NDArray[np.float64], core: NDArray[np.bool_], fissure: Fissure, gap_mm: float
+) -> tuple[NDArray[np.float32], NDArray[np.float64], float]:
+    """Returns the field with the fissure opened, its affine, and the volume (mL) that this took.
+
+    Where more than a thousandth of the brain is taken, the fissure was shut; voxels that are too coarse for its new
+    walls are then made finer first.
+    """
+    wide = opened(field, affine, core, fissure, gap_mm)
+    # an opening of less than two voxels would be lost between them
+    factor = int(np.ceil(1.8 * np.linalg.norm(affine[:3, :3], axis=0).max() / gap_mm))
+    if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
+        solid, _ = refined(core.astype(np.float32), affine, factor)
+        field, affine = refined(field, affine, factor)
+        wide = opened(field, affine, solid > 0.5, fissure, gap_mm)
+    voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
+    return wide, affine, float((field - wide).sum(dtype=float) * voxel_ml)
 
 
 def _hemisphere(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:

@@ -6,7 +6,15 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import area, euler_number, is_closed, signed_volume
-from gyriflow.surface.extraction import cropped, isosurface, made_simple, main_parts, shifted_affine, smoothed_mask
+from gyriflow.surface.extraction import (
+    cropped,
+    isosurface,
+    made_simple,
+    main_parts,
+    refined,
+    shifted_affine,
+    smoothed_mask,
+)
 
 RADIUS = 12.0
 
@@ -40,6 +48,18 @@ def test_cropping_does_not_move_the_brain(ball):
         isosurface(smoothed_mask(cut, 1.0), shifted_affine(affine, first)),
     )
     assert part.vertices.mean(axis=0) == pytest.approx(whole.vertices.mean(axis=0), abs=1e-4)
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+def test_refined_field_stays_in_its_place(ball, factor):
+    affine = np.diag([1.6, 1.6, 2.0, 1.0])
+    field, fine = refined(smoothed_mask(ball, 1.0), affine, factor)
+    assert field.shape == tuple(factor * n for n in ball.shape)
+    surface = isosurface(field, fine)
+    assert surface.vertices.mean(axis=0) == pytest.approx(affine[:3, :3] @ np.full(3, 17.5), abs=0.01)
+    assert signed_volume(surface) == pytest.approx(
+        signed_volume(isosurface(smoothed_mask(ball, 1.0), affine)), rel=0.01
+    )
 
 
 def test_mask_that_touches_the_volumes_edge_is_closed():

@@ -1,0 +1,68 @@
+"""A step ends in the exit code of its error, with one message on the terminal and in its log."""
+
+import logging
+import subprocess
+import sys
+
+import pytest
+
+from gyriflow.errors import MeshError
+from gyriflow.step import EXIT_FILE, record_exit_code, recorded_exit_code, step
+
+
+@pytest.fixture
+def exit_file(tmp_path, monkeypatch):
+    path = tmp_path / "exit"
+    monkeypatch.setenv(EXIT_FILE, str(path))
+    return path
+
+
+def test_the_first_failure_is_the_one_handed_on(exit_file):
+    assert recorded_exit_code(exit_file) is None
+    record_exit_code(3)
+    record_exit_code(5)
+    assert recorded_exit_code(exit_file) == 3
+
+
+def test_without_a_launcher_nothing_is_recorded(monkeypatch):
+    monkeypatch.delenv(EXIT_FILE, raising=False)
+    record_exit_code(3)
+
+
+def test_a_known_error_is_one_message_and_its_code(exit_file, tmp_path, capsys):
+    log = tmp_path / "log"
+
+    def close_holes():
+        logging.getLogger("room").info("a hole was closed")
+        raise MeshError("has a hole", path="x.gii", found="12 mm", expected="at most 3 mm")
+
+    with pytest.raises(SystemExit) as end, step(str(log)):
+        close_holes()
+    assert end.value.code == 3
+    assert recorded_exit_code(exit_file) == 3
+    assert capsys.readouterr().err == "gyriflow: x.gii: has a hole; found 12 mm; expected at most 3 mm\n"
+    text = log.read_text()
+    assert "a hole was closed" in text
+    assert "x.gii: has a hole" in text
+    assert "Traceback" not in text
+
+
+def test_an_unknown_error_keeps_its_traceback(exit_file, tmp_path):
+    log = tmp_path / "log"
+    with pytest.raises(SystemExit) as end, step(str(log)):
+        raise ZeroDivisionError
+    assert end.value.code == 1
+    assert "ZeroDivisionError" in log.read_text()
+
+
+def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path):
+    log = tmp_path / "log"
+    log.write_text("before\n")
+    end = subprocess.run(
+        [sys.executable, "-m", "gyriflow.step", "137", str(log)], capture_output=True, text=True, check=False
+    )
+    assert end.returncode == 137
+    assert "memory ran out" in end.stderr
+    assert log.read_text().startswith("before\n")
+    assert "memory ran out" in log.read_text()
+    assert recorded_exit_code(exit_file) == 137

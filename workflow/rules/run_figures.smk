@@ -1,0 +1,182 @@
+# Figures of each run: PNG, marked for the report, and PDF.
+FIGURES = "results/study/figures"
+DRAWING = {"synthetic": SYNTHETIC, "dpi": CONFIG.report.dpi}
+
+
+def shown_beside(run):
+    """Returns, by week, the measured brain that a run's surface of that week is shown beside."""
+    measured = {week_tag(brain.week): brain.id for brain in reversed(CONFIG.brains)}
+    return {week: measured[week] for week in week_tags(run) if week in measured}
+
+
+def folded(run, side="", weeks=None):
+    """Returns a run's surface files of the given weeks, by default of all output weeks."""
+    return [
+        f"results/{START}/folding/{run}/surfaces/week-{week}.{side}pial.surf.gii"
+        for week in (week_tags(run) if weeks is None else weeks)
+    ]
+
+
+rule weekly_figure:
+    input:
+        simulated=lambda wildcards: folded(wildcards.run),
+        real=lambda wildcards: [
+            f"results/{brain}/surface/pial.surf.gii"
+            for brain in shown_beside(wildcards.run).values()
+        ],
+    output:
+        png=report(
+            f"{FIGURES}/weekly.{{run}}.png",
+            caption="../report/weekly.rst",
+            category="Folding",
+            labels={"figure": "simulated beside measured brains", "run": "{run}"},
+        ),
+        pdf=f"{FIGURES}/weekly.{{run}}.pdf",
+    log:
+        "results/study/logs/weekly_figure.{run}.log",
+    benchmark:
+        "results/study/benchmarks/weekly_figure.{run}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        **DRAWING,
+        simulated_weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
+        real_weeks=lambda wildcards: [
+            float(week) for week in shown_beside(wildcards.run)
+        ],
+        code=code("report"),
+    script:
+        "../scripts/weekly_figure.py"
+
+
+rule displacement_maps:
+    input:
+        rules.simulate.output.frames,
+    output:
+        png=report(
+            f"{FIGURES}/displacement_maps.{{run}}.png",
+            caption="../report/displacement_maps.rst",
+            category="Folding",
+            labels={"figure": "displacement maps", "run": "{run}"},
+        ),
+        pdf=f"{FIGURES}/displacement_maps.{{run}}.pdf",
+    log:
+        "results/study/logs/displacement_maps.{run}.log",
+    benchmark:
+        "results/study/benchmarks/displacement_maps.{run}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        **DRAWING,
+        code=code("report"),
+    script:
+        "../scripts/displacement_maps.py"
+
+
+rule shape_maps:
+    input:
+        simulated=lambda wildcards: folded(wildcards.run, "left.")
+        + folded(wildcards.run, "right."),
+        simulated_maps=lambda wildcards: [
+            f"results/{START}/metrics/{wildcards.run}/week-{week}/{side}.shape.gii"
+            for side in ("left", "right")
+            for week in week_tags(wildcards.run)
+        ],
+        real=lambda wildcards: [
+            f"results/{brain}/surface/{side}.pial.surf.gii"
+            for side in ("left", "right")
+            for brain in shown_beside(wildcards.run).values()
+        ],
+        real_maps=lambda wildcards: [
+            f"results/{brain}/metrics/real/{side}.shape.gii"
+            for side in ("left", "right")
+            for brain in shown_beside(wildcards.run).values()
+        ],
+    output:
+        png=report(
+            f"{FIGURES}/shape_index.{{run}}.png",
+            caption="../report/shape_index.rst",
+            category="Metrics",
+            labels={"figure": "shape index maps", "run": "{run}"},
+        ),
+        pdf=f"{FIGURES}/shape_index.{{run}}.pdf",
+    log:
+        "results/study/logs/shape_maps.{run}.log",
+    benchmark:
+        "results/study/benchmarks/shape_maps.{run}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        **DRAWING,
+        simulated_weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
+        real_weeks=lambda wildcards: [
+            float(week) for week in shown_beside(wildcards.run)
+        ],
+        code=code("report"),
+    script:
+        "../scripts/shape_maps.py"
+
+
+rule zones_figure:
+    input:
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        params=rules.parameters.output[0],
+    output:
+        png=report(
+            f"{FIGURES}/zones.{{run}}.png",
+            caption="../report/zones.rst",
+            category="Folding",
+            labels={"figure": "zones of the boundary", "run": "{run}"},
+        ),
+        pdf=f"{FIGURES}/zones.{{run}}.pdf",
+    log:
+        "results/study/logs/zones_figure.{run}.log",
+    benchmark:
+        "results/study/benchmarks/zones_figure.{run}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        **DRAWING,
+        code=code("report", "folding"),
+    script:
+        "../scripts/zones_figure.py"
+
+
+rule steps_figure:
+    input:
+        rules.simulate.output.steps,
+    output:
+        png=report(
+            f"{FIGURES}/steps.{{run}}.png",
+            caption="../report/steps.rst",
+            category="Folding",
+            labels={"figure": "steps of the solver", "run": "{run}"},
+        ),
+        pdf=f"{FIGURES}/steps.{{run}}.pdf",
+    log:
+        "results/study/logs/steps_figure.{run}.log",
+    benchmark:
+        "results/study/benchmarks/steps_figure.{run}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        **DRAWING,
+        code=code("report"),
+    script:
+        "../scripts/steps_figure.py"
