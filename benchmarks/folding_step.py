@@ -56,7 +56,7 @@ def measure(arguments: argparse.Namespace) -> None:
     from gyriflow.folding.output import peak_memory_mib
     from gyriflow.folding.parameters import parameters_from
     from gyriflow.folding.simulation import Folding
-    from gyriflow.folding.zones import find_zones, refuse_impossible
+    from gyriflow.folding.zones import refuse_impossible, zones_of_run
     from gyriflow.io.tetmeshes import read_tetrahedral_mesh
     from gyriflow.units import M_PER_MM, MM_PER_M
 
@@ -66,15 +66,7 @@ def measure(arguments: argparse.Namespace) -> None:
     values = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": middle, "output_weeks": [21.0, 36.0]}
     values |= yaml.safe_load(arguments.params.read_text()) if arguments.params else {}
     p = parameters_from(values)
-    zones = find_zones(
-        mesh,
-        fissure_x_mm=p.fissure_x_mm,
-        gap_mm=p.contact.gap_mm,
-        contact=p.contact.kind == "planes",
-        shift_y=p.no_growth.shift_y,
-        shift_z=p.no_growth.shift_z,
-        semi_axes=p.no_growth.semi_axes,
-    )
+    zones = zones_of_run(mesh, p)
     refuse_impossible(mesh, zones)
     ours = Folding(comm, mesh, zones, p)
     states, seconds, newton, krylov = [State.at_start(mesh.vertices * M_PER_MM, p.step_s)], [], [], []

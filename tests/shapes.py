@@ -10,7 +10,8 @@ KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0
 def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetrahedralMesh:
     """Returns a box around the origin, in mm, with six elements per grid cell."""
     counts = np.array(cells) + 1
-    points = np.stack(np.meshgrid(*(np.linspace(-s / 2, s / 2, n) for s, n in zip(size, counts)), indexing="ij"), -1)
+    ticks = [np.linspace(-s / 2, s / 2, n) for s, n in zip(size, counts, strict=True)]
+    points = np.stack(np.meshgrid(*ticks, indexing="ij"), -1)
     number = np.arange(counts.prod()).reshape(counts)
     corner = [
         number[i : counts[0] - 1 + i, j : counts[1] - 1 + j, k : counts[2] - 1 + k].ravel()

@@ -23,11 +23,36 @@ rule parameters:
         "../scripts/parameters.py"
 
 
+rule regions:
+    input:
+        mesh=f"results/{START}/mesh/brain.xdmf",
+        data=f"results/{START}/mesh/brain.h5",
+        params=f"results/{START}/folding/{{run}}/params.yaml",
+    output:
+        mesh=f"results/{START}/folding/{{run}}/regions.xdmf",
+        data=f"results/{START}/folding/{{run}}/regions.h5",
+    log:
+        f"results/{START}/logs/regions.{{run}}.log",
+    benchmark:
+        f"results/{START}/benchmarks/regions.{{run}}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=15,
+    params:
+        code=code("folding"),
+    script:
+        "../scripts/regions.py"
+
+
 rule simulate:
     input:
         mesh=f"results/{START}/mesh/brain.xdmf",
         data=f"results/{START}/mesh/brain.h5",
         params=f"results/{START}/folding/{{run}}/params.yaml",
+        # impossible zones are refused there, before the ranks start
+        regions=f"results/{START}/folding/{{run}}/regions.xdmf",
     output:
         steps=f"results/{START}/folding/{{run}}/steps.csv",
         frames=f"results/{START}/folding/{{run}}/frames.h5",

@@ -20,7 +20,7 @@ from ..step import record_exit_code
 from .output import ZONES, say
 from .parameters import FoldingParameters, parameters_from
 from .simulation import run
-from .zones import ZONE_NAMES, find_zones, refuse_impossible, zone_report
+from .zones import ZONE_NAMES, refuse_impossible, zone_report, zones_of_run
 
 PREDICTED_MIB_PER_RANK = 180
 PREDICTED_KIB_PER_TET = 3.0
@@ -85,18 +85,9 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Reads, checks, prints what is to be solved, and solves it."""
     parameters = read_parameters(arguments.params)
     mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
-    p = parameters
-    zones = find_zones(
-        mesh,
-        fissure_x_mm=p.fissure_x_mm,
-        gap_mm=p.contact.gap_mm,
-        contact=p.contact.kind == "planes",
-        shift_y=p.no_growth.shift_y,
-        shift_z=p.no_growth.shift_z,
-        semi_axes=p.no_growth.semi_axes,
-    )
+    zones = zones_of_run(mesh, parameters)
     if comm.rank == 0:
-        report = zone_report(mesh, zones, p.thickness_mm)
+        report = zone_report(mesh, zones, parameters.thickness_mm)
         memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024
         say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")
         for name in ZONE_NAMES:

@@ -101,10 +101,9 @@ class NewtonSolver:
 
     def _solve_linear(self, matrix: PETSc.Mat, count: StepCount) -> None:
         """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
-        for rung in (KEPT, REBUILT, MINRES, DIRECT):
+        first = REBUILT if self._stale else KEPT
+        for rung in range(first, DIRECT + 1):
             if rung == KEPT:
-                if self._stale:
-                    continue
                 solved, iterations = self._run(self._cg, matrix, reuse=True)
                 self._stale = not solved or iterations > 1.5 * self._fresh_iterations + 2
             elif rung == REBUILT:
@@ -118,7 +117,7 @@ class NewtonSolver:
                     )
                 solved, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
             count.krylov += iterations
-            count.rung = max(count.rung, rung if rung > REBUILT else KEPT)
+            count.rung = max(count.rung, rung if rung > first else KEPT)
             if solved and self._direction.dot(self._residual) < 0:
                 return
         raise NotConvergedError("no linear solver found a descent direction")

@@ -16,6 +16,7 @@ from .layers import WEIGHT_REACH, PialSearch, cortical_weight
 from .parameters import FoldingParameters
 from .zones import Zones
 
+Floats = NDArray[np.float64]
 FRAMES = "frames.h5"
 STEPS = "steps.csv"
 SUMMARY = "summary.json"
@@ -42,38 +43,42 @@ def frame_path(folder: Path, week: float) -> Path:
     return folder / f"frame-{week_tag(week)}.h5"
 
 
+def layer_fields(positions_mm: Floats, zones: Zones, parameters: FoldingParameters, wanted: Iterable[str]) -> dict:
+    """Returns the fields of a shape that are among `wanted` (names as in the parameter `fields`), per vertex.
+
+    Positions are (n, 3) in mm. The names of the arrays carry their units.
+    """
+    search = PialSearch(positions_mm, zones.facets)
+    distance = search.distance(positions_mm, WEIGHT_REACH * parameters.thickness_mm)
+    weight = cortical_weight(distance, parameters.thickness_mm)
+    core, cortex = parameters.shear_modulus_core_pa, parameters.shear_modulus_cortex_pa
+    growth = parameters.growth_rate_per_s * parameters.step_s * weight * zones.growth
+    fields: dict[str, dict[str, NDArray]] = {
+        "distance": {"distance_to_pial_mm": distance},
+        "cortex_weight": {"cortex_weight": weight},
+        "growth": {"tangential_growth_per_step": growth},
+        "shear_modulus": {"shear_modulus_pa": core * (1 - weight) + cortex * weight},
+        "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in wanted else {},
+        "zones": {"zone": vertex_zones(zones, len(positions_mm)), "growing": zones.growth},
+    }
+    return {name: values for key in wanted if key in fields for name, values in fields[key].items()}
+
+
+def vertex_zones(zones: Zones, count: int) -> NDArray[np.int32]:
+    """Returns a zone for each of `count` vertices: that of its facets, the highest number where they differ."""
+    zone = np.zeros(count, dtype=np.int32)
+    np.maximum.at(zone, zones.facets.ravel(), np.repeat(zones.facet_zone, 3).astype(np.int32))
+    return zone
+
+
 def save_frame(
-    folder: Path,
-    week: float,
-    positions: NDArray[np.float64],
-    start: NDArray[np.float64],
-    zones: Zones,
-    parameters: FoldingParameters,
+    folder: Path, week: float, positions: Floats, start: Floats, zones: Zones, parameters: FoldingParameters
 ) -> None:
     """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name."""
     fields: dict[str, NDArray] = {"positions": positions * MM_PER_M}
-    wanted = set(parameters.fields)
-    if "displacement" in wanted:
+    if "displacement" in parameters.fields:
         fields["displacement_mm"] = (positions - start) * MM_PER_M
-    if wanted & {"distance", "cortex_weight", "growth", "shear_modulus", "normal"}:
-        search = PialSearch(fields["positions"], zones.facets)
-        distance = search.distance(fields["positions"], WEIGHT_REACH * parameters.thickness_mm)
-        weight = cortical_weight(distance, parameters.thickness_mm)
-        core, cortex = parameters.shear_modulus_core_pa, parameters.shear_modulus_cortex_pa
-        rate = parameters.growth_rate_per_s * parameters.step_s
-        derived = {
-            "distance": ("distance_to_pial_mm", distance),
-            "cortex_weight": ("cortex_weight", weight),
-            "growth": ("tangential_growth_per_step", rate * weight * zones.growth),
-            "shear_modulus": ("shear_modulus_pa", core * (1 - weight) + cortex * weight),
-        }
-        fields |= {name: values for key, (name, values) in derived.items() if key in wanted}
-        if "normal" in wanted:
-            fields["pial_normal"] = search.nearest_normals(fields["positions"])
-    if "zones" in wanted:
-        zone = np.zeros(len(positions), dtype=np.int32)
-        zone[zones.facets.ravel()] = np.repeat(zones.facet_zone, 3)
-        fields |= {"zone": zone, "growing": zones.growth}
+    fields |= layer_fields(fields["positions"], zones, parameters, parameters.fields)
     write_frame(frame_path(folder, week), week, fields)
 
 

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError, MeshError
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from ..geometry.triangles import TriangleMesh, edges, face_areas
+from .parameters import FoldingParameters
 
 FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES = range(5)
 ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes")
@@ -102,6 +103,20 @@ def find_zones(
     growth = np.where(still, 0.0, 1.0)
     growth[np.unique(bridge)] = 0.0
     return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane))
+
+
+def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
+    """Returns the zones of a brain in RAS+ mm for the parameters of a run."""
+    p = parameters
+    return find_zones(
+        mesh,
+        fissure_x_mm=p.fissure_x_mm,
+        gap_mm=p.contact.gap_mm,
+        contact=p.contact.kind == "planes",
+        shift_y=p.no_growth.shift_y,
+        shift_z=p.no_growth.shift_z,
+        semi_axes=p.no_growth.semi_axes,
+    )
 
 
 def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:

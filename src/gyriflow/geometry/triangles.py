@@ -96,8 +96,7 @@ def vertex_normals(mesh: TriangleMesh) -> Floats:
 
 def vertex_areas(mesh: TriangleMesh) -> Floats:
     """Returns the (n,) areas in mm² that belong to the vertices: a third of each face around."""
-    areas: Floats = scatter_to_vertices(mesh, face_areas(mesh)) / 3.0
-    return areas
+    return np.asarray(scatter_to_vertices(mesh, face_areas(mesh)) / 3.0, dtype=np.float64)
 
 
 def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:

@@ -1,5 +1,7 @@
 """State and checkpoint."""
 
+from itertools import pairwise
+
 import h5py
 import numpy as np
 import pytest
@@ -27,7 +29,7 @@ def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
 
     times = [0.0, 1.0, 1.5, 3.0]
     state = State.at_start(at(0.0), 1.0)
-    for before, after in zip(times[:2], times[1:3], strict=True):
+    for before, after in pairwise(times[:3]):
         state = state.after(at(after) - at(before), after - before, {})
     np.testing.assert_allclose(state.predicted(1.5), at(3.0) - at(1.5), rtol=1e-13)
 
