@@ -100,9 +100,13 @@ def panel_grid(
     layout = _Layout(width, left_in, panel_in, 0.66 if colour_bars or legend else 0.46, half_width)
 
     heading = [line for line in (title, synthetic_note() if synthetic else "") if line]
-    head_in, block_head_in, caption_in = 0.1 + 0.16 * len(heading), 0.2, 0.15
+    head_in, block_head_in, caption_line_in = 0.1 + 0.16 * len(heading), 0.2, 0.13
     heights = {id(row): _row_height_in(row, layout) for _, part in blocks for row in part}
-    captions = {id(row): caption_in * any(p and p.caption for p in row.panels) for _, part in blocks for row in part}
+    captions = {
+        id(row): caption_line_in * max((len(p.caption.splitlines()) for p in row.panels if p), default=0)
+        for _, part in blocks
+        for row in part
+    }
     total = head_in + layout.foot + len(blocks) * block_head_in + sum(heights.values()) + sum(captions.values())
 
     figure = Figure(figsize=(width, total))

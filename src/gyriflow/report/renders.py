@@ -133,7 +133,7 @@ def displacement_maps(
         panels = []
         for key in keys:
             mesh, norms = displacements[key]
-            caption = f"max {np.nanmax(norms):.2f}, mean {np.nanmean(norms):.2f} mm" if view == seen[-1] else ""
+            caption = f"max {np.nanmax(norms):.2f} mm\nmean {np.nanmean(norms):.2f} mm" if view == seen[-1] else ""
             panels.append(Panel(mesh, painted(norms, scale), view, caption))
         rows.append(Row(f"{view.name} view", panels))
     return panel_grid(

@@ -130,7 +130,7 @@ def test_displacement_maps_share_their_colour_scale():
     (bar,) = [axes for axes in figure.axes if "displacement" in axes.get_xlabel()]
     assert bar.get_xlim() == (0.0, 4.0)
     assert "(mm)" in bar.get_xlabel()
-    assert {"21–22 GW", "22–23 GW", "max 1.00, mean 1.00 mm", "max 4.00, mean 4.00 mm"} <= words(figure)
+    assert {"21–22 GW", "22–23 GW", "max 1.00 mm\nmean 1.00 mm", "max 4.00 mm\nmean 4.00 mm"} <= words(figure)
     first, second = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
     # viridis: blue at a quarter, yellow at the upper end
     assert first[2] > first[0]
