@@ -20,12 +20,19 @@ import numpy as np
 import yaml
 
 
+def positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError("the first step is not counted, so at least 1 is needed")
+    return number
+
+
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("mesh", type=Path)
-    parser.add_argument("--steps", type=int, default=6, help="counted steps of ours (at least 2)")
-    parser.add_argument("--paper-steps", type=int, default=2, help="counted steps of the paper's set-up")
-    parser.add_argument("--ranks", type=int, default=2)
+    parser.add_argument("--steps", type=positive, default=6, help="counted steps of ours")
+    parser.add_argument("--paper-steps", type=positive, default=2, help="counted steps of the paper's set-up")
+    parser.add_argument("--ranks", type=int, default=2, help="MPI ranks of both")
     parser.add_argument("--params", type=Path, help="parameters (YAML) instead of the paper's reference values")
     parser.add_argument("--inside-mpi", action="store_true", help=argparse.SUPPRESS)
     return parser.parse_args()

@@ -209,6 +209,14 @@ def test_conda_environment_has_the_same_python_packages():
     assert pip == listed(ROOT / "envs" / "requirements.txt")
 
 
+def test_conda_environment_sets_what_the_launcher_sets():
+    (settings,) = re.findall(r"^settings\(\) \{\n(.*?)^\}", (ROOT / "run").read_text(), flags=re.MULTILINE | re.DOTALL)
+    exports = dict(re.findall(r"\b([A-Z]\w+)=(?:\$\{\w+:-)?([\w:,]+)\}?", settings))
+    environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
+    # what concerns the checkout and the user's Python is the launcher's own
+    assert environment["variables"] == {name: exports[name] for name in exports if not name.startswith("PYTHON")}
+
+
 def test_conda_environment_holds_no_path():
     # Snakemake copies the file, so `-e .` and `-r requirements.txt` would point nowhere
     text = (ROOT / "envs" / "gyriflow.yaml").read_text()

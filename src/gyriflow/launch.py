@@ -6,6 +6,7 @@ failed step. Everything else is Snakemake's own command line.
 
 import fcntl
 import os
+import re
 import signal
 import sys
 import time
@@ -75,6 +76,12 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
         print("gyriflow: cleared the lock of an interrupted run; going on where it ended", file=sys.stderr)
 
 
+def looks_only(arguments: Sequence[str]) -> bool:
+    """Returns whether Snakemake takes no lock for these arguments; short options may be bundled, as in `-np`."""
+    bundled = any(re.fullmatch("-[npqrF]*n[npqrF]*", argument) for argument in arguments)
+    return bundled or bool(LOOKS_ONLY.intersection(arguments))
+
+
 def value_of(arguments: Sequence[str], *names: str) -> str | None:
     """Returns the last value of an option given as `--name value`, `--name=value` or (short) `-nvalue`."""
     found = None
@@ -118,7 +125,7 @@ def main(arguments: Sequence[str]) -> int:
     """Runs Snakemake and returns the exit code: its own, or that of the first failed step."""
     refuse_bad_configfiles(arguments)
     directory = Path(value_of(arguments, "--directory", "-d") or ".")
-    if not LOOKS_ONLY.intersection(arguments):
+    if not looks_only(arguments):
         clear_stale_lock(directory)
     from snakemake import cli  # takes a second, which a refused run need not wait for
 

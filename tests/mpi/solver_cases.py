@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
 from petsc4py import PETSc
+from shapes import box_mesh
 
-from gyriflow.folding.newton import DIRECT, KEPT, MINRES, NewtonSettings, NewtonSolver, NotConvergedError
+from gyriflow.folding.newton import DIRECT, GMRES, KEPT, NewtonSettings, NewtonSolver, NotConvergedError
 
 AFFINE = np.array([[0.06, 0.02, -0.01], [0.03, -0.05, 0.02], [0.0, 0.04, 0.03]])
 
@@ -16,6 +17,11 @@ def everywhere(centre):
 
 def at_the_bottom(centre):
     return centre[:, 2] < -2.99
+
+
+def everywhere_known(problem):
+    """Returns the displacement of all vertices: two domains of one mesh may be spread over the ranks differently."""
+    return problem.domain.gathered(problem.displacement[: problem.domain.owned])
 
 
 def growing_problem(contact=False, **changes):
@@ -40,7 +46,7 @@ def test_affine_displacement_of_a_uniform_body_is_in_equilibrium_inside():
     # all boundary nodes are clamped, so only inner forces are left; compare with the traction on a free body
     inner = problem.residual(residual)
     free = problem_on(mesh, zones_of(mesh))
-    free.set_displacement(x @ AFFINE.T)
+    free.set_displacement(free.domain.local(free.domain.positions) @ AFFINE.T)
     assert inner <= 1e-10 * free.residual(free.new_vector())
 
 
@@ -130,25 +136,25 @@ def test_newton_converges_quadratically_with_tight_linear_solves():
     assert count.residual <= 1e-12
 
 
-@pytest.mark.parametrize("rung", [MINRES, DIRECT])
+@pytest.mark.parametrize("rung", [GMRES, DIRECT])
 def test_a_lower_rung_takes_over_where_the_upper_ones_fail(rung, monkeypatch):
     problem = growing_problem()
-    solver = NewtonSolver(problem, NewtonSettings(krylov_tolerance=1e-6), residual_floor=0.0)
+    solver = NewtonSolver(problem, NewtonSettings(1e-9, krylov_tolerance=1e-6), residual_floor=0.0)
     honest = solver._run
 
     def failing(krylov, matrix, reuse):
         solved, iterations = honest(krylov, matrix, reuse)
-        failed = krylov is solver._cg or (rung == DIRECT and krylov.getType() == "minres")
+        failed = krylov is solver._cg or (rung == DIRECT and krylov.getType() == "gmres")
         return solved and not failed, iterations
 
     monkeypatch.setattr(solver, "_run", failing)
     count = solver.solve(np.zeros_like(problem.displacement))
     assert count.rung == rung
-    by_ladder = problem.displacement.copy()
+    by_ladder = everywhere_known(problem)
     reference = growing_problem()
-    plain = NewtonSolver(reference, NewtonSettings(krylov_tolerance=1e-6), residual_floor=0.0)
-    assert plain.solve(np.zeros_like(by_ladder)).rung == KEPT
-    assert np.abs(by_ladder - reference.displacement).max() <= 1e-5 * np.abs(by_ladder).max()
+    plain = NewtonSolver(reference, NewtonSettings(1e-9, krylov_tolerance=1e-6), residual_floor=0.0)
+    assert plain.solve(np.zeros_like(reference.displacement)).rung == KEPT
+    assert np.abs(by_ladder - everywhere_known(reference)).max() <= 1e-5 * np.abs(by_ladder).max()
 
 
 def test_a_failed_solve_says_so():
@@ -164,9 +170,9 @@ def test_the_energy_never_rises_from_one_iterate_to_the_next():
     energies = []
     advance = solver._advance
 
-    def recorded(norm, count):
+    def recorded(norm):
         energies.append(problem.energy())
-        return advance(norm, count)
+        return advance(norm)
 
     solver._advance = recorded
     solver.solve(np.zeros_like(problem.displacement))
@@ -182,3 +188,27 @@ def test_an_inverting_first_guess_is_dropped():
     solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
     assert solver.solve(guess).residual <= 1e-6
     assert problem.smallest_volume_ratio() > 0
+
+
+def test_a_rank_on_which_nothing_moves_does_not_stop_the_others():
+    # a long bar clamped over most of its length: some rank has clamped nodes only
+    mesh = box_mesh((24, 1, 1), (48.0, 2.0, 2.0))
+    problem = problem_on(mesh, zones_of(mesh, lambda c: c[:, 0] < 12.0), dg=0.01, dr=0.01)
+    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
+    solver.solve(np.zeros_like(problem.displacement))
+    again = problem.displacement.copy()
+    assert solver.solve(again).residual <= 1e-6
+
+
+def test_a_rebuilt_preconditioner_is_as_good_as_a_new_one():
+    problem = growing_problem()
+    settings = NewtonSettings(1e-10, krylov_tolerance=1e-8)
+    solver = NewtonSolver(problem, settings, residual_floor=0.0)
+    solver.solve(np.zeros_like(problem.displacement))
+    stretched = problem.domain.positions * [12.0, 1.0, 0.3]
+    problem.domain.place(stretched)
+    solver._stale = True
+    count = solver.solve(np.zeros_like(problem.displacement))
+    new = NewtonSolver(problem, settings, residual_floor=0.0)
+    fresh = new.solve(np.zeros_like(problem.displacement))
+    assert count.krylov / count.newton <= 1.2 * fresh.krylov / fresh.newton + 1

@@ -1,24 +1,29 @@
 """The folding program as users start it: outputs, ranks, interruptions, and how it ends."""
 
-import os
-import signal
+import shutil
 import subprocess
 import sys
-import time
 from collections import namedtuple
+from contextlib import suppress
 
 import numpy as np
 import pandas as pd
+import psutil
 import pytest
 import yaml
+from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
-from gyriflow.errors import StorageError
+from gyriflow.errors import SolverError, StorageError
 from gyriflow.folding.__main__ import require_space
+from gyriflow.folding.checkpoint import read_checkpoint, run_key
+from gyriflow.folding.newton import NotConvergedError
 from gyriflow.folding.parameters import parameters_from
+from gyriflow.folding.simulation import Folding, run
+from gyriflow.folding.zones import zones_of_run
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
-from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
 WEEK = {
@@ -58,6 +63,15 @@ def tight_run(mesh, tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="module")
+def default_run(mesh, tmp_path_factory):
+    """A run on two ranks at default tolerances: its folder and what it printed."""
+    out = tmp_path_factory.mktemp("default") / "out"
+    done = fold(mesh, out, 2)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out, done.stdout
+
+
 def test_a_run_leaves_every_file_and_nothing_else(tight_run):
     assert {p.name for p in tight_run.iterdir()} == {
         ".lock", "frames.h5", "frames.xdmf", "steps.csv", "summary.json", "zones.json"
@@ -85,23 +99,36 @@ def test_the_result_does_not_depend_on_the_number_of_ranks(mesh, tight_run, tmp_
     assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
 
 
-def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(mesh, tight_run, tmp_path):
-    assert fold(mesh, tmp_path / "out", 2).returncode == 0
-    one, other = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, tmp_path / "out"))
+def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, default_run):
+    one, other = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, default_run[0]))
     assert np.linalg.norm(other - one, axis=1).max() <= 1e-3
 
 
+def test_memory_and_a_shortened_step_are_said_before_the_solve(default_run):
+    before, _, _ = default_run[1].partition("step    1")
+    assert "3072 elements, 2187 unknowns, 2 ranks, about 369 MiB" in before
+    assert "step_s 43200 does not divide the time from GW 21 to 21.25: the last step there is shortened" in before
+
+
+def kill(process):
+    """Kills a program with its ranks, which Open MPI's daemon puts into groups of their own."""
+    ranks = psutil.Process(process.pid).children(recursive=True)
+    process.kill()
+    for rank in ranks:
+        with suppress(psutil.NoSuchProcess):
+            rank.kill()
+    psutil.wait_procs(ranks, timeout=10)
+
+
 def killed_after(step, arguments):
-    """Starts the program, kills it with its ranks when it has printed a step, and returns what it printed."""
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+    """Starts the program, kills it when it has printed a step, and returns what it printed."""
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         printed = []
         for line in process.stdout:
             printed.append(line)
             if f"step {step:4d}" in line:
-                os.killpg(process.pid, signal.SIGKILL)
+                kill(process)
                 break
-        # Open MPI's daemon puts ranks into groups of their own
-        subprocess.run(["pkill", "-KILL", "-f", arguments[-1]], check=False)
     return "".join(printed)
 
 
@@ -110,7 +137,6 @@ def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, tig
     out = tmp_path / "out"
     printed = killed_after(3, command(mesh, out, first, solver=TIGHT))
     assert not (out / "frames.h5").exists(), printed
-    time.sleep(0.2)
     again = fold(mesh, out, then, solver=TIGHT)
     assert again.returncode == 0, again.stderr
     assert "going on from the checkpoint after step" in again.stdout
@@ -121,13 +147,19 @@ def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, tig
     assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(tight_run / "steps.csv"))
 
 
-def test_a_checkpoint_of_other_parameters_is_not_used(mesh, tmp_path):
+def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, default_run, tmp_path):
     out = tmp_path / "out"
     killed_after(2, command(mesh, out))
     done = fold(mesh, out, thickness_mm=2.5)
     assert done.returncode == 0
-    assert "another mesh or other parameters: not used" in done.stdout
+    assert "another mesh or other parameters: not used, kept for a return" in done.stdout
     assert "going on" not in done.stdout
+    again = fold(mesh, out)
+    assert again.returncode == 0
+    assert "going on from the checkpoint after step" in again.stdout
+    assert not list(out.glob("checkpoint-*"))
+    one, resumed = (read_positions(folder / "frames.h5", 21.5) for folder in (default_run[0], out))
+    assert np.linalg.norm(resumed - one, axis=1).max() <= 1e-3
 
 
 def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
@@ -146,25 +178,82 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_goes_on(mesh, tmp_pat
     assert (steps["min_J"] > 0).all()
 
 
-def test_at_the_smallest_step_the_run_ends_with_the_last_good_state_kept(mesh, tmp_path):
-    out = tmp_path / "out"
+def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     hard = {"growth_rate_per_s": 2e-5, "solver": {"max_halvings": 0, "max_newton": 3}}
-    done = fold(mesh, out, 2, **hard)
+    done = fold(mesh, tmp_path / "out", 2, **hard)
     assert done.returncode == 4, done.stdout + done.stderr
     assert "fails even with 43200 s" in done.stderr
-    assert not (out / "frames.h5").exists()
+    assert not (tmp_path / "out" / "frames.h5").exists()
+
+
+def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(
+    mesh, tmp_path, monkeypatch, capsys
+):
+    brain = read_tetrahedral_mesh(mesh)
+    weeks = WEEK | {"output_weeks": [21.0, 21.25, 21.5], "ranks": 1}
+    parameters = parameters_from(weeks)
+    honest = Folding.step
+
+    def failing(self, state, step_s):
+        if len(state.rows) == 5:
+            raise NotConvergedError("no way on")
+        return honest(self, state, step_s)
+
+    monkeypatch.setattr(Folding, "step", failing)
+    zones = zones_of_run(brain, parameters)
+    with pytest.raises(SolverError, match="The last good state is kept"):
+        run(MPI.COMM_SELF, brain, zones, parameters, tmp_path)
+    key = run_key(brain, parameters)
+    state, _ = read_checkpoint(tmp_path / f"checkpoint-{key}" / "state.h5", key)
+    assert len(state.rows) == 5
+    earlier = parameters_from(weeks | {"end_week": 21.25, "output_weeks": [21.0, 21.25]})
+    run(MPI.COMM_SELF, brain, zones, earlier, tmp_path)
+    assert "going on from the checkpoint after step 5" in capsys.readouterr().out
+    assert read_weeks(tmp_path / "frames.h5") == [21.0, 21.25]
+    assert pd.read_csv(tmp_path / "steps.csv")["week"].iloc[-1] == pytest.approx(21.25)
 
 
 def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):
     out = tmp_path / "out"
     slow = command(mesh, out, end_week=30.0, output_weeks=[21.0, 30.0])
-    with subprocess.Popen(slow, stdout=subprocess.PIPE, text=True, start_new_session=True) as first:
+    with subprocess.Popen(slow, stdout=subprocess.PIPE, text=True) as first:
         next(line for line in first.stdout if "step" in line)
         second = fold(mesh, out)
-        os.killpg(first.pid, signal.SIGKILL)
-        subprocess.run(["pkill", "-KILL", "-f", str(out)], check=False)
+        kill(first)
     assert second.returncode == 5
     assert "another folding run works in this folder" in second.stderr
+
+
+# the limit stands for the disk's end, set after MPI has made its own files
+FULL_DISK = """
+import resource, runpy
+from mpi4py import MPI
+resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
+runpy.run_module("gyriflow.folding", run_name="__main__")
+"""
+
+
+def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, default_run, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(default_run[0], out)
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    program = [sys.executable, "-c", FULL_DISK, *command(mesh, out)[6:]]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 5, done.stdout + done.stderr
+    assert "cannot be written" in done.stderr
+    assert "Free disk space" in done.stderr
+    assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
+    assert not [path for path in out.rglob("*") if path.is_file() and path.parent != out]
+
+
+def test_a_folder_that_cannot_be_made_ends_in_code_five(mesh, tmp_path):
+    (tmp_path / "file").touch()
+    arguments = command(mesh, tmp_path / "out")
+    done = subprocess.run(
+        [*arguments[:-1], str(tmp_path / "file" / "out")], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 5, done.stdout + done.stderr
+    assert "file/out: cannot be written" in done.stderr
 
 
 def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):

@@ -24,6 +24,6 @@ def test_cases_hold_on(ranks, cases):
         "no:cacheprovider",
         str(path),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=150, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == ranks, done.stdout

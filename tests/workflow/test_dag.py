@@ -66,17 +66,18 @@ def test_nothing_is_to_be_done_after_all_was_made(finished):
 REPORT = {"html_report": 1, "all": 1}
 SHAPE = REPORT | {"metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1}
 ONE_RUN = SHAPE | {
-    "simulate": 1, "parameters": 1, "folded_surface": 2, "measure_simulated": 2, "run_metrics": 2, "displacement": 1,
+    "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure_simulated": 2, "run_metrics": 2,
+    "displacement": 1,
     "similarity": 1, "study_table": 4, "study_runs": 1, "zones_figure": 1, "steps_figure": 1, "weekly_figure": 1,
-    "displacement_maps": 1, "shape_maps": 1, "displacement_figure": 1, "runs_figure": 1,
+    "displacement_maps": 1, "shape_maps": 2, "displacement_figure": 1, "runs_figure": 1, "regions_figure": 1,
 }  # fmt: skip
 OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "runs_figure"}
 BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count in ONE_RUN.items()}
 MESH = {"tetrahedralise": 1, "quality_figure": 1}
 FIGURES = {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "displacement_figure": 1, "quality_figure": 1,
-    "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 2,
-    "zones_figure": 2, "steps_figure": 2,
+    "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 4,
+    "zones_figure": 2, "regions_figure": 2, "steps_figure": 2,
 }  # fmt: skip
 
 
@@ -86,7 +87,7 @@ FIGURES = {
         (
             "metrics",
             {"curvature_radius": 4},
-            SHAPE | {"measure_real": 2, "measure_simulated": 4, "run_metrics": 4, "study_table": 2, "shape_maps": 2},
+            SHAPE | {"measure_real": 2, "measure_simulated": 4, "run_metrics": 4, "study_table": 2, "shape_maps": 4},
         ),
         ("runs", {"thick": {"thickness_mm": 3.5}}, ONE_RUN),
         ("folding", {"growth_rate_per_s": 1e-7}, BOTH_RUNS | {"growth_figure": 1}),

@@ -2,6 +2,9 @@
 
 # the last week of which every run has a surface
 LAST_WEEK = max(set.intersection(*(set(week_tags(run)) for run in RUNS)))
+LAST_BRAINS = [
+    brain for week, brain in shown_beside(RUNS[0]).items() if week == LAST_WEEK
+]
 
 
 rule metrics_figure:
@@ -32,6 +35,7 @@ rule metrics_figure:
         runtime=10,
     params:
         **DRAWING,
+        measured=CONFIG.measured_name(BRAINS),
         code=code("report"),
     script:
         "../scripts/metrics_figure.py"
@@ -59,6 +63,7 @@ rule spectra_figure:
         runtime=10,
     params:
         **DRAWING,
+        measured=CONFIG.measured_name(BRAINS),
         code=code("report"),
     script:
         "../scripts/spectra_figure.py"
@@ -86,6 +91,7 @@ rule bands_figure:
         runtime=10,
     params:
         **DRAWING,
+        measured=CONFIG.measured_name(BRAINS),
         week=float(LAST_WEEK),
         code=code("report"),
     script:
@@ -156,11 +162,7 @@ rule quality_figure:
 rule runs_figure:
     input:
         runs=[file for run in RUNS for file in folded(run, weeks=[LAST_WEEK])],
-        real=[
-            f"results/{brain}/surface/pial.surf.gii"
-            for week, brain in shown_beside(RUNS[0]).items()
-            if week == LAST_WEEK
-        ],
+        real=expand("results/{brain}/surface/pial.surf.gii", brain=LAST_BRAINS),
     output:
         png=report(
             f"{FIGURES}/runs.png",
@@ -180,6 +182,7 @@ rule runs_figure:
         runtime=10,
     params:
         **DRAWING,
+        measured=CONFIG.measured_name(LAST_BRAINS),
         runs=RUNS,
         week=float(LAST_WEEK),
         code=code("report"),
@@ -192,8 +195,10 @@ SINGLE_RUN_FIGURES = [
     rules.displacement_maps,
     rules.shape_maps,
     rules.zones_figure,
+    rules.regions_figure,
     rules.steps_figure,
 ]
+SHAPE_MEASURES = ["shape_index", "curvedness"]
 
 
 rule figures:
@@ -203,7 +208,10 @@ rule figures:
         rules.bands_figure.output,
         rules.displacement_figure.output,
         rules.quality_figure.output,
-        [expand(rule.output, run=RUNS) for rule in SINGLE_RUN_FIGURES],
+        [
+            expand(rule.output, run=RUNS, measure=SHAPE_MEASURES)
+            for rule in SINGLE_RUN_FIGURES
+        ],
         rules.runs_figure.output if len(RUNS) > 1 else [],
         rules.growth.input,
 
@@ -213,11 +221,13 @@ rule paper:
     input:
         rules.growth.input,
         [
-            expand(rule.output, run=RUNS)
+            expand(rule.output, run=RUNS, measure=SHAPE_MEASURES)
             for rule in (
                 rules.weekly_figure,
                 rules.displacement_maps,
+                rules.shape_maps,
                 rules.zones_figure,
+                rules.regions_figure,
             )
         ],
         rules.displacement_figure.output,

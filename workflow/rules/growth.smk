@@ -57,7 +57,7 @@ rule growth_figure:
         runtime=10,
     params:
         folding_rate_per_s=CONFIG.folding.growth_rate_per_s,
-        synthetic=SYNTHETIC,
+        measured=CONFIG.measured_name(BRAINS),
         dpi=CONFIG.report.dpi,
         code=code("report"),
     script:

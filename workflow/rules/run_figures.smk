@@ -43,6 +43,9 @@ rule weekly_figure:
         runtime=10,
     params:
         **DRAWING,
+        measured=lambda wildcards: CONFIG.measured_name(
+            shown_beside(wildcards.run).values()
+        ),
         simulated_weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
         real_weeks=lambda wildcards: [
             float(week) for week in shown_beside(wildcards.run)
@@ -100,16 +103,21 @@ rule shape_maps:
         ],
     output:
         png=report(
-            f"{FIGURES}/shape_index.{{run}}.png",
-            caption="../report/shape_index.rst",
+            f"{FIGURES}/{{measure}}.{{run}}.png",
+            caption="../report/shape_maps.rst",
             category="Metrics",
-            labels={"figure": "shape index maps", "run": "{run}"},
+            labels=lambda wildcards: {
+                "figure": f"{wildcards.measure.replace('_', ' ')} maps",
+                "run": wildcards.run,
+            },
         ),
-        pdf=f"{FIGURES}/shape_index.{{run}}.pdf",
+        pdf=f"{FIGURES}/{{measure}}.{{run}}.pdf",
     log:
-        "results/study/logs/shape_maps.{run}.log",
+        "results/study/logs/shape_maps.{measure}.{run}.log",
     benchmark:
-        "results/study/benchmarks/shape_maps.{run}.tsv"
+        "results/study/benchmarks/shape_maps.{measure}.{run}.tsv"
+    wildcard_constraints:
+        measure="shape_index|curvedness",
     conda:
         ENVIRONMENT
     resources:
@@ -117,6 +125,9 @@ rule shape_maps:
         runtime=10,
     params:
         **DRAWING,
+        measured=lambda wildcards: CONFIG.measured_name(
+            shown_beside(wildcards.run).values()
+        ),
         simulated_weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
         real_weeks=lambda wildcards: [
             float(week) for week in shown_beside(wildcards.run)
@@ -153,6 +164,42 @@ rule zones_figure:
         code=code("report", "folding"),
     script:
         "../scripts/zones_figure.py"
+
+
+rule regions_figure:
+    input:
+        mesh=rules.regions.output.mesh,
+        data=rules.regions.output.data,
+        params=rules.parameters.output[0],
+    output:
+        png=report(
+            f"{FIGURES}/growth_zone.{{run}}.png",
+            caption="../report/growth_zone.rst",
+            category="Folding",
+            labels={"figure": "growth on the surface", "run": "{run}"},
+        ),
+        pdf=f"{FIGURES}/growth_zone.{{run}}.pdf",
+        section_png=report(
+            f"{FIGURES}/layers.{{run}}.png",
+            caption="../report/layers.rst",
+            category="Folding",
+            labels={"figure": "growth and stiffness in a section", "run": "{run}"},
+        ),
+        section_pdf=f"{FIGURES}/layers.{{run}}.pdf",
+    log:
+        "results/study/logs/regions_figure.{run}.log",
+    benchmark:
+        "results/study/benchmarks/regions_figure.{run}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        **DRAWING,
+        code=code("report"),
+    script:
+        "../scripts/regions_figure.py"
 
 
 rule steps_figure:

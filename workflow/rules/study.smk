@@ -71,6 +71,7 @@ rule study_runs:
     input:
         params=expand(rules.parameters.output, run=RUNS),
         summaries=expand(rules.simulate.output.summary, run=RUNS),
+        zones=expand(rules.simulate.output.zones, run=RUNS),
     output:
         csv="results/study/runs.csv",
         table=report(

@@ -8,6 +8,10 @@ from gyriflow.step import step
 params = snakemake.params
 with step(snakemake.log[0]):
     figure = spectra_chart(
-        read_table(snakemake.input[0]), week=params.week, bands=range(1, 7), synthetic=params.synthetic
+        read_table(snakemake.input[0]),
+        week=params.week,
+        bands=range(1, 7),
+        measured=params.measured,
+        synthetic=params.synthetic,
     )
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -3,12 +3,14 @@
 from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_table
 from gyriflow.report.charts import growth_chart
+from gyriflow.report.style import PHANTOM
 from gyriflow.report.tables import growth_table, html_table
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     areas, rates = read_table(snakemake.input.areas), read_table(snakemake.input.rates)
-    figure = growth_chart(areas, rates, folding_rate_per_s=params.folding_rate_per_s, synthetic=params.synthetic)
+    shown = {"measured": params.measured, "synthetic": params.measured == PHANTOM}
+    figure = growth_chart(areas, rates, folding_rate_per_s=params.folding_rate_per_s, **shown)
     write_figure(output.png, output.pdf, figure, dpi=params.dpi)
-    write_html(output.table, html_table(growth_table(rates), caption="Growth rates", synthetic=params.synthetic))
+    write_html(output.table, html_table(growth_table(rates), caption="Growth rates", **shown))

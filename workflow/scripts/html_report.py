@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-from gyriflow.errors import StorageError
+from gyriflow.errors import GyriflowError
 from gyriflow.io.files import replaced
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.step import step
@@ -16,4 +16,5 @@ with step(snakemake.log[0]):
         command = [sys.executable, "-m", "snakemake", "figures", "metrics", *options]
         outcome = subprocess.run(command, capture_output=True, text=True, check=False)
         if outcome.returncode:
-            raise StorageError("the report could not be made", path=output.html, found=outcome.stderr)
+            last = "\n".join(outcome.stderr.splitlines()[-8:])
+            raise GyriflowError("the report could not be made", path=output.html, found=last)

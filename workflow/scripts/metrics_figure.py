@@ -9,6 +9,7 @@ from gyriflow.step import step
 output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     metrics = read_table(snakemake.input[0])
-    write_figure(output.png, output.pdf, metrics_chart(metrics, synthetic=params.synthetic), dpi=params.dpi)
-    table = metrics_table(metrics, synthetic=params.synthetic)
-    write_html(output.table, html_table(table, caption="Metrics of whole brains", synthetic=params.synthetic))
+    shown = {"measured": params.measured, "synthetic": params.synthetic}
+    write_figure(output.png, output.pdf, metrics_chart(metrics, **shown), dpi=params.dpi)
+    table = metrics_table(metrics, measured=params.measured)
+    write_html(output.table, html_table(table, caption="Metrics of whole brains", **shown))

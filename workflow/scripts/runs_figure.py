@@ -11,6 +11,7 @@ with step(snakemake.log[0]):
         dict(zip(params.runs, map(read_surface, files.runs), strict=True)),
         read_surface(files.real[0]) if files.real else None,
         title=f"{params.week:g} GW",
+        measured=params.measured,
         synthetic=params.synthetic,
     )
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

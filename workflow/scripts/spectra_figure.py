@@ -5,6 +5,8 @@ from gyriflow.io.files import read_table
 from gyriflow.report.spectra import spectra_weeks_chart
 from gyriflow.step import step
 
+params = snakemake.params
 with step(snakemake.log[0]):
-    figure = spectra_weeks_chart(read_table(snakemake.input[0]), synthetic=snakemake.params.synthetic)
-    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=snakemake.params.dpi)
+    spectra = read_table(snakemake.input[0])
+    figure = spectra_weeks_chart(spectra, measured=params.measured, synthetic=params.synthetic)
+    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -11,6 +11,7 @@ with step(snakemake.log[0]):
         dict(zip(params.simulated_weeks, map(read_surface, files.simulated), strict=True)),
         dict(zip(params.real_weeks, map(read_surface, files.real), strict=True)),
         title=f"run {snakemake.wildcards.run}",
+        measured=params.measured,
         synthetic=params.synthetic,
     )
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -7,7 +7,7 @@ class MeshSettings(Settings):
     """How the start brain's pial surface is filled with tetrahedra."""
 
     surface_edge_mm: float = setting(
-        0.8, "mm", "Edge length in the cortex: at most half the cortical thickness.", gt=0.1, le=10
+        0.72, "mm", "Edge length in the cortex: at most half the cortical thickness.", gt=0.1, le=10
     )
     core_edge_mm: float = setting(2.5, "mm", "Edge length deep inside.", gt=0.1, le=20)
     envelope_mm: float = setting(0.1, "mm", "How far the mesh's surface may be from the pial surface.", gt=0.001, le=2)

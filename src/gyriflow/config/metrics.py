@@ -15,8 +15,11 @@ class MetricsSettings(Settings):
         "shape_index", "", "The map whose spectrum is analysed."
     )
     spangy_modes: int | None = setting(
-        None, "", "Number of eigenmodes; `null`: Weyl's estimate of what the shortest wavelength needs.", ge=2, le=20000
-    )
+        None, "",
+        "Number of eigenmodes; `null`: Weyl's estimate of what the shortest wavelength needs, a tenth of the vertices "
+        "at most.",
+        ge=2, le=20000,
+    )  # fmt: skip
     spangy_wavelength: Literal["paper", "textbook"] = setting(
         "paper", "", "Relation of the shortest wavelength to λ: `paper` 2π/WL², `textbook` (2π/WL)²."
     )

@@ -1,5 +1,7 @@
 """The whole configuration."""
 
+from collections.abc import Iterable
+
 from .base import Settings, setting
 from .brains import Brain
 from .folding import FoldingSettings, output_weeks
@@ -31,6 +33,13 @@ class Config(Settings):
             if brain.id == name:
                 return brain
         raise KeyError(name)
+
+    def measured_name(self, brains: Iterable[str]) -> str:
+        """Returns what measured brains of these ids are called in figures: phantoms only where all of them are."""
+        phantoms = [self.brain(name).source == "phantom" for name in brains]
+        if any(phantoms):
+            return "phantom" if all(phantoms) else "real brain or phantom"
+        return "real brain"
 
     @property
     def start_week(self) -> float:

@@ -9,13 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import yaml
 from mpi4py import MPI
 
 from ..errors import GyriflowError, InputError, StorageError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
 from ..io.tetmeshes import read_tetrahedral_mesh
+from ..io.yaml_files import read_yaml
 from ..step import record_exit_code
 from .output import ZONES, say
 from .parameters import FoldingParameters, parameters_from
@@ -38,10 +38,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def read_parameters(path: Path) -> FoldingParameters:
     """Returns the parameters of a YAML file; InputError where it cannot be read or does not fit."""
-    try:
-        values = yaml.safe_load(path.read_text())
-    except (OSError, yaml.YAMLError) as error:
-        raise InputError(f"cannot be read: {error}", path=path) from None
+    values = read_yaml(path)
+    if not isinstance(values, dict):
+        raise InputError("holds no parameters", path=path, expected="keys and values, as in params.yaml of a run")
     return parameters_from(values)
 
 
@@ -50,18 +49,17 @@ def locked(folder: Path) -> Iterator[None]:
     """Holds the folder for this run; StorageError where another run holds it or it cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with (folder / ".lock").open("w") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise StorageError(
-                    "another folding run works in this folder",
-                    path=folder,
-                    remedy="Wait for it or choose another folder.",
-                ) from None
-            yield
+        file = (folder / ".lock").open("w")
     except OSError as error:
         raise StorageError(f"cannot be written: {error}", path=folder) from None
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StorageError(
+                "another folding run works in this folder", path=folder, remedy="Wait for it or choose another folder."
+            ) from None
+        yield
 
 
 def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters) -> None:
@@ -85,7 +83,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Reads, checks, prints what is to be solved, and solves it."""
     parameters = read_parameters(arguments.params)
     mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
-    zones = zones_of_run(mesh, parameters)
+    zones = comm.bcast(zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0)
     if comm.rank == 0:
         report = zone_report(mesh, zones, parameters.thickness_mm)
         memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024

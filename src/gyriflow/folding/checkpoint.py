@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..io.files import replaced
+from ..io.hdf5 import new_hdf5
 from .parameters import FoldingParameters
 
 Floats = NDArray[np.float64]
-FORMAT = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +83,20 @@ class State:
 
 
 def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters) -> str:
-    """Returns a hash of all that decides the result: the mesh and the parameters, but not the number of ranks."""
+    """Returns a hash of all that decides the course of a run: mesh, parameters, and the code of model and solver.
+
+    Left out is what only decides how far it goes, when it writes and on how many ranks: a run that failed can be
+    called again with an earlier end or more halvings and goes on.
+    """
     values = asdict(parameters)
-    del values["ranks"]
-    digest = hashlib.sha256(json.dumps([FORMAT, values], sort_keys=True).encode())
+    for name in ("ranks", "end_week", "output_weeks", "output_every_gw"):
+        del values[name]
+    for name in ("max_newton", "max_halvings"):
+        del values["solver"][name]
+    digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
+    package = Path(__file__).parents[1]
+    for source in sorted([*package.glob("folding/*.py"), *package.glob("mechanics/*.py")]):
+        digest.update(source.read_bytes())
     digest.update(mesh.vertices.tobytes())
     digest.update(mesh.tets.tobytes())
     return digest.hexdigest()[:16]
@@ -105,7 +114,7 @@ def write_checkpoint(path: Path, key: str, state: State) -> None:
     values = dict(vars(state))
     arrays = {name: values.pop(name) for name in ("positions", "last", "before_last")}
     scalars = json.dumps({**values, "key": key}, sort_keys=True)
-    with replaced(path) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(path) as file:
         for name, array in arrays.items():
             file[name] = array
         # a data set, since the table of steps outgrows HDF5's limit for attributes

@@ -3,6 +3,7 @@
 import fcntl
 import hashlib
 import os
+import platform
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,13 @@ from mpi4py import MPI
 COMPILER_ARGUMENTS = ["-O3", "-march=native"]
 
 
+def processor() -> str:
+    """Returns a text that differs between processors for which -march=native means different things."""
+    described = Path("/proc/cpuinfo")
+    lines = described.read_text().splitlines() if described.exists() else []
+    return next((line for line in lines if line.startswith(("flags", "Features"))), platform.processor())
+
+
 @contextmanager
 def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     """Yields the options of the form compiler; forms are to be made inside the block, by all ranks.
@@ -21,8 +29,7 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     Rank 0 holds the cache for the block, since concurrent runs share it and a compilation that was killed leaves a
     source file for which everyone would wait.
     """
-    flags = next((line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")), "")
-    kind = hashlib.sha256(flags.encode()).hexdigest()[:8]
+    kind = hashlib.sha256(processor().encode()).hexdigest()[:8]
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
     cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
     options = {"cffi_extra_compile_args": COMPILER_ARGUMENTS, "cache_dir": str(cache)}

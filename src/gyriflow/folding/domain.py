@@ -34,17 +34,18 @@ class Domain:
         Number of owned nodes.
     cells : (c, 4) int
         Local nodes of the local elements.
+    volumes : (c,) float
+        Volumes of the local elements in m³.
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
         self.comm = comm
-        self.tets = mesh.tets
         self.positions: Floats = np.array(mesh.vertices) * M_PER_MM
         element = basix.ufl.element("Lagrange", "tetrahedron", 1, shape=(3,))
         cells = mesh.tets if comm.rank == 0 else np.empty((0, 4), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
-        partitioner = dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.none)
-        self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element), partitioner=partitioner)
+        # by keywords, whose order changed between versions; without ghost cells, the default in all of them
+        self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
         self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", 1, (3,)))
         self.cells = self.space.dofmap.list
         self.owned = self.space.dofmap.index_map.size_local
@@ -52,8 +53,8 @@ class Domain:
         self._geometry_node = np.empty(nodes, dtype=np.int64)
         self._geometry_node[self.cells.ravel()] = self.mesh.geometry.dofmap.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
-        self.cell_of_file = self.mesh.topology.original_cell_index[: len(self.cells)]
         self._counts = [3 * owned for owned in comm.allgather(self.owned)]
+        self.volumes = self.cell_volumes(self.local(self.positions))
         self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.owned]))
 
     def gathered(self, owned_values: Floats) -> Floats:
@@ -71,7 +72,9 @@ class Domain:
     def place(self, positions: Floats) -> None:
         """Moves the mesh to (n, 3) positions in m."""
         self.positions = positions
-        self.mesh.geometry.x[self._geometry_node] = self.local(positions)
+        nodes = self.local(positions)
+        self.mesh.geometry.x[self._geometry_node] = nodes
+        self.volumes = self.cell_volumes(nodes)
 
     def cell_volumes(self, node_positions: Floats) -> Floats:
         """Returns the signed volumes in m³ of the local elements for (k, 3) positions of the local nodes."""
@@ -94,5 +97,8 @@ class Domain:
         weights = np.array([count * count, count, 1], dtype=np.int64)
         known = np.sort(facets, axis=1) @ weights
         order = np.argsort(known)
-        place = order[np.searchsorted(known, names @ weights, sorter=order)]
+        wanted = names @ weights
+        place = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
+        if (known[place] != wanted).any():
+            raise ValueError("the facets are not the boundary of the mesh")
         return dolfinx.mesh.meshtags(self.mesh, 2, local, tags[place].astype(np.int32))

@@ -13,8 +13,8 @@ from ..geometry.triangles import TriangleMesh, vertex_normals
 
 Floats = NDArray[np.float64]
 
-WEIGHT_REACH = 4.0
-"""Depth in cortical thicknesses beyond which the cortical weight is below 1e-13."""
+WEIGHT_REACH = 3.0
+"""Depth in cortical thicknesses beyond which the cortical weight is below 1e-8."""
 
 
 def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:

@@ -13,8 +13,8 @@ from petsc4py import PETSc
 from ..errors import SolverError
 from .problem import Problem
 
-RUNGS = ("cg", "cg, preconditioner rebuilt", "minres", "mumps")
-KEPT, REBUILT, MINRES, DIRECT = range(4)
+RUNGS = ("cg", "cg, preconditioner rebuilt", "gmres", "mumps")
+KEPT, REBUILT, GMRES, DIRECT = range(4)
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,6 @@ class StepCount:
     krylov: int = 0
     rung: int = KEPT
     residual: float = np.inf
-    backtracks: int = 0
 
 
 class NotConvergedError(SolverError):
@@ -68,7 +67,6 @@ class NewtonSolver:
         self._direction = problem.new_vector()
         self._fresh_iterations = 0  # Krylov iterations with a new preconditioner
         self._stale = True
-        self._near_null = rigid_body_modes(problem)
         self._cg = self._new_krylov("cg", "gamg")
         self._fallbacks: dict[int, PETSc.KSP] = {}
 
@@ -78,6 +76,8 @@ class NewtonSolver:
         options = PETSc.Options(prefix)
         if preconditioner == "gamg":
             options["pc_gamg_threshold"] = 0.01
+            # else a rebuilt preconditioner would keep the coarse spaces of the first shape
+            options["pc_gamg_reuse_interpolation"] = False
             options["pc_gamg_aggressive_coarsening"] = 1
             options["mg_levels_ksp_type"] = "chebyshev"
             options["mg_levels_ksp_max_it"] = 3
@@ -94,7 +94,10 @@ class NewtonSolver:
     def _run(self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool) -> tuple[bool, int]:
         krylov.setOperators(matrix)
         krylov.getPC().setReusePreconditioner(reuse)
-        krylov.solve(self._residual, self._direction)
+        try:
+            krylov.solve(self._residual, self._direction)
+        except PETSc.Error:  # a factorisation that broke down
+            return False, 0
         self._direction.scale(-1.0)
         finite = bool(np.isfinite(self._direction.norm()))
         return krylov.getConvergedReason() > 0 and finite, krylov.getIterationNumber()
@@ -107,14 +110,13 @@ class NewtonSolver:
                 solved, iterations = self._run(self._cg, matrix, reuse=True)
                 self._stale = not solved or iterations > 1.5 * self._fresh_iterations + 2
             elif rung == REBUILT:
-                matrix.setNearNullSpace(self._near_null)
+                matrix.setNearNullSpace(rigid_body_modes(self.problem))
                 solved, iterations = self._run(self._cg, matrix, reuse=False)
                 self._fresh_iterations, self._stale = iterations, not solved
             else:
                 if rung not in self._fallbacks:
-                    self._fallbacks[rung] = (
-                        self._new_krylov("minres", "jacobi") if rung == MINRES else self._new_krylov("preonly", "lu")
-                    )
+                    method = ("gmres", "gamg") if rung == GMRES else ("preonly", "lu")
+                    self._fallbacks[rung] = self._new_krylov(*method)
                 solved, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
             count.krylov += iterations
             count.rung = max(count.rung, rung if rung > first else KEPT)
@@ -122,7 +124,7 @@ class NewtonSolver:
                 return
         raise NotConvergedError("no linear solver found a descent direction")
 
-    def _advance(self, norm: float, count: StepCount) -> float:
+    def _advance(self, norm: float) -> float:
         """Moves along the direction as far as energy and elements allow; returns the new residual norm."""
         problem, start = self.problem, self.problem.displacement.copy()
         slope = self._direction.dot(self._residual)
@@ -135,8 +137,8 @@ class NewtonSolver:
             problem.set_displacement(start + length * direction)
             if problem.smallest_volume_ratio() > 0:
                 trial = problem.residual(self._trial)
-                # slope and residual falling together mean that energy fell: the energy itself is asked only otherwise
-                if np.isfinite(trial) and trial < norm and abs(self._direction.dot(self._trial)) <= 0.9 * abs(slope):
+                # where the slope has all but vanished, the energy fell by about half of it: no need to ask for it
+                if np.isfinite(trial) and trial < norm and abs(self._direction.dot(self._trial)) <= 0.1 * abs(slope):
                     return self._accept(trial)
                 if before is None:
                     problem.set_displacement(start)
@@ -146,7 +148,6 @@ class NewtonSolver:
                 if np.isfinite(trial) and energy <= before + 1e-4 * length * slope:
                     return self._accept(trial)
             length /= 2
-            count.backtracks += 1
         problem.set_displacement(start)
         raise NotConvergedError("the line search found no step that lowers the energy")
 
@@ -167,7 +168,7 @@ class NewtonSolver:
         at_rest = problem.residual(self._residual)
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
         norm = at_rest
-        if at_rest > tolerance and start.any():
+        if at_rest > tolerance:
             problem.set_displacement(start)
             if problem.smallest_volume_ratio() > 0:
                 norm = problem.residual(self._residual)
@@ -183,7 +184,7 @@ class NewtonSolver:
                 )
             count.newton += 1
             self._solve_linear(problem.tangent(), count)
-            norm = self._advance(norm, count)
+            norm = self._advance(norm)
         count.residual = norm / at_rest if at_rest > 0 else 0.0
         return count
 

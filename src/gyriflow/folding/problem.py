@@ -1,6 +1,6 @@
 """The discrete problem of one step: energy, residual and tangent on the updated reference.
 
-The only file that knows how dolfinx versions differ.
+With `domain`, the only file that calls dolfinx: what differs between its versions is kept to these two.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
 import ufl
+from dolfinx.la import BlockMode
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -17,6 +18,7 @@ from ..mechanics.growth_tensor import inverse_growth_tensor
 from ..mechanics.kinematics import deformation_gradient, elastic_deformation
 from ..mechanics.neo_hookean import bulk_to_shear_ratio, strain_energy_density
 from ..units import M_PER_MM
+from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
 from .zones import CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, Zones
@@ -84,19 +86,17 @@ class Problem:
         zero = np.zeros(3)
         self.clamps = [dolfinx.fem.dirichletbc(zero, nodes, domain.space)]
         self._clamped_owned = nodes[nodes < domain.owned]
-        self._matrix = dolfinx.fem.petsc.create_matrix(self._tangent)
-        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._matrix.setOption(PETSc.Mat.Option.SPD, True)
+        self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact))
         self.vector = self.u.x.petsc_vec
 
     def set_layers(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
         """Sets shear modulus (Pa) and growth increments at the local nodes, and the unit normals of the local cells."""
         for function, nodal in ((self._mu, mu), (self._dg, dg), (self._dr, dr)):
             if self._by_cell:
-                function.x.array[: len(self.domain.cells)] = nodal[self.domain.cells].mean(axis=1)
+                function.x.array[function.function_space.dofmap.list[:, 0]] = nodal[self.domain.cells].mean(axis=1)
             else:
                 function.x.array[function.function_space.dofmap.list] = nodal[self.domain.cells]
-        self._N.x.array[: normals.size] = normals.ravel()
+        self._N.x.array.reshape(-1, 3)[self._N.function_space.dofmap.list[:, 0]] = normals
 
     @property
     def displacement(self) -> Floats:
@@ -123,10 +123,10 @@ class Problem:
 
     def tangent(self) -> PETSc.Mat:
         """Returns the assembled tangent in N/m, with ones on the diagonal at clamped nodes."""
-        self._matrix.zeroEntries()
-        dolfinx.fem.petsc.assemble_matrix(self._matrix, self._tangent, bcs=self.clamps)
-        self._matrix.assemble()
-        return self._matrix
+        blocks = self._blocks.blocks
+        blocks.set_value(0.0)
+        dolfinx.fem.assemble_matrix(blocks, self._tangent, bcs=self.clamps)
+        return self._blocks.assembled()
 
     def new_vector(self) -> PETSc.Vec:
         """Returns a vector for residuals and directions, without values."""
@@ -135,5 +135,4 @@ class Problem:
     def smallest_volume_ratio(self) -> float:
         """Returns the smallest det F over all elements: positive where no element is inverted."""
         current = self.domain.local(self.domain.positions)
-        before = self.domain.cell_volumes(current)
-        return self.domain.minimum(self.domain.cell_volumes(current + self.displacement) / before)
+        return self.domain.minimum(self.domain.cell_volumes(current + self.displacement) / self.domain.volumes)

@@ -4,6 +4,7 @@ import math
 import shutil
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +12,20 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..errors import SolverError
-from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from .domain import Domain
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight
 from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError, StepCount
-from .output import finish, peak_memory_mib, progress_line, save_frame, say
+from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say
 from .parameters import FoldingParameters
 from .problem import Material, Problem
 from .zones import Zones
 
 Floats = NDArray[np.float64]
+NO_GROWTH = 1e-10
+"""Growth increment of a step that counts as none, a hundred-millionth of what the cortex grows."""
 STEPS_BEFORE_GROWING = 4
 """Accepted steps after which a halved time step is doubled again."""
 
@@ -58,8 +61,7 @@ class Folding:
         self.problem = Problem(self.domain, zones, material, quadrature_degree=quadrature_degree)
         self._pial = np.unique(zones.facets)
         self._growth = self.domain.local(zones.growth)
-        edge = float(np.cbrt(self.domain.cell_volumes(self.domain.local(self.domain.positions)).mean()))
-        edge = comm.allreduce(edge, op=MPI.MAX)
+        edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         # far below any force of growth: a brain that does not grow must stay where it is
         floor = 1e-11 * parameters.shear_modulus_cortex_pa * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
@@ -74,12 +76,14 @@ class Folding:
         nodes = domain.local(domain.positions)
         weight = cortical_weight(search.distance(nodes, WEIGHT_REACH * thickness), thickness)
         growing = self._growth * step_s
-        self.problem.set_layers(
-            mu=p.shear_modulus_core_pa * (1 - weight) + p.shear_modulus_cortex_pa * weight,
-            dg=p.growth_rate_per_s * weight * growing,
-            dr=p.radial_growth_rate_per_s * (1 - weight) * growing,
-            normals=search.nearest_normals(nodes[domain.cells].mean(axis=1)),
-        )
+        dg = p.growth_rate_per_s * weight * growing
+        dr = p.radial_growth_rate_per_s * (1 - weight) * growing
+        # the direction matters only where tissue grows, and the search is slow deep inside
+        grows = (np.abs(dg) + np.abs(dr))[domain.cells].max(axis=1) > NO_GROWTH
+        normals = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
+        normals[grows] = search.nearest_normals(nodes[domain.cells[grows]].mean(axis=1))
+        mu = p.shear_modulus_core_pa * (1 - weight) + p.shear_modulus_cortex_pa * weight
+        self.problem.set_layers(mu, dg, dr, normals)
 
     def step(self, state: State, step_s: float) -> tuple[State, StepCount]:
         """Returns the state after a step of a given length, the mesh moved along.
@@ -142,7 +146,8 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 raise SolverError(
                     f"the step at GW {p.start_week + state.time_s / SECONDS_PER_GW:.3f} fails even with {step_s:g} s",
                     found=error,
-                    remedy="The last good state is kept. Fold to an earlier week, refine the mesh, or lower growth.",
+                    remedy="The last good state is kept: the same command with an earlier folding.end_week, or more "
+                    "folding.solver.max_halvings, goes on from it. A finer mesh or less growth may help.",
                 ) from None
             if folding.domain.comm.rank == 0:
                 say(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
@@ -168,14 +173,11 @@ def run(
     folding = Folding(comm, mesh, zones, parameters)
     key = run_key(mesh, parameters)
     folder = out / f"checkpoint-{key}"
-    state, message = comm.bcast(read_checkpoint(folder / "state.h5", key) if comm.rank == 0 else None, root=0)
+    state, message = comm.bcast(resumable(folder, key, parameters) if comm.rank == 0 else None, root=0)
     if comm.rank == 0:
-        drop_foreign_checkpoints(out, folder)
-        if message:
-            say(message)
-        remainder = math.remainder((parameters.end_week - parameters.start_week) * SECONDS_PER_GW, parameters.step_s)
-        if abs(remainder) > 1e-6 * parameters.step_s:
-            say(f"step_s {parameters.step_s:g} does not divide the span: the last step before an output is shortened")
+        for note in (message, *foreign_checkpoints(out, folder), shortened_steps(parameters)):
+            if note:
+                say(note)
     start = mesh.vertices * M_PER_MM
     weeks = parameters.output_weeks
     if state is None:
@@ -184,7 +186,7 @@ def run(
             save_frame(folder, weeks[0], start, start, zones, parameters)
     first, resumed = len(state.rows), time.monotonic()
     for week in weeks[1:]:
-        until = (week - parameters.start_week) * SECONDS_PER_GW
+        until = seconds_to(week, parameters)
         while state.time_s < until * (1 - 1e-12):
             state = advance(folding, state, until)
             if comm.rank == 0:
@@ -217,9 +219,41 @@ def run(
         say(f"folded to GW {parameters.end_week:g} in {len(steps)} steps, {summary['seconds']:.0f} s")
 
 
-def drop_foreign_checkpoints(out: Path, own: Path) -> None:
-    """Removes checkpoints of other meshes or parameters and says so."""
-    for other in sorted(out.glob("checkpoint-*")):
-        if other != own:
-            say(f"{other} belongs to another mesh or other parameters: not used, removed")
-            shutil.rmtree(other, ignore_errors=True)
+def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
+    """Returns the state to go on from, or None, and what to tell the user.
+
+    The frames of all output weeks that the state has passed must be there.
+    """
+    state, message = read_checkpoint(folder / "state.h5", key)
+    if state is None:
+        return state, message
+    end_s = seconds_to(parameters.end_week, parameters)
+    passed = [week for week in parameters.output_weeks if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)]
+    if not all(frame_path(folder, week).exists() for week in passed):
+        return None, f"the checkpoint {folder} has passed output weeks that were not asked for then: starting anew"
+    within = tuple(row for row in state.rows if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9))
+    return replace(state, rows=within), message
+
+
+def seconds_to(week: float, parameters: FoldingParameters) -> float:
+    """Returns the time in s from the start of the run to a week."""
+    return (week - parameters.start_week) * SECONDS_PER_GW
+
+
+def foreign_checkpoints(out: Path, own: Path) -> list[str]:
+    """Returns what to say of checkpoints of other meshes or parameters, which stay; only the newest two are kept."""
+    others = sorted(
+        (path for path in out.glob("checkpoint-*") if path != own), key=lambda path: path.stat().st_mtime, reverse=True
+    )
+    for old in others[2:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return [f"{path} belongs to another mesh or other parameters: not used, kept for a return" for path in others[:2]]
+
+
+def shortened_steps(parameters: FoldingParameters) -> str:
+    """Returns what to say where the time step does not divide the time between two outputs; empty where it does."""
+    step = parameters.step_s
+    for a, b in pairwise(parameters.output_weeks):
+        if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:
+            return f"step_s {step:g} does not divide the time from GW {a:g} to {b:g}: the last step there is shortened"
+    return ""

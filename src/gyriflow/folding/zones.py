@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError, MeshError
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from ..geometry.triangles import TriangleMesh, edges, face_areas
+from .layers import PialSearch
 from .parameters import FoldingParameters
 
 FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES = range(5)
@@ -97,9 +98,11 @@ def find_zones(
         zone[((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)).all(axis=1)] = LEFT_CONTACT
         zone[((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)).all(axis=1)] = RIGHT_CONTACT
 
-    depth = cKDTree(mesh.vertices[np.unique(facets)]).query(mesh.vertices)[0]
-    innermost_x = x[mesh.tets[np.arange(len(mesh.tets)), depth[mesh.tets].argmax(axis=1)]]
-    bridge = mesh.tets[(innermost_x > left_plane) & (innermost_x < right_plane)]
+    depth = PialSearch(mesh.vertices, facets).distance(mesh.vertices)[mesh.tets]
+    # where several vertices are as deep, all of them must lie between the planes
+    innermost = depth >= depth.max(axis=1, keepdims=True) - 1e-9
+    bridging = ((x > left_plane) & (x < right_plane))[mesh.tets]
+    bridge = mesh.tets[(bridging | ~innermost).all(axis=1)]
     growth = np.where(still, 0.0, 1.0)
     growth[np.unique(bridge)] = 0.0
     return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane))

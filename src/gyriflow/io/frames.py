@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..units import week_tag
 from .files import replaced
+from .hdf5 import new_hdf5
 from .tetmeshes import attribute, document, geometry, topology
 
 
@@ -24,7 +25,7 @@ def group_name(week: float) -> str:
 
 def write_frame(path: str | PathLike[str], week: float, fields: Mapping[str, NDArray]) -> None:
     """Writes one frame to a file of its own; `fields` holds `positions` (n, 3) in mm and further arrays by name."""
-    with replaced(path) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(path) as file:
         for name, values in fields.items():
             file[f"{group_name(week)}/{name}"] = values
 
@@ -32,7 +33,7 @@ def write_frame(path: str | PathLike[str], week: float, fields: Mapping[str, NDA
 def join_frames(path: str | PathLike[str], tets: NDArray, frames: Sequence[str | PathLike[str]]) -> None:
     """Joins the files of single frames, in the order of time, into `path` (.h5) with a .xdmf beside it."""
     path = Path(path)
-    with replaced(path) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(path) as file:
         file["tets"] = tets.astype(np.int32)
         for frame in frames:
             with h5py.File(frame) as source:

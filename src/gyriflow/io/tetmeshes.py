@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
-import h5py
 import meshio
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from .files import replaced
+from .hdf5 import new_hdf5
 
 XDMF_NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
 XDMF_ATTRIBUTE = {1: "Scalar", 3: "Vector", 9: "Tensor"}
@@ -66,7 +66,7 @@ def write_tetrahedral_mesh(
     data = path.with_suffix(".h5")
     fields = [("Node", name, np.asarray(values)) for name, values in (vertex_fields or {}).items()]
     fields += [("Cell", name, np.asarray(values)) for name, values in (cell_fields or {}).items()]
-    with replaced(data) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(data) as file:
         file["tets"] = mesh.tets
         file["vertices"] = mesh.vertices
         for centre, name, values in fields:
@@ -88,16 +88,8 @@ def read_tetrahedral_mesh(path: str | PathLike[str]) -> TetrahedralMesh:
     InputError
         Where the file cannot be read, holds no tetrahedra, points that are not numbers, or flat elements.
     """
-    path = Path(path)
-    try:
-        read = meshio.read(path)
-        points, tets = np.asarray(read.points, dtype=float), read.cells_dict["tetra"]
-    except KeyError:
-        raise InputError("holds no tetrahedra", path=path, found=sorted(read.cells_dict) or "no cells") from None
-    except (Exception, SystemExit) as error:  # meshio leaves through sys.exit on files that it does not know
-        raise InputError(
-            "cannot be read as a tetrahedral mesh", path=path, found=error, expected="XDMF with its .h5 beside it"
-        ) from None
+    read, tets = _content(Path(path))
+    points = np.asarray(read.points, dtype=float)
     wrong = int((~np.isfinite(points)).any(axis=1).sum())
     if wrong:
         raise InputError("has points that are not numbers", path=path, found=f"{wrong} of {len(points)}")
@@ -108,3 +100,29 @@ def read_tetrahedral_mesh(path: str | PathLike[str]) -> TetrahedralMesh:
         raise InputError("has elements without volume", path=path, found=f"{int((volumes == 0).sum())}")
     turned = np.where((volumes < 0)[:, None], mesh.tets[:, [0, 2, 1, 3]], mesh.tets)
     return TetrahedralMesh(mesh.vertices, turned)
+
+
+def read_vertex_field(path: str | PathLike[str], name: str) -> NDArray:
+    """Returns a field of an XDMF file, (n,) or (n, 3), at the vertices of `read_tetrahedral_mesh`.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read or has no such field.
+    """
+    read, tets = _content(Path(path))
+    if name not in read.point_data:
+        raise InputError("lacks a field at its vertices", path=path, found=sorted(read.point_data), expected=name)
+    return np.asarray(read.point_data[name])[np.unique(tets)]
+
+
+def _content(path: Path) -> tuple[meshio.Mesh, NDArray]:
+    try:
+        read = meshio.read(path)
+        return read, read.cells_dict["tetra"]
+    except KeyError:
+        raise InputError("holds no tetrahedra", path=path, found=sorted(read.cells_dict) or "no cells") from None
+    except (Exception, SystemExit) as error:  # meshio leaves through sys.exit on files that it does not know
+        raise InputError(
+            "cannot be read as a tetrahedral mesh", path=path, found=error, expected="XDMF with its .h5 beside it"
+        ) from None

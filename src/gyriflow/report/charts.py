@@ -15,16 +15,17 @@ from .style import (
     FULL_WIDTH_IN,
     MEASURED,
     MUTED_COLOUR,
+    REAL_BRAIN,
     REAL_COLOUR,
     RUN_COLOURS,
     SINGLE_COLUMN_IN,
     column_label,
     from_zero,
     light_grid,
-    measured_name,
     new_figure,
     run_colours,
     run_legend,
+    shown_unit,
     simulated_runs,
     styled,
     week_axis,
@@ -39,8 +40,6 @@ METRIC_TITLES = {
     "mean_shape_index": "mean shape index",
 }
 """The metrics of the overview and their titles."""
-UNIT_TITLES = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹"}
-DIMENSIONLESS = ("", "1", "-")
 HEMISPHERE_LINES: Mapping[str, Literal["-", "--", ":"]] = {"whole": "-", "left": "--", "right": ":"}
 QUALITY_TITLES = {
     "radius_ratio": "radius ratio (1 = regular)",
@@ -55,6 +54,7 @@ def growth_chart(
     rates: pd.DataFrame,
     *,
     folding_rate_per_s: float | None = None,
+    measured: str = REAL_BRAIN,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
@@ -80,7 +80,7 @@ def growth_chart(
     volume_axes.plot(known["week"], known["volume_ml"], "s--", color=RUN_COLOURS[1])
     volume_axes.set_ylabel("volume (mL)", color=RUN_COLOURS[1])
     from_zero(volume_axes)
-    area_axes.set_title(f"{measured_name(synthetic)}: area and volume")
+    area_axes.set_title(f"{measured}: area and volume")
 
     scaled = rates["rate_per_s"] * 1e7
     labels = [
@@ -145,6 +145,7 @@ def metrics_chart(
     metrics: pd.DataFrame,
     *,
     names: Sequence[str] = tuple(METRIC_TITLES),
+    measured: str = REAL_BRAIN,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
@@ -170,16 +171,16 @@ def metrics_chart(
         raise InputError("no metric to draw", found=sorted(set(metrics["metric"])), expected=list(names))
     columns = min(3, len(present))
     lines = -(-len(present) // columns)
-    figure = new_figure(FULL_WIDTH_IN * max(columns, 2) / 3, 0.7 + 1.9 * lines, title=title, synthetic=synthetic)
+    width, height = FULL_WIDTH_IN * max(columns, 2) / 3, 0.7 + 1.9 * lines
+    figure = new_figure(width, height, title=title, synthetic=synthetic, measured=measured)
     grid = figure.subplots(lines, columns, squeeze=False)
     runs = simulated_runs(metrics["run"])
     hemispheres: set[str] = set()
     for axes, name in zip(grid.flat, present, strict=False):
         rows = metrics[metrics["metric"] == name]
         hemispheres |= _metric_panel(axes, rows, run_colours(runs))
-        unit = str(rows["unit"].fillna("").iloc[0])
-        shown = f" ({UNIT_TITLES.get(unit, unit)})" if unit not in DIMENSIONLESS else ""
-        axes.set_title(METRIC_TITLES.get(name, name.replace("_", " ")) + shown)
+        unit = shown_unit(rows["unit"].iloc[0])
+        axes.set_title(METRIC_TITLES.get(name, name.replace("_", " ")) + (f" ({unit})" if unit else ""))
         week_axis(axes, metrics["week"])
         light_grid(axes)
     for axes in grid.flat[len(present) :]:
@@ -189,7 +190,7 @@ def metrics_chart(
         for side in ("left", "right")
         if side in hemispheres
     ]
-    run_legend(figure, runs, synthetic=synthetic, measured=MEASURED in set(metrics["run"]), extra=extra)
+    run_legend(figure, runs, measured=measured if MEASURED in set(metrics["run"]) else "", extra=extra)
     return figure
 
 

@@ -107,5 +107,5 @@ def displacement_chart(
         Line2D([], [], color=MUTED_COLOUR, marker=marker, linestyle="--", label=source)
         for source, marker in markers.items()
     ]
-    run_legend(figure, runs, synthetic=synthetic, measured=False, extra=extra)
+    run_legend(figure, runs, extra=extra)
     return figure

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
 from .scene import View, half_extents, render
-from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, synthetic_note
+from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note
 
 _PIXELS_PER_INCH = 300
 _MARGIN = 1.04
@@ -76,6 +76,7 @@ def panel_grid(
     *,
     title: str,
     synthetic: bool,
+    measured: str = PHANTOM,
     colour_bars: Sequence[tuple[ScalarMappable, str]] = (),
     legend: Sequence[Patch] = (),
 ) -> Figure:
@@ -99,7 +100,7 @@ def panel_grid(
     left_in = label_in + (width - label_in - most * panel_in) / 2
     layout = _Layout(width, left_in, panel_in, 0.66 if colour_bars or legend else 0.46, half_width)
 
-    heading = [line for line in (title, synthetic_note() if synthetic else "") if line]
+    heading = [line for line in (title, synthetic_note(measured) if synthetic else "") if line]
     head_in, block_head_in, caption_line_in = 0.1 + 0.16 * len(heading), 0.2, 0.13
     heights = {id(row): _row_height_in(row, layout) for _, part in blocks for row in part}
     captions = {

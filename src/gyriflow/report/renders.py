@@ -10,10 +10,11 @@ from ..geometry.triangles import Floats, TriangleMesh
 from .panels import Panel, Row, panel_grid
 from .scene import colour_scale, named_views, painted, uniform_colours
 from .style import (
+    PHANTOM,
+    REAL_BRAIN,
     REAL_SURFACE_COLOUR,
     SIMULATED_SURFACE_COLOUR,
     column_label,
-    measured_name,
     styled,
 )
 
@@ -35,6 +36,7 @@ def weekly_comparison(
     real: Mapping[float, TriangleMesh],
     *,
     views: Sequence[str] = SIDE_VIEWS,
+    measured: str = REAL_BRAIN,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
@@ -46,15 +48,18 @@ def weekly_comparison(
         A week that one of them lacks leaves its place empty.
     views
         Names of `scene.VIEWS`.
+    measured
+        What the measured brains are called.
     """
     return _surface_rows(
         {
             "simulated": (simulated, SIMULATED_SURFACE_COLOUR),
-            measured_name(synthetic): (real, REAL_SURFACE_COLOUR),
+            measured: (real, REAL_SURFACE_COLOUR),
         },
         views=views,
         title=title,
         synthetic=synthetic,
+        measured=measured,
     )
 
 
@@ -64,6 +69,7 @@ def runs_comparison(
     real: TriangleMesh | None = None,
     *,
     views: Sequence[str] = SIDE_VIEWS,
+    measured: str = REAL_BRAIN,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
@@ -73,15 +79,14 @@ def runs_comparison(
     ----------
     runs : {run: surface in RAS+ mm}
     """
-    last = measured_name(synthetic)
-    columns = [*runs, last] if real is not None else list(runs)
+    columns = [*runs, measured] if real is not None else list(runs)
     rows = []
     for view in named_views(views):
         panels = [Panel(mesh, uniform_colours(mesh, SIMULATED_SURFACE_COLOUR), view) for mesh in runs.values()]
         if real is not None:
             panels.append(Panel(real, uniform_colours(real, REAL_SURFACE_COLOUR), view))
         rows.append(Row(f"{view.name} view", panels))
-    return panel_grid(columns, rows, title=title, synthetic=synthetic)
+    return panel_grid(columns, rows, title=title, synthetic=synthetic, measured=measured)
 
 
 def _surface_rows(
@@ -90,6 +95,7 @@ def _surface_rows(
     views: Sequence[str],
     title: str,
     synthetic: bool,
+    measured: str,
 ) -> Figure:
     keys = _ordered(*(meshes for meshes, _ in groups.values()))
     rows = [
@@ -101,7 +107,7 @@ def _surface_rows(
         for name, (meshes, colour) in groups.items()
         if meshes
     ]
-    return panel_grid([column_label(key) for key in keys], rows, title=title, synthetic=synthetic)
+    return panel_grid([column_label(key) for key in keys], rows, title=title, synthetic=synthetic, measured=measured)
 
 
 @styled
@@ -109,7 +115,6 @@ def displacement_maps(
     displacements: Mapping[tuple[float, float], SurfaceMap],
     *,
     views: Sequence[str] = SIDE_VIEWS,
-    highest_mm: float | None = None,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
@@ -120,13 +125,9 @@ def displacement_maps(
     Parameters
     ----------
     displacements : {(from_week, to_week): (surface, norms in mm)}
-    highest_mm
-        Upper end of the colour scale; by default the largest norm of all.
     """
     keys = _ordered(displacements)
-    largest = max(float(np.nanmax(norms)) for _, norms in displacements.values())
-    highest = largest if highest_mm is None else highest_mm
-    scale = colour_scale("viridis", 0.0, highest, cut=highest < largest)
+    scale = colour_scale("viridis", 0.0, max(float(np.nanmax(norms)) for _, norms in displacements.values()))
     seen = named_views(views)
     rows = []
     for view in seen:
@@ -151,6 +152,7 @@ def scalar_maps(
     *,
     quantity: str,
     views: Sequence[str] = SIDE_VIEWS,
+    measured: str = PHANTOM,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
@@ -163,6 +165,8 @@ def scalar_maps(
     quantity
         "shape_index" (−1 to 1, gyri red, sulci blue), or "curvedness" (1/mm; from 0 to the 98th percentile of all
         surfaces).
+    measured
+        What the measured brains are called, where there are any.
 
     Raises
     ------
@@ -189,5 +193,10 @@ def scalar_maps(
         for group, known in maps.items()
     ]
     return panel_grid(
-        [column_label(key) for key in keys], rows, title=title, synthetic=synthetic, colour_bars=[(scale, label)]
+        [column_label(key) for key in keys],
+        rows,
+        title=title,
+        synthetic=synthetic,
+        measured=measured,
+        colour_bars=[(scale, label)],
     )

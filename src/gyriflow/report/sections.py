@@ -1,5 +1,7 @@
 """Plane sections through tetrahedral meshes."""
 
+from collections.abc import Mapping
+
 import matplotlib as mpl
 import numpy as np
 import pyvista as pv
@@ -8,10 +10,10 @@ from matplotlib.figure import Figure
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
-from .style import SINGLE_COLUMN_IN, new_figure, styled
+from .style import FULL_WIDTH_IN, new_figure, styled
 
 _PLANES = {
-    # name: (axis across the plane, axes to the right and up, their names)
+    # name: (axis across the plane, axes to the right and up)
     "coronal": (1, 0, 2),
     "axial": (2, 0, 1),
     "sagittal": (0, 1, 2),
@@ -20,89 +22,66 @@ _AXIS_NAMES = ("x: left − to right + (mm)", "y: posterior − to anterior + (m
 
 
 @styled
-def cross_section(
+def cross_sections(
     mesh: TetrahedralMesh,
-    values: Floats,
+    fields: Mapping[str, Floats],
     *,
-    label: str,
     plane: str = "coronal",
-    at_mm: float | None = None,
-    show_elements: bool = False,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
-    """Returns a plane section through a mesh in RAS+ mm with the elements in the colour of their values.
+    """Returns a plane section through the middle of a mesh in RAS+ mm for each of some fields, side by side.
 
     Parameters
     ----------
-    values : (n,) of vertices, shown as their mean over each element, or (m,) of elements
-    label
-        Name and unit of the values.
+    fields : {name and unit: (n,) values at the vertices}
     plane
         "coronal", "axial" or "sagittal"; the brain's left is on the picture's left.
-    at_mm
-        Where the plane cuts its axis; by default the middle of the mesh.
-    show_elements
-        Draws the edges of the elements.
 
     Raises
     ------
     InputError
-        For another plane, values that do not fit the mesh, or a plane that misses it.
+        For another plane, or values that do not fit the mesh.
     """
     if plane not in _PLANES:
         raise InputError("unknown plane", found=plane, expected=list(_PLANES))
-    values = np.asarray(values, dtype=float)
-    if len(values) not in (len(mesh.vertices), len(mesh.tets)):
-        raise InputError(
-            "values do not fit the mesh",
-            found=f"{len(values)} values",
-            expected=f"{len(mesh.vertices)} (vertices) or {len(mesh.tets)} (elements)",
-        )
+    for label, values in fields.items():
+        if len(values) != len(mesh.vertices):
+            expected = f"{len(mesh.vertices)}, one per vertex"
+            raise InputError(f"{label}: values do not fit the mesh", found=len(values), expected=expected)
     across, right, up = _PLANES[plane]
-    low, high = mesh.vertices[:, across].min(), mesh.vertices[:, across].max()
-    position = float((low + high) / 2) if at_mm is None else at_mm
-    if not low < position < high:
-        raise InputError("the plane misses the mesh", found=f"{position:g} mm", expected=f"{low:.1f} to {high:.1f} mm")
-    points, triangles, elements = _cut(mesh, across, position)
-    colours = values[elements] if len(values) == len(mesh.tets) else values[mesh.tets[elements]].mean(axis=1)
-
+    section = _cut(mesh, fields, across)
+    points, triangles = np.asarray(section.points), section.regular_faces
     span = np.ptp(points, axis=0)
-    height = 1.35 + 0.17 * synthetic + (SINGLE_COLUMN_IN - 0.7) * span[up] / span[right]
-    figure = new_figure(SINGLE_COLUMN_IN, height, title=title, synthetic=synthetic)
-    axes = figure.subplots()
-    drawn = axes.tripcolor(
-        points[:, right],
-        points[:, up],
-        triangles,
-        facecolors=colours,
-        cmap="viridis",
-        vmin=float(values.min()),
-        vmax=float(values.max()) if np.ptp(values) > 0 else float(values.min()) + 1.0,
-        edgecolors="#00000055" if show_elements else "none",
-        linewidth=0.15,
-        antialiased=show_elements,
-        rasterized=True,
-    )
-    axes.set_aspect("equal")
-    axes.set_xlabel(_AXIS_NAMES[right])
-    axes.set_ylabel(_AXIS_NAMES[up])
-    axes.set_title(f"{plane} section at {'xyz'[across]} = {position:.1f} mm")
-    axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(6))
-    bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.8, aspect=30)
-    bar.set_label(label)
+    height = 1.35 + 0.17 * synthetic + (FULL_WIDTH_IN / len(fields) - 0.7) * span[up] / span[right]
+    figure = new_figure(FULL_WIDTH_IN, height, title=title, synthetic=synthetic)
+    panels = figure.subplots(1, len(fields), sharey=True, squeeze=False)[0]
+    for axes, (label, values) in zip(panels, fields.items(), strict=True):
+        low, high = float(np.min(values)), float(np.max(values))
+        drawn = axes.tripcolor(
+            points[:, right],
+            points[:, up],
+            triangles,
+            facecolors=section.point_data[label][triangles].mean(axis=1),
+            cmap="viridis",
+            vmin=low,
+            vmax=high if high > low else low + 1.0,
+            antialiased=False,
+            rasterized=True,
+        )
+        axes.set_aspect("equal")
+        axes.set_xlabel(_AXIS_NAMES[right])
+        axes.set_title(f"{plane} section at {'xyz'[across]} = {points[0, across]:.1f} mm")
+        axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(6))
+        figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.8, aspect=30).set_label(label)
+    panels[0].set_ylabel(_AXIS_NAMES[up])
     return figure
 
 
-def _cut(mesh: TetrahedralMesh, axis: int, position: float) -> tuple[Floats, np.ndarray, np.ndarray]:
-    """Returns the (p, 3) points and (t, 3) triangles of the section, and the (t,) element of each triangle."""
-    cells = {pv.CellType.TETRA: np.array(mesh.tets)}
-    grid = pv.UnstructuredGrid(cells, np.array(mesh.vertices))
-    grid.cell_data["element"] = np.arange(len(mesh.tets))
-    normal, origin = np.eye(3)[axis], np.eye(3)[axis] * position
-    section = grid.slice(normal=normal, origin=origin, generate_triangles=True)
-    return (
-        np.asarray(section.points, dtype=float),
-        section.regular_faces.astype(np.int64),
-        np.asarray(section.cell_data["element"]),
-    )
+def _cut(mesh: TetrahedralMesh, fields: Mapping[str, Floats], axis: int) -> pv.PolyData:
+    """Returns the triangles of the section across the middle of an axis, with the fields at their points."""
+    grid = pv.UnstructuredGrid({pv.CellType.TETRA: np.array(mesh.tets)}, np.array(mesh.vertices))
+    for label, values in fields.items():
+        grid.point_data[label] = np.asarray(values, dtype=float)
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    return grid.slice(normal=np.eye(3)[axis], origin=middle, generate_triangles=True)

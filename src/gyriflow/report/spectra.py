@@ -13,6 +13,7 @@ from .style import (
     FULL_WIDTH_IN,
     MEASURED,
     MUTED_COLOUR,
+    REAL_BRAIN,
     REAL_COLOUR,
     from_zero,
     light_grid,
@@ -51,6 +52,7 @@ def spectra_chart(
     week: float,
     bands: Sequence[int] = FOLD_BANDS,
     title: str = "",
+    measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
     """Returns the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
@@ -74,7 +76,7 @@ def spectra_chart(
         raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
     runs = simulated_runs(rows["run"])
     colours = run_colours(runs)
-    figure = new_figure(FULL_WIDTH_IN, 3.0, title=title or week_label(week), synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 3.0, title=title or week_label(week), synthetic=synthetic, measured=measured)
     panels = figure.subplots(1, 2, sharey=True)
     width = 0.8 / max(len(runs), 1)
     for axes, hemisphere in zip(panels, ("left", "right"), strict=True):
@@ -103,7 +105,7 @@ def spectra_chart(
                 facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label="band cut off or not resolved"
             )
         ]
-    run_legend(figure, runs, synthetic=synthetic, measured=MEASURED in set(rows["run"]), extra=extra)
+    run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
     return figure
 
 
@@ -113,6 +115,7 @@ def spectra_weeks_chart(
     *,
     bands: Sequence[int] = FOLD_BANDS,
     title: str = "",
+    measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
     """Returns the relative power of the bands over weeks: a row per hemisphere, a column per band.
@@ -126,7 +129,7 @@ def spectra_weeks_chart(
     rows = _with_band_numbers(spectra, bands)
     runs = simulated_runs(rows["run"])
     colours = run_colours(runs)
-    figure = new_figure(FULL_WIDTH_IN, 4.2, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 4.2, title=title, synthetic=synthetic, measured=measured)
     panels = figure.subplots(2, len(bands), sharex=True, sharey="col", squeeze=False)
     for line, hemisphere in zip(panels, ("left", "right"), strict=True):
         for axes, band in zip(line, bands, strict=True):
@@ -148,6 +151,9 @@ def spectra_weeks_chart(
                     )
             week_axis(axes, rows["week"])
             light_grid(axes)
+            if not here["relative_power"].notna().any():
+                axes.text(0.5, 0.5, "beyond the\nmodes computed", transform=axes.transAxes, ha="center", va="center")
+                axes.set_yticks([])
             if hemisphere == "left":
                 axes.set_title(f"B{band}, {_FOLDS[band]} folds" if band in _FOLDS else f"B{band}")
                 axes.set_xlabel("")
@@ -158,5 +164,5 @@ def spectra_weeks_chart(
     if not rows["trusted"].all():
         hollow = {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}
         extra = [Line2D([], [], color=MUTED_COLOUR, label="band cut off or not resolved", **hollow)]  # type: ignore[arg-type]
-    run_legend(figure, runs, synthetic=synthetic, measured=MEASURED in set(rows["run"]), extra=extra)
+    run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
     return figure

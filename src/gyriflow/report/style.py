@@ -26,6 +26,9 @@ REAL_SURFACE_COLOUR = "#EBD6B4"
 
 MEASURED = "real"
 """The run name of measured brains."""
+REAL_BRAIN, PHANTOM = "real brain", "phantom"
+"""What brains that were not simulated are called."""
+_UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -70,23 +73,31 @@ def styled[**P](chart: Callable[P, Figure]) -> Callable[P, Figure]:
     return drawn
 
 
-def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool) -> Figure:
-    """Returns an empty figure with its heading; `synthetic` says that the brains shown are made by the phantom."""
+def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool, measured: str = PHANTOM) -> Figure:
+    """Returns an empty figure with its heading.
+
+    Parameters
+    ----------
+    synthetic
+        Whether the folded brain is a phantom.
+    measured
+        What the brains that it is shown beside are called.
+    """
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    heading = "\n".join(line for line in (title, synthetic_note() if synthetic else "") if line)
+    heading = "\n".join(line for line in (title, synthetic_note(measured) if synthetic else "") if line)
     if heading:
         figure.suptitle(heading)
     return figure
 
 
-def synthetic_note() -> str:
-    """Returns the words under which brains made by the phantom are shown."""
-    return "synthetic phantom, not a real brain"
+def synthetic_note(measured: str = PHANTOM) -> str:
+    """Returns the words under which a phantom is shown, alone or beside measured brains that are called `measured`."""
+    return "synthetic phantom, not a real brain" if measured == PHANTOM else "simulated from a synthetic phantom"
 
 
-def measured_name(synthetic: bool) -> str:
-    """Returns what brains that were not simulated are called: real, or phantom where they are synthetic."""
-    return "phantom" if synthetic else "real brain"
+def shown_unit(unit: object) -> str:
+    """Returns a unit of the tables as shown, for example "cm²"; empty where there is none."""
+    return _UNITS.get(unit, unit) if isinstance(unit, str) else ""
 
 
 def week_label(week: float) -> str:
@@ -144,18 +155,15 @@ def light_grid(axes: Axes, axis: str = "y") -> None:
     axes.grid(visible=True, axis=axis)  # type: ignore[arg-type]
 
 
-def run_legend(
-    figure: Figure, runs: Sequence[str], *, synthetic: bool, measured: bool, extra: Sequence[Artist] = ()
-) -> None:
-    """Draws below the panels a legend of the runs, of the measured brains where `measured`, and of what else is given.
+def run_legend(figure: Figure, runs: Sequence[str], *, measured: str = "", extra: Sequence[Artist] = ()) -> None:
+    """Draws below the panels a legend of the runs, of the measured brains where they have a name, and of what else.
 
     It has as many columns as its longest label allows.
     """
     colours = run_colours(runs)
     handles: list[Artist] = [Line2D([], [], color=colours[run], marker="o", label=run) for run in runs]
     if measured:
-        name = measured_name(synthetic)
-        handles.append(Line2D([], [], color=REAL_COLOUR, marker="*", markersize=7, linestyle="none", label=name))
+        handles.append(Line2D([], [], color=REAL_COLOUR, marker="*", markersize=7, linestyle="none", label=measured))
     handles.extend(extra)
     # a letter of the legend is about 0.065 in wide, the line before it and the gap behind 0.5 in
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)

@@ -7,9 +7,7 @@ from html import escape
 import numpy as np
 import pandas as pd
 
-from .style import MEASURED, measured_name
-
-UNIT_NAMES = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
+from .style import MEASURED, PHANTOM, REAL_BRAIN, shown_unit, synthetic_note
 
 
 def growth_table(rates: pd.DataFrame) -> pd.DataFrame:
@@ -31,20 +29,22 @@ def growth_table(rates: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def metrics_table(metrics: pd.DataFrame, *, hemisphere: str = "whole", synthetic: bool = False) -> pd.DataFrame:
-    """Returns the metrics per week: a column per run, the measured brain, and each run's difference from it in %.
+def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.DataFrame:
+    """Returns the metrics of whole brains per week: each run, the measured brain, and each run's difference in %.
 
     Parameters
     ----------
     metrics : columns run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; several measured brains of a week give their mean.
+    measured
+        Heading of the measured brains' column.
 
     Returns
     -------
     DataFrame indexed by metric (with its unit) and week; cells without a value are NaN
     """
-    rows = metrics[metrics["hemisphere"] == hemisphere]
-    units = rows["unit"].fillna("").map(lambda unit: UNIT_NAMES.get(unit, unit))
+    rows = metrics[metrics["hemisphere"] == "whole"]
+    units = rows["unit"].map(shown_unit)
     names = rows["metric"].str.replace("_", " ") + [f" ({unit})" if unit else "" for unit in units]
     order = list(dict.fromkeys(names))
     wide = rows.assign(metric=names).pivot_table(
@@ -53,7 +53,7 @@ def metrics_table(metrics: pd.DataFrame, *, hemisphere: str = "whole", synthetic
     wide = wide.reindex(order, level="metric")
     runs = [run for run in dict.fromkeys(rows["run"]) if run != MEASURED]
     real = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
-    columns = {measured_name(synthetic): real}
+    columns = {measured: real}
     for run in runs:
         columns[run] = wide[run]
         columns[f"{run}: difference (%)"] = (100 * (wide[run] / real - 1)).round(1)
@@ -77,21 +77,9 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     return shown.loc[[*shown.index[differs], *shown.index[~differs]]].rename_axis("parameter")
 
 
-def summary_table(values: Mapping[str, object]) -> pd.DataFrame:
-    """Returns a two-column table of named values, such as the summary of a mesh or of a folding.
-
-    Parameters
-    ----------
-    values : {name: value}
-        Values may be mappings themselves; their names are joined by dots.
-    """
-    return pd.DataFrame(
-        [(name.replace("_", " "), _shown(value)) for name, value in _flattened(values).items()],
-        columns=["quantity", "value"],
-    )
-
-
-def html_table(table: pd.DataFrame, *, caption: str, digits: int = 4, synthetic: bool = False) -> str:
+def html_table(
+    table: pd.DataFrame, *, caption: str, digits: int = 4, synthetic: bool = False, measured: str = PHANTOM
+) -> str:
     """Returns the table as HTML with its own look, ready to be put in a page.
 
     Numbers have `digits` significant digits, missing values are dashes, and all text is escaped. The index is shown
@@ -99,7 +87,7 @@ def html_table(table: pd.DataFrame, *, caption: str, digits: int = 4, synthetic:
     """
     named = any(name is not None for name in table.index.names)
     flat = table.reset_index() if named else table
-    heading = caption + (" (synthetic phantom, not a real brain)" if synthetic else "")
+    heading = caption + (f" ({synthetic_note(measured)})" if synthetic else "")
     styler = (
         flat.style.format(lambda value: _shown(value, digits), na_rep="–", escape="html")
         .format_index(lambda name: str(name), axis=1, escape="html")

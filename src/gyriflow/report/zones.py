@@ -19,9 +19,9 @@ ZONE_VIEWS = ("left", "bottom", "left medial", "right medial")
 ZONES: Mapping[int, tuple[str, str]] = {
     0: ("free", "#D55E00"),
     1: ("clamped", "#009E73"),
-    2: ("contact, left", "#0072B2"),
-    3: ("contact, right", "#F0E442"),
-    4: ("between the planes", "#CC79A7"),
+    2: ("left contact", "#0072B2"),
+    3: ("right contact", "#F0E442"),
+    4: ("between planes", "#CC79A7"),
 }
 """Codes of the boundary's zones, their names and colours (near the paper's red, green, blue, yellow and purple)."""
 

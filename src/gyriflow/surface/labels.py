@@ -115,7 +115,7 @@ def cerebrum_mask(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
             f"the label volume has labels that the scheme {scheme.name!r} does not know",
             found=f"{_listed(unknown)} among {_listed(sorted(present))}",
             expected=known,
-            remedy=f"Choose another scheme ({', '.join(sorted(SCHEMES))}), or define one in the config.",
+            remedy=f"Choose another scheme ({', '.join(sorted(SCHEMES))}).",
         )
     if not present & set(scheme.cerebrum):
         raise InputError(
@@ -130,7 +130,7 @@ def cerebrum_mask(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
             f"tissues of the scheme {scheme.name!r} are missing from the label volume",
             found=f"labels {_listed(sorted(present))}",
             expected="also " + ", ".join(f"{number} {scheme.labels[number]}" for number in missing),
-            remedy="Choose the scheme of this volume, or define one in the config without these tissues.",
+            remedy="Choose the scheme of this volume.",
         )
     return np.isin(labels, scheme.cerebrum)
 

@@ -7,6 +7,7 @@ import pytest
 from gyriflow.config import load
 from gyriflow.config.folding import output_weeks
 from gyriflow.errors import InputError
+from gyriflow.report.style import PHANTOM, REAL_BRAIN
 
 
 def study(**changes):
@@ -178,6 +179,18 @@ def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
 def test_a_validated_configuration_written_out_is_valid_again():
     config = load(study(runs={"x": {"thickness_mm": 2}}))
     assert load(config.model_dump(mode="json", exclude_defaults=True)) == config
+
+
+@pytest.mark.parametrize(
+    ("shown", "name"),
+    [(["a"], REAL_BRAIN), (["b", "c"], PHANTOM), (["a", "b"], "real brain or phantom"), ([], REAL_BRAIN)],
+)
+def test_measured_brains_are_phantoms_only_where_all_of_them_are(tmp_path, shown, name):
+    (tmp_path / "a.stl").touch()
+    brains = [{"id": "a", "week": 21, "pial": "a.stl"}]
+    brains += [{"id": brain, "week": 22, "phantom": {}} for brain in ("b", "c")]
+    config = load({"brains": brains, "start": "a", "folding": {"end_week": 22}}, tmp_path)
+    assert config.measured_name(shown) == name
 
 
 def test_label_schemes_are_those_of_the_surface_room():

@@ -18,7 +18,7 @@ def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
 
 
 def test_weight_beyond_its_reach_does_not_matter():
-    assert cortical_weight(np.array([WEIGHT_REACH * 2.0]), 2.0)[0] < 1e-12
+    assert cortical_weight(np.array([WEIGHT_REACH * 2.0]), 2.0)[0] < 1e-8
 
 
 def test_distance_is_to_the_triangles_not_to_the_vertices():

@@ -25,7 +25,7 @@ def brain():
     return ellipsoid_mesh(12, (20.0, 26.0, 18.0))
 
 
-def test_the_ellipsoid_stands_where_the_design_puts_it():
+def test_the_ellipsoid_stands_where_the_model_puts_it():
     box = np.array([[-10.0, -20.0, -30.0], [10.0, 20.0, 30.0]])
     centre = np.array([0.0, 0.05 * 40, -0.15 * 60])
     tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])

@@ -1,5 +1,9 @@
 """Sizing, quality and tetrahedralisation."""
 
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
 import igl
 import numpy as np
 import pytest
@@ -9,11 +13,14 @@ from shapes import box_mesh
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, transformed
+from gyriflow.io.surfaces import write_surface
 from gyriflow.mesh.quality import dihedral_angles, quality_summary, radius_ratios, refuse_bad_elements
 from gyriflow.mesh.sizing import background_mesh, edge_length_at
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 
 REGULAR = TetrahedralMesh([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 2, 1, 3]])
+SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "tetrahedralise.py"
+OUTPUTS = {"mesh": "brain.xdmf", "data": "brain.h5", "surface": "pial.stl", "quality": "quality.json"}
 SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
 
 
@@ -96,6 +103,43 @@ def test_an_open_or_inverted_surface_is_refused():
         tetrahedralise(TriangleMesh(shape.vertices, shape.faces[1:]), **SIZES)
     with pytest.raises(MeshError, match="closed and face outwards"):
         tetrahedralise(flipped(shape), **SIZES)
+
+
+@pytest.fixture
+def dying_mesher(tmp_path, monkeypatch):
+    """A mesher that dies with a few last words."""
+    (tmp_path / "pytetwild.py").write_text(
+        "import os, signal\n"
+        "def tetrahedralize(*arrays, **settings):\n"
+        "    os.write(1, b'99 % of the elements are inverted')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    # the mesher's process is given this path
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+@pytest.mark.usefixtures("dying_mesher")
+def test_a_mesher_that_dies_leaves_its_last_words():
+    with pytest.raises(MeshError, match=r"exit code -9; found 99 % of the elements are inverted\. .*memory ran out"):
+        tetrahedralise(ball(), **SIZES)
+
+
+@pytest.mark.usefixtures("dying_mesher")
+def test_the_step_of_a_mesher_that_dies_ends_in_three(tmp_path, capsys):
+    write_surface(tmp_path / "pial.surf.gii", ball())
+    outputs = {name: str(tmp_path / file) for name, file in OUTPUTS.items()}
+    job = SimpleNamespace(
+        input=[str(tmp_path / "pial.surf.gii")],
+        output=SimpleNamespace(**outputs),
+        params=SimpleNamespace(settings=SIZES | {"min_radius_ratio": 0.02}),
+        log=[str(tmp_path / "log")],
+    )
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
+    assert end.value.code == 3
+    assert "inverted" in capsys.readouterr().err
+    assert "inverted" in (tmp_path / "log").read_text()
+    assert not [path for path in outputs.values() if Path(path).exists()]
 
 
 def test_the_mesher_is_stopped_at_its_time_limit():

@@ -65,11 +65,19 @@ def test_growth_chart_without_a_folding_has_no_line_of_it():
 
 def test_phantom_is_called_synthetic_and_never_real():
     metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
-    for figure in (growth_chart(AREAS, RATES, synthetic=True), metrics_chart(metrics, synthetic=True)):
+    phantom = {"measured": "phantom", "synthetic": True}
+    for figure in (growth_chart(AREAS, RATES, **phantom), metrics_chart(metrics, **phantom)):
         shown = words(figure)
         assert any("synthetic phantom" in text for text in shown)
         assert "real brain" not in shown
     assert not any("synthetic" in text for text in words(growth_chart(AREAS, RATES)))
+
+
+def test_a_phantom_beside_real_brains_is_synthetic_and_they_are_not():
+    metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
+    shown = words(metrics_chart(metrics, measured="real brain", synthetic=True))
+    assert {"simulated from a synthetic phantom", "real brain"} <= set(shown)
+    assert not any("not a real brain" in text for text in shown)
 
 
 def test_settings_outside_stay_and_fonts_inside_are_the_same_when_saved(tmp_path):

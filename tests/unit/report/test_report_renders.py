@@ -6,13 +6,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from gyriflow.errors import InputError
+from gyriflow.folding.zones import ZONE_NAMES
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.report.panels import round_length
 from gyriflow.report.renders import displacement_maps, runs_comparison, scalar_maps, weekly_comparison
 from gyriflow.report.scene import VIEWS, render, uniform_colours
-from gyriflow.report.sections import cross_section
-from gyriflow.report.zones import field_picture, zones_picture
+from gyriflow.report.sections import cross_sections
+from gyriflow.report.zones import ZONES, field_picture, zones_picture
 
 
 def box(size: tuple[float, float, float], middle: tuple[float, float, float] = (0, 0, 0)) -> TriangleMesh:
@@ -99,7 +100,7 @@ def test_all_panels_have_one_scale_and_the_bar_its_length():
 
 def test_simulated_and_measured_brains_differ_in_colour_and_the_phantom_is_named():
     mesh = box((20, 30, 20))
-    figure = weekly_comparison({22.0: mesh}, {22.0: mesh}, views=("left",), synthetic=True)
+    figure = weekly_comparison({22.0: mesh}, {22.0: mesh}, views=("left",), measured="phantom", synthetic=True)
     simulated, measured = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
     assert simulated[2] > simulated[0]
     assert measured[0] > measured[2]
@@ -161,7 +162,7 @@ def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
     zones = np.repeat([1, 3], 12)
     figure = zones_picture(brain, zones, fissure_x_mm=0.0, views=("left medial", "right medial"))
     # a box of 10 × 30 × 20 mm has 22 cm²
-    assert {"clamped 22.0 cm²", "contact, right 22.0 cm²", "free 0.0 cm²"} <= words(figure)
+    assert {"clamped 22.0 cm²", "right contact 22.0 cm²", "free 0.0 cm²"} <= words(figure)
     left, right = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
     assert left[1] > left[0]
     assert right[0] > 2 * right[2]
@@ -181,28 +182,42 @@ def test_field_picture_names_the_field():
     assert bar.get_xlim() == (0.0, 2.0)
 
 
-def test_cross_section_has_the_area_and_values_of_the_cut():
+def test_a_section_has_the_area_and_the_values_of_the_middle_plane():
     corner = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10], [10, 10, 10]], dtype=float)
     mesh = TetrahedralMesh(corner, np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
-    figure = cross_section(mesh, np.array([3.0, 7.0]), label="shear modulus (Pa)", plane="axial", at_mm=5.0)
-    (drawn,) = [item for item in figure.axes[0].collections if item.get_array() is not None]
-    paths = [path.vertices[:3] for path in drawn.get_paths()]
+    figure = cross_sections(mesh, {"height (mm)": corner[:, 2], "x (mm)": corner[:, 0]}, plane="axial")
+    height, x = (axes.collections[0] for axes in figure.axes[:2])
+    paths = [path.vertices[:3] for path in x.get_paths()]
     (u, v) = (np.array([path[k] - path[0] for path in paths]) for k in (1, 2))
     areas = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
-    values = np.asarray(drawn.get_array())
-    assert areas[values == 3].sum() == pytest.approx(12.5)
-    assert set(values) == {3.0, 7.0}
-    assert "axial section at z = 5.0 mm" in words(figure)
+    # at half its height the corner tetrahedron is a triangle with legs of 5 mm, the other a square of 50 mm2
+    assert areas.sum() == pytest.approx(12.5 + 50.0)
+    np.testing.assert_allclose(np.asarray(height.get_array()), 5.0)
+    np.testing.assert_allclose(np.asarray(x.get_array()), [path[:, 0].mean() for path in paths])
+    assert {"axial section at z = 5.0 mm", "height (mm)", "x (mm)"} <= words(figure)
 
 
-def test_a_section_beside_the_mesh_or_wrong_values_are_refused():
+def test_a_section_of_wrong_values_or_in_an_unknown_plane_is_refused():
     mesh = TetrahedralMesh(np.eye(4, 3), np.array([[3, 0, 1, 2]]))
-    with pytest.raises(InputError, match="misses the mesh; found 5 mm"):
-        cross_section(mesh, np.zeros(1), label="x", at_mm=5.0)
-    with pytest.raises(InputError, match="do not fit the mesh; found 9 values"):
-        cross_section(mesh, np.zeros(9), label="x")
+    with pytest.raises(InputError, match="growth: values do not fit the mesh; found 9; expected 4, one per vertex"):
+        cross_sections(mesh, {"growth": np.zeros(9)})
+    with pytest.raises(InputError, match="unknown plane; found oblique"):
+        cross_sections(mesh, {"growth": np.zeros(4)}, plane="oblique")
+
+
+def test_curvedness_goes_from_zero_to_where_few_vertices_are_above():
+    mesh = box((20, 30, 20))
+    values = np.array([0.1] * 7 + [9.0])
+    figure = scalar_maps({"simulated": {28.0: (mesh, values)}}, quantity="curvedness", views=("left",))
+    (bar,) = [axes for axes in figure.axes if "curvedness" in axes.get_xlabel()]
+    assert bar.get_xlim() == pytest.approx((0.0, np.percentile(values, 98)))
+    assert "(mm⁻¹)" in bar.get_xlabel()
+
+
+def test_zones_have_the_codes_and_names_of_the_folding():
+    assert {code: name for code, (name, _) in ZONES.items()} == dict(enumerate(ZONE_NAMES))
 
 
 @pytest.mark.parametrize(("limit", "length"), [(55, 50), (50, 50), (49, 20), (0.7, 0.5), (9.9, 5)])
-def test_scale_bars_haveround_lengths(limit, length):
+def test_scale_bars_have_round_lengths(limit, length):
     assert round_length(limit) == pytest.approx(length)

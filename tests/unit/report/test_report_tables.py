@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from gyriflow.report.displacement import displacement_chart, displacement_summary, displacement_table
-from gyriflow.report.tables import growth_table, html_table, metrics_table, runs_table, summary_table
+from gyriflow.report.tables import growth_table, html_table, metrics_table, runs_table
 
 NORMS = pd.DataFrame(
     {
@@ -75,7 +75,7 @@ def test_metrics_table_gives_the_difference_from_the_measured_brain():
     assert table.loc[("area (cm²)", 22.0), "thin: difference (%)"] == pytest.approx(10.0)
     assert np.isnan(table.loc[("area (cm²)", 23.0), "real brain"])
     assert table.loc[("gyrification index", 22.0), "thin"] == 1.2
-    assert "phantom" in metrics_table(metrics, synthetic=True)
+    assert "phantom" in metrics_table(metrics, measured="phantom")
 
 
 def test_metrics_table_without_measured_brains_has_no_differences():
@@ -96,11 +96,6 @@ def test_runs_table_puts_what_differs_first():
     assert table.index.tolist() == ["contact.gap_mm", "poisson_ratio", "thickness_mm"]
     assert table["differs"].tolist() == ["yes", "", ""]
     assert table.loc["contact.gap_mm", "thin"] == "2"
-
-
-def test_summary_table_flattens_and_names():
-    table = summary_table({"pial_faces": 12, "clamped": {"left": 0.25}, "converged": True})
-    assert table.to_numpy().tolist() == [["pial faces", "12"], ["clamped.left", "0.25"], ["converged", "yes"]]
 
 
 def test_html_is_escaped_named_and_the_same_each_time():

@@ -1,0 +1,95 @@
+"""A folding that is interrupted or killed within the workflow."""
+
+import os
+import signal
+import subprocess
+import time
+from contextlib import suppress
+
+import psutil
+import pytest
+from shapes import ellipsoid_mesh
+
+from gyriflow.io.files import read_json, write_json
+from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+
+from .conftest import SMALL_STUDY
+
+STUDY = SMALL_STUDY | {
+    "brains": SMALL_STUDY["brains"][:1],
+    "folding": {"end_week": 22.5, "thickness_mm": 3.0},
+    "runs": {"reference": {}},
+}
+SUMMARY = "results/a/folding/reference/summary.json"
+LOG = "results/a/logs/simulate.reference.log"
+
+
+@pytest.fixture
+def meshed(workflow):
+    """A study whose surface and mesh count as made: an ellipsoid."""
+    workflow.write("study.yaml", STUDY)
+    listed = workflow.run("mesh", "--configfile", "study.yaml", "--forceall", "--summary").stdout
+    for file in [line.split("\t")[0] for line in listed.splitlines()[1:]]:
+        path = workflow.directory / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    results = workflow.directory / "results" / "a"
+    write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
+    write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", ellipsoid_mesh(10, (20.0, 26.0, 18.0)))
+    touched = workflow.run("--touch", "--cores", "1", "mesh", "--configfile", "study.yaml")
+    assert touched.returncode == 0, touched.stderr
+    return workflow
+
+
+def started(workflow, until):
+    """Starts the folding and returns its process when the log has a line with `until`."""
+    process = subprocess.Popen(
+        workflow.command("--cores", "2", SUMMARY, "--configfile", "study.yaml"),
+        cwd=workflow.directory, env=workflow.environment, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    log, deadline = workflow.directory / LOG, time.monotonic() + 90
+    while not (log.exists() and until in log.read_text()):
+        assert process.poll() is None, process.communicate()[0]
+        assert time.monotonic() < deadline, "the folding did not begin"
+        time.sleep(0.02)
+    return process
+
+
+def ranks_of(process):
+    """Returns the folding programs below a process."""
+    found = []
+    for child in psutil.Process(process.pid).children(recursive=True):
+        with suppress(psutil.NoSuchProcess):
+            if child.cmdline()[1:3] == ["-m", "gyriflow.folding"]:
+                found.append(child)
+    return found
+
+
+def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
+    process = started(meshed, until="step    3")
+    below = psutil.Process(process.pid).children(recursive=True)
+    os.killpg(process.pid, signal.SIGINT)
+    printed, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, printed
+    assert "interrupted; the same command goes on from here" in printed
+    _, alive = psutil.wait_procs(below, timeout=10)
+    assert alive == []
+    assert list((meshed.directory / "results/a/folding/reference").glob("checkpoint-*/state.h5"))
+    again = meshed.run("--cores", "2", SUMMARY, "--configfile", "study.yaml")
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert "going on from the checkpoint after step" in (meshed.directory / LOG).read_text()
+    summary = read_json(meshed.directory / SUMMARY)
+    assert summary["resumed_after_step"] >= 3
+    assert summary["steps"] == 21
+
+
+def test_a_killed_rank_is_reported_as_memory_that_ran_out(meshed):
+    process = started(meshed, until="step    2")
+    ranks_of(process)[-1].kill()
+    printed, _ = process.communicate(timeout=60)
+    assert process.returncode == 137, printed
+    assert "about" in printed.partition("step    1")[0]
+    assert "most probably because memory ran out" in printed
+    assert "most probably because memory ran out" in (meshed.directory / LOG).read_text()
+    assert not (meshed.directory / SUMMARY).exists()
