@@ -186,9 +186,7 @@ def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     assert not (tmp_path / "out" / "frames.h5").exists()
 
 
-def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(
-    mesh, tmp_path, monkeypatch, capsys
-):
+def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_path, monkeypatch, capsys):
     brain = read_tetrahedral_mesh(mesh)
     weeks = WEEK | {"output_weeks": [21.0, 21.25, 21.5], "ranks": 1}
     parameters = parameters_from(weeks)

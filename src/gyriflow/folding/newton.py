@@ -21,7 +21,8 @@ KEPT, REBUILT, GMRES, DIRECT = range(4)
 class NewtonSettings:
     """Tolerances and limits of the iteration.
 
-    `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side.
+    `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side. Where one
+    linear solve can end the step, it is solved as far as that takes, down to a tenth of `krylov_tolerance`.
     """
 
     newton_tolerance: float = 1e-6
@@ -67,6 +68,7 @@ class NewtonSolver:
         self._direction = problem.new_vector()
         self._fresh_iterations = 0  # Krylov iterations with a new preconditioner
         self._stale = True
+        self._wanted_reduction = settings.krylov_tolerance
         self._cg = self._new_krylov("cg", "gamg")
         self._fallbacks: dict[int, PETSc.KSP] = {}
 
@@ -80,18 +82,22 @@ class NewtonSolver:
             options["pc_gamg_reuse_interpolation"] = False
             options["pc_gamg_aggressive_coarsening"] = 1
             options["mg_levels_ksp_type"] = "chebyshev"
-            options["mg_levels_ksp_max_it"] = 3
-            options["mg_levels_pc_type"] = "jacobi"
+            options["mg_levels_ksp_max_it"] = 2
+            options["mg_levels_pc_type"] = "pbjacobi"
         krylov.setOptionsPrefix(prefix)
         krylov.setType(method)
         krylov.getPC().setType(preconditioner)
+        if method == "cg":
+            # the norm that Newton's method is judged by
+            krylov.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         if preconditioner == "lu":
             krylov.getPC().setFactorSolverType("mumps")
-        krylov.setTolerances(rtol=self.settings.krylov_tolerance, atol=0.0, max_it=self.settings.max_krylov)
+        krylov.setTolerances(atol=0.0, max_it=self.settings.max_krylov)
         krylov.setFromOptions()
         return krylov
 
     def _run(self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool) -> tuple[bool, int]:
+        krylov.setTolerances(rtol=self._wanted_reduction)
         krylov.setOperators(matrix)
         krylov.getPC().setReusePreconditioner(reuse)
         try:
@@ -183,6 +189,9 @@ class NewtonSolver:
                     expected=f"at most {tolerance:.2e} N",
                 )
             count.newton += 1
+            enough = 0.4 * tolerance / norm
+            floor = self.settings.krylov_tolerance
+            self._wanted_reduction = enough if enough >= 0.1 * floor else floor
             self._solve_linear(problem.tangent(), count)
             norm = self._advance(norm)
         count.residual = norm / at_rest if at_rest > 0 else 0.0
