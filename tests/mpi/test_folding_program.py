@@ -34,6 +34,8 @@ WEEK = {
     "thickness_mm": 3.0,
 }
 
+MANY_STEPS = 4000.0
+
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
@@ -110,6 +112,15 @@ def test_memory_and_a_shortened_step_are_said_before_the_solve(default_run):
     assert "step_s 43200 does not divide the time from GW 21 to 21.25: the last step there is shortened" in before
 
 
+@pytest.fixture(scope="module")
+def long_run(mesh, tmp_path_factory):
+    """A run of so many steps that it does not end before it is killed, uninterrupted."""
+    out = tmp_path_factory.mktemp("long") / "out"
+    done = fold(mesh, out, solver=TIGHT, step_s=MANY_STEPS)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out
+
+
 def kill(process):
     """Kills a program with its ranks, which Open MPI's daemon puts into groups of their own."""
     ranks = psutil.Process(process.pid).children(recursive=True)
@@ -133,32 +144,32 @@ def killed_after(step, arguments):
 
 
 @pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 3)])
-def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, tight_run, tmp_path, first, then):
+def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, long_run, tmp_path, first, then):
     out = tmp_path / "out"
-    printed = killed_after(3, command(mesh, out, first, solver=TIGHT))
+    printed = killed_after(3, command(mesh, out, first, solver=TIGHT, step_s=MANY_STEPS))
     assert not (out / "frames.h5").exists(), printed
-    again = fold(mesh, out, then, solver=TIGHT)
+    again = fold(mesh, out, then, solver=TIGHT, step_s=MANY_STEPS)
     assert again.returncode == 0, again.stderr
     assert "going on from the checkpoint after step" in again.stdout
     assert read_json(out / "summary.json")["resumed_after_step"] >= 3
-    one, more = (read_positions(folder / "frames.h5", 21.5) for folder in (tight_run, out))
+    one, more = (read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out))
     largest = np.linalg.norm(one - read_positions(out / "frames.h5", 21.0), axis=1).max()
     assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
-    assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(tight_run / "steps.csv"))
+    assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(long_run / "steps.csv"))
 
 
-def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, default_run, tmp_path):
+def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run, tmp_path):
     out = tmp_path / "out"
-    killed_after(2, command(mesh, out))
+    killed_after(2, command(mesh, out, step_s=MANY_STEPS))
     done = fold(mesh, out, thickness_mm=2.5)
     assert done.returncode == 0
     assert "another mesh or other parameters: not used, kept for a return" in done.stdout
     assert "going on" not in done.stdout
-    again = fold(mesh, out)
+    again = fold(mesh, out, step_s=MANY_STEPS)
     assert again.returncode == 0
     assert "going on from the checkpoint after step" in again.stdout
     assert not list(out.glob("checkpoint-*"))
-    one, resumed = (read_positions(folder / "frames.h5", 21.5) for folder in (default_run[0], out))
+    one, resumed = (read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out))
     assert np.linalg.norm(resumed - one, axis=1).max() <= 1e-3
 
 
