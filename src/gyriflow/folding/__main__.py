@@ -20,7 +20,7 @@ from ..step import record_exit_code
 from .output import ZONES, say
 from .parameters import FoldingParameters, parameters_from
 from .simulation import run
-from .zones import ZONE_NAMES, refuse_impossible, zone_report, zones_of_run
+from .zones import ZONE_NAMES, refuse_impossible, zone_report, zone_warnings, zones_of_run
 
 PREDICTED_MIB_PER_RANK = 180
 PREDICTED_KIB_PER_TET = 3.0
@@ -95,8 +95,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         say(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
         through = report["elements_through_cortex"]
         say(f"  elements through the cortex: {through:.1f}")
-        if through < 2:
-            say(f"warning: fewer than two elements through the cortex ({through:.2f}): folds may be mesh noise")
+        for warning in zone_warnings(report):
+            say(f"warning: {warning}")
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / ZONES, report)

@@ -18,6 +18,8 @@ from .layers import PialSearch
 from .parameters import FoldingParameters
 
 FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES = range(5)
+MUCH_BETWEEN_PLANES = 0.05
+"""Share of the pial area between the contact planes above which a user is warned."""
 ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes")
 
 
@@ -149,6 +151,22 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
         ),
         "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
     }
+
+
+def zone_warnings(report: dict) -> list[str]:
+    """Returns what a user should know of the zones, from their report, before trusting a run."""
+    warnings = []
+    through = report["elements_through_cortex"]
+    if through < 2:
+        warnings.append(f"fewer than two elements through the cortex ({through:.2f}): folds may be mesh noise")
+    areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
+    share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
+    if share > MUCH_BETWEEN_PLANES:
+        warnings.append(
+            f"{share:.0%} of the pial area lies between the contact planes and feels no contact, so the hemispheres "
+            "may cross: lower folding.contact.gap_mm below twice the fissure's width, or raise surface.gap_mm"
+        )
+    return warnings
 
 
 def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:

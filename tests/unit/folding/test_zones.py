@@ -14,6 +14,7 @@ from gyriflow.folding.zones import (
     inside_ellipsoid,
     refuse_impossible,
     zone_report,
+    zone_warnings,
 )
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 
@@ -80,6 +81,16 @@ def test_the_report_adds_up(brain):
     assert sum(zone["facets"] for zone in report["zones"].values()) == len(zones.facets)
     assert report["initial_penetration_mm"] == 0
     assert report["clamped_share"]["left"] == pytest.approx(report["clamped_share"]["right"], rel=0.05)
+
+
+def test_walls_between_the_planes_and_a_coarse_cortex_are_warned_of(brain):
+    def warnings(gap_mm, thickness_mm):
+        zones = find_zones(brain, fissure_x_mm=0.0, **(DEFAULTS | {"gap_mm": gap_mm}))
+        return zone_warnings(zone_report(brain, zones, thickness_mm))
+
+    assert warnings(2.5, 8.0) == []
+    assert any("feels no contact" in text for text in warnings(30.0, 8.0))
+    assert any("fewer than two elements" in text for text in warnings(2.5, 1.0))
 
 
 def test_elements_through_the_cortex_of_a_box():
