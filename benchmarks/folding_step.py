@@ -80,13 +80,13 @@ def measure(arguments: argparse.Namespace) -> None:
     for step in range(arguments.steps + 1):
         comm.barrier()
         began = time.perf_counter()
-        state, count = ours.step(states[-1], p.step_s)
+        state = ours.step(states[-1], p.step_s)
         seconds.append(time.perf_counter() - began)
-        newton.append(count.newton)
-        krylov.append(count.krylov)
+        newton.append(state.rows[-1]["newton"])
+        krylov.append(state.rows[-1]["krylov"])
         states.append(state)
         if comm.rank == 0:
-            print(f"ours  step {step}: {seconds[-1]:.2f} s, newton {count.newton}, krylov {count.krylov}", flush=True)
+            print(f"ours  step {step}: {seconds[-1]:.2f} s, newton {newton[-1]}, krylov {krylov[-1]}", flush=True)
     memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
 
     paper = Folding(comm, mesh, zones, p, quadrature_degree=3)

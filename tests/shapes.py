@@ -2,25 +2,12 @@
 
 import numpy as np
 
-from gyriflow.geometry.tetrahedra import TetrahedralMesh
-
-KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
 
 
 def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetrahedralMesh:
     """Returns a box around the origin, in mm, with six elements per grid cell."""
-    counts = np.array(cells) + 1
-    ticks = [np.linspace(-s / 2, s / 2, n) for s, n in zip(size, counts, strict=True)]
-    points = np.stack(np.meshgrid(*ticks, indexing="ij"), -1)
-    number = np.arange(counts.prod()).reshape(counts)
-    corner = [
-        number[i : counts[0] - 1 + i, j : counts[1] - 1 + j, k : counts[2] - 1 + k].ravel()
-        for i in (0, 1)
-        for j in (0, 1)
-        for k in (0, 1)
-    ]
-    tets = np.concatenate([np.stack([corner[c] for c in tet], axis=1) for tet in KUHN])
-    return TetrahedralMesh(points.reshape(-1, 3), tets)
+    return grid([np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(size, cells, strict=True)])
 
 
 def ellipsoid_mesh(cells: int, semi_axes: tuple[float, float, float]) -> TetrahedralMesh:

@@ -11,7 +11,7 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.tetrahedra import TetrahedralMesh, volumes_between
 from ..units import M_PER_MM
 
 Floats = NDArray[np.float64]
@@ -78,8 +78,7 @@ class Domain:
 
     def cell_volumes(self, node_positions: Floats) -> Floats:
         """Returns the signed volumes in m³ of the local elements for (k, 3) positions of the local nodes."""
-        a, b, c, d = (node_positions[self.cells[:, i]] for i in range(4))
-        return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+        return volumes_between(node_positions, self.cells)
 
     def minimum(self, local_values: Floats) -> float:
         """Returns the smallest value over all ranks."""

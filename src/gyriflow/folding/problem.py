@@ -1,6 +1,6 @@
 """The discrete problem of one step: energy, residual and tangent on the updated reference.
 
-With `domain`, the only file that calls dolfinx: what differs between its versions is kept to these two.
+With `domain` and `block_matrix`, the only files that use dolfinx: what differs between its versions is kept to them.
 """
 
 from dataclasses import dataclass

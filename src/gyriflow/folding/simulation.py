@@ -17,7 +17,7 @@ from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from .domain import Domain
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight
-from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError, StepCount
+from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError
 from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say
 from .parameters import FoldingParameters
 from .problem import Material, Problem
@@ -85,8 +85,8 @@ class Folding:
         mu = p.shear_modulus_core_pa * (1 - weight) + p.shear_modulus_cortex_pa * weight
         self.problem.set_layers(mu, dg, dr, normals)
 
-    def step(self, state: State, step_s: float) -> tuple[State, StepCount]:
-        """Returns the state after a step of a given length, the mesh moved along.
+    def step(self, state: State, step_s: float) -> State:
+        """Returns the state after a step of a given length, the mesh moved along; its last row says what it took.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Folding:
         }
         after = state.after(u, step_s, row)
         domain.place(after.positions)
-        return after, count
+        return after
 
 
 def advance(folding: Folding, state: State, until_s: float) -> State:
@@ -139,7 +139,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
         # a remainder of a rounding error's length is no step of its own
         step_s = left if left < state.step_s * (1 + 1e-9) else state.step_s
         try:
-            after, _ = folding.step(state, step_s)
+            after = folding.step(state, step_s)
         except NotConvergedError as error:
             half = min(state.step_s, step_s) / 2
             if half < smallest * (1 - 1e-9):

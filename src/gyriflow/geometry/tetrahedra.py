@@ -1,10 +1,15 @@
 """Tetrahedral meshes: a frozen pair of arrays, and what can be measured on it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .triangles import Floats, Ints, TriangleMesh, frozen
+
+# the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
+KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +34,27 @@ class TetrahedralMesh:
             raise ValueError("a tetrahedron names a vertex that does not exist")
 
 
+def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
+    """Returns the (m,) volumes of (m, 4) tetrahedra, negative for inverted ones, in the cube of the vertices' unit."""
+    a, b, c, d = (vertices[tets[:, i]] for i in range(4))
+    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+
+
 def signed_volumes(mesh: TetrahedralMesh) -> Floats:
     """Returns the (m,) volumes in mm³, negative for inverted elements."""
-    a, b, c, d = mesh.vertices[mesh.tets].transpose(1, 0, 2)
-    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+    return volumes_between(mesh.vertices, mesh.tets)
+
+
+def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
+    """Returns a box of six tetrahedra per cell on the grid of three ascending arrays of coordinates in mm."""
+    points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
+    x, y, z = points.shape[:3]
+    number = np.arange(x * y * z).reshape(x, y, z)
+    corner = [
+        number[i : x - 1 + i, j : y - 1 + j, k : z - 1 + k].ravel() for i in (0, 1) for j in (0, 1) for k in (0, 1)
+    ]
+    tets = np.concatenate([np.stack([corner[c] for c in tet], axis=1) for tet in KUHN])
+    return TetrahedralMesh(points.reshape(-1, 3), tets)
 
 
 def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:

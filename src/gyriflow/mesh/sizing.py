@@ -4,16 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.tetrahedra import TetrahedralMesh, grid
 from ..geometry.triangles import TriangleMesh
 
 FINE_DEPTH = 2.5
 """Depth of the layer of fine elements, in surface edge lengths: just more than the cortex that they must resolve."""
 GROWTH = 0.5
 """Increase of edge length per depth below the fine layer."""
-
-# the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
-KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
 
 
 def edge_length_at(depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float) -> NDArray[np.float64]:
@@ -29,15 +26,6 @@ def background_mesh(
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
     counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
-    index = np.indices(counts).reshape(3, -1).T
-    points = low + spacing * index
-    number = np.arange(len(points)).reshape(counts)
-    corner = [
-        number[i : counts[0] - 1 + i, j : counts[1] - 1 + j, k : counts[2] - 1 + k].ravel()
-        for i in (0, 1)
-        for j in (0, 1)
-        for k in (0, 1)
-    ]
-    tets = np.concatenate([np.stack([corner[c] for c in tet], axis=1) for tet in KUHN])
-    depth = cKDTree(surface.vertices).query(points)[0]
-    return TetrahedralMesh(points, tets), edge_length_at(depth, surface_edge_mm, core_edge_mm)
+    background = grid([start + spacing * np.arange(count) for start, count in zip(low, counts, strict=True)])
+    depth = cKDTree(surface.vertices).query(background.vertices)[0]
+    return background, edge_length_at(depth, surface_edge_mm, core_edge_mm)
