@@ -53,6 +53,45 @@ def test_one_brain_alone_is_folded_without_growth_rates(workflow):
     assert not {"growth_rates", "similarity"} & set(jobs)
 
 
+def test_maps_are_planned_for_the_runs_that_have_any(workflow):
+    for name in ("left.gii", "right.gii", "soft.nii.gz"):
+        (workflow.directory / name).touch()
+    pair = ["left.gii", "right.gii"]
+    runs = {"plain": {}, "thick": {"thickness_mm": {"map": pair, "surface": pair}}}
+    with_maps = workflow.write("maps.yaml", SMALL_STUDY | {"runs": runs})
+    jobs = workflow.jobs("folding", "--configfile", with_maps)
+    assert (jobs["parameter_maps"], jobs["simulate"]) == (1, 2)
+    runs["plain"] = {"shear_modulus_core_pa": {"map": "soft.nii.gz"}}
+    assert (
+        workflow.jobs("--configfile", workflow.write("both.yaml", SMALL_STUDY | {"runs": runs}))["parameter_maps"] == 2
+    )
+    assert "parameter_maps" not in workflow.jobs("--configfile", workflow.write("none.yaml", SMALL_STUDY))
+    shown = workflow.run("-n", "folding", "--printshellcmds", "--configfile", with_maps).stdout
+    commands = [line for line in shown.splitlines() if "gyriflow.folding" in line]
+    assert sorted("--maps results/a/folding/thick/maps.h5 --out" in command for command in commands) == [False, True]
+
+
+def test_growth_is_estimated_before_a_folding_that_asks_for_it(workflow):
+    target = "results/a/folding/reference/params.yaml"
+    growth = SMALL_STUDY["folding"] | {"growth_rate_per_s": "estimated"}
+    asked = workflow.write("asked.yaml", SMALL_STUDY | {"folding": growth})
+    assert workflow.jobs(target, "--configfile", asked) == {
+        "phantom": 2,
+        "pial_surface": 2,
+        "growth_rates": 1,
+        "parameters": 1,
+    }
+    plain = workflow.write("plain.yaml", SMALL_STUDY)
+    assert workflow.jobs(target, "--configfile", plain) == {"phantom": 1, "pial_surface": 1, "parameters": 1}
+
+
+def test_growth_comes_from_the_brains_that_are_named(workflow):
+    third = {"id": "c", "week": 23, "phantom": {"voxel_mm": 1.5}}
+    study = SMALL_STUDY | {"brains": [*SMALL_STUDY["brains"], third], "growth": {"brains": ["a", "c"]}}
+    jobs = workflow.jobs("growth", "--configfile", workflow.write("some.yaml", study))
+    assert (jobs["pial_surface"], jobs["growth_rates"]) == (2, 1)
+
+
 def changed(section, **values):
     study = copy.deepcopy(SMALL_STUDY)
     study[section] = study.get(section, {}) | values
@@ -64,7 +103,8 @@ def test_nothing_is_to_be_done_after_all_was_made(finished):
 
 
 REPORT = {"html_report": 1, "all": 1}
-SHAPE = REPORT | {"metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1}
+NEW_RESULTS = REPORT | {"study_resources": 1}
+SHAPE = NEW_RESULTS | {"metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1}
 ONE_RUN = SHAPE | {
     "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure_simulated": 2, "run_metrics": 2,
     "displacement": 1,
@@ -97,7 +137,8 @@ FIGURES = {
             {"edge_length_mm": 1.5},
             BOTH_RUNS | MESH | {"pial_surface": 2, "measure_real": 2, "growth_rates": 1, "growth_figure": 1},
         ),
-        ("report", {"dpi": 100}, REPORT | FIGURES),
+        ("report", {"dpi": 100}, NEW_RESULTS | FIGURES),
+        ("report", {"energy": {"pue": 1.67}}, NEW_RESULTS),
         # a setting for another kind of input, and the number of ranks, which changes no result: the report alone,
         # as it shows the configuration
         ("surface", {"gap_mm": 1.0}, REPORT),

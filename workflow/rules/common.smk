@@ -39,7 +39,7 @@ CONFIG = validated_config()
 START = CONFIG.start
 BRAINS = [brain.id for brain in CONFIG.brains]
 RUNS = list(CONFIG.runs)
-SYNTHETIC = CONFIG.brain(START).source == "phantom"
+SYNTHETIC = CONFIG.brain(START).synthetic
 
 # held as long as this process lives: how `gyriflow.launch` tells a live run from one that was interrupted
 if workflow.is_main_process and not workflow.dryrun:

@@ -1,7 +1,22 @@
 # The folding simulation of each run, and its surfaces at the output weeks.
+RUNS_WITH_MAPS = [run for run in RUNS if CONFIG.maps(run)]
+
+
+def maps_of_run(wildcards):
+    """Returns the file with the maps of a run, where it has any."""
+    return rules.parameter_maps.output[0] if wildcards.run in RUNS_WITH_MAPS else []
+
+
+def rates_of_run(wildcards):
+    """Returns the table of the growth rates where the run takes one of them."""
+    settings = CONFIG.parameters(wildcards.run)
+    return rules.growth_rates.output.rates if "estimated" in settings.values() else []
+
+
 rule parameters:
     input:
-        f"results/{START}/surface/surface.json",
+        surface=f"results/{START}/surface/surface.json",
+        rates=rates_of_run,
     output:
         f"results/{START}/folding/{{run}}/params.yaml",
     log:
@@ -14,13 +29,43 @@ rule parameters:
         mem_mb=500,
         runtime=5,
     params:
-        # the result does not depend on the number of ranks
-        settings=lambda wildcards: CONFIG.runs[wildcards.run].model_dump(
-            mode="json", exclude={"ranks"}
-        ),
+        settings=lambda wildcards: CONFIG.parameters(wildcards.run),
         weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
+        code=lambda wildcards: code("growth") if rates_of_run(wildcards) else None,
     script:
         "../scripts/parameters.py"
+
+
+rule parameter_maps:
+    input:
+        lambda wildcards: [
+            file
+            for files in CONFIG.maps(wildcards.run).values()
+            for file in (*files["map"], *files["surface"])
+        ],
+        mesh=f"results/{START}/mesh/brain.xdmf",
+        data=f"results/{START}/mesh/brain.h5",
+        surface=f"results/{START}/surface/surface.json",
+    output:
+        f"results/{START}/folding/{{run}}/maps.h5",
+    log:
+        f"results/{START}/logs/parameter_maps.{{run}}.log",
+    benchmark:
+        f"results/{START}/benchmarks/parameter_maps.{{run}}.tsv"
+    wildcard_constraints:
+        run=one_of(RUNS_WITH_MAPS),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=15,
+    params:
+        maps=lambda wildcards: CONFIG.maps(wildcards.run),
+        # files of maps are understood as those of the brain
+        reading=CONFIG.brain(START).model_dump(include={"coordinates", "affine_from"}),
+        code=code("mesh"),
+    script:
+        "../scripts/parameter_maps.py"
 
 
 rule regions:
@@ -28,6 +73,7 @@ rule regions:
         mesh=f"results/{START}/mesh/brain.xdmf",
         data=f"results/{START}/mesh/brain.h5",
         params=f"results/{START}/folding/{{run}}/params.yaml",
+        maps=maps_of_run,
     output:
         mesh=f"results/{START}/folding/{{run}}/regions.xdmf",
         data=f"results/{START}/folding/{{run}}/regions.h5",
@@ -51,6 +97,7 @@ rule simulate:
         mesh=f"results/{START}/mesh/brain.xdmf",
         data=f"results/{START}/mesh/brain.h5",
         params=f"results/{START}/folding/{{run}}/params.yaml",
+        maps=maps_of_run,
         # impossible zones are refused there, before the ranks start
         regions=f"results/{START}/folding/{{run}}/regions.xdmf",
     output:
@@ -74,12 +121,14 @@ rule simulate:
         runtime=1440,
     params:
         folder=subpath(output.steps, parent=True),
+        maps=lambda wildcards, input: ["--maps", input.maps] if input.maps else [],
         code=code("folding", "mechanics"),
     shell:
         # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
         "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
         "{resources.mpi} -n {resources.tasks} python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
-        " --out {params.folder:q} 2>&1 | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
+        " {params.maps:q} --out {params.folder:q} 2>&1"
+        " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
 
 
 rule folded_surface:

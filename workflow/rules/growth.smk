@@ -1,13 +1,20 @@
 # Growth rates of the cortex, from the areas of the brains' pial surfaces over the weeks.
-# a rate needs brains of two weeks
-HAS_GROWTH = len({brain.week for brain in CONFIG.brains}) > 1
+GROWTH_BRAINS = CONFIG.growth_brains
+
+
+def folding_rate():
+    """Returns the folding's growth rate: a number, {week: number}, `estimated`, or None where it has a map."""
+    rate = CONFIG.folding.growth_rate_per_s
+    if isinstance(rate, (float, str)):
+        return rate
+    return dict(rate.weeks) if rate.map is None else None
 
 
 rule growth_rates:
     input:
-        whole=expand("results/{brain}/surface/pial.surf.gii", brain=BRAINS),
-        left=expand("results/{brain}/surface/left.pial.surf.gii", brain=BRAINS),
-        right=expand("results/{brain}/surface/right.pial.surf.gii", brain=BRAINS),
+        whole=expand("results/{brain}/surface/pial.surf.gii", brain=GROWTH_BRAINS),
+        left=expand("results/{brain}/surface/left.pial.surf.gii", brain=GROWTH_BRAINS),
+        right=expand("results/{brain}/surface/right.pial.surf.gii", brain=GROWTH_BRAINS),
     output:
         areas=f"results/{START}/growth/areas.csv",
         rates=f"results/{START}/growth/rates.csv",
@@ -21,8 +28,8 @@ rule growth_rates:
         mem_mb=1000,
         runtime=10,
     params:
-        brains=BRAINS,
-        weeks=[brain.week for brain in CONFIG.brains],
+        brains=GROWTH_BRAINS,
+        weeks=[CONFIG.brain(brain).week for brain in GROWTH_BRAINS],
         code=code("growth"),
     script:
         "../scripts/growth_rates.py"
@@ -56,8 +63,8 @@ rule growth_figure:
         mem_mb=1000,
         runtime=10,
     params:
-        folding_rate_per_s=CONFIG.folding.growth_rate_per_s,
-        measured=CONFIG.measured_name(BRAINS),
+        folding_rate_per_s=folding_rate(),
+        measured=CONFIG.measured_name(GROWTH_BRAINS),
         dpi=CONFIG.report.dpi,
         code=code("report"),
     script:
@@ -66,4 +73,4 @@ rule growth_figure:
 
 rule growth:
     input:
-        [rules.growth_rates.output, rules.growth_figure.output] if HAS_GROWTH else [],
+        [rules.growth_rates.output, rules.growth_figure.output] if GROWTH_BRAINS else [],

@@ -1,4 +1,16 @@
-# Inputs that the workflow makes itself: synthetic brains.
+# Inputs that the workflow makes itself: synthetic brains and simple shapes.
+def shape_settings(wildcards):
+    """Returns what a shape depends on; sizes of other kinds are no part of it."""
+    shape = CONFIG.brain(wildcards.brain).shape
+    return {
+        "kind": shape.kind,
+        "size_mm": list(shape.size_mm),
+        "noise_mm": shape.noise_mm,
+        "seed": shape.seed,
+        "edge_length_mm": CONFIG.surface.edge_length_mm,
+    }
+
+
 rule phantom:
     output:
         "results/{brain}/surface/labels.nii.gz",
@@ -19,3 +31,24 @@ rule phantom:
         code=code("phantom"),
     script:
         "../scripts/phantom.py"
+
+
+rule shape:
+    output:
+        "results/{brain}/surface/shape.surf.gii",
+    log:
+        "results/{brain}/logs/shape.log",
+    benchmark:
+        "results/{brain}/benchmarks/shape.tsv"
+    wildcard_constraints:
+        brain=one_of(brain.id for brain in CONFIG.brains if brain.shape),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        shape=shape_settings,
+        code=code("phantom"),
+    script:
+        "../scripts/shape.py"

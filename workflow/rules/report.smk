@@ -1,8 +1,48 @@
-# The HTML report: Snakemake's own, of the figures and tables marked for it.
+# What the jobs took, and the HTML report: Snakemake's own, of the figures and tables marked for it.
+# by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
+BENCHMARKS = {
+    job.name: job.benchmark.regex().pattern for job in workflow.rules if job.benchmark
+}
+
+
+rule study_resources:
+    input:
+        # the files of benchmarks are no inputs: a lost one would have its stage run again
+        rules.figures.input,
+        rules.metrics.input,
+        summaries=expand(rules.simulate.output.summary, run=RUNS),
+        steps=expand(rules.simulate.output.steps, run=RUNS),
+    output:
+        csv="results/study/resources.csv",
+        table=report(
+            "results/study/resources.html",
+            caption="../report/resources_table.rst",
+            category="Resources",
+            labels={"figure": "time, memory, energy and emissions"},
+        ),
+    log:
+        "results/study/logs/study_resources.log",
+    benchmark:
+        "results/study/benchmarks/study_resources.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        benchmarks=BENCHMARKS,
+        power=CONFIG.report.energy.model_dump(),
+        runs=RUNS,
+        code=code("report"),
+    script:
+        "../scripts/study_resources.py"
+
+
 rule html_report:
     input:
         rules.figures.input,
         rules.metrics.input,
+        rules.study_resources.output,
     output:
         html="results/report/report.html",
         config="results/report/config.yaml",

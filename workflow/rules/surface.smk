@@ -8,12 +8,15 @@ SURFACE_SETTINGS = {
     ),
     "hemispheres": ("gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"),
     "pial": ("edge_length_mm", "smoothing_iterations", "max_hole_mm"),
+    # made with the edge length that they keep
+    "shape": (),
 }
+MADE_INPUTS = {"phantom": "labels.nii.gz", "shape": "shape.surf.gii"}
 
 
 def surface_files(wildcards):
     brain = CONFIG.brain(wildcards.brain)
-    return brain.files or [f"results/{brain.id}/surface/labels.nii.gz"]
+    return brain.files or [f"results/{brain.id}/surface/{MADE_INPUTS[brain.source]}"]
 
 
 def surface_source(wildcards):
@@ -31,12 +34,16 @@ def surface_settings(wildcards):
 def surface_reading(wildcards):
     """Returns how the brain's files are to be understood."""
     brain = CONFIG.brain(wildcards.brain)
-    if surface_source(wildcards) == "labels":
-        return {
-            "scheme": brain.scheme or "spina-bifida-atlas",
-            "affine_from": brain.affine_from,
-        }
-    return {"coordinates": brain.coordinates}
+    match surface_source(wildcards):
+        case "labels":
+            return {
+                "scheme": brain.scheme or "spina-bifida-atlas",
+                "affine_from": brain.affine_from,
+            }
+        case "shape":
+            return {}
+        case _:
+            return {"coordinates": brain.coordinates}
 
 
 rule pial_surface:

@@ -1,18 +1,20 @@
 """The validated parameters of a run, which its folding reads and which stay with its results."""
 
-from gyriflow.io.files import read_json
+from gyriflow.growth.rates import FOLDING_RATES, rate_curve
+from gyriflow.io.files import read_json, read_table
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.step import step
 
-weeks = snakemake.params.weeks
+files, weeks, settings = snakemake.input, snakemake.params.weeks, dict(snakemake.params.settings)
 with step(snakemake.log[0]):
-    surface = read_json(snakemake.input[0])
-    write_yaml(
-        snakemake.output[0],
-        {
-            "start_week": weeks[0],
-            "output_weeks": list(weeks),
-            "fissure_x_mm": surface["fissure_x_mm"],
-            **snakemake.params.settings,
-        },
-    )
+    for name, column in FOLDING_RATES.items():
+        if settings[name] == "estimated":
+            allowed = settings["allow_negative_growth"]
+            curve = rate_curve(read_table(files.rates), column, allow_negative=allowed)
+            settings[name] = {"weeks": dict(zip(*(numbers.tolist() for numbers in curve), strict=True))}
+    known = {
+        "start_week": weeks[0],
+        "output_weeks": list(weeks),
+        "fissure_x_mm": read_json(files.surface)["fissure_x_mm"],
+    }
+    write_yaml(snakemake.output[0], known | settings)

@@ -5,7 +5,7 @@ from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.step import step
 from gyriflow.surface.labels import SCHEMES
-from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial
+from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial, from_shape
 
 files, output, params = list(snakemake.input), snakemake.output, snakemake.params
 with step(snakemake.log[0]):
@@ -15,10 +15,11 @@ with step(snakemake.log[0]):
             scheme = SCHEMES[params.reading["scheme"]]
             surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
         case "hemispheres":
-            left, right = map(read_surface, files)
-            surface = from_hemispheres(left, right, week=params.week, **params.reading, **params.settings)
+            surface = from_hemispheres(*map(read_surface, files), week=params.week, **params.reading, **params.settings)
         case "pial":
             surface = from_pial(read_surface(files[0]), week=params.week, **params.reading, **params.settings)
+        case "shape":
+            surface = from_shape(read_surface(files[0]), week=params.week)
     write_surface(output.whole, surface.whole)
     write_surface(output.left, surface.left, "CortexLeft")
     write_surface(output.right, surface.right, "CortexRight")

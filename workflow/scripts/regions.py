@@ -1,17 +1,23 @@
 """Zones and fields of a run on the start mesh, for a look before the solve."""
 
 from gyriflow.folding.output import layer_fields
-from gyriflow.folding.parameters import parameters_from
-from gyriflow.folding.zones import refuse_impossible, zones_of_run
+from gyriflow.folding.parameters import parameters_from, require_maps
+from gyriflow.folding.zone_checks import refuse_impossible
+from gyriflow.folding.zones import zones_of_run
+from gyriflow.io.maps import read_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
 
 FIELDS = ("zones", "distance", "cortex_weight", "growth", "shear_modulus", "normal")
 
+files = snakemake.input
 with step(snakemake.log[0]):
-    mesh = read_tetrahedral_mesh(snakemake.input.mesh)
-    parameters = parameters_from(read_yaml(snakemake.input.params))
+    mesh = read_tetrahedral_mesh(files.mesh)
+    parameters = parameters_from(read_yaml(files.params))
+    maps = read_maps(files.maps) if files.maps else {}
+    require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    write_tetrahedral_mesh(snakemake.output.mesh, mesh, layer_fields(mesh.vertices, zones, parameters, FIELDS))
+    fields = layer_fields(mesh.vertices, zones, parameters, maps, parameters.start_week, FIELDS)
+    write_tetrahedral_mesh(snakemake.output.mesh, mesh, fields)

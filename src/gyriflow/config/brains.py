@@ -1,15 +1,28 @@
 """The brains of a study: what each is, and from which kind of data its pial surface comes."""
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from .base import Settings, setting
 
-SOURCES = ("labels", "hemispheres", "pial", "phantom")
+SOURCES = ("labels", "hemispheres", "pial", "phantom", "shape")
 """The keys of a brain of which exactly one is given."""
 
 SIDES = ("left", "right")
 
 Scheme = Literal["spina-bifida-atlas", "dhcp-19", "feta-7", "binary"]
+ShapeKind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
+
+SHAPE_SIZES = {
+    "sphere": "radius_mm",
+    "ellipsoid": "semi_axes_mm",
+    "half-ellipsoid": "semi_axes_mm",
+    "slab": "extent_mm",
+}
+"""The key that holds the size of each kind of shape."""
+
+Length = Annotated[float, Field(ge=5, le=150)]
 
 
 class PhantomSettings(Settings):
@@ -20,6 +33,38 @@ class PhantomSettings(Settings):
     cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
 
 
+class ShapeSettings(Settings):
+    """A simple geometry in the place of a brain, for teaching and verification, centred on x = 0 and y = 0."""
+
+    kind: ShapeKind = setting(
+        ..., "",
+        "`sphere`, `ellipsoid` (both centred on z = 0), `half-ellipsoid` (a dome on a flat base at z = 0) or `slab` "
+        "(a box upwards from z = 0).",
+    )  # fmt: skip
+    radius_mm: float = setting(23.0, "mm", "Radius of a sphere.", ge=5, le=150)
+    semi_axes_mm: tuple[Length, Length, Length] = setting(
+        (21.0, 28.0, 22.0), "mm",
+        "Semi-axes along X, Y, Z of an ellipsoid or half-ellipsoid, each 5 to 150; the longest is at most twice the "
+        "shortest.",
+    )  # fmt: skip
+    extent_mm: tuple[Length, Length, Length] = setting(
+        (40.0, 40.0, 12.0), "mm", "Extents of a slab along X, Y, Z, each 5 to 150."
+    )
+    noise_mm: float = setting(
+        0.05, "mm",
+        "Root mean square height of smooth bumps that folding starts from, at most a fiftieth of the smallest size; "
+        "flat bases and a slab's sides stay flat.",
+        ge=0, le=0.5,
+    )  # fmt: skip
+    seed: int = setting(0, "", "Seed of the bumps' random pattern.", ge=0)
+
+    @property
+    def size_mm(self) -> tuple[float, float, float]:
+        """The three semi-axes, or the three extents of a slab."""
+        size = getattr(self, SHAPE_SIZES[self.kind])
+        return (size, size, size) if self.kind == "sphere" else size
+
+
 class HemisphereFiles(Settings):
     """The pial surfaces of one brain's hemispheres."""
 
@@ -28,7 +73,7 @@ class HemisphereFiles(Settings):
 
 
 class Brain(Settings):
-    """One brain. Exactly one of `labels`, `hemispheres`, `pial` and `phantom` says where its surface comes from.
+    """One brain. Exactly one of `labels`, `hemispheres`, `pial`, `phantom`, `shape` says where its surface comes from.
 
     Paths are relative to the configuration file or, if no such file is there, to the working directory.
     """
@@ -46,11 +91,17 @@ class Brain(Settings):
     pial: str | None = setting(None, "", "Surface file of the whole brain, closed.")
     coordinates: Literal["ras", "lps"] = setting("ras", "", "Axes of the coordinates in `hemispheres` or `pial` files.")
     phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
+    shape: ShapeSettings | None = setting(None, "", "A simple geometry in the place of a brain.")
 
     @property
     def source(self) -> str:
         """The one key that says where the surface comes from."""
         return next(name for name in SOURCES if getattr(self, name) is not None)
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether the workflow makes the brain itself."""
+        return self.source in ("phantom", "shape")
 
     @property
     def files(self) -> list[str]:

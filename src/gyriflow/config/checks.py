@@ -3,11 +3,15 @@
 from collections import Counter
 from typing import Any
 
-from .brains import SOURCES
-from .folding import FoldingSettings
+from .brains import SHAPE_SIZES, SOURCES, ShapeSettings
+from .folding import GROWTH_RATES, FoldingSettings
 
 PHANTOM_WEEKS = (21, 36)
 """Gestational weeks of which synthetic brains can be made."""
+MOST_UNEQUAL_AXES = 2.0
+"""Longest over shortest semi-axis of a shape: beyond this its ends are too sharp for even triangles."""
+MOST_NOISE = 0.02
+"""Height of the bumps over the smallest size of a shape."""
 RESERVED_BRAINS = ("study", "report")
 """Folders of results that belong to no brain."""
 RESERVED_RUNS = ("real",)
@@ -31,6 +35,34 @@ def brain_problems(raw: Any, where: str) -> list[str]:
     week = _number(raw.get("week"))
     if "phantom" in given and week is not None and not PHANTOM_WEEKS[0] <= week <= PHANTOM_WEEKS[1]:
         problems.append(f"{where}.week: found {week:g}; a phantom's should be {PHANTOM_WEEKS[0]} to {PHANTOM_WEEKS[1]}")
+    if isinstance(raw.get("shape"), dict):
+        problems += [f"{where}.shape.{problem}" for problem in _shape_problems(raw["shape"])]
+    return problems
+
+
+def _shape_problems(shape: dict[str, Any]) -> list[str]:
+    """Returns what is wrong between the keys of one shape, each with its key in front."""
+    kind = shape.get("kind")
+    if not isinstance(kind, str) or kind not in SHAPE_SIZES:
+        return []
+    key = SHAPE_SIZES[kind]
+    problems = [
+        f"{other}: has no meaning with kind {kind}, whose size is {key}"
+        for other in dict.fromkeys(SHAPE_SIZES.values())
+        if other in shape and other != key
+    ]
+    given = shape.get(key, ShapeSettings.model_fields[key].default)
+    sizes = [_number(size) for size in (given if isinstance(given, list | tuple) else [given])]
+    known = [size for size in sizes if size is not None and size > 0]
+    if len(known) < len(sizes) or not known:
+        return problems
+    if key == "semi_axes_mm" and max(known) > MOST_UNEQUAL_AXES * min(known):
+        expected = f"at most {MOST_UNEQUAL_AXES:g} times the shortest, {min(known):g}"
+        problems.append(f"{key}: found {max(known):g} as the longest; it should be {expected}")
+    noise = _number(shape.get("noise_mm"))
+    if noise is not None and noise > MOST_NOISE * min(known):
+        expected = f"at most {MOST_NOISE * min(known):g}, a fiftieth of the smallest size in {key}"
+        problems.append(f"noise_mm: found {noise:g}; it should be {expected}")
     return problems
 
 
@@ -55,6 +87,28 @@ def study_problems(brains: Any, start: Any, runs: dict[str, dict[str, Any]]) -> 
     return problems
 
 
+def growth_problems(brains: Any, growth: Any, runs: dict[str, dict[str, Any]]) -> list[str]:
+    """Returns what is wrong between the brains, those that growth rates are estimated from, and the runs (all raw)."""
+    entries = [entry for entry in brains if isinstance(entry, dict)] if isinstance(brains, list) else []
+    weeks = {entry["id"]: _number(entry.get("week")) for entry in entries if isinstance(entry.get("id"), str)}
+    given = growth.get("brains") if isinstance(growth, dict) else None
+    named = isinstance(given, list) and all(isinstance(name, str) for name in given)
+    chosen: list[str] = given if isinstance(given, list) and named else list(weeks)
+    unknown = [name for name in chosen if name not in weeks]
+    if unknown:
+        return [f"growth.brains: found {', '.join(unknown)}; expected ids of brains: {', '.join(weeks)}"]
+    found = {weeks[name] for name in chosen} - {None}
+    if len(found) > 1:
+        return []
+    least = f"found brains of {len(found)} week{'' if len(found) == 1 else 's'}; a growth rate needs two or more"
+    problems = {f"growth.brains: {least}": None} if named else {}
+    for name, settings in runs.items():
+        for key in GROWTH_RATES:
+            if settings.get(key) == "estimated":
+                problems[f"{_where(name, key, runs)}: can't be estimated: {least}"] = None
+    return list(problems)
+
+
 def _name_problems(name: str) -> list[str]:
     if name in RESERVED_RUNS:
         return [f"runs.{name}: the name is reserved; choose another"]
@@ -75,10 +129,15 @@ def _run_problems(settings: dict[str, Any], start_week: float | None) -> list[tu
     if start_week is not None and end_week is not None and end_week <= start_week:
         problems.append(("end_week", f"found {end_week:g}; it should be above the start brain's week, {start_week:g}"))
     if settings.get("allow_negative_growth") not in (True, "true"):
-        for key in ("growth_rate_per_s", "radial_growth_rate_per_s"):
-            rate = _number(settings.get(key, FoldingSettings.model_fields[key].default))
-            if rate is not None and rate < 0:
-                problems.append((key, f"found {rate:g}; it should be 0 or more unless allow_negative_growth is true"))
+        for key in GROWTH_RATES:
+            value = settings.get(key, FoldingSettings.model_fields[key].default)
+            curve = value.get("weeks") if isinstance(value, dict) else {"": value}
+            rates = [_number(rate) for rate in curve.values()] if isinstance(curve, dict) else []
+            problems += [
+                (key, f"found {rate:g}; it should be 0 or more unless allow_negative_growth is true")
+                for rate in rates
+                if rate is not None and rate < 0
+            ]
     return problems
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -10,6 +10,7 @@ from pydantic_core import PydanticUndefined
 
 from .base import Settings
 from .root import Config
+from .varying import VaryingSettings
 
 INTRODUCTION = """\
 # Configuration
@@ -37,7 +38,8 @@ BOUNDS = {"gt": "> {}", "ge": "≥ {}", "lt": "< {}", "le": "≤ {}"}
 
 def documentation() -> str:
     """Returns the page config/README.md."""
-    return "\n".join([INTRODUCTION, *(_section(name, model) for name, model in _sections(Config, ""))])
+    sections = [_section(name, model) for name, model in _sections(Config, "")]
+    return "\n".join([INTRODUCTION, *sections, _section("varying", VaryingSettings)])
 
 
 def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -46,7 +48,7 @@ def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[Bas
     for name, field in model.model_fields.items():
         # runs have the keys of `folding`
         if name != "runs":
-            for inner in _models(field.annotation):
+            for inner in (model for model in _models(field.annotation) if model is not VaryingSettings):
                 yield from _sections(inner, f"{path}.{name}".lstrip(".") + ("[]" if _is_list(field) else ""))
 
 
@@ -68,7 +70,8 @@ def _section(path: str, model: type[BaseModel]) -> str:
 def _row(name: str, field: FieldInfo) -> str:
     extra = field.json_schema_extra
     unit = str(extra["unit"]) if isinstance(extra, dict) else ""
-    bounds = [
+    held: Any = extra.get("bounds", {}) if isinstance(extra, dict) else {}
+    bounds = [text.format(_number(held[key])) for key, text in BOUNDS.items() if key in held] + [
         text.format(_number(getattr(bound, key)))
         for bound in field.metadata
         for key, text in BOUNDS.items()
@@ -106,14 +109,19 @@ def _number(value: Any) -> str:
 
 def _type_name(annotation: Any) -> str:
     origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _type_name(parts[0])
     if origin is Literal:
         return " or ".join(f"`{part}`" for part in parts)
     if origin in (Union, UnionType):
-        return " or ".join("`null`" if part is type(None) else _type_name(part) for part in parts)
+        kinds = ["`null`" if part is type(None) else _type_name(part) for part in parts]
+        return " or ".join(dict.fromkeys(kinds))
     if origin is tuple:
         return "list of " + _type_name(parts[0])
     if origin is dict:
         return "names with settings"
+    if annotation is VaryingSettings:
+        return "varying"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "section"
     if origin is not None:

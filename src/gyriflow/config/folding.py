@@ -1,13 +1,36 @@
 """Settings of the folding simulation."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from .base import Settings, setting
+from .varying import Varying, VaryingOrEstimated, VaryingSettings, require_bounds, varying
 
-FieldName = Literal["displacement", "distance", "cortex_weight", "growth", "shear_modulus", "normal", "zones"]
+FieldName = Literal[
+    "displacement",
+    "distance",
+    "cortex_weight",
+    "growth",
+    "shear_modulus",
+    "bulk_modulus",
+    "normal",
+    "zones",
+    "stress",
+    "strain",
+    "volume_ratio",
+]
 Fraction = Annotated[float, Field(gt=0, le=2)]
+VARYING = (
+    "thickness_mm",
+    "shear_modulus_cortex_pa",
+    "shear_modulus_core_pa",
+    "growth_rate_per_s",
+    "radial_growth_rate_per_s",
+    "core_growth_rate_per_s",
+)
+"""Keys of `folding` whose values may be curves and maps."""
+GROWTH_RATES = VARYING[3:]
 
 
 class ContactSettings(Settings):
@@ -21,8 +44,12 @@ class ContactSettings(Settings):
 
 
 class NoGrowthSettings(Settings):
-    """The ellipsoid inside which nothing grows; pial facets in it are clamped. All as fractions of the extents."""
+    """The ellipsoid inside which nothing grows, and whose pial facets are clamped with `support: ellipsoid`."""
 
+    kind: Literal["ellipsoid", "none"] = setting(
+        "ellipsoid", "",
+        "`ellipsoid`: nothing grows in it, nor in the bridge between the hemispheres; `none`: all tissue grows.",
+    )  # fmt: skip
     shift_y: float = setting(0.05, "Y-extent", "Shift of its centre from the middle, to anterior.", ge=-1, le=1)
     shift_z: float = setting(-0.15, "Z-extent", "Shift of its centre from the middle, to superior.", ge=-1, le=1)
     semi_axes: tuple[Fraction, Fraction, Fraction] = setting(
@@ -48,15 +75,33 @@ class FoldingSettings(Settings):
     step_s: float = setting(
         43200.0, "s", "Time step; the last one before an output is shortened where it does not fit.", gt=0, le=604800
     )
-    thickness_mm: float = setting(1.5, "mm", "Cortical thickness H.", gt=0, le=10)
-    shear_modulus_cortex_pa: float = setting(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
-    shear_modulus_core_pa: float = setting(300.0, "Pa", "Shear modulus of what lies under the cortex.", gt=0, le=1e7)
+    thickness_mm: Varying = varying(1.5, "mm", "Cortical thickness H, at the start where it grows.", gt=0, le=10)
+    thickness_growth_mm_per_gw: float = setting(
+        0.0, "mm/GW", "Growth of the thickness, H = H₀ + β·t from the start on.", ge=-1, le=1
+    )
+    shear_modulus_cortex_pa: Varying = varying(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
+    shear_modulus_core_pa: Varying = varying(300.0, "Pa", "Shear modulus of what lies under it.", gt=0, le=1e7)
     poisson_ratio: float = setting(0.45, "", "Poisson's ratio ν.", ge=0, lt=0.5)
-    growth_rate_per_s: float = setting(2.0e-7, "1/s", "Tangential growth rate of the cortex.", ge=-1e-5, le=1e-5)
-    radial_growth_rate_per_s: float = setting(
+    growth_rate_per_s: VaryingOrEstimated = varying(
+        2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated`: from the brains' areas.", ge=-1e-5, le=1e-5
+    )
+    radial_growth_rate_per_s: Varying = varying(
         0.0, "1/s", "Growth rate along the cortical normal, under the cortex.", ge=-1e-5, le=1e-5
     )
+    core_growth_rate_per_s: VaryingOrEstimated = varying(
+        0.0, "1/s",
+        "Growth rate in all directions, under the cortex; `estimated`: from the brains' volumes.", ge=-1e-5, le=1e-5,
+    )  # fmt: skip
     allow_negative_growth: bool = setting(False, "", "Whether the growth rates may be negative (atrophy).")
+    stress_memory_gw: float | Literal["infinite"] = setting(
+        0.0, "GW",
+        "Time in which elastic stress relaxes: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
+    )  # fmt: skip
+    support: Literal["ellipsoid", "base", "box", "free"] = setting(
+        "ellipsoid", "",
+        "What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth, `base` the flat base, "
+        "`box` too and lets the upright sides slide, `free` nothing (rigid motions are removed).",
+    )  # fmt: skip
     contact: ContactSettings = setting(ContactSettings(), "", "The hemispheres' contact.")
     no_growth: NoGrowthSettings = setting(NoGrowthSettings(), "", "Where nothing grows.")
     output_every_gw: float = setting(
@@ -67,6 +112,21 @@ class FoldingSettings(Settings):
     )
     solver: SolverSettings = setting(SolverSettings(), "", "The solvers.")
     ranks: int = setting(2, "", "MPI ranks of one simulation.", ge=1, le=4096)
+
+    @field_validator(*VARYING)
+    @classmethod
+    def _hold_bounds(cls, value: Any, info: ValidationInfo) -> float | VaryingSettings | str:
+        extra = cls.model_fields[str(info.field_name)].json_schema_extra
+        assert isinstance(extra, dict)
+        require_bounds(value, extra["bounds"])  # type: ignore[arg-type]
+        return value
+
+    @field_validator("stress_memory_gw")
+    @classmethod
+    def _not_negative(cls, value: float | str) -> float | str:
+        if isinstance(value, float) and value < 0:
+            raise ValueError("be 0 or more, or 'infinite'")
+        return value
 
 
 def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:

@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
@@ -12,8 +12,9 @@ from pydantic_core import ErrorDetails
 from ..errors import InputError
 from .brains import SIDES, Brain
 from .checks import brain_problems, study_problems
-from .folding import FoldingSettings
+from .folding import VARYING, FoldingSettings
 from .root import Config
+from .varying import TAGS
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
 
@@ -44,9 +45,9 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
     problems += [_unknown((key,), key, list(Config.model_fields)) for key in plain if key not in Config.model_fields]
 
     valid["brains"] = _brains(plain.get("brains", _ABSENT), Path(base_dir), problems)
-    folding = plain.get("folding", {})
+    folding = _with_map_files(plain.get("folding", {}), Path(base_dir), "folding", problems)
     valid["folding"] = _validated(FoldingSettings, folding, ("folding",), problems)
-    runs = _runs(plain.get("runs"), folding if isinstance(folding, dict) else {}, problems)
+    runs = _runs(plain.get("runs"), folding if isinstance(folding, dict) else {}, Path(base_dir), problems)
     problems += study_problems(plain.get("brains"), plain.get("start"), runs)
     if problems:
         raise InputError(
@@ -109,17 +110,39 @@ def _with_files(entry: Any, base_dir: Path, where: str, problems: list[str]) -> 
     else:
         holders = [(entry, "labels", ""), (entry, "pial", "")]
     for holder, key, prefix in holders:
-        if not isinstance(holder.get(key), str):
-            continue
-        places = [base_dir / Path(holder[key]).expanduser(), Path.cwd() / holder[key]]
-        present = [place for place in places if place.is_file()]
-        holder[key] = str((present or places)[0].resolve())
-        if not present:
-            problems.append(f"{where}.{prefix}{key}: no such file: {places[0]}")
+        if isinstance(holder.get(key), str):
+            holder[key] = _found_file(holder[key], base_dir, f"{where}.{prefix}{key}", problems)
     return entry
 
 
-def _runs(raw: Any, folding: dict[str, Any], problems: list[str]) -> dict[str, dict[str, Any]]:
+def _with_map_files(settings: Any, base_dir: Path, where: str, problems: list[str]) -> Any:
+    """Returns settings of the folding with the files of maps as absolute paths; missing ones go to `problems`."""
+    if not isinstance(settings, dict):
+        return settings
+    settings = dict(settings)
+    for name in VARYING:
+        if not isinstance(settings.get(name), dict):
+            continue
+        settings[name] = dict(settings[name])
+        for key in ("map", "surface"):
+            value, place = settings[name].get(key), f"{where}.{name}.{key}"
+            if isinstance(value, str):
+                settings[name][key] = _found_file(value, base_dir, place, problems)
+            elif isinstance(value, list) and all(isinstance(path, str) for path in value):
+                settings[name][key] = [_found_file(path, base_dir, place, problems) for path in value]
+    return settings
+
+
+def _found_file(path: str, base_dir: Path, where: str, problems: list[str]) -> str:
+    """Returns the absolute path of a file; where there is none, that is added to `problems`."""
+    places = [base_dir / Path(path).expanduser(), Path.cwd() / path]
+    present = [place for place in places if place.is_file()]
+    if not present:
+        problems.append(f"{where}: no such file: {places[0]}")
+    return str((present or places)[0].resolve())
+
+
+def _runs(raw: Any, folding: dict[str, Any], base_dir: Path, problems: list[str]) -> dict[str, dict[str, Any]]:
     """Returns each run's settings: `folding` with the run's own on top."""
     if raw is None or raw == {}:
         raw = REFERENCE_RUNS
@@ -131,7 +154,8 @@ def _runs(raw: Any, folding: dict[str, Any], problems: list[str]) -> dict[str, d
         if override is not None and not isinstance(override, dict):
             problems.append(f"runs.{name}: found {override!r}; expected settings that differ from folding")
             continue
-        runs[name] = _merged(folding, override or {})
+        override = _with_map_files(override or {}, base_dir, f"runs.{name}", problems)
+        runs[name] = _merged(folding, override)
         found: list[str] = []
         _validated(FoldingSettings, runs[name], ("runs", name), found)
         # what `folding` itself has wrong was already said there
@@ -143,7 +167,7 @@ def _runs(raw: Any, folding: dict[str, Any], problems: list[str]) -> dict[str, d
 def _merged(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
     both = dict(base)
     for key, value in override.items():
-        nested = isinstance(value, dict) and isinstance(base.get(key), dict)
+        nested = isinstance(value, dict) and isinstance(base.get(key), dict) and key not in VARYING
         both[key] = _merged(base[key], value) if nested else value
     return both
 
@@ -154,9 +178,10 @@ def _dotted(path: tuple) -> str:
 
 
 def _described(kind: Any, details: ErrorDetails, path: tuple) -> str:
-    where = (*path, *details["loc"])
+    place = tuple(part for part in details["loc"] if part not in TAGS)
+    where = (*path, *place)
     if details["type"] == "extra_forbidden":
-        return _unknown(where, str(details["loc"][-1]), list(_keys_at(kind, details["loc"][:-1])))
+        return _unknown(where, str(place[-1]), list(_keys_at(kind, place[:-1])))
     if details["type"] == "missing":
         return f"{_dotted(where)}: is missing"
     expected = details["msg"].removeprefix("Value error, ").removeprefix("Input should ")
@@ -181,7 +206,7 @@ def _keys_at(kind: Any, path: tuple) -> list[str]:
 
 
 def _models(kind: Any) -> list[type[BaseModel]]:
-    if get_origin(kind) in (Union, UnionType):
+    if get_origin(kind) in (Union, UnionType, Annotated):
         return [model for part in get_args(kind) for model in _models(part)]
     return [kind] if _is_model(kind) else []
 

@@ -3,7 +3,31 @@
 from .base import Settings, setting
 
 
+class EnergySettings(Settings):
+    """What energy and emissions are estimated with: t × (cores × core_power_w + GB × memory_w_per_gb) × pue.
+
+    The formula and the defaults are those of Green Algorithms (Lannelongue, Grealey & Inouye 2021,
+    doi:10.1002/advs.202100707) for an unknown processor, a machine of one's own, and no country in particular.
+    """
+
+    core_power_w: float = setting(
+        12.0, "W", "Power of one busy core: thermal design power of the processor / its cores.", gt=0, le=1000
+    )
+    memory_w_per_gb: float = setting(0.3725, "W/GB", "Power of the memory in use.", ge=0, le=100)
+    pue: float = setting(
+        1.0,
+        "",
+        "Power usage effectiveness: 1 for a machine of your own, 1.67 for an average data centre.",
+        ge=1,
+        le=10,
+    )
+    carbon_intensity_g_per_kwh: float = setting(
+        475.0, "g/kWh", "Emissions of the electricity as CO₂; 475 is the world's average of 2019 (IEA).", ge=0, le=5000
+    )
+
+
 class ReportSettings(Settings):
-    """How figures are drawn."""
+    """How figures are drawn, and what energy is estimated with."""
 
     dpi: int = setting(150, "dots per inch", "Resolution of the PNG figures.", ge=50, le=1200)
+    energy: EnergySettings = setting(EnergySettings(), "", "Energy and emissions in the table of resources.")

@@ -1,14 +1,17 @@
 """The whole configuration."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from .base import Settings, setting
 from .brains import Brain
-from .folding import FoldingSettings, output_weeks
+from .folding import VARYING, FoldingSettings, output_weeks
+from .growth import GrowthSettings
 from .mesh import MeshSettings
 from .metrics import MetricsSettings
 from .report import ReportSettings
 from .surface import SurfaceSettings
+from .varying import VaryingSettings
 
 
 class Config(Settings):
@@ -20,6 +23,7 @@ class Config(Settings):
     start: str = setting(..., "", "The id of the brain whose folding is simulated.")
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
     mesh: MeshSettings = setting(MeshSettings(), "", "Tetrahedral mesh.")
+    growth: GrowthSettings = setting(GrowthSettings(), "", "Growth rates.")
     folding: FoldingSettings = setting(..., "", "Folding simulation.")
     runs: dict[str, FoldingSettings] = setting(
         {}, "", "Runs by name, each with what differs from `folding`; without any, one run named `reference`."
@@ -35,11 +39,18 @@ class Config(Settings):
         raise KeyError(name)
 
     def measured_name(self, brains: Iterable[str]) -> str:
-        """Returns what measured brains of these ids are called in figures: phantoms only where all of them are."""
-        phantoms = [self.brain(name).source == "phantom" for name in brains]
-        if any(phantoms):
-            return "phantom" if all(phantoms) else "real brain or phantom"
-        return "real brain"
+        """Returns what measured brains of these ids are called in figures: real ones only where one is among them.
+
+        Shapes go by their kind where all are of one.
+        """
+        chosen = [self.brain(name) for name in brains]
+        kinds = sorted({brain.shape.kind for brain in chosen if brain.shape is not None})
+        names = [
+            "real brain" if not all(brain.synthetic for brain in chosen) else "",
+            "phantom" if any(brain.source == "phantom" for brain in chosen) else "",
+            (kinds[0] if len(kinds) == 1 else "simple shape") if kinds else "",
+        ]
+        return " or ".join(name for name in names if name) or "real brain"
 
     @property
     def start_week(self) -> float:
@@ -50,3 +61,37 @@ class Config(Settings):
         """Returns the output weeks of a run, the start included."""
         settings = self.runs[run]
         return output_weeks(self.start_week, settings.end_week, settings.output_every_gw)
+
+    @property
+    def growth_brains(self) -> list[str]:
+        """The ids of the brains that growth rates are estimated from; none where they are all of one week."""
+        chosen = [brain for brain in self.brains if self.growth.brains is None or brain.id in self.growth.brains]
+        return [brain.id for brain in chosen] if len({brain.week for brain in chosen}) > 1 else []
+
+    def parameters(self, run: str) -> dict[str, Any]:
+        """Returns the settings of a run for its folding program, where a map goes by the name of its parameter.
+
+        The number of ranks is left out, since no result depends on it.
+        """
+        settings = self.runs[run].model_dump(mode="json", exclude={"ranks"})
+        for name, value in self._tables(run).items():
+            curve = {"weeks": dict(sorted(value.weeks.items()))} if value.weeks else {}
+            settings[name] = curve | ({"map": name} if value.map is not None else {})
+        return settings
+
+    def maps(self, run: str) -> dict[str, dict[str, list[str]]]:
+        """Returns for each parameter of a run that has a map its files under "map" and "surface", none for volumes."""
+
+        def listed(files: str | tuple[str, str] | None) -> list[str]:
+            return [files] if isinstance(files, str) else list(files or ())
+
+        return {
+            name: {"map": listed(value.map), "surface": listed(value.surface)}
+            for name, value in self._tables(run).items()
+            if value.map is not None
+        }
+
+    def _tables(self, run: str) -> dict[str, VaryingSettings]:
+        """Returns the parameters of a run that are curves or maps."""
+        values = {name: getattr(self.runs[run], name) for name in VARYING}
+        return {name: value for name, value in values.items() if isinstance(value, VaryingSettings)}

@@ -9,18 +9,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
 
 from ..errors import GyriflowError, InputError, StorageError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
+from ..io.maps import read_maps
 from ..io.tetmeshes import read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
 from ..step import record_exit_code
 from .output import ZONES, say
-from .parameters import FoldingParameters, parameters_from
-from .simulation import run
-from .zones import ZONE_NAMES, refuse_impossible, zone_report, zone_warnings, zones_of_run
+from .parameters import FoldingParameters, parameters_from, require_maps
+from .run import run
+from .varying import Maps
+from .zone_checks import refuse_impossible, zone_report, zone_warnings
+from .zones import ZONE_NAMES, zones_of_run
 
 PREDICTED_MIB_PER_RANK = 180
 PREDICTED_KIB_PER_TET = 3.0
@@ -32,6 +36,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m gyriflow.folding", description=__doc__)
     parser.add_argument("mesh", type=Path, help="tetrahedral mesh, RAS+ mm (XDMF)")
     parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
+    parser.add_argument("--maps", type=Path, help="maps of parameters at the mesh's vertices (HDF5)")
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     return parser.parse_args(arguments)
 
@@ -84,8 +89,10 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     parameters = read_parameters(arguments.params)
     mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
     zones = comm.bcast(zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0)
+    maps: Maps = comm.bcast(read_maps(arguments.maps) if comm.rank == 0 and arguments.maps else {}, root=0)
+    require_maps(parameters, maps, len(mesh.vertices))
     if comm.rank == 0:
-        report = zone_report(mesh, zones, parameters.thickness_mm)
+        report = zone_report(mesh, zones, float(np.median(parameters.thickness_at(parameters.start_week, maps))))
         memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024
         say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")
         for name in ZONE_NAMES:
@@ -101,7 +108,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / ZONES, report)
     comm.barrier()
-    run(comm, mesh, zones, parameters, arguments.out)
+    run(comm, mesh, zones, parameters, maps, arguments.out)
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:

@@ -8,6 +8,7 @@ import ctypes
 
 import numpy as np
 from dolfinx.la import MatrixCSR
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 # PETSc itself, through the library that is linked with it
@@ -27,9 +28,11 @@ class BlockMatrix:
     ----------
     blocks
         Matrix of 3 × 3 blocks, one block row for each local node.
+    fixed : (owned, 3) bool
+        Components of the owned nodes whose rows and columns are those of the unit matrix.
     """
 
-    def __init__(self, blocks: MatrixCSR) -> None:
+    def __init__(self, blocks: MatrixCSR, fixed: NDArray[np.bool_]) -> None:
         self.blocks = blocks
         row_map, column_map = blocks.index_map(0), blocks.index_map(1)
         owned = row_map.size_local
@@ -39,6 +42,13 @@ class BlockMatrix:
         i = (3 * row_map.local_to_global(rows)[:, None] + first).ravel().astype(PETSc.IntType)
         j = (3 * column_map.local_to_global(columns)[:, None] + second).ravel().astype(PETSc.IntType)
         self._entries = len(i)
+        # by global numbers, since the columns reach nodes that no local element has
+        everywhere = np.concatenate(row_map.comm.allgather(fixed))
+        across = everywhere[column_map.local_to_global(columns)]
+        crossed = fixed[rows][:, :, None] | across[:, None, :]
+        self._crossed = np.flatnonzero(crossed.ravel())
+        diagonal = (rows == columns)[:, None, None] & (fixed[rows][:, :, None] & np.eye(3, dtype=bool))
+        self._fixed_diagonal = np.flatnonzero(diagonal.ravel())
         self._matrix = PETSc.Mat().create(row_map.comm)
         size = (3 * owned, 3 * row_map.size_global)
         self._matrix.setSizes((size, size), bsize=3)
@@ -57,6 +67,8 @@ class BlockMatrix:
         """Returns the PETSc matrix with the present values of the blocks, contributions to ghost rows added."""
         self.blocks.scatter_reverse()
         values = np.ascontiguousarray(self.blocks.data[: self._entries], dtype=PETSc.ScalarType)
+        values[self._crossed] = 0.0
+        values[self._fixed_diagonal] = 1.0
         _check(
             _PETSC.MatSetValuesCOO(
                 ctypes.c_void_p(self._matrix.handle), values.ctypes.data_as(ctypes.c_void_p), ctypes.c_int(_INSERT)

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.hdf5 import new_hdf5
 from .parameters import FoldingParameters
+from .varying import Maps
 
 Floats = NDArray[np.float64]
+ARRAYS = ("positions", "last", "before_last", "stretch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,8 @@ class State:
         Lengths of the two last steps; zero where there was none.
     successes : int
         Steps since the last halving.
+    stretch : (m, 6) float or None
+        Elastic stretch of the elements that the next step starts with, where stress is remembered (see `memory`).
     rows : tuple of dict
         The step table so far.
     """
@@ -50,11 +54,12 @@ class State:
     last_s: float = 0.0
     before_last_s: float = 0.0
     successes: int = 0
+    stretch: Floats | None = None
     rows: tuple[dict, ...] = field(default=())
 
     @classmethod
     def at_start(cls, positions: Floats, step_s: float) -> "State":
-        """Returns the state before the first step."""
+        """Returns the state before the first step, free of stress."""
         return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
 
     def predicted(self, step_s: float) -> Floats:
@@ -67,8 +72,8 @@ class State:
         slope = (rate - self.before_last / self.before_last_s) / ((self.last_s + self.before_last_s) / 2)
         return (rate + slope * (self.last_s + step_s) / 2) * step_s
 
-    def after(self, displacement: Floats, step_s: float, row: dict) -> "State":
-        """Returns the state after an accepted step with its (n, 3) displacement in m."""
+    def after(self, displacement: Floats, step_s: float, row: dict, stretch: Floats | None = None) -> "State":
+        """Returns the state after an accepted step with its (n, 3) displacement in m and the (m, 6) stretch it left."""
         return replace(
             self,
             positions=self.positions + displacement,
@@ -78,12 +83,13 @@ class State:
             last_s=step_s,
             before_last_s=self.last_s,
             successes=self.successes + 1,
+            stretch=stretch,
             rows=(*self.rows, row),
         )
 
 
-def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters) -> str:
-    """Returns a hash of all that decides the course of a run: mesh, parameters, and the code of model and solver.
+def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) -> str:
+    """Returns a hash of all that decides the course of a run: mesh, parameters, maps, and the code of model and solver.
 
     Left out is what only decides how far it goes, when it writes and on how many ranks: a run that failed can be
     called again with an earlier end or more halvings and goes on.
@@ -99,6 +105,8 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters) -> str:
         digest.update(source.read_bytes())
     digest.update(mesh.vertices.tobytes())
     digest.update(mesh.tets.tobytes())
+    for name in sorted(parameters.maps):
+        digest.update(maps[name].tobytes())
     return digest.hexdigest()[:16]
 
 
@@ -112,7 +120,8 @@ def _checksum(arrays: dict[str, Floats], scalars: str) -> str:
 def write_checkpoint(path: Path, key: str, state: State) -> None:
     """Writes the state of the run `key`; StorageError where the disk is full or the folder cannot be written."""
     values = dict(vars(state))
-    arrays = {name: values.pop(name) for name in ("positions", "last", "before_last")}
+    arrays = {name: values.pop(name) for name in ARRAYS if values[name] is not None}
+    values.pop("stretch", None)
     scalars = json.dumps({**values, "key": key}, sort_keys=True)
     with new_hdf5(path) as file:
         for name, array in arrays.items():
@@ -128,7 +137,7 @@ def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
         return None, ""
     try:
         with h5py.File(path) as file:
-            arrays = {name: file[name][:] for name in ("positions", "last", "before_last")}
+            arrays = {name: file[name][:] for name in ARRAYS if name in file}
             scalars = file["scalars"][:].tobytes().decode()
             checksum = file.attrs["checksum"]
         if _checksum(arrays, scalars) != checksum:

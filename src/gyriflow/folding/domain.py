@@ -11,7 +11,7 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ..geometry.tetrahedra import TetrahedralMesh, volumes_between
+from ..geometry.tetrahedra import TetrahedralMesh, connected_parts, volumes_between
 from ..units import M_PER_MM
 
 Floats = NDArray[np.float64]
@@ -34,6 +34,10 @@ class Domain:
         Number of owned nodes.
     cells : (c, 4) int
         Local nodes of the local elements.
+    part : (n,) int
+        The connected part of the mesh that each vertex belongs to, equal on every rank.
+    tet_of_cell : (c,) int
+        File index of each local element.
     volumes : (c,) float
         Volumes of the local elements in m³.
     """
@@ -53,8 +57,11 @@ class Domain:
         self._geometry_node = np.empty(nodes, dtype=np.int64)
         self._geometry_node[self.cells.ravel()] = self.mesh.geometry.dofmap.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
+        self.part = connected_parts(mesh)
         self._counts = [3 * owned for owned in comm.allgather(self.owned)]
         self.volumes = self.cell_volumes(self.local(self.positions))
+        self.tet_of_cell = np.array(self.mesh.topology.original_cell_index[: len(self.cells)])
+        self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
         self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.owned]))
 
     def gathered(self, owned_values: Floats) -> Floats:
@@ -63,6 +70,12 @@ class Domain:
         self.comm.Allgatherv(np.ascontiguousarray(owned_values), (received, self._counts))
         values = np.empty_like(received)
         values[self._order] = received
+        return values
+
+    def gathered_cells(self, cell_values: Floats) -> Floats:
+        """Returns on every rank the (m, k) values of all elements, in the file's order, from the local (c, k) ones."""
+        values = np.empty((len(self._tets), cell_values.shape[1]))
+        values[self._tets] = np.concatenate(self.comm.allgather(cell_values))
         return values
 
     def local(self, values: NDArray) -> NDArray:
@@ -83,6 +96,14 @@ class Domain:
     def minimum(self, local_values: Floats) -> float:
         """Returns the smallest value over all ranks."""
         return self.comm.allreduce(float(local_values.min(initial=np.inf)), op=MPI.MIN)
+
+    def least(self, values: Floats, numbers: NDArray, places: Floats) -> tuple[float, int, Floats]:
+        """Returns the smallest of the local values over all ranks, with its number in the file and its place."""
+        found = (np.inf, -1, np.full(3, np.nan))
+        if len(values):
+            i = int(values.argmin())
+            found = (float(values[i]), int(numbers[i]), places[i])
+        return min(self.comm.allgather(found), key=lambda entry: entry[:2])
 
     def local_facets(self, facets: NDArray[np.int64], tags: NDArray[np.int64]) -> dolfinx.mesh.MeshTags:
         """Returns the tags of boundary facets, given as vertex indices of the file, on the local facets."""

@@ -1,8 +1,10 @@
-"""Cortex and core: distance to the pial surface, cortical weight, stiffness and growth fields of a step.
+"""Cortex and core: distance to the pial surface, cortical weight, stiffness and growth of a step.
 
 Plain NumPy on whole arrays. Every rank builds the same search structures from the same pial positions, so that fields
 do not depend on the number of ranks.
 """
+
+from dataclasses import dataclass
 
 import igl
 import numpy as np
@@ -10,16 +12,65 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, vertex_normals
+from .parameters import FoldingParameters
+from .varying import Maps
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 WEIGHT_REACH = 3.0
-"""Depth in cortical thicknesses beyond which the cortical weight is below 1e-8."""
+"""Depth in cortical thicknesses beyond which the cortical weight, below 1e-8, is taken as 0."""
+TIE = 1e-9
+"""Relative difference below which two distances count as equal."""
 
 
 def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:
     """Returns w = 1/(1 + exp(10 (d/H − 1))): 1 in the cortex, 0 in the core (paper, after Tallinen et al. 2016)."""
     return 1.0 / (1.0 + np.exp(np.minimum(10.0 * (distance / thickness - 1.0), 700.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Fields of a step at (n,) points.
+
+    Attributes
+    ----------
+    weight
+        Cortical weight w.
+    mu
+        Shear modulus in Pa.
+    dg, dr
+        Growth of the step along the pial surface and across it, as stretches less 1.
+    """
+
+    weight: Floats
+    mu: Floats
+    dg: Floats
+    dr: Floats
+
+
+def layers_at(
+    distance_mm: Floats, growth: Floats, parameters: FoldingParameters, maps: Maps, week: float, step_s: float
+) -> Layers:
+    """Returns the fields of a step around a week.
+
+    Parameters
+    ----------
+    distance_mm, growth
+        Distance to the pial surface, and 1 where tissue grows, at (n,) points.
+    maps
+        Parameters' maps at the same points.
+    """
+    p = parameters
+    w = cortical_weight(distance_mm, p.thickness_at(week, maps))
+    core = p.core_growth_rate_per_s.at(week, maps) * (1 - w)
+    growing = growth * step_s
+    return Layers(
+        weight=w,
+        mu=p.shear_modulus_core_pa.at(week, maps) * (1 - w) + p.shear_modulus_cortex_pa.at(week, maps) * w,
+        dg=(p.growth_rate_per_s.at(week, maps) * w + core) * growing,
+        dr=(p.radial_growth_rate_per_s.at(week, maps) * (1 - w) + core) * growing,
+    )
 
 
 class PialSearch:
@@ -33,38 +84,48 @@ class PialSearch:
         Pial facets, outward, as vertex indices.
     """
 
-    def __init__(self, positions: Floats, facets: NDArray[np.int64]) -> None:
+    def __init__(self, positions: Floats, facets: Ints) -> None:
         self.pial = np.unique(facets)
         local = np.searchsorted(self.pial, facets)
         self.surface = TriangleMesh(positions[self.pial], local)
         self.normals = vertex_normals(self.surface)
         self.tree = cKDTree(self.surface.vertices)
+        # which of several vertices comes first where they are as near
+        self._order = np.empty(len(self.pial), dtype=np.int64)
+        self._order[np.lexsort(self.surface.vertices.T[::-1])] = np.arange(len(self.pial))
 
-    def distance(self, points: Floats, reach: float = np.inf) -> Floats:
+    def nearest(self, points: Floats) -> tuple[Floats, Ints]:
+        """Returns distance and index of the pial vertex nearest to each of (k, 3) points."""
+        return self.tree.query(points)
+
+    def distance(self, points: Floats, reach: float = np.inf, to_vertex: Floats | None = None) -> Floats:
         """Returns the distances of (k, 3) points to the pial triangles.
 
-        Points that are further than `reach` from every pial vertex get the distance to the nearest vertex.
+        Where a distance is beyond `reach`, that to the nearest vertex may stand for it. `to_vertex` are the distances
+        to the nearest vertices, where they are known.
         """
-        distance = self.tree.query(points)[0]
-        near = (distance > 0) & (distance <= reach)
+        distance = (self.nearest(points)[0] if to_vertex is None else to_vertex).copy()
+        # a point of a triangle is at most edge/√3 from its nearest vertex
+        longest = np.linalg.norm(np.diff(self.surface.vertices[self.surface.faces], axis=1), axis=2).max()
+        near = (distance > 0) & (distance <= np.hypot(reach, longest / np.sqrt(3)))
         if near.any():
             faces = self.surface.faces.astype(np.int32)
             squared = igl.point_mesh_squared_distance(points[near], self.surface.vertices.copy(), faces)[0]
             distance[near] = np.sqrt(squared)
         return distance
 
-    def nearest_normals(self, points: Floats) -> Floats:
-        """Returns the (k, 3) unit normals of the pial vertices nearest to (k, 3) points.
+    def normals_from(self, points: Floats, candidates: Ints) -> Floats:
+        """Returns for (k, 3) points the unit normals of the nearest of (k, c) candidate pial vertices.
 
-        Ties (to 1e-9 of the distance) go to the vertex with the smaller coordinates, whatever the order of points.
+        Ties go to the vertex with the smaller coordinates, whatever the order of points and candidates.
         """
-        neighbours = min(2, len(self.pial))
-        distance, index = self.tree.query(points, k=neighbours)
-        if neighbours == 1:
-            return self.normals[index]
-        tied = np.flatnonzero(distance[:, 1] <= distance[:, 0] * (1 + 1e-9))
-        index = index[:, 0]
-        for i in tied:
-            ball = self.tree.query_ball_point(points[i], distance[i, 0] * (1 + 1e-9))
-            index[i] = min(ball, key=lambda j: tuple(self.surface.vertices[j]))
-        return self.normals[index]
+        gaps = np.linalg.norm(self.surface.vertices[candidates] - points[:, None], axis=2)
+        tied = gaps <= gaps.min(axis=1, keepdims=True) * (1 + TIE)
+        first = np.where(tied, self._order[candidates], len(self.pial)).argmin(axis=1)
+        return self.normals[np.take_along_axis(candidates, first[:, None], axis=1)[:, 0]]
+
+    def nearest_normals(self, points: Floats) -> Floats:
+        """Returns the (k, 3) unit normals of the pial vertices nearest to (k, 3) points, ties as in `normals_from`."""
+        neighbours = min(8, len(self.pial))
+        index = self.tree.query(points, k=neighbours)[1].reshape(len(points), neighbours)
+        return self.normals_from(points, index)

@@ -13,8 +13,15 @@ from petsc4py import PETSc
 from ..errors import SolverError
 from .problem import Problem
 
-RUNGS = ("cg", "cg, preconditioner rebuilt", "gmres", "mumps")
-KEPT, REBUILT, GMRES, DIRECT = range(4)
+RUNGS = ("cg", "cg, preconditioner rebuilt", "cg, tangent shifted", "gmres", "mumps")
+KEPT, REBUILT, SHIFTED, GMRES, DIRECT = range(5)
+ROUND_OFF = 1e-12
+"""Relative error of an energy, a sum over elements."""
+NEAR = 100.0
+"""Multiple of the tolerance below which the tangent of the iteration before is as good as a new one."""
+INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
+SHIFTS = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
+"""Parts of its diagonal that are added to a tangent that is not positive definite, one after the other."""
 
 
 @dataclass(frozen=True)
@@ -96,37 +103,61 @@ class NewtonSolver:
         krylov.setFromOptions()
         return krylov
 
-    def _run(self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool) -> tuple[bool, int]:
+    def _run(self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool) -> tuple[int, int]:
+        """Solves into the direction; returns PETSc's reason for the end, 0 for one without, and the iterations."""
         krylov.setTolerances(rtol=self._wanted_reduction)
-        krylov.setOperators(matrix)
+        krylov.setOperators(self.problem.operator(matrix), matrix)
         krylov.getPC().setReusePreconditioner(reuse)
         try:
             krylov.solve(self._residual, self._direction)
         except PETSc.Error:  # a factorisation that broke down
-            return False, 0
+            return 0, 0
         self._direction.scale(-1.0)
         finite = bool(np.isfinite(self._direction.norm()))
-        return krylov.getConvergedReason() > 0 and finite, krylov.getIterationNumber()
+        return krylov.getConvergedReason() if finite else 0, krylov.getIterationNumber()
+
+    def _run_shifted(self, matrix: PETSc.Mat) -> tuple[int, int]:
+        """Solves with a tangent whose diagonal is raised until conjugate gradients find it positive definite."""
+        diagonal, total = matrix.getDiagonal(), 0
+        for shift in SHIFTS:
+            raised = matrix.copy()
+            raised.setDiagonal(diagonal * (1 + shift))
+            raised.setNearNullSpace(self.problem.near_null_space())
+            reason, iterations = self._run(self._cg, raised, reuse=False)
+            total += iterations
+            if reason > 0:
+                break
+        self._stale = True
+        return reason, total
 
     def _solve_linear(self, matrix: PETSc.Mat, count: StepCount) -> None:
         """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
-        first = REBUILT if self._stale else KEPT
+        first, indefinite = REBUILT if self._stale else KEPT, False
         for rung in range(first, DIRECT + 1):
             if rung == KEPT:
-                solved, iterations = self._run(self._cg, matrix, reuse=True)
-                self._stale = not solved or iterations > 1.5 * self._fresh_iterations + 2
+                reason, iterations = self._run(self._cg, matrix, reuse=True)
+                self._stale = reason <= 0 or iterations > 1.5 * self._fresh_iterations + 2
             elif rung == REBUILT:
-                matrix.setNearNullSpace(rigid_body_modes(self.problem))
-                solved, iterations = self._run(self._cg, matrix, reuse=False)
-                self._fresh_iterations, self._stale = iterations, not solved
+                matrix.setNearNullSpace(self.problem.near_null_space())
+                reason, iterations = self._run(self._cg, matrix, reuse=False)
+                self._fresh_iterations, self._stale = iterations, reason <= 0
+                indefinite = reason in INDEFINITE
+            elif rung == SHIFTED:
+                if not indefinite:
+                    continue
+                reason, iterations = self._run_shifted(matrix)
             else:
                 if rung not in self._fallbacks:
                     method = ("gmres", "gamg") if rung == GMRES else ("preonly", "lu")
                     self._fallbacks[rung] = self._new_krylov(*method)
-                solved, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
+                reason, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
             count.krylov += iterations
             count.rung = max(count.rung, rung if rung > first else KEPT)
-            if solved and self._direction.dot(self._residual) < 0:
+            slope = self._direction.dot(self._residual)
+            if rung in (GMRES, DIRECT) and slope > 0:
+                # the way to a saddle: the energy falls in the other direction
+                self._direction.scale(-1.0)
+            if reason > 0 and slope != 0 and (slope < 0 or rung in (GMRES, DIRECT)):
                 return
         raise NotConvergedError("no linear solver found a descent direction")
 
@@ -138,7 +169,7 @@ class NewtonSolver:
         self._direction.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
         with self._direction.localForm() as local:
             direction = local.array_r.reshape(-1, 3).copy()
-        length = 1.0
+        length = problem.largest_step(direction)
         for _ in range(self.settings.max_backtracks):
             problem.set_displacement(start + length * direction)
             if problem.smallest_volume_ratio() > 0:
@@ -152,6 +183,9 @@ class NewtonSolver:
                     problem.set_displacement(start + length * direction)
                 energy = problem.energy()
                 if np.isfinite(trial) and energy <= before + 1e-4 * length * slope:
+                    return self._accept(trial)
+                # what is left to gain is below the energy's round-off: the residual decides
+                if trial < norm and abs(energy - before) <= ROUND_OFF * abs(before):
                     return self._accept(trial)
             length /= 2
         problem.set_displacement(start)
@@ -181,6 +215,7 @@ class NewtonSolver:
             if not norm < at_rest:  # also where it is not a number
                 problem.set_displacement(np.zeros_like(start))
                 norm = problem.residual(self._residual)
+        tangent, before = None, np.inf
         while not norm <= tolerance:
             if count.newton >= self.settings.max_newton:
                 raise NotConvergedError(
@@ -192,28 +227,10 @@ class NewtonSolver:
             enough = 0.4 * tolerance / norm
             floor = self.settings.krylov_tolerance
             self._wanted_reduction = enough if enough >= 0.1 * floor else floor
-            self._solve_linear(problem.tangent(), count)
+            if tangent is None or norm > NEAR * tolerance or norm > before / 4:
+                tangent = problem.tangent()
+            before = norm
+            self._solve_linear(tangent, count)
             norm = self._advance(norm)
         count.residual = norm / at_rest if at_rest > 0 else 0.0
         return count
-
-
-def rigid_body_modes(problem: Problem) -> PETSc.NullSpace:
-    """Returns the three translations and three rotations of the current mesh, orthonormal."""
-    domain = problem.domain
-    x = domain.local(domain.positions)[: domain.owned]
-    x = x - domain.positions.mean(axis=0)
-    modes = np.zeros((6, domain.owned, 3))
-    for i in range(3):
-        modes[i, :, i] = 1.0
-        j, k = (i + 1) % 3, (i + 2) % 3
-        modes[3 + i, :, j], modes[3 + i, :, k] = -x[:, k], x[:, j]
-    vectors: list[PETSc.Vec] = []
-    for mode in modes:
-        vector = problem.new_vector()
-        vector.array[:] = mode.ravel()
-        for other in vectors:
-            vector.axpy(-vector.dot(other), other)
-        vector.normalize()
-        vectors.append(vector)
-    return PETSc.NullSpace().create(vectors=vectors, comm=domain.comm)

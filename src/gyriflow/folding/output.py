@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, write_frame
+from ..mechanics.neo_hookean import bulk_to_shear_ratio
 from ..units import MM_PER_M, week_tag
-from .layers import WEIGHT_REACH, PialSearch, cortical_weight
+from .layers import PialSearch, layers_at
 from .parameters import FoldingParameters
+from .varying import Maps
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -43,21 +45,27 @@ def frame_path(folder: Path, week: float) -> Path:
     return folder / f"frame-{week_tag(week)}.h5"
 
 
-def layer_fields(positions_mm: Floats, zones: Zones, parameters: FoldingParameters, wanted: Iterable[str]) -> dict:
+def layer_fields(
+    positions_mm: Floats,
+    zones: Zones,
+    parameters: FoldingParameters,
+    maps: Maps,
+    week: float,
+    wanted: Iterable[str],
+) -> dict[str, NDArray]:
     """Returns the fields of a shape that are among `wanted` (names as in the parameter `fields`), per vertex.
 
     Positions are (n, 3) in mm. The names of the arrays carry their units.
     """
-    search = PialSearch(positions_mm, zones.facets)
-    distance = search.distance(positions_mm, WEIGHT_REACH * parameters.thickness_mm)
-    weight = cortical_weight(distance, parameters.thickness_mm)
-    core, cortex = parameters.shear_modulus_core_pa, parameters.shear_modulus_cortex_pa
-    growth = parameters.growth_rate_per_s * parameters.step_s * weight * zones.growth
+    search = PialSearch(positions_mm, zones.cortex_facets)
+    distance = search.distance(positions_mm)
+    layers = layers_at(distance, zones.growth, parameters, maps, week, parameters.step_s)
     fields: dict[str, dict[str, NDArray]] = {
         "distance": {"distance_to_pial_mm": distance},
-        "cortex_weight": {"cortex_weight": weight},
-        "growth": {"tangential_growth_per_step": growth},
-        "shear_modulus": {"shear_modulus_pa": core * (1 - weight) + cortex * weight},
+        "cortex_weight": {"cortex_weight": layers.weight},
+        "growth": {"tangential_growth_per_step": layers.dg, "radial_growth_per_step": layers.dr},
+        "shear_modulus": {"shear_modulus_pa": layers.mu},
+        "bulk_modulus": {"bulk_modulus_pa": bulk_to_shear_ratio(parameters.poisson_ratio) * layers.mu},
         "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in wanted else {},
         "zones": {"zone": vertex_zones(zones, len(positions_mm)), "growing": zones.growth},
     }
@@ -72,14 +80,24 @@ def vertex_zones(zones: Zones, count: int) -> NDArray[np.int32]:
 
 
 def save_frame(
-    folder: Path, week: float, positions: Floats, start: Floats, zones: Zones, parameters: FoldingParameters
+    folder: Path,
+    week: float,
+    positions: Floats,
+    start: Floats,
+    zones: Zones,
+    parameters: FoldingParameters,
+    maps: Maps,
+    elements: dict[str, Floats],
 ) -> None:
-    """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name."""
+    """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name.
+
+    `elements` are the (m,) fields of the elements that are among them.
+    """
     fields: dict[str, NDArray] = {"positions": positions * MM_PER_M}
     if "displacement" in parameters.fields:
         fields["displacement_mm"] = (positions - start) * MM_PER_M
-    fields |= layer_fields(fields["positions"], zones, parameters, parameters.fields)
-    write_frame(frame_path(folder, week), week, fields)
+    fields |= layer_fields(fields["positions"], zones, parameters, maps, week, parameters.fields)
+    write_frame(frame_path(folder, week), week, fields, elements)
 
 
 def finish(

@@ -1,13 +1,40 @@
 """What a folding run needs to know: the content of its `params.yaml`."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, get_args, get_origin, get_type_hints
 
-from ..errors import InputError
+import numpy as np
 
-FIELDS = ("displacement", "distance", "cortex_weight", "growth", "shear_modulus", "normal", "zones")
-"""Fields that a run can write for ParaView."""
+from ..errors import InputError
+from .varying import Maps, Varying
+
+FIELDS = (
+    "displacement",
+    "distance",
+    "cortex_weight",
+    "growth",
+    "shear_modulus",
+    "bulk_modulus",
+    "normal",
+    "zones",
+    "stress",
+    "strain",
+    "volume_ratio",
+)
+"""Fields that a run can write for ParaView, the last three per element."""
+SUPPORTS = ("ellipsoid", "base", "box", "free")
+VARYING = (
+    "thickness_mm",
+    "shear_modulus_cortex_pa",
+    "shear_modulus_core_pa",
+    "growth_rate_per_s",
+    "radial_growth_rate_per_s",
+    "core_growth_rate_per_s",
+)
+"""Parameters that may vary with week and place."""
+GROWTH_RATES = VARYING[3:]
 
 
 @dataclass(frozen=True)
@@ -21,8 +48,9 @@ class Contact:
 
 @dataclass(frozen=True)
 class NoGrowth:
-    """The ellipsoid of no growth, in fractions of the brain's extents."""
+    """The ellipsoid of no growth, in fractions of the brain's extents; with the kind "none" all tissue grows."""
 
+    kind: str = "ellipsoid"
     shift_y: float = 0.05
     shift_z: float = -0.15
     semi_axes: tuple[float, float, float] = (0.35, 0.40, 0.50)
@@ -42,7 +70,9 @@ class Solver:
 class FoldingParameters:
     """Parameters of a run; names carry the units, defaults are the paper's reference values.
 
-    `output_weeks` starts with `start_week` and ends with `end_week`.
+    `output_weeks` starts with `start_week` and ends with `end_week`. `support` is "ellipsoid" (pial facets inside the
+    ellipsoid of no growth are clamped), "base" (the flat base is), "box" (so it is, and the upright sides slide), or
+    "free". `stress_memory_gw` is the time in GW in which stress relaxes: 0 none is kept, infinity all of it.
     """
 
     start_week: float
@@ -50,13 +80,17 @@ class FoldingParameters:
     fissure_x_mm: float
     output_weeks: tuple[float, ...]
     step_s: float = 43_200.0
-    thickness_mm: float = 1.5
-    shear_modulus_cortex_pa: float = 1500.0
-    shear_modulus_core_pa: float = 300.0
+    thickness_mm: Varying = field(default=Varying.constant(1.5))
+    thickness_growth_mm_per_gw: float = 0.0
+    shear_modulus_cortex_pa: Varying = field(default=Varying.constant(1500.0))
+    shear_modulus_core_pa: Varying = field(default=Varying.constant(300.0))
     poisson_ratio: float = 0.45
-    growth_rate_per_s: float = 2e-7
-    radial_growth_rate_per_s: float = 0.0
+    growth_rate_per_s: Varying = field(default=Varying.constant(2e-7))
+    radial_growth_rate_per_s: Varying = field(default=Varying.constant(0.0))
+    core_growth_rate_per_s: Varying = field(default=Varying.constant(0.0))
     allow_negative_growth: bool = False
+    stress_memory_gw: float = 0.0
+    support: str = "ellipsoid"
     contact: Contact = field(default_factory=Contact)
     no_growth: NoGrowth = field(default_factory=NoGrowth)
     output_every_gw: float = 1.0
@@ -65,17 +99,14 @@ class FoldingParameters:
     ranks: int = 1
 
     def __post_init__(self) -> None:
-        growth = (self.growth_rate_per_s, self.radial_growth_rate_per_s)
         axes, solver = self.no_growth.semi_axes, self.solver
         checks = {
             "end_week must come after start_week": self.end_week > self.start_week,
             "step_s must be positive": self.step_s > 0,
-            "thickness_mm must be positive": self.thickness_mm > 0,
-            "shear moduli must be positive": min(self.shear_modulus_cortex_pa, self.shear_modulus_core_pa) > 0,
             "poisson_ratio must lie in [0, 0.5)": 0 <= self.poisson_ratio < 0.5,
-            "growth rates must not be negative unless allow_negative_growth is true": self.allow_negative_growth
-            or min(growth) >= 0,
-            "a growth rate times step_s must stay below 1": max(map(abs, growth)) * self.step_s < 1,
+            "stress_memory_gw must not be negative": self.stress_memory_gw >= 0,
+            f"support must be among {', '.join(SUPPORTS)}": self.support in SUPPORTS,
+            "no_growth.kind must be ellipsoid or none": self.no_growth.kind in ("ellipsoid", "none"),
             "contact.kind must be planes or none": self.contact.kind in ("planes", "none"),
             "contact.penalty_pa_per_m and contact.gap_mm must be positive": min(
                 self.contact.penalty_pa_per_m, self.contact.gap_mm
@@ -93,8 +124,48 @@ class FoldingParameters:
             and self.output_weeks[-1:] == (self.end_week,),
         }
         broken = [text for text, holds in checks.items() if not holds]
+        if not self.maps:
+            broken += value_problems(self, {})
         if broken:
             raise InputError("folding parameters: " + "; ".join(broken))
+
+    @property
+    def maps(self) -> set[str]:
+        """The names of the maps that the parameters need."""
+        return {name for name in (getattr(self, key).map for key in VARYING) if name is not None}
+
+    def thickness_at(self, week: float, maps: Maps) -> float | np.ndarray:
+        """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
+        return self.thickness_mm.at(week, maps) + self.thickness_growth_mm_per_gw * (week - self.start_week)
+
+
+def value_problems(p: FoldingParameters, maps: Maps) -> list[str]:
+    """Returns what is wrong with the values of parameters that may vary, over all weeks and places."""
+    smallest = {name: getattr(p, name).range(maps)[0] for name in VARYING}
+    largest = {name: max(map(abs, getattr(p, name).range(maps))) for name in GROWTH_RATES}
+    thickness_lost = min(0.0, p.thickness_growth_mm_per_gw * (p.end_week - p.start_week))
+    checks = {
+        "thickness_mm must be positive in all weeks": smallest["thickness_mm"] + thickness_lost > 0,
+        "shear moduli must be positive": min(smallest["shear_modulus_cortex_pa"], smallest["shear_modulus_core_pa"])
+        > 0,
+        "growth rates must not be negative unless allow_negative_growth is true": p.allow_negative_growth
+        or min(smallest[name] for name in GROWTH_RATES) >= 0,
+        "a growth rate times step_s must stay below 1": sum(largest.values()) * p.step_s < 1,
+    }
+    return [text for text, holds in checks.items() if not holds]
+
+
+def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
+    """Raises InputError where a map is missing, does not fit the mesh, or holds values that cannot be."""
+    for name in sorted(p.maps):
+        if name not in maps:
+            raise InputError(f"the map {name} is missing", expected="a file with it, given with --maps")
+        found = maps[name].shape
+        if found != (vertices,):
+            raise InputError(f"the map {name} does not fit the mesh", found=found, expected=f"{vertices} values")
+    problems = value_problems(p, maps)
+    if problems:
+        raise InputError("folding parameters: " + "; ".join(problems))
 
 
 def parameters_from(values: Mapping[str, Any], cls: type = FoldingParameters, where: str = "") -> Any:
@@ -121,8 +192,12 @@ def parameters_from(values: Mapping[str, Any], cls: type = FoldingParameters, wh
 
 def _converted(value: Any, hint: Any, key: str) -> Any:
     """Returns a value as the type of its field."""
+    if hint is Varying:
+        return Varying.read(value, key)
     if isinstance(hint, type) and is_dataclass(hint):
         return parameters_from(value, hint, f"{key}.")
+    if hint is float and value == "infinite":
+        return math.inf
     try:
         if get_origin(hint) is tuple:
             return tuple(_converted(item, get_args(hint)[0], key) for item in value)

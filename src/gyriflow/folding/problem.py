@@ -4,6 +4,7 @@ With `domain` and `block_matrix`, the only files that use dolfinx: what differs 
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -21,7 +22,8 @@ from ..units import M_PER_MM
 from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
-from .zones import CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, Zones
+from .rigid import FreeOperator, RigidMotions
+from .zones import LEFT_CONTACT, RIGHT_CONTACT, Zones
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +36,22 @@ class Material:
     penalty_pa_per_m: float
 
 
+class Contribution(Protocol):
+    """A further part of the energy, such as contact between folds; all of it at the problem's present displacement."""
+
+    def energy(self) -> float:
+        """Returns the energy in J, the same on every rank."""
+
+    def add_residual(self, out: PETSc.Vec) -> None:
+        """Adds the energy's derivative in N to the owned components of a vector."""
+
+    def add_tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Returns the matrix plus the energy's second derivative in N/m; the matrix itself may be changed."""
+
+    def largest_step(self, direction: Floats) -> float:
+        """Returns the part of (k, 3) local displacements that can safely be added: at most 1, equal on all ranks."""
+
+
 class Problem:
     """Energy, residual and tangent of the displacement of one step.
 
@@ -41,6 +59,8 @@ class Problem:
     ----------
     domain, zones, material
         The mesh, its fixed zones, and constants.
+    remembers_stress
+        Whether the present mesh may be stretched elastically, see `set_stretch`.
     quadrature_degree
         1 takes stiffness and growth at the centre of each element; higher degrees take them as linear in it.
 
@@ -48,10 +68,23 @@ class Problem:
     ----------
     u : dolfinx.fem.Function
         The displacement of the step in m, the unknown.
+    contributions : list of Contribution
+        Further parts of the energy.
+    last_residual : (3 · owned,) float
+        The residual that was assembled last, in N.
     """
 
-    def __init__(self, domain: Domain, zones: Zones, material: Material, *, quadrature_degree: int = 1) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        zones: Zones,
+        material: Material,
+        *,
+        quadrature_degree: int = 1,
+        remembers_stress: bool = False,
+    ) -> None:
         self.domain = domain
+        self.contributions: list[Contribution] = []
         mesh = domain.mesh
         self.u = dolfinx.fem.Function(domain.space)
         field = ("DG", 0) if quadrature_degree == 1 else ("Lagrange", 1)
@@ -67,8 +100,15 @@ class Problem:
         dx = ufl.dx(metadata={"quadrature_degree": quadrature_degree})
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": 2})
 
-        Fe = elastic_deformation(deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N))
-        energy = strain_energy_density(Fe, self._mu, ratio * self._mu) * dx
+        F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
+        if remembers_stress:
+            self._V = dolfinx.fem.Function(dolfinx.fem.functionspace(mesh, ("DG", 0, (3, 3))))
+            Fe = elastic_deformation(F * self._V, Fg_inverse)
+            # counted per volume of the state without stress
+            energy = strain_energy_density(Fe, self._mu, ratio * self._mu) / ufl.det(self._V) * dx
+        else:
+            Fe = elastic_deformation(F, Fg_inverse)
+            energy = strain_energy_density(Fe, self._mu, ratio * self._mu) * dx
         x = ufl.SpatialCoordinate(mesh)[0] + self.u[0]
         if len(zones.vertices_of(LEFT_CONTACT)) or len(zones.vertices_of(RIGHT_CONTACT)):
             energy += contact_energy_density(x, planes[0], -1, penalty) * ds(LEFT_CONTACT)
@@ -80,14 +120,22 @@ class Problem:
                 dolfinx.fem.form(form, jit_options=options) for form in (energy, residual, tangent)
             )
 
-        clamped = np.zeros(len(domain.positions), dtype=bool)
-        clamped[zones.vertices_of(CLAMPED)] = True
-        nodes = np.flatnonzero(domain.local(clamped)).astype(np.int32)
-        zero = np.zeros(3)
-        self.clamps = [dolfinx.fem.dirichletbc(zero, nodes, domain.space)]
-        self._clamped_owned = nodes[nodes < domain.owned]
-        self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact))
+        fixed = domain.local(zones.fixed)[: domain.owned]
+        self._fixed_owned = np.flatnonzero(fixed.ravel())
+        self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
+        self.last_residual = np.zeros(3 * domain.owned)
+        self._free = zones.free
+        self._motions = RigidMotions(domain, domain.part)
         self.vector = self.u.x.petsc_vec
+
+    def mesh_moved(self) -> None:
+        """Takes note of a mesh that has been placed anew."""
+        if self._free:
+            self._motions = RigidMotions(self.domain, self.domain.part)
+
+    def near_null_space(self) -> PETSc.NullSpace:
+        """Returns the rigid motions of the present mesh as a whole."""
+        return RigidMotions(self.domain, np.zeros_like(self.domain.part)).null_space(self.vector)
 
     def set_layers(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
         """Sets shear modulus (Pa) and growth increments at the local nodes, and the unit normals of the local cells."""
@@ -97,6 +145,21 @@ class Problem:
             else:
                 function.x.array[function.function_space.dofmap.list] = nodal[self.domain.cells]
         self._N.x.array.reshape(-1, 3)[self._N.function_space.dofmap.list[:, 0]] = normals
+
+    @property
+    def growth(self) -> tuple[Floats, Floats, Floats]:
+        """Growth increments dg and dr (c,) and unit normals (c, 3) of the local cells."""
+        dg, dr = (values.x.array[values.function_space.dofmap.list].mean(axis=1) for values in (self._dg, self._dr))
+        return dg, dr, self._N.x.array.reshape(-1, 3)[self._N.function_space.dofmap.list[:, 0]]
+
+    @property
+    def shear_modulus(self) -> Floats:
+        """The (c,) shear moduli in Pa of the local cells."""
+        return self._mu.x.array[self._mu.function_space.dofmap.list].mean(axis=1)
+
+    def set_stretch(self, V: Floats) -> None:
+        """Sets the elastic left stretch (c, 3, 3) of the local cells that the present mesh has kept."""
+        self._V.x.array.reshape(-1, 9)[self._V.function_space.dofmap.list[:, 0]] = V.reshape(-1, 9)
 
     @property
     def displacement(self) -> Floats:
@@ -110,23 +173,40 @@ class Problem:
     def energy(self) -> float:
         """Returns the total energy in J, contact included."""
         local = dolfinx.fem.assemble_scalar(self._energy)
-        return float(np.real(self.domain.comm.allreduce(local)))
+        total = float(np.real(self.domain.comm.allreduce(local)))
+        return total + sum(part.energy() for part in self.contributions)
 
     def residual(self, out: PETSc.Vec) -> float:
-        """Assembles the residual in N into `out`, zero at clamped nodes, and returns its norm."""
+        """Assembles the residual in N into `out`, zero where the displacement is fixed, and returns its norm."""
         with out.localForm() as local:
             local.set(0.0)
         dolfinx.fem.petsc.assemble_vector(out, self._residual)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        out.array.reshape(-1, 3)[self._clamped_owned] = 0.0
+        for part in self.contributions:
+            part.add_residual(out)
+        out.array[self._fixed_owned] = 0.0
+        if self._free:
+            self._motions.remove(out.array_w)
+        self.last_residual = out.array_r.copy()
         return out.norm()
 
     def tangent(self) -> PETSc.Mat:
-        """Returns the assembled tangent in N/m, with ones on the diagonal at clamped nodes."""
+        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed."""
         blocks = self._blocks.blocks
         blocks.set_value(0.0)
-        dolfinx.fem.assemble_matrix(blocks, self._tangent, bcs=self.clamps)
-        return self._blocks.assembled()
+        dolfinx.fem.assemble_matrix(blocks, self._tangent)
+        matrix = self._blocks.assembled()
+        for part in self.contributions:
+            matrix = part.add_tangent(matrix)
+        return matrix
+
+    def operator(self, tangent: PETSc.Mat) -> PETSc.Mat:
+        """Returns what a tangent does to admissible displacements: for a free body, without rigid motions."""
+        return FreeOperator(tangent, self._motions).as_matrix() if self._free else tangent
+
+    def largest_step(self, direction: Floats) -> float:
+        """Returns the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""
+        return min((part.largest_step(direction) for part in self.contributions), default=1.0)
 
     def new_vector(self) -> PETSc.Vec:
         """Returns a vector for residuals and directions, without values."""

@@ -1,11 +1,9 @@
-"""The time loop: layers, one Newton solve, moved mesh; halved steps where a solve fails; frames at the output weeks."""
+"""One step after the other: layers, a Newton solve, the moved mesh; halved steps where a solve fails."""
 
 import math
-import shutil
 import time
+from collections.abc import Iterable
 from dataclasses import replace
-from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -13,14 +11,18 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from ..mechanics.neo_hookean import bulk_to_shear_ratio
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
-from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
+from .checkpoint import State
 from .domain import Domain
-from .layers import WEIGHT_REACH, PialSearch, cortical_weight
+from .layers import WEIGHT_REACH, Layers, PialSearch, layers_at
+from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError
-from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say
-from .parameters import FoldingParameters
+from .output import say
+from .parameters import FoldingParameters, require_maps
 from .problem import Material, Problem
+from .stress import deformation_gradients, elastic_part, strain_fields, stress_fields, volume_ratio_fields
+from .varying import Maps
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -39,8 +41,8 @@ class Folding:
         Communicator of the solve.
     mesh
         The brain at the start, RAS+ mm; the whole mesh on every rank.
-    zones, parameters
-        What holds through the run.
+    zones, parameters, maps
+        What holds through the run; maps at the mesh's vertices, for the parameters that have one.
     quadrature_degree
         See `Problem`.
     """
@@ -51,39 +53,104 @@ class Folding:
         mesh: TetrahedralMesh,
         zones: Zones,
         parameters: FoldingParameters,
+        maps: Maps | None = None,
         *,
         quadrature_degree: int = 1,
     ) -> None:
         self.parameters = parameters
         self.zones = zones
+        self.maps = maps or {}
+        require_maps(parameters, self.maps, len(mesh.vertices))
         self.domain = Domain(comm, mesh)
         material = Material(parameters.poisson_ratio, parameters.contact.penalty_pa_per_m)
-        self.problem = Problem(self.domain, zones, material, quadrature_degree=quadrature_degree)
-        self._pial = np.unique(zones.facets)
+        self._remembers = parameters.stress_memory_gw > 0
+        self.problem = Problem(
+            self.domain, zones, material, quadrature_degree=quadrature_degree, remembers_stress=self._remembers
+        )
+        self._pial = np.unique(zones.cortex_facets)
         self._growth = self.domain.local(zones.growth)
+        self._local_maps = {name: self.domain.local(values) for name, values in self.maps.items()}
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         # far below any force of growth: a brain that does not grow must stay where it is
-        floor = 1e-11 * parameters.shear_modulus_cortex_pa * edge**2 * math.sqrt(len(mesh.vertices))
+        stiffness = parameters.shear_modulus_cortex_pa.range(self.maps)[1]
+        floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
+        self._bulk_ratio = bulk_to_shear_ratio(parameters.poisson_ratio)
+        self._shows_stress = not {"stress", "strain"}.isdisjoint(parameters.fields)
+        self._elastic = np.tile(np.eye(3), (len(self.domain.cells), 1, 1))
+        self._start = self.domain.positions
+        if "strain" in parameters.fields:
+            nodes = self.domain.local(self._start)
+            centres = nodes[self.domain.cells].mean(axis=1)
+            self._start_normals = PialSearch(self._start, zones.cortex_facets).nearest_normals(centres)
         settings = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
         self.solver = NewtonSolver(self.problem, settings, floor)
 
-    def set_layers(self, step_s: float) -> None:
-        """Sets stiffness, growth increments and normals for a step of the present shape."""
+    def set_layers(self, time_s: float, step_s: float) -> Layers:
+        """Sets stiffness, growth and normals for a step from a time on, with parameters as in its middle.
+
+        Returns the fields at the local nodes.
+        """
         p, domain = self.parameters, self.domain
-        thickness = p.thickness_mm * M_PER_MM
-        search = PialSearch(domain.positions, self.zones.facets)
+        week = p.start_week + (time_s + step_s / 2) / SECONDS_PER_GW
+        reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
+        search = PialSearch(domain.positions, self.zones.cortex_facets)
         nodes = domain.local(domain.positions)
-        weight = cortical_weight(search.distance(nodes, WEIGHT_REACH * thickness), thickness)
-        growing = self._growth * step_s
-        dg = p.growth_rate_per_s * weight * growing
-        dr = p.radial_growth_rate_per_s * (1 - weight) * growing
-        # the direction matters only where tissue grows, and the search is slow deep inside
-        grows = (np.abs(dg) + np.abs(dr))[domain.cells].max(axis=1) > NO_GROWTH
+        to_vertex, nearest = search.nearest(nodes)
+        distance = search.distance(nodes, reach, to_vertex) * MM_PER_M
+        layers = layers_at(distance, self._growth, p, self._local_maps, week, step_s)
+        # the direction matters only where growth differs along and across it
+        directed = np.abs(layers.dg - layers.dr)[domain.cells].max(axis=1) > NO_GROWTH
         normals = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
-        normals[grows] = search.nearest_normals(nodes[domain.cells[grows]].mean(axis=1))
-        mu = p.shear_modulus_core_pa * (1 - weight) + p.shear_modulus_cortex_pa * weight
-        self.problem.set_layers(mu, dg, dr, normals)
+        cells = domain.cells[directed]
+        normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
+        self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
+        self.problem.mesh_moved()
+        return layers
+
+    def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
+        """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
+        if not self._remembers:
+            return None
+        if state.stretch is None:
+            return unpacked(unstretched(len(self.domain.cells)))
+        before = unpacked(state.stretch[self.domain.tet_of_cell])
+        return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
+
+    def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
+        """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
+
+        Names are those of the parameter `fields`; those of the arrays carry their units. Right after a step only.
+        """
+        domain = self.domain
+        fields: dict[str, Floats] = {}
+        after = domain.local(domain.positions)
+        F = deformation_gradients(after - self.problem.displacement, after, domain.cells)
+        total = deformation_gradients(domain.local(self._start), after, domain.cells)
+        if "stress" in wanted:
+            mu = self.problem.shear_modulus
+            fields |= stress_fields(self._elastic, mu, self._bulk_ratio * mu)
+        if "strain" in wanted:
+            fields |= strain_fields(self._elastic, total, self._start_normals)
+        if "volume_ratio" in wanted:
+            fields |= volume_ratio_fields(F, total)
+        if not fields:
+            return fields
+        together = domain.gathered_cells(np.stack(list(fields.values()), axis=1))
+        return dict(zip(fields, together.T, strict=True))
+
+    def trouble(self) -> str:
+        """Returns where the last solve stood worst: the most compressed element and the largest residual, in mm."""
+        domain, problem = self.domain, self.problem
+        before = domain.local(domain.positions)
+        ratios = domain.cell_volumes(before + problem.displacement) / domain.volumes
+        forces = -np.linalg.norm(problem.last_residual.reshape(-1, 3), axis=1)
+        ratio, tet, centre = domain.least(ratios, domain.tet_of_cell, before[domain.cells].mean(axis=1) * MM_PER_M)
+        force, vertex, place = domain.least(forces, domain.vertex_of_node, before * MM_PER_M)
+        return (
+            f"smallest det F {ratio:.3g} in element {tet} at {np.round(centre, 1).tolist()} mm, "
+            f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(place, 1).tolist()} mm"
+        )
 
     def step(self, state: State, step_s: float) -> State:
         """Returns the state after a step of a given length, the mesh moved along; its last row says what it took.
@@ -97,7 +164,10 @@ class Folding:
         domain, problem = self.domain, self.problem
         if domain.positions is not state.positions:
             domain.place(state.positions)
-        self.set_layers(step_s)
+        self.set_layers(state.time_s, step_s)
+        stretch = self._kept_stretch(state, step_s)
+        if stretch is not None:
+            problem.set_stretch(stretch)
         count = self.solver.solve(domain.local(state.predicted(step_s)))
         min_J = problem.smallest_volume_ratio()
         energy = problem.energy()
@@ -119,7 +189,14 @@ class Folding:
             "rung": RUNGS[count.rung],
             "seconds": time.monotonic() - began,
         }
-        after = state.after(u, step_s, row)
+        left = None
+        if stretch is not None or self._shows_stress:
+            before = domain.local(domain.positions)
+            F = deformation_gradients(before, before + problem.displacement, domain.cells)
+            self._elastic = elastic_part(F, np.eye(3) if stretch is None else stretch, *problem.growth)
+        if stretch is not None:
+            left = domain.gathered_cells(packed(left_stretch(self._elastic)))
+        after = state.after(u, step_s, row, left)
         domain.place(after.positions)
         return after
 
@@ -145,7 +222,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             if half < smallest * (1 - 1e-9):
                 raise SolverError(
                     f"the step at GW {p.start_week + state.time_s / SECONDS_PER_GW:.3f} fails even with {step_s:g} s",
-                    found=error,
+                    found=f"{error}; {folding.trouble()}",
                     remedy="The last good state is kept: the same command with an earlier folding.end_week, or more "
                     "folding.solver.max_halvings, goes on from it. A finer mesh or less growth may help.",
                 ) from None
@@ -156,104 +233,3 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
-
-
-def run(
-    comm: MPI.Comm,
-    mesh: TetrahedralMesh,
-    zones: Zones,
-    parameters: FoldingParameters,
-    out: Path,
-) -> None:
-    """Folds a brain from the first to the last output week and writes frames, step table and summary into `out`.
-
-    Goes on from a checkpoint in `out` that belongs to this mesh and these parameters.
-    """
-    began = time.monotonic()
-    folding = Folding(comm, mesh, zones, parameters)
-    key = run_key(mesh, parameters)
-    folder = out / f"checkpoint-{key}"
-    state, message = comm.bcast(resumable(folder, key, parameters) if comm.rank == 0 else None, root=0)
-    if comm.rank == 0:
-        for note in (message, *foreign_checkpoints(out, folder), shortened_steps(parameters)):
-            if note:
-                say(note)
-    start = mesh.vertices * M_PER_MM
-    weeks = parameters.output_weeks
-    if state is None:
-        state = State.at_start(start, parameters.step_s)
-        if comm.rank == 0:
-            save_frame(folder, weeks[0], start, start, zones, parameters)
-    first, resumed = len(state.rows), time.monotonic()
-    for week in weeks[1:]:
-        until = seconds_to(week, parameters)
-        while state.time_s < until * (1 - 1e-12):
-            state = advance(folding, state, until)
-            if comm.rank == 0:
-                if until - state.time_s < 1e-9 * until:
-                    save_frame(folder, week, state.positions, start, zones, parameters)
-                write_checkpoint(folder / "state.h5", key, state)
-                rate = (time.monotonic() - resumed) / (len(state.rows) - first)
-                steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s
-                say(progress_line(state.rows[-1], parameters.end_week, rate * steps_left))
-    memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
-    if comm.rank == 0:
-        steps = [row["seconds"] for row in state.rows]
-        summary = {
-            "tets": len(mesh.tets),
-            "dofs": 3 * len(mesh.vertices),
-            "pial_faces": len(zones.facets),
-            "ranks": comm.size,
-            "steps": len(steps),
-            "newton": sum(row["newton"] for row in state.rows),
-            "krylov": sum(row["krylov"] for row in state.rows),
-            "seconds": time.monotonic() - began,
-            "seconds_per_step": float(np.median(steps)),
-            "peak_memory_MiB": memory,
-            "min_J": min(row["min_J"] for row in state.rows),
-            "weeks": list(weeks),
-            "resumed_after_step": first,
-        }
-        finish(out, folder, mesh.tets, weeks, state.rows, summary)
-        shutil.rmtree(folder)
-        say(f"folded to GW {parameters.end_week:g} in {len(steps)} steps, {summary['seconds']:.0f} s")
-
-
-def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
-    """Returns the state to go on from, or None, and what to tell the user.
-
-    The frames of all output weeks that the state has passed must be there.
-    """
-    state, message = read_checkpoint(folder / "state.h5", key)
-    if state is None:
-        return state, message
-    end_s = seconds_to(parameters.end_week, parameters)
-    passed = [week for week in parameters.output_weeks if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)]
-    if not all(frame_path(folder, week).exists() for week in passed):
-        return None, f"the checkpoint {folder} has passed output weeks that were not asked for then: starting anew"
-    within = tuple(row for row in state.rows if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9))
-    return replace(state, rows=within), message
-
-
-def seconds_to(week: float, parameters: FoldingParameters) -> float:
-    """Returns the time in s from the start of the run to a week."""
-    return (week - parameters.start_week) * SECONDS_PER_GW
-
-
-def foreign_checkpoints(out: Path, own: Path) -> list[str]:
-    """Returns what to say of checkpoints of other meshes or parameters, which stay; only the newest two are kept."""
-    others = sorted(
-        (path for path in out.glob("checkpoint-*") if path != own), key=lambda path: path.stat().st_mtime, reverse=True
-    )
-    for old in others[2:]:
-        shutil.rmtree(old, ignore_errors=True)
-    return [f"{path} belongs to another mesh or other parameters: not used, kept for a return" for path in others[:2]]
-
-
-def shortened_steps(parameters: FoldingParameters) -> str:
-    """Returns what to say where the time step does not divide the time between two outputs; empty where it does."""
-    step = parameters.step_s
-    for a, b in pairwise(parameters.output_weeks):
-        if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:
-            return f"step_s {step:g} does not divide the time from GW {a:g} to {b:g}: the last step there is shortened"
-    return ""

@@ -7,20 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from ..errors import InputError, MeshError
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
-from ..geometry.triangles import TriangleMesh, edges, face_areas
+from ..geometry.triangles import TriangleMesh, face_normals
 from .layers import PialSearch
 from .parameters import FoldingParameters
 
-FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES = range(5)
-MUCH_BETWEEN_PLANES = 0.05
-"""Share of the pial area between the contact planes above which a user is warned."""
-ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes")
+FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y = range(8)
+ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y")
+FLAT = 0.01
+"""Part of the extent within which vertices of a flat base or side lie."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +28,16 @@ class Zones:
     facets : (f, 3) int
         Pial facets, outward, as vertex indices.
     facet_zone : (f,) int
-        FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES.
+        FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES; BASE, SIDE_X or SIDE_Y where tissue is cut off
+        flat and there is no cortex.
     growth : (n,) float
         1 where tissue grows, 0 where it does not.
     fissure_x_mm : float
         Position of the interhemispheric fissure.
     planes_mm : (float, float)
         The plane that the left, and that the right hemisphere may not pass.
+    free : bool
+        Whether nothing is fixed on purpose, so that rigid motions are to be removed.
     """
 
     facets: NDArray[np.int64]
@@ -46,10 +45,25 @@ class Zones:
     growth: NDArray[np.float64]
     fissure_x_mm: float
     planes_mm: tuple[float, float]
+    free: bool = False
 
-    def vertices_of(self, zone: int) -> NDArray[np.int64]:
-        """Returns the vertices of the facets of a zone, each once."""
-        return np.unique(self.facets[self.facet_zone == zone])
+    def vertices_of(self, *zones: int) -> NDArray[np.int64]:
+        """Returns the vertices of the facets of some zones, each once."""
+        return np.unique(self.facets[np.isin(self.facet_zone, zones)])
+
+    @property
+    def cortex_facets(self) -> NDArray[np.int64]:
+        """The (c, 3) facets under which the cortex lies: all but flat cuts."""
+        return self.facets[self.facet_zone < BASE]
+
+    @property
+    def fixed(self) -> NDArray[np.bool_]:
+        """Which of the (n, 3) components of the vertices' displacements are zero."""
+        fixed = np.zeros((len(self.growth), 3), dtype=bool)
+        fixed[self.vertices_of(CLAMPED, BASE)] = True
+        fixed[self.vertices_of(SIDE_X), 0] = True
+        fixed[self.vertices_of(SIDE_Y), 1] = True
+        return fixed
 
 
 def inside_ellipsoid(
@@ -62,6 +76,24 @@ def inside_ellipsoid(
     return (((vertices - centre) / (np.array(semi_axes) * extent)) ** 2).sum(axis=1) <= 1
 
 
+def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64], sides: bool) -> NDArray[np.int64]:
+    """Returns BASE for facets of a flat base, SIDE_X and SIDE_Y for those of upright sides if asked for, else FREE.
+
+    A facet belongs to a cut where its vertices lie within a hundredth of the extent of the mesh's end and it faces it.
+    """
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    near = FLAT * (high - low)
+    normals = face_normals(TriangleMesh(mesh.vertices, facets))
+    corners = mesh.vertices[facets]
+    zone = np.full(len(facets), FREE)
+    for axis, name in ((0, SIDE_X), (1, SIDE_Y)) if sides else ():
+        for end, sign in ((low, -1.0), (high, 1.0)):
+            at_end = (np.abs(corners[:, :, axis] - end[axis]) <= near[axis]).all(axis=1)
+            zone[at_end & (sign * normals[:, axis] > 0.7)] = name
+    zone[(corners[:, :, 2] <= low[2] + near[2]).all(axis=1) & (normals[:, 2] < -0.7)] = BASE
+    return zone
+
+
 def find_zones(
     mesh: TetrahedralMesh,
     *,
@@ -71,6 +103,8 @@ def find_zones(
     shift_y: float,
     shift_z: float,
     semi_axes: tuple[float, float, float],
+    support: str = "ellipsoid",
+    grows_everywhere: bool = False,
 ) -> Zones:
     """Returns the zones of a brain in RAS+ mm.
 
@@ -84,6 +118,10 @@ def find_zones(
         Whether the hemispheres are kept apart by the planes.
     shift_y, shift_z, semi_axes
         The ellipsoid of no growth, in fractions of the brain's extents (Tallinen et al. 2016).
+    support
+        "ellipsoid", "base", "box" or "free", as in `FoldingParameters`.
+    grows_everywhere
+        Whether all tissue grows, that in the ellipsoid and that between the planes too.
     """
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
@@ -94,20 +132,33 @@ def find_zones(
     between = ((facet_x > left_plane) & (facet_x < right_plane)).all(axis=1)
 
     zone = np.full(len(facets), FREE)
-    zone[still[facets].all(axis=1)] = CLAMPED
+    if support == "ellipsoid":
+        zone[still[facets].all(axis=1)] = CLAMPED
     if contact:
         zone[between] = BETWEEN_PLANES
         zone[((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)).all(axis=1)] = LEFT_CONTACT
         zone[((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)).all(axis=1)] = RIGHT_CONTACT
+    if support in ("base", "box"):
+        cuts = flat_cuts(mesh, facets, sides=support == "box")
+        zone[cuts != FREE] = cuts[cuts != FREE]
 
+    growth = np.ones(len(mesh.vertices))
+    if not grows_everywhere:
+        growth[still] = 0.0
+        growth[bridge_vertices(mesh, facets, left_plane, right_plane)] = 0.0
+    return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), support == "free")
+
+
+def bridge_vertices(
+    mesh: TetrahedralMesh, facets: NDArray[np.int64], left_plane: float, right_plane: float
+) -> NDArray[np.int64]:
+    """Returns the vertices of the elements whose innermost vertex lies between the planes, each once."""
+    x = mesh.vertices[:, 0]
     depth = PialSearch(mesh.vertices, facets).distance(mesh.vertices)[mesh.tets]
     # where several vertices are as deep, all of them must lie between the planes
     innermost = depth >= depth.max(axis=1, keepdims=True) - 1e-9
     bridging = ((x > left_plane) & (x < right_plane))[mesh.tets]
-    bridge = mesh.tets[(bridging | ~innermost).all(axis=1)]
-    growth = np.where(still, 0.0, 1.0)
-    growth[np.unique(bridge)] = 0.0
-    return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane))
+    return np.unique(mesh.tets[(bridging | ~innermost).all(axis=1)])
 
 
 def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
@@ -121,101 +172,6 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         shift_y=p.no_growth.shift_y,
         shift_z=p.no_growth.shift_z,
         semi_axes=p.no_growth.semi_axes,
+        support=p.support,
+        grows_everywhere=p.no_growth.kind == "none",
     )
-
-
-def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
-    """Returns what a user should see before the first step.
-
-    Facets and area per zone, the clamped share of each hemisphere's facets, the initial penetration of the planes
-    in mm (0 by construction) and the number of elements through the cortical thickness.
-    """
-    pial = TriangleMesh(mesh.vertices, zones.facets)
-    areas = face_areas(pial)
-    centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
-    clamped = zones.facet_zone == CLAMPED
-    sides = {"left": centroid_x < zones.fissure_x_mm, "right": centroid_x >= zones.fissure_x_mm}
-    beyond = [mesh.vertices[zones.vertices_of(LEFT_CONTACT), 0] - zones.planes_mm[0]]
-    beyond += [zones.planes_mm[1] - mesh.vertices[zones.vertices_of(RIGHT_CONTACT), 0]]
-    return {
-        "zones": {
-            name: {"facets": int((zones.facet_zone == i).sum()), "area_mm2": float(areas[zones.facet_zone == i].sum())}
-            for i, name in enumerate(ZONE_NAMES)
-        },
-        "clamped_share": {
-            side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
-        },
-        "growing_vertices": int((zones.growth > 0).sum()),
-        "initial_penetration_mm": float(
-            max(0.0, *(gap.max() for gap in beyond if gap.size)) if any(gap.size for gap in beyond) else 0.0
-        ),
-        "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
-    }
-
-
-def zone_warnings(report: dict) -> list[str]:
-    """Returns what a user should know of the zones, from their report, before trusting a run."""
-    warnings = []
-    through = report["elements_through_cortex"]
-    if through < 2:
-        warnings.append(f"fewer than two elements through the cortex ({through:.2f}): folds may be mesh noise")
-    areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
-    share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
-    if share > MUCH_BETWEEN_PLANES:
-        warnings.append(
-            f"{share:.0%} of the pial area lies between the contact planes and feels no contact, so the hemispheres "
-            "may cross: lower folding.contact.gap_mm below twice the fissure's width, or raise surface.gap_mm"
-        )
-    return warnings
-
-
-def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
-    """Returns the mean edge length in mm of the elements whose centroid lies in the cortex."""
-    centroids = mesh.vertices[mesh.tets].mean(axis=1)
-    depth = cKDTree(mesh.vertices[np.unique(zones.facets)]).query(centroids)[0]
-    cortex = mesh.tets[depth <= thickness_mm]
-    if not len(cortex):
-        cortex = mesh.tets
-    pairs = cortex[:, [0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3]].reshape(-1, 2)
-    return float(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1), axis=-1).mean())
-
-
-def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
-    """Raises an error for a brain that cannot be folded with these zones.
-
-    Raises
-    ------
-    InputError
-        Where nothing grows, no facet is clamped, or the fissure lies outside the brain.
-    MeshError
-        Where the pial surface is not closed, or a part of the brain has no clamped facet and would float.
-    """
-    low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
-    if not low < zones.fissure_x_mm < high:
-        raise InputError(
-            "the fissure lies outside the brain",
-            found=f"fissure_x_mm {zones.fissure_x_mm:.2f}",
-            expected=f"a value between {low:.2f} and {high:.2f} mm",
-        )
-    _, uses = edges(TriangleMesh(mesh.vertices, zones.facets))
-    if (uses % 2).any():
-        raise MeshError("the boundary of the mesh is not closed", found=f"{int((uses % 2).sum())} open edges")
-    if not (zones.growth > 0).any():
-        raise InputError("no vertex grows", remedy="Make the no-growth ellipsoid smaller (folding.no_growth).")
-    clamped = zones.vertices_of(CLAMPED)
-    if not len(clamped):
-        raise InputError(
-            "no facet is clamped, so the brain would drift",
-            expected="pial facets inside the no-growth ellipsoid, outside the contact zones",
-            remedy="Make or move the ellipsoid so that it cuts the pial surface (folding.no_growth).",
-        )
-    pairs = mesh.tets[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
-    parts, part = connected_components(graph, directed=False)
-    floating = np.setdiff1d(np.arange(parts), part[clamped])
-    if len(floating):
-        raise MeshError(
-            "parts of the brain have no clamped facet and would float",
-            found=f"{len(floating)} of {parts} parts, the largest with {np.bincount(part)[floating].max()} vertices",
-            remedy="Drop small parts in the surface stage, or make the no-growth ellipsoid reach every part.",
-        )

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from .triangles import Floats, Ints, TriangleMesh, frozen
 
@@ -43,6 +45,13 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
 def signed_volumes(mesh: TetrahedralMesh) -> Floats:
     """Returns the (m,) volumes in mm³, negative for inverted elements."""
     return volumes_between(mesh.vertices, mesh.tets)
+
+
+def connected_parts(mesh: TetrahedralMesh) -> Ints:
+    """Returns for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
+    pairs = mesh.tets[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:

@@ -1,6 +1,8 @@
 """The frames of a folding run: one HDF5 file, with an XDMF file beside it that ParaView opens as a time series.
 
-Layout of the HDF5 file: `tets` (m, 4); per output week a group `week_21.00` with `positions` (n, 3) in mm and fields.
+Layout of the HDF5 file: `tets` (m, 4), once; per output week a group `week_21.00` with `positions` (n, 3) in mm, fields
+at the vertices, and in its group `cell_fields` those of the elements. Positions are in double precision: metrics and
+displacements are computed from them. Fields are in single precision, about seven digits, at half the size.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,21 +19,63 @@ from .files import replaced
 from .hdf5 import new_hdf5
 from .tetmeshes import attribute, document, geometry, topology
 
+POSITIONS = "positions"
+CELL_FIELDS = "cell_fields"
+
 
 def group_name(week: float) -> str:
     """Returns the name of the group of a week."""
     return f"week_{week_tag(week)}"
 
 
-def write_frame(path: str | PathLike[str], week: float, fields: Mapping[str, NDArray]) -> None:
-    """Writes one frame to a file of its own; `fields` holds `positions` (n, 3) in mm and further arrays by name."""
+def write_frame(
+    path: str | PathLike[str],
+    week: float,
+    vertex_fields: Mapping[str, NDArray],
+    cell_fields: Mapping[str, NDArray] | None = None,
+) -> None:
+    """Writes one frame to a file of its own.
+
+    Parameters
+    ----------
+    week
+        Gestational week of the frame.
+    vertex_fields
+        `positions` (n, 3) in mm and further arrays (n,) or (n, 3) by name.
+    cell_fields
+        Arrays (m,), (m, 3) or (m, 9) by name, one value per element in the order of the run's mesh.
+
+    Raises
+    ------
+    ValueError
+        Where fields at the vertices are not of one length.
+    """
+    if len({len(values) for values in vertex_fields.values()}) != 1:
+        raise ValueError(f"fields at the vertices differ in length: {_lengths(vertex_fields)}")
     with new_hdf5(path) as file:
-        for name, values in fields.items():
-            file[f"{group_name(week)}/{name}"] = values
+        frame = file.create_group(group_name(week))
+        for name, values in vertex_fields.items():
+            frame[name] = values if name == POSITIONS else _single(values)
+        for name, values in (cell_fields or {}).items():
+            frame[f"{CELL_FIELDS}/{name}"] = _single(values)
+
+
+def _single(values: NDArray) -> NDArray:
+    return values.astype(np.float32) if values.dtype.kind == "f" else values
+
+
+def _lengths(fields: Mapping[str, NDArray]) -> str:
+    return ", ".join(f"{name} {len(values)}" for name, values in fields.items())
 
 
 def join_frames(path: str | PathLike[str], tets: NDArray, frames: Sequence[str | PathLike[str]]) -> None:
-    """Joins the files of single frames, in the order of time, into `path` (.h5) with a .xdmf beside it."""
+    """Joins the files of single frames, in the order of time, into `path` (.h5) with a .xdmf beside it.
+
+    Raises
+    ------
+    ValueError
+        Where fields of the elements do not fit the (m, 4) tetrahedra.
+    """
     path = Path(path)
     with new_hdf5(path) as file:
         file["tets"] = tets.astype(np.int32)
@@ -52,12 +96,16 @@ def _time_series(data_name: str, file: h5py.File) -> str:
         parts = [
             f'<Time Value="{float(name.removeprefix("week_"))}"/>',
             topology(tets, f"{data_name}:/tets"),
-            geometry(frame["positions"], f"{data_name}:/{name}/positions"),
+            geometry(frame[POSITIONS], f"{data_name}:/{name}/{POSITIONS}"),
         ]
         for field, values in frame.items():
-            if field != "positions":
-                centre = "Cell" if len(values) == len(tets) else "Node"
-                parts.append(attribute(field, centre, values, f"{data_name}:/{name}/{field}"))
+            if field not in (POSITIONS, CELL_FIELDS):
+                parts.append(attribute(field, "Node", values, f"{data_name}:/{name}/{field}"))
+        cell_fields = frame.get(CELL_FIELDS, {})
+        if any(len(values) != len(tets) for values in cell_fields.values()):
+            raise ValueError(f"fields of {len(tets)} elements in {name} have other lengths: {_lengths(cell_fields)}")
+        for field, values in cell_fields.items():
+            parts.append(attribute(field, "Cell", values, f"{data_name}:/{name}/{CELL_FIELDS}/{field}"))
         grids.append(f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>')
     return f'<Grid Name="folding" GridType="Collection" CollectionType="Temporal">{"".join(grids)}</Grid>'
 
@@ -74,15 +122,24 @@ def read_tets(path: str | PathLike[str]) -> NDArray[np.int64]:
         return file["tets"][:].astype(np.int64)
 
 
-def read_field(path: str | PathLike[str], week: float, field: str) -> NDArray[np.float64]:
-    """Returns a field of the frame of a week; InputError where there is none, the weeks present named."""
-    with h5py.File(path) as file:
-        name = f"{group_name(week)}/{field}"
-        if name not in file:
-            raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {read_weeks(path)}")
-        return file[name][:]
+def read_field(path: str | PathLike[str], week: float, field: str) -> NDArray:
+    """Returns a field at the vertices at a week; InputError, which names the weeks there are, where there is none."""
+    return _values(path, week, field, field)
+
+
+def read_cell_field(path: str | PathLike[str], week: float, field: str) -> NDArray:
+    """Returns a field of the elements, as `read_field` does one at the vertices."""
+    return _values(path, week, field, f"{CELL_FIELDS}/{field}")
 
 
 def read_positions(path: str | PathLike[str], week: float) -> NDArray[np.float64]:
     """Returns the (n, 3) positions in mm at a week."""
-    return read_field(path, week, "positions")
+    return read_field(path, week, POSITIONS)
+
+
+def _values(path: str | PathLike[str], week: float, field: str, where: str) -> NDArray:
+    with h5py.File(path) as file:
+        name = f"{group_name(week)}/{where}"
+        if name not in file:
+            raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {read_weeks(path)}")
+        return file[name][:]

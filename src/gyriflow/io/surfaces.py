@@ -88,14 +88,15 @@ def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Struct
 
 def read_vertex_maps(path: AnyPath) -> dict[str, NDArray[np.float64]]:
     """Returns the named per-vertex values of a GIFTI shape file."""
-    image = _load_gifti(path)
+    image = load_gifti(path)
     return {
         array.meta.get("Name") or f"map {number}": np.asarray(array.data, dtype=float)
         for number, array in enumerate(image.darrays)
     }
 
 
-def _load_gifti(path: AnyPath) -> GiftiImage:
+def load_gifti(path: AnyPath) -> GiftiImage:
+    """Returns the image of a GIFTI file; InputError where it is missing, truncated or of another kind."""
     try:
         image = nib.load(path)
     except FileNotFoundError as error:
@@ -113,7 +114,7 @@ def _load_gifti(path: AnyPath) -> GiftiImage:
 
 
 def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
-    image = _load_gifti(path)
+    image = load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
     if len(points) != 1 or len(triangles) != 1 or not len(points[0].data) or not len(triangles[0].data):

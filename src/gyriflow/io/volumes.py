@@ -1,4 +1,4 @@
-"""Label volumes in NIfTI (and MGH) files, always in RAS+ mm."""
+"""Volumes of labels and other numbers in NIfTI (and MGH) files, always in RAS+ mm."""
 
 import logging
 import zlib
@@ -46,23 +46,35 @@ def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto") -> Labe
     `affine_from` says which of NIfTI's two matrices counts; "auto" takes the one that is set and refuses two that
     disagree. InputError for missing or truncated files, values that are no whole numbers, NaN, unclear orientation.
     """
+    values, affine = read_values(path, affine_from, "labels")
+    return LabelVolume(_whole_numbers(values, path), affine)
+
+
+def read_values(
+    path: AnyPath, affine_from: AffineSource, content: str
+) -> tuple[NDArray[np.number], NDArray[np.float64]]:
+    """Returns the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
+
+    `content` says in messages what the values are: "labels". InputError for missing or truncated files, other numbers
+    of axes, unclear orientation.
+    """
     try:
         image = nib.load(path)
         if not isinstance(image, SpatialImage):
-            raise InputError("is no volume", path=path, found=type(image).__name__, expected="a label volume")
+            raise InputError("is no volume", path=path, found=type(image).__name__, expected=f"a volume of {content}")
         values = np.asanyarray(image.dataobj)
     except FileNotFoundError as error:
-        raise InputError("no such file", path=path, expected="a label volume (.nii, .nii.gz, .mgz)") from error
+        raise InputError("no such file", path=path, expected=f"a volume of {content} (.nii, .nii.gz, .mgz)") from error
     except (ImageFileError, HeaderDataError, EOFError, OSError, ValueError, zlib.error) as error:
         raise InputError(
             f"cannot be read as an image: {error}",
             path=path,
-            expected="a whole label volume (.nii, .nii.gz, .mgz)",
+            expected=f"a whole volume of {content} (.nii, .nii.gz, .mgz)",
             remedy="The file may be truncated or of another kind: copy or download it again.",
         ) from error
-    labels = _whole_numbers(_three_axes(values, path), path)
+    values = _three_axes(values, path, content)
     affine = _nifti_affine(image, affine_from, path) if isinstance(image, nib.Nifti1Image) else image.affine
-    return LabelVolume(labels, _checked_affine(np.array(affine, dtype=float), path))
+    return values, _checked_affine(np.array(affine, dtype=float), path)
 
 
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
@@ -100,7 +112,7 @@ def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPa
             "neither qform nor sform is set, so left and right are unknown",
             path=path,
             expected="a qform or sform code > 0",
-            remedy="Write the orientation into the file, or say which matrix holds with affine_from: qform or sform.",
+            remedy="Write the orientation into the file, or say which matrix holds with the brain's affine_from.",
         )
     if len(given) == 2:
         shape = np.array(image.shape[:3]) - 1
@@ -116,7 +128,7 @@ def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPa
                 found=f"\nqform (code {codes['qform']})\n{matrices['qform']}\n"
                 f"sform (code {codes['sform']})\n{matrices['sform']}\n",
                 expected="the same position of every voxel",
-                remedy="Say which one holds with affine_from: qform or sform.",
+                remedy="Say which one holds with the brain's affine_from: qform or sform.",
             )
     return scale @ matrices[given[0]]
 
@@ -130,16 +142,16 @@ def _checked_affine(affine: NDArray[np.float64], path: AnyPath) -> NDArray[np.fl
     return affine
 
 
-def _three_axes(values: NDArray, path: AnyPath) -> NDArray:
+def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
     shape = values.shape
     kept = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
     if len(kept) != 3 or values.dtype.kind not in "biuf":
         raise InputError(
-            "is not a volume of labels",
+            f"is not a volume of {content}",
             path=path,
             found=f"shape {shape}, type {values.dtype}",
-            expected="three axes (further ones of length 1) of whole numbers",
-            remedy="Give the label volume, not the images of a time series or of a colour map.",
+            expected="three axes (further ones of length 1) of numbers",
+            remedy="Give a single volume, not the images of a time series or of a colour map.",
         )
     return values.reshape(kept)
 

@@ -53,7 +53,7 @@ def growth_chart(
     areas: pd.DataFrame,
     rates: pd.DataFrame,
     *,
-    folding_rate_per_s: float | None = None,
+    folding_rate_per_s: float | Mapping[float, float] | None = None,
     measured: str = REAL_BRAIN,
     title: str = "",
     synthetic: bool = False,
@@ -65,7 +65,8 @@ def growth_chart(
     areas : columns subject, week, area_cm2, volume_ml
     rates : columns from_week, to_week, rate_per_s (1/s)
     folding_rate_per_s
-        Growth rate of the folding in 1/s, drawn as a line over the bars.
+        Growth rate of the folding in 1/s, drawn as a line over the bars: a number, or values by week that are linear
+        in between and constant beyond.
     """
     figure = new_figure(FULL_WIDTH_IN, 2.6, title=title, synthetic=synthetic)
     area_axes, rate_axes = figure.subplots(1, 2)
@@ -87,17 +88,15 @@ def growth_chart(
         column_label((a, b)).removesuffix(" GW") for a, b in zip(rates["from_week"], rates["to_week"], strict=True)
     ]
     bars = rate_axes.bar(labels, scaled, width=0.7, color=RUN_COLOURS[0])
-    rate_axes.bar_label(
-        bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5 if len(rates) <= 10 else 5, padding=1
-    )
+    # in front of the folding's line, where they meet
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+    size = 6.5 if len(rates) <= 10 else 5
+    texts = rate_axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=size, padding=2)
+    for text in texts:
+        text.set(bbox=box, zorder=3)
     rate_axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
-        rate_axes.axhline(
-            folding_rate_per_s * 1e7,
-            color=RUN_COLOURS[1],
-            linestyle="--",
-            label=f"folding: {folding_rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹",
-        )
+        _folding_line(rate_axes, rates, folding_rate_per_s)
         # above the axes, where no bar can be
         rate_axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.06), borderaxespad=0)
     rate_axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
@@ -110,6 +109,20 @@ def growth_chart(
     spare = max(0.0, 3 - len(labels)) / 2
     rate_axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
     return figure
+
+
+def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]) -> None:
+    """Draws the folding's growth rate over bars of equal width, one per interval of the rates."""
+    look: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
+    if not isinstance(rate_per_s, Mapping):
+        axes.axhline(rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **look)
+        return
+    weeks = np.array(sorted(rate_per_s))
+    values = 1e7 * np.array([rate_per_s[week] for week in weeks])
+    ends = np.array([*rates["from_week"], rates["to_week"].iloc[-1]])
+    shown = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
+    places = np.interp(shown, ends, np.arange(len(ends)) - 0.5)
+    axes.plot(places, np.interp(shown, weeks, values), label="folding", **look)
 
 
 def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> set[str]:

@@ -1,24 +1,12 @@
 """A brain's pial surface from each kind of input, posed in RAS+ mm: the calls of the surface stage."""
 
 import logging
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import (
-    TriangleMesh,
-    area,
-    corners,
-    euler_number,
-    is_closed,
-    mean_edge_length,
-    merged,
-    signed_volume,
-    transformed,
-)
+from gyriflow.geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
 from gyriflow.surface.extraction import (
     PAD_VOXELS,
     cropped,
@@ -29,14 +17,23 @@ from gyriflow.surface.extraction import (
     smoothed_mask,
 )
 from gyriflow.surface.fissure import Fissure, fissure_between, opened
-from gyriflow.surface.hemispheres import least_gap, left_faces, parted, require_common_pose, require_pair, set_apart
+from gyriflow.surface.hemispheres import (
+    least_gap,
+    left_faces,
+    parted,
+    require_common_pose,
+    require_pair,
+    set_apart,
+    split,
+)
 from gyriflow.surface.labels import LabelScheme, cerebrum_mask, require_sides
 from gyriflow.surface.orientation import MidPlane, mid_plane, upright
+from gyriflow.surface.outcome import PialSurface, described, faults, require_sound
 from gyriflow.surface.remaking import remade
-from gyriflow.surface.remeshing import evened, self_intersecting_faces
+from gyriflow.surface.remeshing import evened
 from gyriflow.surface.repair import cleaned, pieces
 from gyriflow.surface.size import require_plausible_size
-from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
+from gyriflow.units import ML_PER_MM3
 
 log = logging.getLogger(__name__)
 
@@ -44,29 +41,6 @@ Coordinates = Literal["ras", "lps"]
 LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
-
-
-@dataclass(frozen=True, eq=False)
-class PialSurface:
-    """A posed pial surface in RAS+ mm.
-
-    Attributes
-    ----------
-    whole
-        The closed, outward surface of the brain: one piece, or one for each hemisphere.
-    left, right
-        The hemispheres' parts of it, open where a connected brain is cut at the fissure.
-    fissure_x_mm
-        Where the interhemispheric fissure is: the plane x = const between the hemispheres.
-    report
-        What was found and done, in plain values for JSON.
-    """
-
-    whole: TriangleMesh
-    left: TriangleMesh
-    right: TriangleMesh
-    fissure_x_mm: float
-    report: dict[str, Any]
 
 
 def from_labels(
@@ -174,6 +148,17 @@ def from_pial(
     return _posed(mesh, left, plane, report, week)
 
 
+def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
+    """Returns a simple geometry as it is, in the place of a brain: its left and right meet at x = 0.
+
+    It has no fissure to be found and no size of its own, and smoothing would round its edges. MeshError where it is
+    not closed or cuts itself.
+    """
+    require_sound(mesh)
+    pose = {"pose": np.eye(4).tolist(), "rotation_deg": 0.0}
+    return described(mesh, *split(mesh, 0.0), 0.0, {"source": "shape", **pose}, week)
+
+
 def _with_fissure(
     field: NDArray[np.float32], affine: NDArray[np.float64], core: NDArray[np.bool_], fissure: Fissure, gap_mm: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float64], float]:
@@ -214,30 +199,12 @@ def _even(
     Where the triangles can't be repaired, the surface is made anew through voxels of half an edge length.
     """
     even, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
-    if _faults(even):
-        _warn(report, f"the surface was made anew through voxels, since it had {_faults(even)}")
+    if faults(even):
+        _warn(report, f"the surface was made anew through voxels, since it had {faults(even)}")
         mesh, report["topology"] = remade(mesh, 0.5 * edge_length_mm)
         even, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
-    if _faults(even):
-        raise MeshError(
-            "the surface could not be made good",
-            found=_faults(even),
-            expected="closed pieces of Euler number 2 that do not cut themselves",
-            remedy="Look at the labels or the surface there; more smoothing or shorter edges may help.",
-        )
+    require_sound(even)
     return even
-
-
-def _faults(mesh: TriangleMesh) -> str:
-    """Returns what keeps the surface from being closed spheres without intersections; empty where nothing does."""
-    euler = [euler_number(piece) for piece in pieces(mesh)]
-    cutting = int(self_intersecting_faces(mesh).sum())
-    found = [
-        "edges without two faces" if not is_closed(mesh) else "",
-        f"Euler numbers {euler}" if any(number != 2 for number in euler) else "",
-        f"{cutting} faces that cut others" if cutting else "",
-    ]
-    return ", ".join(fault for fault in found if fault)
 
 
 def _posed(
@@ -256,26 +223,14 @@ def _posed(
         _warn(report, "no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
     if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * width:
         _warn(report, f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
-    parts = {"whole": whole, "left": left, "right": right}
     report |= {
-        "week": week,
         "pose": matrix.tolist(),
         "rotation_deg": angle,
-        "fissure_x_mm": fissure_x,
         "fissure_points": plane.fissure_points,
         "fissure_scatter_mm": plane.scatter_mm,
         "asymmetry_mm": plane.asymmetry_mm,
-        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items()},
-        "volume_mL": signed_volume(whole) * ML_PER_MM3,
-        "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
-        "vertices": len(whole.vertices),
-        "faces": len(whole.faces),
-        "mean_edge_mm": mean_edge_length(whole),
-        "pieces": len(pieces(whole)),
-        "euler_number": euler_number(whole),
     }
-    report.setdefault("warnings", [])
-    return PialSurface(whole, left, right, fissure_x, report)
+    return described(whole, left, right, fissure_x, report, week)
 
 
 def _warn(report: dict[str, Any], message: str) -> None:

@@ -60,7 +60,7 @@ def test_all_mistakes_are_named_at_once():
         ("step_s", True, "number"),
         ("growth_rate_per_s", float("nan"), "finite"),
         ("ranks", 1.5, "integer"),
-        ("fields", ["stress"], "'displacement'"),
+        ("fields", ["tension"], "'displacement'"),
         ("contact", {"kind": "walls"}, "'planes' or 'none'"),
     ],
 )

@@ -82,20 +82,20 @@ def test_no_checkpoint_says_nothing(tmp_path):
 def test_the_key_knows_mesh_and_parameters_but_not_ranks():
     mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
     base = parameters_from(VALUES)
-    assert run_key(mesh, base) == run_key(mesh, parameters_from(VALUES | {"ranks": 7}))
-    assert run_key(mesh, base) != run_key(mesh, parameters_from(VALUES | {"thickness_mm": 2.0}))
-    assert run_key(mesh, base) != run_key(box_mesh((1, 1, 1), (1.0, 1.0, 1.1)), base)
+    assert run_key(mesh, base, {}) == run_key(mesh, parameters_from(VALUES | {"ranks": 7}), {})
+    assert run_key(mesh, base, {}) != run_key(mesh, parameters_from(VALUES | {"thickness_mm": 2.0}), {})
+    assert run_key(mesh, base, {}) != run_key(box_mesh((1, 1, 1), (1.0, 1.0, 1.1)), base, {})
+    mapped = parameters_from(VALUES | {"thickness_mm": {"map": "thickness_mm"}})
+    thin, thick = ({"thickness_mm": np.full(8, h)} for h in (1.0, 2.0))
+    assert run_key(mesh, mapped, thin) != run_key(mesh, mapped, thick)
 
 
 def test_defaults_are_the_papers_reference_values():
     p = FoldingParameters(21.0, 36.0, 0.0, (21.0, 36.0))
-    assert (p.thickness_mm, p.shear_modulus_cortex_pa, p.shear_modulus_core_pa, p.poisson_ratio) == (
-        1.5,
-        1500,
-        300,
-        0.45,
-    )
-    assert (p.growth_rate_per_s, p.contact.penalty_pa_per_m, p.step_s) == (2e-7, 5e5, 43200)
+    constants = (p.thickness_mm, p.shear_modulus_cortex_pa, p.shear_modulus_core_pa, p.growth_rate_per_s)
+    assert [value.at(30.0, {}) for value in constants] == [1.5, 1500, 300, 2e-7]
+    assert (p.poisson_ratio, p.contact.penalty_pa_per_m, p.step_s) == (0.45, 5e5, 43200)
+    assert (p.stress_memory_gw, p.support, p.core_growth_rate_per_s.at(30.0, {})) == (0, "ellipsoid", 0)
 
 
 def test_unknown_parameters_are_all_named():
@@ -106,5 +106,5 @@ def test_unknown_parameters_are_all_named():
 
 
 def test_parameters_out_of_bounds_are_all_named():
-    with pytest.raises(InputError, match=r"thickness_mm.*poisson_ratio.*allow_negative_growth"):
+    with pytest.raises(InputError, match=r"poisson_ratio.*thickness_mm.*allow_negative_growth"):
         parameters_from(VALUES | {"thickness_mm": 0.0, "poisson_ratio": 0.5, "growth_rate_per_s": -1e-7})

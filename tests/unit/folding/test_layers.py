@@ -34,9 +34,14 @@ def test_pial_vertices_have_distance_zero():
     assert (search.distance(mesh.vertices)[search.pial] == 0).all()
 
 
-def test_beyond_reach_the_distance_is_that_of_the_nearest_vertex():
+def test_far_beyond_reach_the_distance_is_that_of_the_nearest_vertex():
+    search = search_of(box_mesh((4, 4, 4), (10.0, 10.0, 10.0)))
+    assert search.distance(np.zeros((1, 3)), reach=1.0)[0] == pytest.approx(5.0)
+
+
+def test_within_reach_of_a_triangle_whose_vertices_are_beyond_it_the_distance_is_the_triangles():
     search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
-    assert search.distance(np.zeros((1, 3)), reach=1.0)[0] == pytest.approx(np.sqrt(75))
+    assert search.distance(np.array([[4.0, 0.0, 0.0]]), reach=1.5)[0] == pytest.approx(1.0)
 
 
 def test_normals_on_a_ball_point_outwards_and_have_length_one():

@@ -3,7 +3,7 @@
 import pytest
 
 from gyriflow.folding.parameters import parameters_from
-from gyriflow.folding.simulation import shortened_steps
+from gyriflow.folding.run import shortened_steps
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 

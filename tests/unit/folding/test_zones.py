@@ -5,6 +5,7 @@ import pytest
 from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.errors import InputError, MeshError
+from gyriflow.folding.zone_checks import refuse_impossible, zone_report, zone_warnings
 from gyriflow.folding.zones import (
     BETWEEN_PLANES,
     CLAMPED,
@@ -12,9 +13,6 @@ from gyriflow.folding.zones import (
     RIGHT_CONTACT,
     find_zones,
     inside_ellipsoid,
-    refuse_impossible,
-    zone_report,
-    zone_warnings,
 )
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.growth.rates import growth_rates
+from gyriflow.growth.rates import FOLDING_RATES, growth_rates, rate_curve
 
 WEEK_S = 604_800.0
 
@@ -19,8 +19,10 @@ def test_rates_are_those_the_areas_were_made_with() -> None:
         "to_week",
         "area_ratio",
         "rate_per_s",
+        "compound_rate_per_s",
         "volume_ratio",
         "core_rate_per_s",
+        "core_compound_rate_per_s",
     ]
     row = table.iloc[0]
     assert row["rate_per_s"] == pytest.approx(rate)
@@ -44,6 +46,37 @@ def test_weeks_in_any_order() -> None:
 
 def test_shrinking_is_negative() -> None:
     assert growth_rates([21, 22], [121.0, 100.0], [1.0, 1.0])["rate_per_s"][0] < 0
+
+
+@pytest.mark.parametrize("weeks", [1.0, 4.0])
+def test_compound_rates_multiply_up_to_the_ratios(weeks: float) -> None:
+    step_s = 600.0
+    row = growth_rates([21, 21 + weeks], [9000.0, 14_000.0], [45_000.0, 80_000.0]).iloc[0]
+    length = core_length = 1.0
+    for _ in range(round(weeks * WEEK_S / step_s)):
+        length *= 1 + row["compound_rate_per_s"] * step_s
+        core_length *= 1 + row["core_compound_rate_per_s"] * step_s
+    assert length**2 == pytest.approx(14 / 9, rel=1e-3)
+    assert core_length**3 == pytest.approx(16 / 9, rel=1e-3)
+    # the rates that refer to the start of the interval would overshoot
+    assert row["rate_per_s"] > row["compound_rate_per_s"]
+    assert row["core_rate_per_s"] > row["core_compound_rate_per_s"]
+
+
+def test_the_curve_has_each_rate_in_the_middle_of_its_interval() -> None:
+    table = growth_rates([21, 22, 24], [100.0, 121.0, 144.0], [1.0, 1.5, 2.0])
+    for column in FOLDING_RATES.values():
+        weeks, values = rate_curve(table, column)
+        assert weeks.tolist() == [21.5, 23.0]
+        assert values.tolist() == table[column].tolist()
+
+
+def test_negative_rates_are_refused_with_their_intervals_unless_allowed() -> None:
+    table = growth_rates([21, 22, 23, 24], [100.0, 90.0, 95.0, 85.0], [1.0, 1.1, 1.2, 1.3])
+    with pytest.raises(InputError, match=r"from week 21 to 22, .*from week 23 to 24; .*growth\.brains.*allow_negative"):
+        rate_curve(table, "compound_rate_per_s")
+    assert (rate_curve(table, "compound_rate_per_s", allow_negative=True)[1] < 0).tolist() == [True, False, True]
+    assert (rate_curve(table, "core_compound_rate_per_s")[1] > 0).all()
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,20 @@
 import meshio
 import numpy as np
 import pytest
+import pyvista
 from shapes import box_mesh
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.tetrahedra import signed_volumes
-from gyriflow.io.frames import join_frames, read_field, read_positions, read_tets, read_weeks, write_frame
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from gyriflow.io.frames import (
+    join_frames,
+    read_cell_field,
+    read_field,
+    read_positions,
+    read_tets,
+    read_weeks,
+    write_frame,
+)
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, read_vertex_field, write_tetrahedral_mesh
 
 
@@ -58,17 +67,59 @@ def test_files_without_tetrahedra_or_with_bad_points_are_refused(tmp_path):
         read_tetrahedral_mesh(tmp_path / "missing.xdmf")
 
 
-def test_frames_are_joined_into_one_time_series(tmp_path):
-    mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
-    parts = []
+@pytest.fixture
+def frames(tmp_path):
+    """Three frames of a box that grows with the week, with fields at vertices and elements, as many as vertices."""
+    box = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
+    # eight elements of eight vertices: only the place in the file tells the two kinds apart
+    mesh = TetrahedralMesh(box.vertices, np.vstack([box.tets, box.tets[:2]]))
     for week in (21.0, 21.5, 22.0):
-        parts.append(tmp_path / f"{week}.h5")
-        write_frame(parts[-1], week, {"positions": mesh.vertices * week, "w": np.full(8, week)})
-    join_frames(tmp_path / "frames.h5", mesh.tets, parts)
-    assert read_weeks(tmp_path / "frames.h5") == [21.0, 21.5, 22.0]
-    np.testing.assert_array_equal(read_positions(tmp_path / "frames.h5", 21.5), mesh.vertices * 21.5)
-    np.testing.assert_array_equal(read_tets(tmp_path / "frames.h5"), mesh.tets)
-    with meshio.xdmf.TimeSeriesReader(tmp_path / "frames.xdmf") as series:
-        assert series.num_steps == 3
-    with pytest.raises(InputError, match=r"weeks \[21\.0, 21\.5, 22\.0\]"):
-        read_field(tmp_path / "frames.h5", 23.0, "w")
+        vertex_fields = {"positions": mesh.vertices * week, "w": np.full(8, week), "u": mesh.vertices * (week - 21)}
+        write_frame(tmp_path / f"{week}.h5", week, vertex_fields, {"stress": week + np.arange(8), "zone": np.arange(8)})
+    join_frames(tmp_path / "frames.h5", mesh.tets, [tmp_path / f"{week}.h5" for week in (21.0, 21.5, 22.0)])
+    return tmp_path / "frames.h5", mesh
+
+
+def test_frames_are_joined_into_one_time_series(frames):
+    path, mesh = frames
+    assert read_weeks(path) == [21.0, 21.5, 22.0]
+    np.testing.assert_array_equal(read_positions(path, 21.5), mesh.vertices * 21.5)
+    np.testing.assert_array_equal(read_tets(path), mesh.tets)
+    np.testing.assert_array_equal(read_field(path, 22.0, "w"), np.full(8, 22.0))
+    np.testing.assert_array_equal(read_cell_field(path, 21.5, "stress"), 21.5 + np.arange(8))
+    with pytest.raises(InputError, match=r"has no w of week 23.*weeks \[21\.0, 21\.5, 22\.0\]"):
+        read_field(path, 23.0, "w")
+    with pytest.raises(InputError, match="has no w of week 21"):
+        read_cell_field(path, 21.0, "w")
+
+
+def test_positions_are_kept_as_they_are_and_fields_in_single_precision(frames):
+    path, _ = frames
+    assert read_positions(path, 21.5).dtype == np.float64
+    assert read_field(path, 21.5, "u").dtype == read_cell_field(path, 21.5, "stress").dtype == np.float32
+    assert read_cell_field(path, 21.5, "zone").dtype == np.int64
+
+
+def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):
+    path, mesh = frames
+    reader = pyvista.get_reader(path.with_suffix(".xdmf"))
+    assert reader.time_values == [21.0, 21.5, 22.0]
+    reader.set_active_time_value(21.5)
+    grid = reader.read()
+    np.testing.assert_array_equal(grid.points, mesh.vertices * 21.5)
+    np.testing.assert_array_equal(grid.cells_dict[pyvista.CellType.TETRA], mesh.tets)
+    assert set(grid.point_data) == {"w", "u"}
+    assert set(grid.cell_data) == {"stress", "zone"}
+    np.testing.assert_allclose(grid.point_data["u"], mesh.vertices / 2)
+    np.testing.assert_array_equal(grid.cell_data["stress"], 21.5 + np.arange(8))
+    np.testing.assert_array_equal(grid.cell_data["zone"], np.arange(8))
+
+
+def test_fields_of_another_length_are_refused(tmp_path):
+    mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
+    with pytest.raises(ValueError, match="positions 8, w 7"):
+        write_frame(tmp_path / "a.h5", 21.0, {"positions": mesh.vertices, "w": np.zeros(7)})
+    write_frame(tmp_path / "b.h5", 21.0, {"positions": mesh.vertices}, {"stress": np.zeros(5)})
+    with pytest.raises(ValueError, match=r"6 elements in week_21\.00 .*stress 5"):
+        join_frames(tmp_path / "frames.h5", mesh.tets, [tmp_path / "b.h5"])
+    assert not (tmp_path / "frames.h5").exists()

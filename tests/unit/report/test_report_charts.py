@@ -59,6 +59,21 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
 
 
+def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
+    curve = {21.5: 1e-7, 22.5: 2e-7, 25.0: 4.5e-7}
+    figure = growth_chart(AREAS, RATES, folding_rate_per_s=curve)
+    # the bars of weeks 21-22 and 22-23 stand at 0 and 1, one wide: constant up to 21.5, linear from there on
+    assert line_of(figure.axes[1], "#D55E00") == pytest.approx(
+        np.array([[-0.5, 1.0], [0.0, 1.0], [0.5, 1.5], [1.0, 2.0], [1.5, 2.5]])
+    )
+    assert "folding" in words(figure)
+
+
+def test_a_curve_of_one_week_is_a_constant_rate():
+    figure = growth_chart(AREAS, RATES, folding_rate_per_s={30.0: 2e-7})
+    assert line_of(figure.axes[1], "#D55E00")[:, 1] == pytest.approx([2.0, 2.0, 2.0])
+
+
 def test_growth_chart_without_a_folding_has_no_line_of_it():
     assert not any("folding" in text for text in words(growth_chart(AREAS, RATES)))
 

@@ -1,0 +1,107 @@
+"""Two hemispheres that are each other's mirror image, folded: what the solver may not tell apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.parameters import FoldingParameters, parameters_from
+from gyriflow.folding.simulation import Folding
+from gyriflow.folding.zones import LEFT_CONTACT, RIGHT_CONTACT, Zones, zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.units import M_PER_MM, MM_PER_M
+
+Floats = NDArray[np.float64]
+
+SEMI_AXES_MM = np.array([7.0, 12.0, 9.0])
+MIDDLE_MM = 7.5
+"""Distance of a hemisphere's centre from the midline."""
+GAP_MM = 1.9
+"""Width of the fissure for the contact planes, which the hemispheres all but touch at the start."""
+STEP_S = 86_400.0
+
+
+@dataclass(frozen=True)
+class Asymmetry:
+    """How far two mirrored hemispheres are from each other after some steps.
+
+    Attributes
+    ----------
+    relative
+        Largest distance of a vertex from its partner's mirror image, over the largest displacement.
+    displacement_mm, penetration_mm
+        Largest displacement from the start, and the largest depth beyond a contact plane.
+    """
+
+    relative: float
+    displacement_mm: float
+    penetration_mm: float
+
+
+def hemisphere(cells: int, by: float) -> TetrahedralMesh:
+    """Returns a right half in mm: an ellipsoid beside the midline, its inner vertices moved by up to `by` cells.
+
+    Moved at random (seeded), no two pial vertices are as near to the same point.
+    """
+    cube = grid([np.linspace(-1.0, 1.0, cells + 1)] * 3)
+    x = cube.vertices.copy()
+    inner = np.setdiff1d(np.arange(len(x)), boundary_faces(cube)[0])
+    shell = np.abs(x).max(axis=1, keepdims=True)
+    length = np.linalg.norm(x, axis=1, keepdims=True)
+    ball = np.where(length > 0, x * shell / np.where(length > 0, length, 1.0), 0.0)
+    x = shell * ball + (1 - shell) * x
+    random = np.random.default_rng(11)
+    move = random.uniform(-by, by, x.shape) * 2 / cells
+    x[inner] += move[inner]
+    outer = np.setdiff1d(np.arange(len(x)), inner)
+    x[outer] += move[outer]
+    x[outer] /= np.linalg.norm(x[outer], axis=1, keepdims=True)
+    return TetrahedralMesh(x * SEMI_AXES_MM + [MIDDLE_MM, 0.0, 0.0], cube.tets)
+
+
+def reflected_and_merged(half: TetrahedralMesh) -> TetrahedralMesh:
+    """Returns a half and its mirror image at x = 0 side by side; vertex i of the first has its partner at n + i."""
+    image = half.vertices * [-1.0, 1.0, 1.0]
+    # a mirrored element is inside out until two of its vertices change places
+    tets = half.tets[:, [0, 1, 3, 2]] + len(half.vertices)
+    return TetrahedralMesh(np.concatenate([half.vertices, image]), np.concatenate([half.tets, tets]))
+
+
+def parameters(**changes) -> FoldingParameters:
+    """Returns the parameters of a run with tight tolerances."""
+    values = {
+        "start_week": 21.0,
+        "end_week": 36.0,
+        "fissure_x_mm": 0.0,
+        "output_weeks": [21.0, 36.0],
+        "step_s": STEP_S,
+        "thickness_mm": 2.5,
+        "contact": {"kind": "planes", "gap_mm": GAP_MM},
+        "solver": {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10},
+    }
+    return parameters_from(values | changes)
+
+
+def asymmetry(mesh: TetrahedralMesh, state: State, zones: Zones) -> Asymmetry:
+    """Returns what tells the halves of a `reflected_and_merged` mesh apart in a state."""
+    one, other = np.split(state.positions * MM_PER_M, 2)
+    moved = np.linalg.norm(state.positions * MM_PER_M - mesh.vertices, axis=1).max()
+    gap = np.linalg.norm(one - other * [-1.0, 1.0, 1.0], axis=1).max()
+    x = state.positions[:, 0] * MM_PER_M
+    beyond = [x[zones.vertices_of(LEFT_CONTACT)] - zones.planes_mm[0]]
+    beyond.append(zones.planes_mm[1] - x[zones.vertices_of(RIGHT_CONTACT)])
+    return Asymmetry(float(gap / moved), float(moved), float(max(depth.max() for depth in beyond)))
+
+
+def folded(half: TetrahedralMesh, steps: int, comm: MPI.Comm = MPI.COMM_WORLD, **changes) -> tuple[State, Asymmetry]:
+    """Returns the state after some steps of a half and its mirror image, and how much the two differ then."""
+    mesh = reflected_and_merged(half)
+    p = parameters(**changes)
+    zones = zones_of_run(mesh, p)
+    folding = Folding(comm, mesh, zones, p)
+    state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    for _ in range(steps):
+        state = folding.step(state, p.step_s)
+    return state, asymmetry(mesh, state, zones)

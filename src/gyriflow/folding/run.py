@@ -1,0 +1,125 @@
+"""A whole run: from the start or a checkpoint to the last output week, with frames, step table and summary."""
+
+import math
+import shutil
+import time
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..units import M_PER_MM, SECONDS_PER_GW
+from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
+from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say
+from .parameters import FoldingParameters
+from .simulation import Folding, advance
+from .varying import Maps
+from .zones import Zones
+
+
+def run(
+    comm: MPI.Comm,
+    mesh: TetrahedralMesh,
+    zones: Zones,
+    parameters: FoldingParameters,
+    maps: Maps,
+    out: Path,
+) -> None:
+    """Folds a brain from the first to the last output week and writes frames, step table and summary into `out`.
+
+    Goes on from a checkpoint in `out` that belongs to this mesh and these parameters.
+    """
+    began = time.monotonic()
+    folding = Folding(comm, mesh, zones, parameters, maps)
+    key = run_key(mesh, parameters, maps)
+    folder = out / f"checkpoint-{key}"
+    state, message = comm.bcast(resumable(folder, key, parameters) if comm.rank == 0 else None, root=0)
+    if comm.rank == 0:
+        for note in (message, *foreign_checkpoints(out, folder), shortened_steps(parameters)):
+            if note:
+                say(note)
+    start = mesh.vertices * M_PER_MM
+    weeks = parameters.output_weeks
+    if state is None:
+        state = State.at_start(start, parameters.step_s)
+        elements = folding.element_fields(parameters.fields)
+        if comm.rank == 0:
+            save_frame(folder, weeks[0], start, start, zones, parameters, maps, elements)
+    first, resumed = len(state.rows), time.monotonic()
+    for week in weeks[1:]:
+        until = seconds_to(week, parameters)
+        while state.time_s < until * (1 - 1e-12):
+            state = advance(folding, state, until)
+            arrived = until - state.time_s < 1e-9 * until
+            elements = folding.element_fields(parameters.fields) if arrived else {}
+            if comm.rank == 0:
+                if arrived:
+                    save_frame(folder, week, state.positions, start, zones, parameters, maps, elements)
+                write_checkpoint(folder / "state.h5", key, state)
+                rate = (time.monotonic() - resumed) / (len(state.rows) - first)
+                steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s
+                say(progress_line(state.rows[-1], parameters.end_week, rate * steps_left))
+    memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
+    if comm.rank == 0:
+        steps = [row["seconds"] for row in state.rows]
+        summary = {
+            "tets": len(mesh.tets),
+            "dofs": 3 * len(mesh.vertices),
+            "pial_faces": len(zones.facets),
+            "ranks": comm.size,
+            "steps": len(steps),
+            "newton": sum(row["newton"] for row in state.rows),
+            "krylov": sum(row["krylov"] for row in state.rows),
+            "seconds": time.monotonic() - began,
+            "seconds_per_step": float(np.median(steps)),
+            "peak_memory_MiB": memory,
+            "min_J": min(row["min_J"] for row in state.rows),
+            "weeks": list(weeks),
+            "resumed_after_step": first,
+        }
+        finish(out, folder, mesh.tets, weeks, state.rows, summary)
+        shutil.rmtree(folder)
+        say(f"folded to GW {parameters.end_week:g} in {len(steps)} steps, {summary['seconds']:.0f} s")
+
+
+def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
+    """Returns the state to go on from, or None, and what to tell the user.
+
+    The frames of all output weeks that the state has passed must be there.
+    """
+    state, message = read_checkpoint(folder / "state.h5", key)
+    if state is None:
+        return state, message
+    end_s = seconds_to(parameters.end_week, parameters)
+    passed = [week for week in parameters.output_weeks if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)]
+    if not all(frame_path(folder, week).exists() for week in passed):
+        return None, f"the checkpoint {folder} has passed output weeks that were not asked for then: starting anew"
+    within = tuple(row for row in state.rows if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9))
+    return replace(state, rows=within), message
+
+
+def seconds_to(week: float, parameters: FoldingParameters) -> float:
+    """Returns the time in s from the start of the run to a week."""
+    return (week - parameters.start_week) * SECONDS_PER_GW
+
+
+def foreign_checkpoints(out: Path, own: Path) -> list[str]:
+    """Returns what to say of checkpoints of other meshes or parameters, which stay; only the newest two are kept."""
+    others = sorted(
+        (path for path in out.glob("checkpoint-*") if path != own), key=lambda path: path.stat().st_mtime, reverse=True
+    )
+    for old in others[2:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return [f"{path} belongs to another mesh or other parameters: not used, kept for a return" for path in others[:2]]
+
+
+def shortened_steps(parameters: FoldingParameters) -> str:
+    """Returns what to say where the time step does not divide the time between two outputs; empty where it does."""
+    step = parameters.step_s
+    for a, b in pairwise(parameters.output_weeks):
+        if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:
+            return f"step_s {step:g} does not divide the time from GW {a:g} to {b:g}: the last step there is shortened"
+    return ""

@@ -1,0 +1,53 @@
+"""The benchmark files that Snakemake leaves of each job: wall time, CPU time and memory."""
+
+import logging
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from .files import AnyPath
+
+COLUMNS = {"s": "wall_s", "cpu_time": "cpu_s", "max_rss": "memory_MiB"}
+"""Columns that are read, by their names in the files; Snakemake calls 2²⁰ bytes a megabyte."""
+
+
+def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
+    """Returns what Snakemake measured of the jobs whose benchmark files are of a rule.
+
+    Parameters
+    ----------
+    folder
+        What paths are relative to; the files are looked for in its `results/*/benchmarks`.
+    patterns : {rule: regular expression}
+        Paths of a rule's files; what a group named `run` matches is the job's run.
+
+    Returns
+    -------
+    DataFrame with columns rule, run (None where there is none), wall_s, cpu_s, memory_MiB
+        In the order of the rules. Values are NaN where Snakemake could not measure ("NA", "-") or the file is torn.
+    """
+    folder = Path(folder)
+    found = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/*/benchmarks/*.tsv"))
+    rows = []
+    for rule, pattern in patterns.items():
+        for path in found:
+            if match := re.fullmatch(pattern, path):
+                rows.append({"rule": rule, "run": match.groupdict().get("run"), **_measured(folder / path)})
+    return pd.DataFrame(rows, columns=["rule", "run", *COLUMNS.values()])
+
+
+def _measured(path: Path) -> dict[str, float]:
+    try:
+        table = pd.read_csv(path, sep="\t", dtype=str)
+    except (OSError, ValueError) as error:
+        logging.warning("%s cannot be read: %s", path, error)
+        table = pd.DataFrame()
+    numbers = table.reindex(columns=list(COLUMNS)).apply(pd.to_numeric, errors="coerce")
+    # a job that was told to repeat itself has several lines
+    return {
+        "wall_s": numbers["s"].sum(min_count=1),
+        "cpu_s": numbers["cpu_time"].sum(min_count=1),
+        "memory_MiB": numbers["max_rss"].max(),
+    }

@@ -1,0 +1,155 @@
+"""Maps over a brain brought onto the vertices of its tetrahedral mesh: from surfaces and from volumes."""
+
+import logging
+from collections.abc import Sequence
+
+import igl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import distance_transform_edt, map_coordinates
+from scipy.spatial import cKDTree
+
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, corners, face_areas, transformed
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+log = logging.getLogger(__name__)
+
+FARTHEST_MM = 5.0
+QUANTILE = 0.95
+"""The surface of a map may be this far from this part of the mesh's surface: pial, white and midthickness surfaces of
+the same brain are nearer, and a few places where one of them is cut differently do no harm."""
+NEIGHBOURS = 8
+TIE = 1e-9
+"""Relative difference below which two distances count as equal."""
+
+
+def vertex_map_on_mesh(
+    mesh_vertices_mm: Floats, pial_facets: Ints, surface: TriangleMesh, values: Floats, path: str | None = None
+) -> Floats:
+    """Returns a map on a surface as (n,) values at the vertices of a mesh.
+
+    A vertex on the mesh's own surface takes the value at the nearest point of the surface, linear in its triangle; an
+    inner vertex takes that of the nearest vertex on the mesh's surface, ties going to smaller coordinates.
+
+    Parameters
+    ----------
+    mesh_vertices_mm : (n, 3) float
+        Vertices of the tetrahedral mesh.
+    pial_facets : (f, 3) int
+        Its outer facets as indices of vertices.
+    surface
+        The map's surface, in the coordinates of the mesh, of any number of pieces.
+    values : (k,) float
+        Values at the surface's vertices.
+    path
+        The map's file, for messages.
+
+    Raises
+    ------
+    InputError
+        Where a twentieth of the mesh's surface is more than 5 mm from the map's.
+    """
+    pial = np.unique(pial_facets)
+    points = mesh_vertices_mm[pial]
+    distance, faces, nearest = _nearest_points(points, surface)
+    far = float(np.quantile(distance, QUANTILE))
+    log.info("the surface of %s is %.2f mm from the mesh's (median; 95 %%: %.2f mm)", path, np.median(distance), far)
+    if far > FARTHEST_MM:
+        raise InputError(
+            "the surface of a map lies far from that of the start brain's mesh",
+            path=path,
+            found=f"{far:.1f} mm for a twentieth of the mesh's surface, {np.median(distance):.1f} mm for half of it",
+            expected=f"at most {FARTHEST_MM:g} mm",
+            remedy="Is it the surface of this brain, both hemispheres, in the same coordinates?",
+        )
+    on_pial = np.einsum("ij,ij->i", _shares(nearest, corners(surface)[faces]), values[surface.faces[faces]])
+    mapped = on_pial[_nearest_vertices(mesh_vertices_mm, points)]
+    mapped[pial] = on_pial
+    return mapped
+
+
+def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike, path: str | None = None) -> Floats:
+    """Returns a volume's (n,) values at the vertices of a mesh, linear between the centres of voxels.
+
+    In the outer half of the outermost voxels the value is constant outwards.
+
+    Parameters
+    ----------
+    mesh_vertices_mm : (n, 3) float
+        Vertices of the tetrahedral mesh.
+    data : (i, j, k) float
+        Values of the voxels.
+    affine : (4, 4) float
+        Voxel index to position in the coordinates of the mesh.
+    path
+        The volume's file, for messages.
+
+    Raises
+    ------
+    InputError
+        Where vertices lie outside the volume, or between voxels of which one is NaN or infinite.
+    """
+    matrix = np.asarray(affine, dtype=float)
+    index = np.linalg.solve(matrix[:3, :3], (mesh_vertices_mm - matrix[:3, 3]).T).T
+    # rounding must not push a vertex on the rim outside
+    covered = np.clip(index, -0.5 - 1e-6, np.array(data.shape) - 0.5 + 1e-6)
+    outside = np.linalg.norm((index - covered) @ matrix[:3, :3].T, axis=1)
+    expected = f"values at all {len(index)} vertices of the start brain's mesh"
+    if (outside > 0).any():
+        raise InputError(
+            "a map's volume does not cover the start brain",
+            path=path,
+            found=f"{int((outside > 0).sum())} vertices outside it, by up to {outside.max():.1f} mm",
+            expected=expected,
+            remedy="Is it a volume of this brain, in the same world coordinates? It has to cover the core too.",
+        )
+    values = map_coordinates(data, index.T, order=1, mode="nearest")
+    missing = ~np.isfinite(values)
+    if missing.any():
+        known = np.isfinite(data)
+        reach = distance_transform_edt(~known, sampling=np.linalg.norm(matrix[:3, :3], axis=0))
+        voxels = np.clip(np.rint(index[missing]).astype(int), 0, np.array(data.shape) - 1)
+        depth = f", up to {reach[tuple(voxels.T)].max():.1f} mm from the nearest number" if known.any() else ""
+        raise InputError(
+            "a map has no number in parts of the start brain",
+            path=path,
+            found=f"{int(missing.sum())} vertices at voxels that are NaN or infinite{depth}",
+            expected=expected,
+            remedy="Continue the map over the whole brain, or give it on a surface.",
+        )
+    return values
+
+
+def placed(points: Floats, surface: TriangleMesh, matrices: Sequence[ArrayLike]) -> TriangleMesh:
+    """Returns the surface moved by that of the (4, 4) matrices which brings it nearest to (k, 3) points on average."""
+    moved = [transformed(surface, matrix) for matrix in matrices]
+    return min(moved, key=lambda candidate: _nearest_points(points, candidate)[0].mean())
+
+
+def _nearest_points(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Floats]:
+    """Returns for (k, 3) points the distance to a surface, and the face and the position of its nearest point."""
+    # a triangle without area has no place inside, and its edges belong to others too
+    solid = np.flatnonzero(face_areas(surface) > 0)
+    squared, face, nearest = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces[solid])
+    return np.sqrt(squared), solid[face], nearest
+
+
+def _shares(points: Floats, triangles: Floats) -> Floats:
+    """Returns the (k, 3) barycentric coordinates of (k, 3) points in (k, 3, 3) triangles, from partial areas."""
+    to_corner = triangles - points[:, None]
+    areas = np.linalg.norm(np.cross(to_corner[:, [1, 2, 0]], to_corner[:, [2, 0, 1]]), axis=2)
+    return areas / areas.sum(axis=1, keepdims=True)
+
+
+def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:
+    """Returns for each of (k, 3) points the index of the nearest vertex, of equally near ones the first in x, y, z."""
+    count = min(NEIGHBOURS, len(vertices))
+    gaps, candidates = (found.reshape(len(points), count) for found in cKDTree(vertices).query(points, k=count))
+    rank = np.empty(len(vertices), dtype=np.int64)
+    rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
+    tied = gaps <= gaps[:, :1] * (1 + TIE)
+    first = np.where(tied, rank[candidates], len(vertices)).argmin(axis=1)
+    return np.take_along_axis(candidates, first[:, None], axis=1)[:, 0]

@@ -1,0 +1,137 @@
+"""Stress that is remembered, on bodies whose answer is known; and a body that nothing holds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from boxes import COMM, MATERIAL, distorted_box, everywhere_known, zones_of
+from shapes import box_mesh
+
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.domain import Domain
+from gyriflow.folding.memory import packed, unpacked
+from gyriflow.folding.newton import NewtonSettings, NewtonSolver
+from gyriflow.folding.parameters import parameters_from
+from gyriflow.folding.problem import Problem
+from gyriflow.folding.simulation import Folding
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
+from gyriflow.units import M_PER_MM, SECONDS_PER_GW
+
+RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0]}
+TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
+STRETCH = np.array([[1.1, 0.03, 0.0], [0.03, 0.95, -0.02], [0.0, -0.02, 1.02]])
+
+
+def folding_of(mesh, zones, **changes):
+    parameters = parameters_from(RUN | {"contact": {"kind": "none"}, "solver": TIGHT} | changes)
+    return Folding(COMM, mesh, zones, parameters), State.at_start(mesh.vertices * M_PER_MM, parameters.step_s)
+
+
+def stretched_problem(zones, mesh):
+    domain = Domain(COMM, mesh)
+    problem = Problem(domain, zones, MATERIAL, remembers_stress=True)
+    nodes, cells = len(domain.vertex_of_node), len(domain.cells)
+    uniform = np.ones(nodes)
+    problem.set_layers(1000.0 * uniform, 0.0 * uniform, 0.0 * uniform, np.tile([0.0, 0.0, 1.0], (cells, 1)))
+    problem.set_stretch(np.tile(STRETCH, (cells, 1, 1)))
+    return problem
+
+
+def test_a_free_body_springs_back_from_the_stretch_it_kept():
+    mesh = distorted_box()
+    problem = stretched_problem(replace(zones_of(mesh), free=True), mesh)
+    x = problem.domain.local(problem.domain.positions)
+    problem.set_displacement(x @ (np.linalg.inv(STRETCH) - np.eye(3)).T)
+    assert problem.energy() == pytest.approx(0.0, abs=1e-16)
+    solver = NewtonSolver(problem, NewtonSettings(1e-10, 1e-8), residual_floor=0.0)
+    solver.solve(np.zeros_like(problem.displacement))
+    assert problem.energy() == pytest.approx(0.0, abs=1e-14)
+    found = everywhere_known(problem)
+    # the rotation is free to choose, so compare distances
+    pairs = np.random.default_rng(1).integers(0, len(found), (200, 2))
+    now, exact = (
+        np.linalg.norm(np.diff(points[pairs], axis=1), axis=2)
+        for points in (problem.domain.positions + found, problem.domain.positions @ np.linalg.inv(STRETCH).T)
+    )
+    np.testing.assert_allclose(now, exact, rtol=1e-6, atol=1e-12)
+
+
+def test_the_energy_of_a_kept_stretch_is_counted_per_volume_without_stress():
+    mesh = distorted_box()
+    problem = stretched_problem(zones_of(mesh), mesh)
+    Je, volume = np.linalg.det(STRETCH), 288e-9
+    bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
+    density = 500.0 * ((STRETCH**2).sum() * Je ** (-2 / 3) - 3) + bulk / 2 * (Je - 1) ** 2
+    assert problem.energy() == pytest.approx(density * volume / Je, rel=1e-12)
+
+
+@pytest.mark.parametrize("memory_gw", [0.25, np.inf])
+def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(memory_gw):
+    # uniform isotropic growth of a body whose whole surface is fixed: nothing moves, and ln V adds up and decays
+    mesh = distorted_box()
+    zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
+    folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw)
+    nodes, cells = np.ones(len(folding.domain.vertex_of_node)), len(folding.domain.cells)
+    uniform = (300.0 * nodes, 0.01 * nodes, 0.01 * nodes, np.tile([0.0, 0.0, 1.0], (cells, 1)))
+    folding.set_layers = lambda *_: folding.problem.set_layers(*uniform)
+    for _ in range(5):
+        state = folding.step(state, 43200.0)
+    kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
+    strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
+    np.testing.assert_allclose(strain, -np.log(1.01) * sum(kept**n for n in range(5)), rtol=1e-9)
+
+
+def test_an_elastic_state_stays_where_it_is_in_equilibrium():
+    # no growth, one stiffness: what is kept from a stretched start is released in part; then nothing is left to do
+    mesh = box_mesh((3, 3, 3), (6.0, 6.0, 6.0))
+    zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
+    stiffness = {"shear_modulus_cortex_pa": 800, "shear_modulus_core_pa": 800}
+    folding, start = folding_of(mesh, zones, stress_memory_gw="infinite", growth_rate_per_s=0.0, **stiffness)
+    start = replace(start, stretch=packed(np.tile(STRETCH, (len(mesh.tets), 1, 1))))
+    once = folding.step(start, 43200.0)
+    again = folding.step(once, 43200.0)
+    moved = np.abs(once.positions - start.positions).max()
+    assert moved > 1e-4
+    assert np.abs(again.positions - once.positions).max() <= 1e-8 * moved
+
+
+def test_a_kept_state_is_the_same_on_any_ranks_and_after_a_restart():
+    mesh = distorted_box()
+    zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
+    folding, state = folding_of(mesh, zones, stress_memory_gw=1.0, thickness_mm=2.0)
+    for _ in range(2):
+        state = folding.step(state, 43200.0)
+    other, _ = folding_of(mesh, zones, stress_memory_gw=1.0, thickness_mm=2.0)
+    a, b = folding.step(state, 43200.0), other.step(state, 43200.0)
+    assert np.abs(a.positions - b.positions).max() <= 1e-8 * np.abs(a.last).max()
+    np.testing.assert_allclose(a.stretch, b.stretch, atol=1e-9)
+    for values in (a.positions, a.stretch):
+        assert (COMM.bcast(values) == values).all()
+
+
+def test_a_free_body_grows_without_drifting():
+    mesh = distorted_box()
+    zones = replace(zones_of(mesh), free=True)
+    folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"})
+    after = folding.step(state, 43200.0)
+    u, x = after.last, state.positions - state.positions.mean(axis=0)
+    size = np.abs(u).max()
+    assert size > 1e-6
+    assert np.abs(u.mean(axis=0)).max() <= 1e-12 * size
+    assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(x).max() * size * len(x)
+
+
+def test_two_free_bodies_move_as_each_does_alone():
+    one = distorted_box()
+    far = TetrahedralMesh(one.vertices + [40.0, 0.0, 0.0], one.tets)
+    both = TetrahedralMesh(
+        np.concatenate([one.vertices, far.vertices]), np.concatenate([one.tets, far.tets + len(one.vertices)])
+    )
+    settings = {"thickness_mm": 2.0, "support": "free", "no_growth": {"kind": "none"}}
+    moves = []
+    for mesh in (one, both):
+        folding, state = folding_of(mesh, replace(zones_of(mesh), free=True), **settings)
+        moves.append(folding.step(state, 43200.0).last)
+    count = len(one.vertices)
+    for part in (moves[1][:count], moves[1][count:]):
+        assert np.abs(part - moves[0]).max() <= 1e-8 * np.abs(moves[0]).max()

@@ -1,0 +1,150 @@
+"""Maps of parameters: what files say per vertex or voxel, or a refusal that names the file."""
+
+import nibabel as nib
+import numpy as np
+import pytest
+import trimesh
+from nibabel.gifti import GiftiDataArray, GiftiImage
+from scipy.spatial.transform import Rotation
+
+from gyriflow.errors import InputError, StorageError
+from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.io.maps import read_maps, read_surface_map, read_surface_maps, read_volume_map, write_maps
+from gyriflow.io.surfaces import write_surface, write_vertex_maps
+
+
+@pytest.fixture
+def ball(tmp_path):
+    sphere = trimesh.creation.icosphere(subdivisions=2, radius=10.0)
+    for name in ("ball.surf.gii", "ball.ply", "ball.obj", "ball.stl"):
+        write_surface(tmp_path / name, TriangleMesh(sphere.vertices, sphere.faces))
+    return TriangleMesh(sphere.vertices, sphere.faces)
+
+
+def gifti(path, *arrays, intent="NIFTI_INTENT_SHAPE"):
+    nib.save(GiftiImage(darrays=[GiftiDataArray(array, intent=intent) for array in arrays]), path)
+    return path
+
+
+@pytest.mark.parametrize("name", ["ball.surf.gii", "ball.ply", "ball.obj"])
+def test_a_maps_values_stay_at_their_vertices(tmp_path, ball, name):
+    write_vertex_maps(tmp_path / "x.shape.gii", {"x": ball.vertices[:, 0]})
+    surface, values = read_surface_map(tmp_path / "x.shape.gii", tmp_path / name)
+    assert values == pytest.approx(ball.vertices[:, 0], abs=1e-5)
+    assert surface.vertices[:, 0] == pytest.approx(values, abs=1e-5)
+    assert np.array_equal(surface.faces, ball.faces)
+
+
+def test_other_number_types_and_a_column_are_read(tmp_path, ball):
+    values = np.arange(len(ball.vertices), dtype=np.int32)
+    for shape in (values, values[:, None]):
+        _, read = read_surface_map(gifti(tmp_path / "a.func.gii", shape), tmp_path / "ball.surf.gii")
+        assert read.tolist() == values.tolist()
+
+
+def test_a_wrong_length_names_both_files_and_counts(tmp_path, ball):
+    path = gifti(tmp_path / "a.shape.gii", np.ones(100, np.float32))
+    with pytest.raises(InputError, match=r"a\.shape\.gii.*100 values.*162.*ball\.surf\.gii") as caught:
+        read_surface_map(path, tmp_path / "ball.surf.gii")
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_nan_and_infinity_are_counted(tmp_path, ball, value):
+    values = np.ones(len(ball.vertices), np.float32)
+    values[3:8] = value
+    with pytest.raises(InputError, match=r"a\.shape\.gii.*5 vertices"):
+        read_surface_map(gifti(tmp_path / "a.shape.gii", values), tmp_path / "ball.surf.gii")
+
+
+def test_maps_of_two_hemispheres_stand_side_by_side(tmp_path, ball):
+    write_surface(tmp_path / "other.surf.gii", TriangleMesh(ball.vertices + [50, 0, 0], ball.faces))
+    paths = [tmp_path / "a.shape.gii", tmp_path / "b.shape.gii"]
+    for path, value in zip(paths, (1.0, 2.0), strict=True):
+        write_vertex_maps(path, {"x": np.full(len(ball.vertices), value)})
+    surface, values = read_surface_maps(paths, [tmp_path / "ball.surf.gii", tmp_path / "other.surf.gii"])
+    assert len(surface.faces) == 2 * len(ball.faces)
+    assert (values == np.where(surface.vertices[:, 0] < 25, 1.0, 2.0)).all()
+
+
+@pytest.mark.parametrize("arrays", [0, 2])
+def test_none_or_several_maps_in_a_file_are_refused(tmp_path, ball, arrays):
+    path = gifti(tmp_path / "a.func.gii", *[np.ones(len(ball.vertices), np.float32)] * arrays)
+    with pytest.raises(InputError, match=r"a\.func\.gii.*one array"):
+        read_surface_map(path, tmp_path / "ball.surf.gii")
+
+
+def test_a_surface_in_the_place_of_a_map_is_refused(tmp_path, ball):
+    with pytest.raises(InputError, match=r"POINTSET \(162, 3\), TRIANGLE \(320, 3\)"):
+        read_surface_map(tmp_path / "ball.surf.gii", tmp_path / "ball.surf.gii")
+
+
+def test_stl_has_no_vertices_for_a_map(tmp_path, ball):
+    write_vertex_maps(tmp_path / "x.shape.gii", {"x": ball.vertices[:, 0]})
+    with pytest.raises(InputError, match=r"ball\.stl.*GIFTI"):
+        read_surface_map(tmp_path / "x.shape.gii", tmp_path / "ball.stl")
+
+
+@pytest.mark.parametrize("kept", [0.05, 0.5, 0.9])
+def test_truncated_and_missing_maps_are_named(tmp_path, ball, kept):
+    write_vertex_maps(tmp_path / "x.shape.gii", {"x": ball.vertices[:, 0]})
+    whole = (tmp_path / "x.shape.gii").read_bytes()
+    (tmp_path / "torn.shape.gii").write_bytes(whole[: int(kept * len(whole))])
+    for name in ("torn", "none"):
+        with pytest.raises(InputError, match=name):
+            read_surface_map(tmp_path / f"{name}.shape.gii", tmp_path / "ball.surf.gii")
+
+
+def saved(path, values, affine=None, unit="mm"):
+    image = nib.Nifti1Image(values, np.diag([0.8, 0.9, 1.0, 1.0]) if affine is None else affine)
+    image.header.set_xyzt_units(unit)
+    nib.save(image, path)
+    return path
+
+
+def test_a_volume_keeps_fractions_nan_and_its_oblique_affine(tmp_path):
+    values = np.random.default_rng(0).normal(size=(4, 5, 6)).astype(np.float32)
+    values[0, 0, 0] = np.nan
+    oblique = np.eye(4)
+    oblique[:3, :3] = Rotation.from_euler("xyz", [20, -30, 40], degrees=True).as_matrix() * 0.8
+    metres = np.diag([1e-3, 1e-3, 1e-3, 1.0]) @ oblique
+    volume = read_volume_map(saved(tmp_path / "a.nii.gz", values[..., None], metres, "meter"))
+    np.testing.assert_array_equal(volume.values, values)
+    assert volume.affine == pytest.approx(oblique, abs=1e-5)
+
+
+def test_a_stored_scale_counts(tmp_path):
+    image = nib.Nifti1Image(np.full((3, 3, 3), 7, np.int16), np.eye(4))
+    image.header.set_slope_inter(0.25, 1.0)
+    nib.save(image, tmp_path / "a.nii")
+    assert read_volume_map(tmp_path / "a.nii").values == pytest.approx(np.full((3, 3, 3), 2.75))
+
+
+def test_time_series_truncated_and_missing_volumes_are_named(tmp_path):
+    with pytest.raises(InputError, match=r"series\.nii.*three axes"):
+        read_volume_map(saved(tmp_path / "series.nii", np.ones((3, 3, 3, 2), np.float32)))
+    whole = saved(tmp_path / "a.nii.gz", np.random.default_rng(0).normal(size=(20, 20, 20))).read_bytes()
+    (tmp_path / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
+    for name in ("torn.nii.gz", "none.nii"):
+        with pytest.raises(InputError, match=name):
+            read_volume_map(tmp_path / name)
+
+
+def test_maps_on_a_mesh_come_back_exactly(tmp_path):
+    maps = {"thickness_mm": np.random.default_rng(0).normal(size=50), "growth_rate_per_s": np.full(50, 2e-7)}
+    write_maps(tmp_path / "maps.h5", maps)
+    back = read_maps(tmp_path / "maps.h5")
+    assert set(back) == set(maps)
+    for name, values in maps.items():
+        np.testing.assert_array_equal(back[name], values)
+        assert back[name].dtype == np.float64
+
+
+def test_torn_and_missing_files_of_maps_are_named(tmp_path):
+    write_maps(tmp_path / "maps.h5", {"a": np.ones(5000)})
+    (tmp_path / "torn.h5").write_bytes((tmp_path / "maps.h5").read_bytes()[:3000])
+    for name in ("torn.h5", "none.h5"):
+        with pytest.raises(InputError, match=name):
+            read_maps(tmp_path / name)
+    with pytest.raises(StorageError, match=r"maps\.h5"):
+        write_maps(tmp_path / "maps.h5" / "inside.h5", {"a": np.ones(5)})

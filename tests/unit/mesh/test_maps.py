@@ -1,0 +1,186 @@
+"""Maps brought onto a mesh: linear functions come back, in the right place, and foreign surfaces are refused."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+from shapes import box_mesh, ellipsoid_mesh
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
+from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
+from gyriflow.mesh.maps import placed, vertex_map_on_mesh, volume_map_on_mesh
+
+RADIUS = 20.0
+SLOPE = np.array([0.3, -0.7, 0.2])
+
+
+def sphere(subdivisions=3, radius=RADIUS):
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    return TriangleMesh(ball.vertices, ball.faces)
+
+
+def linear(points):
+    return 5.0 + points @ SLOPE
+
+
+def pose(*degrees, shift=(4.0, -3.0, 2.0)):
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
+    matrix[:3, 3] = shift
+    return matrix
+
+
+def moved(points, matrix):
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return ellipsoid_mesh(8, (RADIUS, RADIUS, RADIUS))
+
+
+def test_a_linear_function_on_a_sphere_comes_back_at_pial_vertices(ball):
+    facets, _ = boundary_faces(ball)
+    surface = sphere(4)
+    mapped = vertex_map_on_mesh(ball.vertices, facets, surface, linear(surface.vertices))
+    pial = np.unique(facets)
+    # chords of the surface lie up to 0.03 mm inside the sphere
+    assert mapped[pial] == pytest.approx(linear(ball.vertices[pial]), abs=0.03)
+    assert mapped.shape == (len(ball.vertices),)
+
+
+def test_values_are_linear_in_a_triangle():
+    surface = TriangleMesh([[0, 0, 0], [3, 0, 0], [0, 3, 0]], [[0, 1, 2]])
+    mesh = TetrahedralMesh([[1, 1, 0], [0.5, 0.25, 0], [2, 0.75, 1], [4, 0, 0]], [[0, 1, 2, 3]])
+    mapped = vertex_map_on_mesh(mesh.vertices, mesh.tets[:, :3], surface, np.array([10.0, 40.0, 70.0]))
+    # the last vertex is no pial one: (2, 0.75, 1) is the nearest
+    assert mapped == pytest.approx([40.0, 20.0, 45.0, 45.0])
+
+
+def test_inner_vertices_take_the_value_of_the_nearest_pial_vertex(ball):
+    facets, _ = boundary_faces(ball)
+    pial = np.unique(facets)
+    inner = np.setdiff1d(np.arange(len(ball.vertices)), pial)
+    surface = sphere()
+    mapped = vertex_map_on_mesh(ball.vertices, facets, surface, surface.vertices[:, 2])
+    for vertex in inner:
+        gaps = np.linalg.norm(ball.vertices[pial] - ball.vertices[vertex], axis=1)
+        nearest = gaps <= gaps.min() * (1 + 1e-9)
+        assert mapped[vertex] in mapped[pial[nearest]]
+
+
+def test_equally_near_pial_vertices_are_chosen_by_coordinates_not_by_order():
+    # nine vertices, of which the middle one is as near to all corners
+    mesh = box_mesh((2, 2, 2), (2.0, 2.0, 2.0))
+    centre = int(np.flatnonzero((mesh.vertices == 0).all(axis=1))[0])
+    surface = TriangleMesh(mesh.vertices, boundary_faces(mesh)[0])
+    shuffled = np.random.default_rng(0).permutation(len(mesh.vertices))
+    back = np.argsort(shuffled)
+    for vertices, tets in ((mesh.vertices, mesh.tets), (mesh.vertices[shuffled], back[mesh.tets])):
+        facets, _ = boundary_faces(TetrahedralMesh(vertices, tets))
+        mapped = vertex_map_on_mesh(vertices, facets, surface, surface.vertices @ [1.0, 10.0, 100.0])
+        at = centre if vertices is mesh.vertices else back[centre]
+        # of the middles of the six sides the one at the smallest x
+        assert mapped[at] == pytest.approx(-1.0)
+
+
+def test_two_hemispheres_count_as_one_surface():
+    left, right = box_mesh((2, 4, 4), (8.0, 20.0, 20.0)), box_mesh((2, 4, 4), (8.0, 20.0, 20.0))
+    vertices = np.concatenate([left.vertices - [6, 0, 0], right.vertices + [6, 0, 0]])
+    mesh = TetrahedralMesh(vertices, np.concatenate([left.tets, right.tets + len(left.vertices)]))
+    facets, _ = boundary_faces(mesh)
+    sides = [
+        TriangleMesh(side.vertices + shift, boundary_faces(side)[0])
+        for side, shift in ((left, [-6, 0, 0]), (right, [6, 0, 0]))
+    ]
+    values = [np.full(len(side.vertices), value) for side, value in zip(sides, (1.0, 2.0), strict=True)]
+    mapped = vertex_map_on_mesh(vertices, facets, merged(*sides), np.concatenate(values))
+    assert (mapped == np.where(vertices[:, 0] < 0, 1.0, 2.0)).all()
+
+
+def test_triangles_without_area_do_no_harm(ball):
+    facets, _ = boundary_faces(ball)
+    surface = sphere()
+    line = TriangleMesh(surface.vertices, np.concatenate([[[0, 0, 1], [2, 2, 2]], surface.faces]))
+    values = linear(surface.vertices)
+    assert vertex_map_on_mesh(ball.vertices, facets, line, values) == pytest.approx(
+        vertex_map_on_mesh(ball.vertices, facets, surface, values)
+    )
+
+
+@pytest.mark.parametrize(
+    ("surface", "found"),
+    [
+        (transformed(sphere(), pose(0, 0, 0, shift=(30.0, 0, 0))), "mm for a twentieth"),
+        (
+            TriangleMesh(
+                sphere().vertices, sphere().faces[sphere().vertices[sphere().faces][:, :, 0].mean(axis=1) < 0]
+            ),
+            r"0\.\d mm for half",
+        ),
+        (sphere(radius=100.0), "79"),
+    ],
+    ids=["elsewhere", "one hemisphere", "inflated"],
+)
+def test_a_surface_that_is_not_this_brains_is_refused_with_its_distance(ball, surface, found):
+    facets, _ = boundary_faces(ball)
+    with pytest.raises(InputError, match=rf"a\.shape\.gii.*{found}.*at most 5 mm.*same coordinates"):
+        vertex_map_on_mesh(ball.vertices, facets, surface, np.ones(len(surface.vertices)), "a.shape.gii")
+
+
+@pytest.mark.parametrize("given_posed", [False, True], ids=["input's coordinates", "posed already"])
+def test_a_turned_brain_takes_its_map_in_either_coordinates(given_posed):
+    matrix = pose(5, 0, 8)
+    brain = ellipsoid_mesh(8, (15.0, 20.0, 12.0))
+    facets, _ = boundary_faces(brain)
+    surface = TriangleMesh(brain.vertices, facets)
+    values = linear(surface.vertices)
+    turned = moved(brain.vertices, matrix)
+    given = transformed(surface, matrix) if given_posed else surface
+    there = placed(turned[np.unique(facets)], given, [matrix, np.eye(4)])
+    assert vertex_map_on_mesh(turned, facets, there, values)[np.unique(facets)] == pytest.approx(
+        values[np.unique(facets)]
+    )
+
+
+def oblique_volume(shape=(24, 26, 28)):
+    affine = pose(20, -30, 40, shift=(0.0, 0.0, 0.0))
+    affine[:3, :3] = affine[:3, :3] @ np.diag([2.0, 2.2, 1.9]) @ [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]
+    affine[:3, 3] = -affine[:3, :3] @ ((np.array(shape) - 1) / 2)
+    index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
+    return linear(moved(index.reshape(-1, 3), affine)).reshape(shape), affine
+
+
+def test_a_linear_field_comes_back_through_an_oblique_affine(ball):
+    data, affine = oblique_volume()
+    assert volume_map_on_mesh(ball.vertices, data, affine) == pytest.approx(linear(ball.vertices))
+
+
+def test_a_volume_follows_the_pose_of_the_brain(ball):
+    data, affine = oblique_volume()
+    matrix = pose(10, 5, -15)
+    turned = moved(ball.vertices, matrix)
+    assert volume_map_on_mesh(turned, data, matrix @ affine) == pytest.approx(linear(ball.vertices))
+
+
+def test_the_outermost_voxels_are_covered_to_their_rim():
+    data = np.arange(4.0)[:, None, None] * np.ones((4, 4, 4))
+    corners = np.array([[-0.5, 1, 1], [0.25, 1, 1], [3.5, 3.5, 3.5]])
+    assert volume_map_on_mesh(corners, data, np.eye(4)) == pytest.approx([0.0, 0.25, 3.0])
+    with pytest.raises(InputError, match=r"a\.nii.*1 vertices outside it, by up to 0\.7 mm"):
+        volume_map_on_mesh(np.array([[0.0, 0, 0], [0, 0, -1.2]]), data, np.eye(4), "a.nii")
+
+
+def test_vertices_without_a_number_are_counted_with_the_distance_to_one(ball):
+    data, affine = np.ones((50, 50, 50)), np.eye(4)
+    affine[:3, 3] = -24.5
+    core = np.linalg.norm(np.stack(np.meshgrid(*[np.arange(50) - 24.5] * 3, indexing="ij")), axis=0) < 10.0
+    volume_map_on_mesh(ball.vertices, np.where(core, 7.0, data), affine)
+    inside = int((np.linalg.norm(ball.vertices, axis=1) < 8.0).sum())
+    for nothing in (np.nan, np.inf):
+        with pytest.raises(InputError, match=r"a\.nii.*\d+ vertices.*from the nearest number") as caught:
+            volume_map_on_mesh(ball.vertices, np.where(core, nothing, data), affine, "a.nii")
+        found = str(caught.value).split("found ")[1]
+        assert inside <= int(found.split()[0]) <= (np.linalg.norm(ball.vertices, axis=1) < 12.0).sum()
+        assert 9.0 <= float(found.split("up to ")[1].split()[0]) <= 10.0

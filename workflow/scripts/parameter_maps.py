@@ -1,0 +1,29 @@
+"""The maps of a run's parameters at the vertices of the start brain's mesh."""
+
+import numpy as np
+
+from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.io.files import read_json
+from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.mesh.maps import placed, vertex_map_on_mesh, volume_map_on_mesh
+from gyriflow.step import step
+from gyriflow.surface.pial import LPS_TO_RAS
+
+files, reading, maps = snakemake.input, snakemake.params.reading, {}
+with step(snakemake.log[0]):
+    mesh = read_tetrahedral_mesh(files.mesh)
+    facets, _ = boundary_faces(mesh)
+    pose = np.array(read_json(files.surface)["pose"])
+    # surfaces of the input are turned as the brain was; those that gyriflow made are turned already
+    poses = [pose @ LPS_TO_RAS if reading["coordinates"] == "lps" else pose, np.eye(4)]
+    for name, source in snakemake.params.maps.items():
+        path = ", ".join(source["map"])
+        if source["surface"]:
+            surface, values = read_surface_maps(source["map"], source["surface"])
+            surface = placed(mesh.vertices[np.unique(facets)], surface, poses)
+            maps[name] = vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
+        else:
+            volume = read_volume_map(path, reading["affine_from"])
+            maps[name] = volume_map_on_mesh(mesh.vertices, volume.values, pose @ volume.affine, path)
+    write_maps(snakemake.output[0], maps)

@@ -1,0 +1,8 @@
+"""A simple geometry as a closed surface in the place of a brain's."""
+
+from gyriflow.io.surfaces import write_surface
+from gyriflow.phantom.shapes import shape_surface
+from gyriflow.step import step
+
+with step(snakemake.log[0]):
+    write_surface(snakemake.output[0], shape_surface(**snakemake.params.shape))
