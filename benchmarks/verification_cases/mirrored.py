@@ -40,25 +40,26 @@ class Asymmetry:
     penetration_mm: float
 
 
-def hemisphere(cells: int, by: float) -> TetrahedralMesh:
-    """Returns a right half in mm: an ellipsoid beside the midline, its inner vertices moved by up to `by` cells.
+def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
+    """Returns a right half in mm: an ellipsoid beside the midline, its vertices moved by up to `by` of a cell.
 
-    Moved at random (seeded), no two pial vertices are as near to the same point.
+    Moved at random (seeded), so that hardly any point has two nearest pial vertices.
     """
     cube = grid([np.linspace(-1.0, 1.0, cells + 1)] * 3)
-    x = cube.vertices.copy()
-    inner = np.setdiff1d(np.arange(len(x)), boundary_faces(cube)[0])
-    shell = np.abs(x).max(axis=1, keepdims=True)
-    length = np.linalg.norm(x, axis=1, keepdims=True)
-    ball = np.where(length > 0, x * shell / np.where(length > 0, length, 1.0), 0.0)
-    x = shell * ball + (1 - shell) * x
-    random = np.random.default_rng(11)
-    move = random.uniform(-by, by, x.shape) * 2 / cells
-    x[inner] += move[inner]
-    outer = np.setdiff1d(np.arange(len(x)), inner)
-    x[outer] += move[outer]
-    x[outer] /= np.linalg.norm(x[outer], axis=1, keepdims=True)
+    shell = np.abs(cube.vertices).max(axis=1, keepdims=True)
+    length = np.linalg.norm(cube.vertices, axis=1, keepdims=True)
+    ball = cube.vertices * shell / np.where(length > 0, length, 1.0)
+    x = shell * ball + (1 - shell) * cube.vertices
+    x += np.random.default_rng(11).uniform(-by, by, x.shape) * 2 / cells
+    pial = np.unique(boundary_faces(cube)[0])
+    x[pial] /= np.linalg.norm(x[pial], axis=1, keepdims=True)
     return TetrahedralMesh(x * SEMI_AXES_MM + [MIDDLE_MM, 0.0, 0.0], cube.tets)
+
+
+def block(cells: int) -> TetrahedralMesh:
+    """Returns a right half in mm: a box of even cells, where most points have several nearest pial vertices."""
+    span = np.linspace(-1.0, 1.0, cells + 1)
+    return grid([semi * span + middle for semi, middle in zip(SEMI_AXES_MM, (MIDDLE_MM, 0.0, 0.0), strict=True)])
 
 
 def reflected_and_merged(half: TetrahedralMesh) -> TetrahedralMesh:
@@ -78,7 +79,10 @@ def parameters(**changes) -> FoldingParameters:
         "output_weeks": [21.0, 36.0],
         "step_s": STEP_S,
         "thickness_mm": 2.5,
+        "core_growth_rate_per_s": 1e-7,
         "contact": {"kind": "planes", "gap_mm": GAP_MM},
+        # clamped below, so that growth pushes the hemispheres against the planes
+        "no_growth": {"shift_y": 0.0, "shift_z": -0.5, "semi_axes": [0.6, 0.45, 0.25]},
         "solver": {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10},
     }
     return parameters_from(values | changes)

@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from ..errors import InputError
 from .brains import SIDES, Brain
-from .checks import brain_problems, study_problems
+from .checks import brain_problems, growth_problems, study_problems
 from .folding import VARYING, FoldingSettings
 from .root import Config
 from .varying import TAGS
@@ -49,6 +49,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
     valid["folding"] = _validated(FoldingSettings, folding, ("folding",), problems)
     runs = _runs(plain.get("runs"), folding if isinstance(folding, dict) else {}, Path(base_dir), problems)
     problems += study_problems(plain.get("brains"), plain.get("start"), runs)
+    problems += growth_problems(plain.get("brains"), plain.get("growth"), runs)
     if problems:
         raise InputError(
             f"the configuration has {len(problems)} problem{'s' if len(problems) > 1 else ''}:\n  "

@@ -64,7 +64,7 @@ VaryingOrEstimated = Annotated[
 
 def varying(default: float, unit: str, description: str, **bounds: float) -> Any:
     """Returns a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
-    return Field(default, description=description, json_schema_extra={"unit": unit, "bounds": bounds})
+    return Field(default, description=description, json_schema_extra={"unit": unit, "bounds": dict(bounds)})
 
 
 BOUND_TEXTS = {

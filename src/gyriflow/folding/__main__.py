@@ -20,7 +20,7 @@ from ..io.tetmeshes import read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
 from ..step import record_exit_code
 from .output import ZONES, say
-from .parameters import FoldingParameters, parameters_from, require_maps
+from .parameters import ELEMENT_FIELDS, FoldingParameters, parameters_from, require_maps
 from .run import run
 from .varying import Maps
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
@@ -69,9 +69,14 @@ def locked(folder: Path) -> Iterator[None]:
 
 def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters) -> None:
     """Raises StorageError where the disk has no room for the run's frames, kept twice while they are joined."""
-    values_per_vertex = 3 + 3 * len(parameters.fields)
-    frame = 8 * values_per_vertex * len(mesh.vertices)
-    checkpoint = 2 * 8 * 9 * len(mesh.vertices)
+    # positions in double precision, fields in single
+    per_vertex, per_element = (
+        24 + 12 * len(parameters.fields),
+        4 * len(set(ELEMENT_FIELDS) & set(parameters.fields)) * 4,
+    )
+    frame = per_vertex * len(mesh.vertices) + per_element * len(mesh.tets)
+    stretch = 8 * 6 * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
+    checkpoint = 2 * (8 * 9 * len(mesh.vertices) + stretch)
     needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 16 * len(mesh.tets)
     free = shutil.disk_usage(out).free
     if free < needed:

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-# -ffast-math would break the checks for numbers that are none
-COMPILER_ARGUMENTS = ["-O3", "-march=native"]
+# sums may be taken in any order, a fifth faster; all of -ffast-math would break the checks for numbers that are none
+REORDERED_SUMS = ["-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno"]
+COMPILER_ARGUMENTS = ["-O3", "-march=native", *REORDERED_SUMS]
 
 
 def processor() -> str:

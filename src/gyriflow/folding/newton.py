@@ -32,7 +32,7 @@ class NewtonSettings:
     linear solve can end the step, it is solved as far as that takes, down to a tenth of `krylov_tolerance`.
     """
 
-    newton_tolerance: float = 1e-6
+    newton_tolerance: float = 1e-5
     krylov_tolerance: float = 1e-3
     max_newton: int = 20
     max_krylov: int = 300
@@ -209,7 +209,7 @@ class NewtonSolver:
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
         norm = at_rest
         if at_rest > tolerance:
-            problem.set_displacement(start)
+            problem.set_displacement(problem.largest_step(start) * start)
             if problem.smallest_volume_ratio() > 0:
                 norm = problem.residual(self._residual)
             if not norm < at_rest:  # also where it is not a number

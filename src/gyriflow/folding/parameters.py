@@ -10,6 +10,8 @@ import numpy as np
 from ..errors import InputError
 from .varying import Maps, Varying
 
+ELEMENT_FIELDS = ("stress", "strain", "volume_ratio")
+"""Fields that a run can write for ParaView, with values per element (up to four arrays each)."""
 FIELDS = (
     "displacement",
     "distance",
@@ -19,11 +21,9 @@ FIELDS = (
     "bulk_modulus",
     "normal",
     "zones",
-    "stress",
-    "strain",
-    "volume_ratio",
+    *ELEMENT_FIELDS,
 )
-"""Fields that a run can write for ParaView, the last three per element."""
+"""All fields that a run can write."""
 SUPPORTS = ("ellipsoid", "base", "box", "free")
 VARYING = (
     "thickness_mm",
@@ -60,7 +60,7 @@ class NoGrowth:
 class Solver:
     """Tolerances of the solvers and the number of times that a step may be halved."""
 
-    newton_tolerance: float = 1e-6
+    newton_tolerance: float = 1e-5
     krylov_tolerance: float = 1e-3
     max_newton: int = 20
     max_halvings: int = 6

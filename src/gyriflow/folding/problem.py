@@ -212,7 +212,11 @@ class Problem:
         """Returns a vector for residuals and directions, without values."""
         return self.vector.duplicate()
 
+    def volume_ratios(self) -> Floats:
+        """Returns det F of the (c,) local elements."""
+        current = self.domain.local(self.domain.positions)
+        return self.domain.cell_volumes(current + self.displacement) / self.domain.volumes
+
     def smallest_volume_ratio(self) -> float:
         """Returns the smallest det F over all elements: positive where no element is inverted."""
-        current = self.domain.local(self.domain.positions)
-        return self.domain.minimum(self.domain.cell_volumes(current + self.displacement) / self.domain.volumes)
+        return self.domain.minimum(self.volume_ratios())

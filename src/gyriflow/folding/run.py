@@ -63,6 +63,7 @@ def run(
                 steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s
                 say(progress_line(state.rows[-1], parameters.end_week, rate * steps_left))
     memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
+    processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
     if comm.rank == 0:
         steps = [row["seconds"] for row in state.rows]
         summary = {
@@ -74,6 +75,7 @@ def run(
             "newton": sum(row["newton"] for row in state.rows),
             "krylov": sum(row["krylov"] for row in state.rows),
             "seconds": time.monotonic() - began,
+            "cpu_seconds": processor,
             "seconds_per_step": float(np.median(steps)),
             "peak_memory_MiB": memory,
             "min_J": min(row["min_J"] for row in state.rows),

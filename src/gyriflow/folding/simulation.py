@@ -143,7 +143,7 @@ class Folding:
         """Returns where the last solve stood worst: the most compressed element and the largest residual, in mm."""
         domain, problem = self.domain, self.problem
         before = domain.local(domain.positions)
-        ratios = domain.cell_volumes(before + problem.displacement) / domain.volumes
+        ratios = problem.volume_ratios()
         forces = -np.linalg.norm(problem.last_residual.reshape(-1, 3), axis=1)
         ratio, tet, centre = domain.least(ratios, domain.tet_of_cell, before[domain.cells].mean(axis=1) * MM_PER_M)
         force, vertex, place = domain.least(forces, domain.vertex_of_node, before * MM_PER_M)
@@ -169,7 +169,7 @@ class Folding:
         if stretch is not None:
             problem.set_stretch(stretch)
         count = self.solver.solve(domain.local(state.predicted(step_s)))
-        min_J = problem.smallest_volume_ratio()
+        ratios = problem.volume_ratios()
         energy = problem.energy()
         u = domain.gathered(problem.displacement[: domain.owned])
         length = np.linalg.norm(u, axis=1) * MM_PER_M
@@ -181,7 +181,8 @@ class Folding:
             "krylov": count.krylov,
             "residual": count.residual,
             "energy_J": energy,
-            "min_J": min_J,
+            "min_J": domain.minimum(ratios),
+            "max_J": -domain.minimum(-ratios),
             "max_u_mm": float(length.max()),
             "mean_u_mm": float(length.mean()),
             "max_u_pial_mm": float(length[self._pial].max()),

@@ -91,8 +91,8 @@ def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool
 
 
 def synthetic_note(measured: str = PHANTOM) -> str:
-    """Returns the words under which a phantom is shown, alone or beside measured brains that are called `measured`."""
-    return "synthetic phantom, not a real brain" if measured == PHANTOM else "simulated from a synthetic phantom"
+    """Returns the words under which a synthetic brain is shown, alone or beside brains that are called `measured`."""
+    return "simulated from a synthetic phantom" if REAL_BRAIN in measured else "synthetic phantom, not a real brain"
 
 
 def shown_unit(unit: object) -> str:

@@ -22,6 +22,9 @@ ZONES: Mapping[int, tuple[str, str]] = {
     2: ("left contact", "#0072B2"),
     3: ("right contact", "#F0E442"),
     4: ("between planes", "#CC79A7"),
+    5: ("base", "#999999"),
+    6: ("side x", "#56B4E9"),
+    7: ("side y", "#E69F00"),
 }
 """Codes of the boundary's zones, their names and colours (near the paper's red, green, blue, yellow and purple)."""
 

@@ -7,6 +7,7 @@ from shapes import box_mesh, ellipsoid_mesh
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.zone_checks import refuse_impossible, zone_report, zone_warnings
 from gyriflow.folding.zones import (
+    BASE,
     BETWEEN_PLANES,
     CLAMPED,
     LEFT_CONTACT,
@@ -16,6 +17,7 @@ from gyriflow.folding.zones import (
 )
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 
+OPEN = {"contact": False}
 DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift_y": 0.05, "shift_z": -0.15, "semi_axes": (0.35, 0.40, 0.50)}
 
 
@@ -96,6 +98,44 @@ def test_elements_through_the_cortex_of_a_box():
     zones = find_zones(box, fissure_x_mm=0.0, **DEFAULTS)
     # a cell of 1 mm has three edges of 1, three of √2 shared with neighbours, and one of √3
     assert 1.5 < zone_report(box, zones, 2.0)["elements_through_cortex"] < 2.0
+
+
+def dome(cells=8):
+    """Returns the upper half of an ellipsoid, on a flat base at z = 0."""
+    box = box_mesh((cells, cells, cells), (2.0, 2.0, 2.0))
+    x = box.vertices * [1.0, 1.0, 0.5] + [0.0, 0.0, 0.5]
+    shell = np.abs(x * [1.0, 1.0, 1.0]).max(axis=1, keepdims=True)
+    length = np.linalg.norm(x, axis=1, keepdims=True)
+    return TetrahedralMesh(20.0 * x * np.where(length > 0, shell / np.where(length > 0, length, 1), 1), box.tets)
+
+
+def test_a_flat_base_is_held_and_has_no_cortex():
+    mesh = dome()
+    zones = find_zones(mesh, fissure_x_mm=0.0, **(DEFAULTS | OPEN), support="base", grows_everywhere=True)
+    base = zones.facets[zones.facet_zone == BASE]
+    assert len(base)
+    assert (mesh.vertices[base][:, :, 2] == 0).all()
+    assert (zones.fixed.any(axis=1) == (mesh.vertices[:, 2] == 0)).all()
+    assert len(zones.cortex_facets) == len(zones.facets) - len(base)
+    refuse_impossible(mesh, zones)
+
+
+def test_the_sides_of_a_box_slide_in_their_planes():
+    box = box_mesh((4, 3, 2), (8.0, 6.0, 4.0))
+    zones = find_zones(box, fissure_x_mm=0.0, **(DEFAULTS | OPEN), support="box", grows_everywhere=True)
+    x, y, z = box.vertices.T
+    low = z == -2.0
+    np.testing.assert_array_equal(zones.fixed[:, 0], (np.abs(x) == 4.0) | low)
+    np.testing.assert_array_equal(zones.fixed[:, 1], (np.abs(y) == 3.0) | low)
+    np.testing.assert_array_equal(zones.fixed[:, 2], low)
+    assert (box.vertices[zones.cortex_facets][:, :, 2] == 2.0).all()
+    assert (zones.growth == 1).all()
+
+
+def test_a_free_brain_needs_no_clamps(brain):
+    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS, support="free")
+    assert not zones.fixed.any()
+    refuse_impossible(brain, zones)
 
 
 def test_a_brain_without_clamped_facets_is_refused(brain):

@@ -1,0 +1,201 @@
+"""Verification of the folding solver: cases whose answers are known, with figures and tables of what comes out.
+
+    ./run python benchmarks/verification.py --figures docs/images
+
+Cases and literature: docs/verification.md. Each part runs on two MPI ranks, the comparison of ranks on one, two and
+three. The last line is one JSON object with all that was measured.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+MANUFACTURED_CELLS = (6, 12, 24)
+CONTRASTS = (5.0, 20.0, 50.0)
+SLAB_CELLS = (2, 4, 8, 16)
+"""Cells to a cortical thickness."""
+RATE_GROWTH = 1e-3
+"""Growth of the step from which rates are taken."""
+MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS = 20.0, 0.004, 12
+MEMORIES = (0.0, 0.05, np.inf)
+MEMORY_CELLS = (2, 4, 8, 16)
+STEP_CELLS, STEP_COUNTS = 4, (6, 12, 24)
+RANKS = (1, 2, 3)
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+def consistency() -> dict:
+    from verification_cases.consistency import LENGTHS, patch_residual, remainders
+
+    found = remainders()
+    return {
+        "patch_residual": patch_residual(),
+        "lengths": LENGTHS,
+        "energy_remainders": found.energy,
+        "residual_remainders": found.residual,
+        "energy_slopes": found.slopes()[:, 0],
+        "residual_slopes": found.slopes()[:, 1],
+    }
+
+
+def manufactured() -> dict:
+    from verification_cases.manufactured import CASES, rates, solved
+
+    found = {}
+    for case in CASES:
+        errors = [solved(case, cells) for cells in MANUFACTURED_CELLS]
+        orders = rates(errors)
+        found[case] = {
+            "cells": MANUFACTURED_CELLS,
+            "displacement_errors": [one.displacement for one in errors],
+            "gradient_errors": [one.gradient for one in errors],
+            "displacement_orders": orders[:, 0],
+            "gradient_orders": orders[:, 1],
+        }
+    return found
+
+
+def symmetry() -> dict:
+    from verification_cases.mirrored import block, folded, hemisphere
+
+    runs = {
+        "forgotten": (hemisphere(8), {}),
+        "remembered": (hemisphere(8), {"stress_memory_gw": 1.0}),
+        "forgotten_with_ties": (block(6), {}),
+    }
+    return {name: asdict(folded(half, 6, **changes)[1]) for name, (half, changes) in runs.items()}
+
+
+def ranks() -> dict:
+    """Returns the places of all vertices after some steps, with tight tolerances and with those of a run."""
+    from verification_cases.mirrored import folded, hemisphere
+
+    usual = {"newton_tolerance": 1e-6, "krylov_tolerance": 1e-3}
+    runs = {"tight": {}, "usual": {"solver": usual}}
+    return {
+        name: folded(hemisphere(8), 4, stress_memory_gw=1.0, **changes)[0].positions for name, changes in runs.items()
+    }
+
+
+def rates() -> dict:
+    from verification_cases.slab import Waved, amplified
+
+    found = {}
+    for contrast in CONTRASTS:
+        case = Waved(contrast, RATE_GROWTH, 1)
+        found[f"{contrast:g}"] = {
+            "lengths": case.lengths_mm,
+            "expected": np.log(case.expected()[1]) / RATE_GROWTH,
+            "measured": [np.log(amplified(case, cells)[1]) / RATE_GROWTH for cells in SLAB_CELLS],
+        }
+    return found
+
+
+def memory() -> dict:
+    from verification_cases.slab import Waved, amplified
+
+    found = {}
+    for tau in MEMORIES:
+        case = Waved(MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS, tau)
+        cells = MEMORY_CELLS if np.isinf(tau) else MEMORY_CELLS[2:3]
+        found[f"{tau:g}"] = {
+            "lengths": case.lengths_mm,
+            "expected": case.expected(),
+            "measured": [amplified(case, count) for count in cells],
+        }
+    return found
+
+
+def time_steps() -> dict:
+    from verification_cases.slab import Waved, amplified
+
+    found: dict = {"growth_of_step": [], "expected": [], "measured": []}
+    for count in STEP_COUNTS:
+        case = Waved(MEMORY_CONTRAST, MEMORY_GROWTH * MEMORY_STEPS / count, count, np.inf)
+        found["growth_of_step"].append(case.growth)
+        found["expected"].append(case.expected()[-1])
+        found["measured"].append(amplified(case, STEP_CELLS)[-1])
+    return found
+
+
+PARTS = {part.__name__: part for part in (consistency, manufactured, symmetry, ranks, rates, memory, time_steps)}
+
+
+def plain(value):
+    """Returns a value with arrays as lists, for JSON."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def run(part: str, ranks: int) -> dict:
+    """Returns what a part measures in an MPI run of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "found.json"
+        program = [sys.executable, __file__, "--inside-mpi", part, "--into", str(file)]
+        command = ["mpiexec", "-n", str(ranks), *program]
+        done = subprocess.run(command, env=os.environ | ONE_THREAD, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise SystemExit(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
+        return json.loads(file.read_text())
+
+
+def inside_mpi(part: str, into: Path) -> None:
+    from mpi4py import MPI
+
+    found = PARTS[part]()
+    if MPI.COMM_WORLD.rank == 0:
+        into.write_text(json.dumps(plain(found)))
+
+
+def differences_between_ranks() -> dict:
+    """Returns the largest distance of a vertex between two numbers of ranks, over the largest displacement."""
+    from verification_cases.mirrored import hemisphere, reflected_and_merged
+
+    start = reflected_and_merged(hemisphere(8)).vertices * 1e-3
+    runs = [run("ranks", count) for count in RANKS]
+    found = {}
+    for name in runs[0]:
+        one, *others = (np.array(result[name]) for result in runs)
+        largest = np.linalg.norm(one - start, axis=1).max()
+        found[name] = [float(np.linalg.norm(other - one, axis=1).max() / largest) for other in others]
+    return found
+
+
+def parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--figures", type=Path, help="folder for the pictures (PNG)")
+    parser.add_argument("--inside-mpi", choices=sorted(PARTS), help=argparse.SUPPRESS)
+    parser.add_argument("--into", type=Path, help=argparse.SUPPRESS)
+    return parser.parse_args()
+
+
+def main(arguments: argparse.Namespace) -> None:
+    from verification_cases.figures import draw
+    from verification_cases.summary import summary
+
+    found: dict = {}
+    for part in PARTS:
+        found[part] = differences_between_ranks() if part == "ranks" else run(part, 2)
+        print(f"{part}: done", flush=True)
+    if arguments.figures:
+        meshes = {"slab_cells": SLAB_CELLS, "memory_cells": MEMORY_CELLS}
+        draw(found | meshes | {"contrast": MEMORY_CONTRAST, "growth": MEMORY_GROWTH}, arguments.figures)
+    print(json.dumps(summary(found)), flush=True)
+
+
+if __name__ == "__main__":
+    arguments = parse()
+    if arguments.inside_mpi:
+        inside_mpi(arguments.inside_mpi, arguments.into)
+    else:
+        main(arguments)

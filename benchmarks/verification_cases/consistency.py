@@ -1,0 +1,101 @@
+"""Energy, forces and stiffness that belong together: Taylor's remainders, and the patch test."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from gyriflow.folding.domain import Domain
+from gyriflow.folding.problem import Material, Problem
+from gyriflow.folding.zones import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT, Zones
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+
+from .manufactured import STRETCH
+
+Floats = NDArray[np.float64]
+
+SIDE_MM = 6.0
+AFFINE = np.array([[0.06, 0.02, -0.01], [0.03, -0.05, 0.02], [0.0, 0.04, 0.03]])
+LENGTHS = 0.4 * 0.5 ** np.arange(5)
+"""Steps along a direction."""
+
+
+def cube() -> TetrahedralMesh:
+    """Returns a cube around the origin, in mm, whose inner vertices are moved at random (seeded)."""
+    mesh = grid([np.linspace(-SIDE_MM / 2, SIDE_MM / 2, 5)] * 3)
+    inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
+    vertices = mesh.vertices.copy()
+    vertices[inner] += np.random.default_rng(3).uniform(-0.3, 0.3, (len(inner), 3))
+    return TetrahedralMesh(vertices, mesh.tets)
+
+
+def problem_of(zone_of, comm: MPI.Comm, uniform: bool) -> Problem:
+    """Returns a problem on the cube with zones by the facets' centroids, growth, oblique normals and kept stretch."""
+    mesh = cube()
+    facets, _ = boundary_faces(mesh)
+    zones = Zones(facets, zone_of(mesh.vertices[facets].mean(axis=1)), np.ones(len(mesh.vertices)), 0.0, (-3.2, 3.2))
+    domain = Domain(comm, mesh)
+    problem = Problem(domain, zones, Material(0.45, 5e5), remembers_stress=True)
+    x = 0 if uniform else domain.local(domain.positions)[:, 2] / (SIDE_MM * 1e-3)
+    ones, cells = np.ones(len(domain.vertex_of_node)), len(domain.cells)
+    problem.set_layers(1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones, np.tile([1 / 3, 2 / 3, 2 / 3], (cells, 1)))
+    problem.set_stretch(np.tile(STRETCH, (cells, 1, 1)))
+    return problem
+
+
+@dataclass(frozen=True, eq=False)
+class Remainders:
+    """|E(u + hv) − E(u) − h E'(u)v| and |r(u + hv) − r(u) − h K(u)v| at `LENGTHS`: both fall as h²."""
+
+    energy: Floats
+    residual: Floats
+
+    def slopes(self) -> Floats:
+        """Returns the (4, 2) slopes of their logarithms."""
+        values = np.stack([self.energy, self.residual], axis=1)
+        return np.diff(np.log(values), axis=0) / np.diff(np.log(LENGTHS))[:, None]
+
+
+def remainders(comm: MPI.Comm = MPI.COMM_WORLD) -> Remainders:
+    """Returns Taylor's remainders of a problem with all parts: layers, kept stress, a clamped base, both planes."""
+
+    def zone_of(centre):
+        zone = np.full(len(centre), FREE)
+        zone[centre[:, 0] < -0.499 * SIDE_MM] = LEFT_CONTACT
+        zone[centre[:, 0] > 0.499 * SIDE_MM] = RIGHT_CONTACT
+        zone[centre[:, 2] < -0.499 * SIDE_MM] = CLAMPED
+        return zone
+
+    problem = problem_of(zone_of, comm, uniform=False)
+    domain = problem.domain
+    # walls at -3 and 3 mm that may not be left of 3.2 and right of -3.2 mm: contact acts all along
+    x = domain.local(domain.positions) * 1e3
+    u = 2e-4 * np.stack([np.sin(0.3 * x[:, 1]), np.cos(0.25 * x[:, 2]), np.sin(0.05 * x[:, 0] * x[:, 1])], axis=1)
+    v = np.ascontiguousarray(u[:, [2, 0, 1]]) / 2
+    v[x[:, 2] < -0.499 * SIDE_MM] = 0.0
+    direction, residual, other, change = (problem.new_vector() for _ in range(4))
+    direction.array[:] = v[: domain.owned].ravel()
+    problem.set_displacement(u)
+    energy = problem.energy()
+    problem.residual(residual)
+    problem.tangent().mult(direction, change)
+    by_energy, by_residual = [], []
+    for h in LENGTHS:
+        problem.set_displacement(u + h * v)
+        by_energy.append(abs(problem.energy() - energy - h * residual.dot(direction)))
+        problem.residual(other)
+        other.axpy(-1.0, residual)
+        other.axpy(-h, change)
+        by_residual.append(other.norm())
+    return Remainders(np.array(by_energy), np.array(by_residual))
+
+
+def patch_residual(comm: MPI.Comm = MPI.COMM_WORLD) -> float:
+    """Returns the force left inside a uniform body under an affine displacement, over that on its surface."""
+    norms = []
+    for zone in (CLAMPED, FREE):
+        problem = problem_of(lambda centre, zone=zone: np.full(len(centre), zone), comm, uniform=True)
+        problem.set_displacement(problem.domain.local(problem.domain.positions) @ AFFINE.T)
+        norms.append(problem.residual(problem.new_vector()))
+    return float(norms[0] / norms[1])

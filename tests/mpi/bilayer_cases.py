@@ -1,0 +1,70 @@
+"""Waves on a growing slab: the theory in its closed limits, and the solver against the theory."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from boxes import COMM
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
+from verification_cases.modes import Slab, amplifications, critical_growth, growth_rates
+from verification_cases.slab import Waved, amplified
+
+LONG = slice(0, 3)
+"""The longest waves, which coarse meshes resolve."""
+ORDER = 1.5
+"""About the order in which errors fall on such meshes (benchmarks/verification.py)."""
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.45])
+def test_on_cortex_alone_all_waves_grow_at_the_rate_in_closed_form(poisson_ratio):
+    slab = Slab(1.0, poisson_ratio, depth=8.0, thickness=np.inf)
+    rates = growth_rates(slab, 2 * np.pi / np.array([0.5, 1.0, 2.0]))
+    np.testing.assert_allclose(rates, short_wave_rate(poisson_ratio), rtol=2e-6)
+
+
+@pytest.mark.parametrize("steepness", [10.0, np.inf])
+def test_on_a_stiff_film_the_theory_is_that_of_thin_plates(steepness):
+    slab = Slab(1e3, steepness=steepness, depth=200.0)
+    film = thin_film(slab)
+    length = film.wavelength * np.array([0.97, 0.985, 1.0, 1.015, 1.03])
+    rates = growth_rates(slab, 2 * np.pi / length)
+    assert rates.argmax() == 2
+    assert rates.max() == pytest.approx(film.growth_rate, rel=0.04)
+
+
+def test_where_stress_is_kept_a_stiff_film_wrinkles_at_the_critical_growth():
+    slab = Slab(1e3, memory=np.inf, depth=150.0, finest=0.04)
+    film = thin_film(slab)
+    lengths = film.wavelength * np.array([0.6, 1.0, 1.6])
+    found = critical_growth(slab, 2 * np.pi / lengths, film.critical_growth / 25, 2 * film.critical_growth)
+    assert found.argmin() == 1
+    assert found[1] == pytest.approx(film.critical_growth, rel=0.07)
+
+
+def test_where_stress_is_kept_a_half_space_wrinkles_at_biots_stretch():
+    slab = Slab(1.0, 0.4999, depth=6.0, memory=np.inf, thickness=np.inf, finest=0.05)
+    found = critical_growth(slab, 2 * np.pi / np.array([1.0, 2.0]), 0.02, 1.0)
+    np.testing.assert_allclose(1 / (1 + found), BIOT_STRETCH, rtol=0.01)
+
+
+def test_memory_leads_from_none_to_all():
+    k = np.array([0.3, 0.6])
+    ends = [amplifications(Slab(20.0, memory=memory), k, 0.005, 3)[-1] for memory in (0.0, 1e-7, 0.05, 1e7, np.inf)]
+    np.testing.assert_allclose(ends[1], ends[0], rtol=1e-12)
+    np.testing.assert_allclose(ends[3], ends[4], rtol=1e-6)
+    assert (ends[0] < ends[2]).all()
+    assert (ends[2] < ends[4]).all()
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.03, np.inf])
+def test_waves_grow_as_in_theory(memory):
+    case = Waved(contrast=20.0, growth=0.01, steps=3, memory=memory)
+    exact = np.log(case.expected()[-1])[LONG]
+    coarse, fine = (np.log(amplified(case, cells, COMM)[-1])[LONG] for cells in (2, 4))
+    assert (np.abs(fine - exact) <= 0.42 * np.abs(coarse - exact)).all()
+    # what is left on ever finer meshes; memory changes the exact values by 8 to 28 %
+    limit = fine + (fine - coarse) / (2**ORDER - 1)
+    np.testing.assert_allclose(limit, exact, rtol=0.03)

@@ -1,0 +1,18 @@
+"""With layers, remembered stress, clamped facets and contact at once: forces fit the energy, stiffness the forces."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from boxes import COMM
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from verification_cases.consistency import patch_residual, remainders
+
+
+def test_taylors_remainders_fall_with_the_square_of_the_step():
+    assert remainders(COMM).slopes() == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_uniform_body_is_in_equilibrium_under_an_affine_displacement():
+    assert patch_residual(COMM) <= 1e-12

@@ -1,0 +1,64 @@
+"""Which jobs the workflow plans for simple shapes in the place of brains."""
+
+import pytest
+
+STUDY = {
+    "brains": [
+        {"id": "dome", "week": 21, "shape": {"kind": "half-ellipsoid"}},
+        {"id": "old", "week": 22, "phantom": {}},
+    ],
+    "start": "dome",
+    "folding": {"end_week": 22, "contact": {"kind": "none"}},
+}
+TARGET = "results/dome/surface/pial.surf.gii"
+
+
+def test_a_shape_is_made_and_takes_the_path_of_a_brain(workflow):
+    jobs = workflow.jobs("--configfile", workflow.write("study.yaml", STUDY))
+    assert (jobs["shape"], jobs["phantom"], jobs["pial_surface"], jobs["measure_real"]) == (1, 1, 2, 2)
+    assert jobs["tetrahedralise"] == jobs["simulate"] == 1
+    assert jobs["html_report"] == 1
+
+
+@pytest.fixture
+def made(workflow):
+    """The surface of the shape, which counts as made."""
+    name = workflow.write("study.yaml", STUDY)
+    folder = workflow.directory / "results" / "dome" / "surface"
+    folder.mkdir(parents=True)
+    sides = [f"{side}pial.surf.gii" for side in ("", "left.", "right.")]
+    for file in ["shape.surf.gii", "pial.stl", "surface.json", *sides]:
+        (folder / file).touch()
+    touched = workflow.run(TARGET, "--cores", "1", "--touch", "--forceall", "--configfile", name)
+    assert touched.returncode == 0, touched.stderr
+    assert workflow.jobs(TARGET, "--configfile", name) == {}
+    return workflow
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"surface": {"edge_length_mm": 1.2}}, {"shape": 1, "pial_surface": 1}),
+        ({"shape": {"kind": "slab"}}, {"shape": 1, "pial_surface": 1}),
+        ({"shape": {"kind": "half-ellipsoid", "seed": 1}}, {"shape": 1, "pial_surface": 1}),
+        # defaults written out, and what is for other kinds of input
+        ({"shape": {"kind": "half-ellipsoid", "noise_mm": 0.05}}, {}),
+        ({"surface": {"smoothing_iterations": 3, "max_hole_mm": 1.0}}, {}),
+    ],
+)
+def test_exactly_what_depends_on_a_changed_setting_runs_again(made, change, expected):
+    study = dict(STUDY)
+    if "shape" in change:
+        study["brains"] = [STUDY["brains"][0] | change, STUDY["brains"][1]]
+    else:
+        study |= change
+    name = made.write("changed.yaml", study)
+    assert made.jobs(TARGET, "--configfile", name) == expected
+
+
+def test_a_wrong_shape_ends_in_exit_code_2_before_any_job(workflow):
+    wrong = STUDY | {"brains": [{"id": "dome", "week": 21, "shape": {"kind": "cone"}}]}
+    outcome = workflow.run("--cores", "1", "--configfile", workflow.write("wrong.yaml", wrong))
+    assert outcome.returncode == 2
+    assert "brains[0].shape.kind: found 'cone'" in outcome.stdout + outcome.stderr
+    assert not (workflow.directory / "results").exists()
