@@ -27,23 +27,24 @@ def by_length(axes: Axes, shown: list[float], label: str) -> None:
     light_grid(axes, "both")
 
 
-def by_cells(axes: Axes, cells: list[int], xlabel: str, ylabel: str) -> None:
-    """Gives axes logarithmic scales with the numbers of cells as ticks."""
+def log_scales(axes: Axes, ticks: list, xlabel: str, ylabel: str) -> None:
+    """Gives axes logarithmic scales with ticks at given places."""
     axes.set(xscale="log", yscale="log", xlabel=xlabel, ylabel=ylabel)
-    axes.xaxis.set_major_locator(FixedLocator(cells))
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter("{x:g}")
     light_grid(axes, "both")
 
 
 def slope(axes: Axes, x, at: float, order: float) -> None:
-    """Draws the line of an order through a value at the last of x, named at its middle."""
+    """Draws the line of an order through a value at the last of x, named beside it."""
     x = np.asarray(x, dtype=float)
     y = at * (x / x[-1]) ** order
     axes.plot(x, y, ":", color=MUTED_COLOUR, linewidth=1.0, zorder=1)
-    middle = len(x) // 2
-    text = f"order {abs(order):g}"
-    axes.annotate(text, (x[middle], y[middle]), (3, -3), textcoords="offset points", va="top", color=MUTED_COLOUR)
+    side, shift = ("left", 4) if order > 0 else ("right", -4)
+    place, place_of_text = (x[-2], y[-2]), (shift, -4)
+    text = {"textcoords": "offset points", "ha": side, "va": "top", "color": MUTED_COLOUR}
+    axes.annotate(f"order {abs(order):g}", place, place_of_text, **text)
 
 
 def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
@@ -53,10 +54,10 @@ def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
     one = found["consistency"]
     for i, (key, name) in enumerate((("energy_remainders", "energy"), ("residual_remainders", "forces"))):
         values = np.array(one[key]) / one[key][0]
-        taylor.plot(one["lengths"], values, MARKERS[i] + "-", color=RUN_COLOURS[i], label=name, mfc=("none", None)[i])
+        look = {"color": RUN_COLOURS[i], "markersize": 6 - 3 * i, "mfc": ("none", RUN_COLOURS[i])[i]}
+        taylor.plot(one["lengths"], values, MARKERS[i] + ("-", "--")[i], label=name, **look)
     slope(taylor, one["lengths"], 0.3 * values[-1], 2)
-    taylor.set(xscale="log", yscale="log", xlabel="step along a direction", ylabel="Taylor remainder (relative)")
-    light_grid(taylor, "both")
+    log_scales(taylor, one["lengths"], "step along a direction", "Taylor remainder (relative)")
     taylor.legend(loc="upper left")
 
     for i, (case, name) in enumerate(CASES.items()):
@@ -66,7 +67,7 @@ def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
             manufactured.plot(own["cells"], own[key], MARKERS[i] + line, color=RUN_COLOURS[i], mfc="none", label=label)
     slope(manufactured, own["cells"], 0.6 * own["displacement_errors"][-1], -2)
     slope(manufactured, own["cells"], 0.7 * own["gradient_errors"][-1], -1)
-    by_cells(manufactured, own["cells"], "cells along a side", "relative error")
+    log_scales(manufactured, own["cells"], "cells along a side", "relative error")
     manufactured.plot([], [], "-", color=MUTED_COLOUR, label="displacement")
     manufactured.plot([], [], "--", color=MUTED_COLOUR, label="its gradient")
     manufactured.legend(loc="lower left", fontsize=6, labelspacing=0.25)
@@ -78,7 +79,7 @@ def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
         label = f"contrast {contrast}"
         waves.plot(slab_cells, errors, MARKERS[i] + "-", color=RUN_COLOURS[i], mfc="none", label=label)
     slope(waves, slab_cells, 0.5 * errors[-1], -2)
-    by_cells(
+    log_scales(
         waves, list(slab_cells), "cells to a cortical thickness", "relative error of the fastest\nwave's growth rate"
     )
     waves.legend(loc="lower left")
@@ -110,7 +111,7 @@ def rates(found: dict, slab_cells: tuple[int, ...]) -> Figure:
 
 def memory(found: dict, cells: tuple[int, ...]) -> Figure:
     """Returns amplifications where stress is kept, by wavelength and by growth."""
-    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN + 0.2, title="", synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN + 0.7, title="", synthetic=False)
     by_wave, by_growth = figure.subplots(1, 2)
     contrast, step = found["contrast"], found["growth"]
     runs = found["memory"]
@@ -126,7 +127,6 @@ def memory(found: dict, cells: tuple[int, ...]) -> Figure:
     by_wave.axvline(thin_film(kept).wavelength, color=MUTED_COLOUR, linestyle=":", label=label)
     by_length(by_wave, [4, 6, 8, 12, 16, 24, 48], f"height over that at the start,\nafter growth by {step * steps:.3g}")
     by_wave.set_title("all stress kept")
-    by_wave.legend(loc="upper left")
 
     wave = int(np.argmax(own["expected"][-1]))
     growth = step * np.arange(steps + 1)
@@ -145,7 +145,8 @@ def memory(found: dict, cells: tuple[int, ...]) -> Figure:
     by_growth.yaxis.set_minor_locator(NullLocator())
     by_growth.yaxis.set_major_formatter("{x:g}")
     light_grid(by_growth, "both")
-    by_growth.legend(loc="upper left")
+    for axes, columns in ((by_wave, 2), (by_growth, 1)):
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=columns)
     return figure
 
 

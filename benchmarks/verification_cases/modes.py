@@ -82,7 +82,7 @@ class Waves:
 
 
 class Fields(NamedTuple):
-    """What a step starts with in each element of each wave, (k, n, …): values of the flat slab plus imaginary amplitudes.
+    """What a step starts with in each element of each wave, (k, n, …): flat values plus imaginary amplitudes.
 
     `place` is the gradient of the present shape x(X) over the flat slab X.
     """

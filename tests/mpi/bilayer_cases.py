@@ -62,9 +62,10 @@ def test_memory_leads_from_none_to_all():
 @pytest.mark.parametrize("memory", [0.0, 0.03, np.inf])
 def test_waves_grow_as_in_theory(memory):
     case = Waved(contrast=20.0, growth=0.01, steps=3, memory=memory)
-    exact = np.log(case.expected()[-1])[LONG]
-    coarse, fine = (np.log(amplified(case, cells, COMM)[-1])[LONG] for cells in (2, 4))
-    assert (np.abs(fine - exact) <= 0.42 * np.abs(coarse - exact)).all()
-    # what is left on ever finer meshes; memory changes the exact values by 8 to 28 %
+    exact = np.log(case.expected()[-1])
+    coarse, fine = (np.log(amplified(case, cells, COMM)[-1]) for cells in (2, 4))
+    assert (np.abs(fine - exact) <= 0.6 * np.abs(coarse - exact)).all()
+    # what is left on ever finer meshes: memory changes the long waves by 8 to 28 %, turning normals the short ones
     limit = fine + (fine - coarse) / (2**ORDER - 1)
-    np.testing.assert_allclose(limit, exact, rtol=0.03)
+    np.testing.assert_allclose(limit[LONG], exact[LONG], rtol=0.03)
+    np.testing.assert_allclose(limit, exact, rtol=0.2)

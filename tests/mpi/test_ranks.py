@@ -8,7 +8,13 @@ import pytest
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
-@pytest.mark.parametrize("cases", ["solver_cases.py", "growth_cases.py", "memory_cases.py", "ladder_cases.py"])
+@pytest.mark.parametrize(
+    "cases",
+    [
+        *("solver_cases.py", "growth_cases.py", "memory_cases.py", "ladder_cases.py", "consistency_cases.py"),
+        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py"),
+    ],
+)
 def test_cases_hold_on(ranks, cases):
     path = Path(__file__).with_name(cases)
     command = [
