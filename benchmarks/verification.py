@@ -2,8 +2,8 @@
 
     ./run python benchmarks/verification.py --figures docs/images
 
-Cases and literature: docs/verification.md. Each part runs on two MPI ranks, the comparison of ranks on one, two and
-three. The last line is one JSON object with all that was measured.
+Cases and literature: docs/verification.md. The solver runs on two MPI ranks, and on one, two and three where these are
+compared. The last line is one JSON object with all that was measured.
 """
 
 import argparse
@@ -83,6 +83,35 @@ def ranks() -> dict:
     }
 
 
+def theory() -> dict:
+    """Returns the linearised theory in limits that are known in closed form."""
+    from scipy.optimize import minimize_scalar
+    from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
+    from verification_cases.modes import Slab, critical_growth, growth_rates
+
+    cortex = Slab(1.0, depth=8.0, thickness=np.inf)
+    rates = growth_rates(cortex, 2 * np.pi / np.array([0.5, 1.0, 2.0]))
+    found: dict = {"cortex_alone": {"known": short_wave_rate(0.45), "found": rates}}
+    for contrast in (1e2, 1e3, 1e4):
+        slab = Slab(contrast, depth=40 * (contrast / 3) ** (1 / 3))
+        film = thin_film(slab)
+        start = [0.8 * film.wavelength, 1.2 * film.wavelength]
+        best = minimize_scalar(lambda length, slab=slab: -growth_rates(slab, np.array([2 * np.pi / length]))[0], start)
+        found[f"thin_film_{contrast:g}"] = {
+            "known_wavelength": film.wavelength,
+            "found_wavelength": best.x,
+            "known_rate": film.growth_rate,
+            "found_rate": -best.fun,
+        }
+    film, slab = thin_film(Slab(1e3)), Slab(1e3, depth=200.0, memory=np.inf)
+    critical = critical_growth(slab, 2 * np.pi / np.array([film.wavelength]), film.critical_growth / 100, 1.0)
+    found["critical_growth_1000"] = {"known": film.critical_growth, "found": critical[0]}
+    half_space = Slab(1.0, 0.4999, depth=6.0, memory=np.inf, thickness=np.inf, finest=0.04)
+    critical = critical_growth(half_space, 2 * np.pi / np.array([1.0]), 0.002, 1.0)
+    found["half_space_stretch"] = {"known": BIOT_STRETCH, "found": 1 / (1 + critical[0])}
+    return found
+
+
 def rates() -> dict:
     from verification_cases.slab import Waved, amplified
 
@@ -124,7 +153,9 @@ def time_steps() -> dict:
     return found
 
 
-PARTS = {part.__name__: part for part in (consistency, manufactured, symmetry, ranks, rates, memory, time_steps)}
+PARTS = {
+    part.__name__: part for part in (consistency, manufactured, symmetry, ranks, theory, rates, memory, time_steps)
+}
 
 
 def plain(value):
@@ -184,7 +215,7 @@ def main(arguments: argparse.Namespace) -> None:
 
     found: dict = {}
     for part in PARTS:
-        found[part] = differences_between_ranks() if part == "ranks" else run(part, 2)
+        found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part == "theory" else 2)
         print(f"{part}: done", flush=True)
     if arguments.figures:
         meshes = {"slab_cells": SLAB_CELLS, "memory_cells": MEMORY_CELLS}

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from .closed_forms import short_wave_rate, thin_film
+from .closed_forms import thin_film
 from .modes import Slab
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def summary(found: dict) -> dict:
             "manufactured": found["manufactured"],
             "symmetry": found["symmetry"],
             "ranks": found["ranks"],
-            "short_wave_rate": short_wave_rate(0.45),
+            "theory": found["theory"],
             "rates": {contrast: rates_of(float(contrast), one) for contrast, one in found["rates"].items()},
             "memory": {tau: memory_of(one) for tau, one in found["memory"].items()},
             "time_steps": time_steps_of(found["time_steps"]),

@@ -1,5 +1,7 @@
 """Each rung of the linear solver's ladder on a case that needs it, and further contributions to the problem."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from boxes import COMM, distorted_box, everywhere_known, problem_on, smooth_displacement, zones_of
@@ -140,3 +142,60 @@ def test_a_contribution_holds_the_body_and_limits_the_steps():
     # half steps at most: the residual can no more than halve in each
     assert count.newton >= 25 > easy.newton
     assert springs.asked == count.newton + 1
+
+
+class Tie:
+    """A linear spring between the lowest and the highest vertex, which may belong to different ranks."""
+
+    def __init__(self, problem, stiffness):
+        domain = problem.domain
+        self.problem, self.stiffness = problem, stiffness
+        ends = [int(np.argmin(domain.positions[:, 2])), int(np.argmax(domain.positions[:, 2]))]
+        first = domain.space.dofmap.index_map.local_range[0]
+        owned = domain.vertex_of_node[: domain.owned]
+        self.local = [np.flatnonzero(owned == end) for end in ends]
+        self.rows = [COMM.allreduce(int(first + i[0]) if len(i) else 0) for i in self.local]
+
+    def _stretch(self):
+        u = self.problem.displacement
+        ends = [COMM.allreduce(u[i[0]] if len(i) else np.zeros(3)) for i in self.local]
+        return ends[1] - ends[0]
+
+    def energy(self):
+        return 0.5 * self.stiffness * float(self._stretch() @ self._stretch())
+
+    def add_residual(self, out):
+        force = self.stiffness * self._stretch()
+        for i, sign in zip(self.local, (-1.0, 1.0), strict=True):
+            out.array.reshape(-1, 3)[i] += sign * force
+
+    def add_tangent(self, matrix):
+        matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, False)
+        if COMM.rank == 0:
+            for i, a in enumerate(self.rows):
+                for j, b in enumerate(self.rows):
+                    for k in range(3):
+                        value = self.stiffness * (1 if i == j else -1)
+                        matrix.setValue(3 * a + k, 3 * b + k, value, addv=PETSc.InsertMode.ADD_VALUES)
+        matrix.assemble()
+        return matrix
+
+    def largest_step(self, direction):
+        return 1.0
+
+
+def test_a_contribution_across_the_clamped_boundary_leaves_it_where_it_is():
+    problem = clamped_box()
+    problem.contributions.append(Tie(problem, 5.0))
+    count, u = solved(problem)
+    assert count.residual <= 1e-9
+    assert (u[problem.domain.positions[:, 2] <= -2.99e-3] == 0).all()
+
+
+def test_the_direct_solver_takes_a_free_body_too():
+    mesh = distorted_box()
+    problem = problem_on(mesh, replace(zones_of(mesh), free=True), mu=500.0, dg=lambda x: 0.01 + x[:, 2], dr=0.002)
+    count, u = solved(problem, krylov_tolerance=1e-8, max_krylov=4)
+    assert count.rung == DIRECT
+    assert count.residual <= 1e-9
+    assert np.abs(u.mean(axis=0)).max() <= 1e-9 * np.abs(u).max()

@@ -158,8 +158,9 @@ def test_a_failed_solve_says_so():
         solver.solve(np.zeros_like(problem.displacement))
 
 
-def test_the_energy_never_rises_from_one_iterate_to_the_next():
-    problem = growing_problem(dg=lambda x: 0.05 + 5 * x[:, 2])
+@pytest.mark.parametrize("contact", [False, True])
+def test_the_energy_never_rises_from_one_iterate_to_the_next(contact):
+    problem = growing_problem(contact, dg=lambda x: 0.05 + 5 * x[:, 2])
     solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-10, krylov_tolerance=1e-8), residual_floor=0.0)
     energies = []
     advance = solver._advance

@@ -8,7 +8,7 @@ import pytest
 from boxes import COMM
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from verification_cases.mirrored import folded, hemisphere, reflected_and_merged
+from verification_cases.mirrored import block, folded, hemisphere, reflected_and_merged
 
 from gyriflow.geometry.tetrahedra import signed_volumes
 
@@ -28,3 +28,9 @@ def test_mirrored_hemispheres_stay_mirror_images(memory_gw):
     assert found.displacement_mm > 0.5
     assert found.relative <= 1e-9
     assert (COMM.bcast(state.positions) == state.positions).all()
+
+
+def test_equal_distances_to_several_pial_vertices_do_not_break_the_symmetry():
+    _, found = folded(block(6), 4, COMM)
+    assert found.displacement_mm > 0.1
+    assert found.relative <= 1e-9

@@ -25,6 +25,7 @@ from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
+from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
@@ -223,6 +224,56 @@ def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_pat
     assert "going on from the checkpoint after step 5" in capsys.readouterr().out
     assert read_weeks(tmp_path / "frames.h5") == [21.0, 21.25]
     assert pd.read_csv(tmp_path / "steps.csv")["week"].iloc[-1] == pytest.approx(21.25)
+
+
+def test_stress_is_remembered_across_an_interruption(mesh, tmp_path, monkeypatch, capsys):
+    brain = read_tetrahedral_mesh(mesh)
+    parameters = parameters_from(WEEK | {"stress_memory_gw": 0.5, "solver": TIGHT})
+    zones = zones_of_run(brain, parameters)
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "whole")
+    honest = Folding.step
+
+    def failing(self, state, step_s):
+        if len(state.rows) == 4:
+            raise NotConvergedError("no way on")
+        return honest(self, state, step_s)
+
+    monkeypatch.setattr(Folding, "step", failing)
+    with pytest.raises(SolverError):
+        run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "cut")
+    monkeypatch.undo()
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "cut")
+    assert "going on from the checkpoint after step 4" in capsys.readouterr().out
+    whole, cut = (read_positions(tmp_path / name / "frames.h5", 21.5) for name in ("whole", "cut"))
+    forgetful = parameters_from(WEEK | {"solver": TIGHT})
+    run(MPI.COMM_SELF, brain, zones, forgetful, {}, tmp_path / "forgetful")
+    other = read_positions(tmp_path / "forgetful" / "frames.h5", 21.5)
+    assert np.abs(cut - whole).max() <= 1e-8 * np.abs(whole - brain.vertices).max()
+    assert np.abs(other - whole).max() > 1e-3
+
+
+def test_a_map_of_the_thickness_acts_where_it_says_on_any_ranks(mesh, tmp_path):
+    brain = read_tetrahedral_mesh(mesh)
+    y = brain.vertices[:, 1]
+    write_maps(tmp_path / "maps.h5", {"thickness_mm": np.where(y > 0, 4.0, 2.0)})
+    ends = []
+    for ranks in (1, 2):
+        out = tmp_path / f"out{ranks}"
+        settings = {"thickness_mm": {"map": "thickness_mm"}, "solver": TIGHT, "fields": ["cortex_weight"]}
+        call = [*command(mesh, out, ranks, **settings), "--maps", str(tmp_path / "maps.h5")]
+        done = subprocess.run(call, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        ends.append(read_positions(out / "frames.h5", 21.5))
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-8 * np.abs(ends[0] - brain.vertices).max()
+    weight = read_field(tmp_path / "out1" / "frames.h5", 21.0, "cortex_weight")
+    inside = np.abs(weight - 0.5) < 0.499
+    assert weight[inside & (y > 0)].mean() > weight[inside & (y < 0)].mean()
+
+    write_maps(tmp_path / "short.h5", {"thickness_mm": np.ones(7)})
+    call[-1] = str(tmp_path / "short.h5")
+    done = subprocess.run(call, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("the map thickness_mm does not fit the mesh") == 1
 
 
 def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):

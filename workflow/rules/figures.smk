@@ -159,6 +159,43 @@ rule quality_figure:
         "../scripts/quality_figure.py"
 
 
+# brains with an image that their surface can be compared with
+OVERLAID = [brain.id for brain in CONFIG.brains if brain.image]
+
+
+rule overlay_figure:
+    input:
+        image=lambda wildcards: CONFIG.brain(wildcards.brain).image,
+        surface="results/{brain}/surface/pial.surf.gii",
+        report="results/{brain}/surface/surface.json",
+    output:
+        png=report(
+            f"{FIGURES}/overlay.{{brain}}.png",
+            caption="../report/overlay.rst",
+            category="Brains and growth",
+            labels={"figure": "surface over the image", "brain": "{brain}"},
+        ),
+        pdf=f"{FIGURES}/overlay.{{brain}}.pdf",
+    log:
+        "results/study/logs/overlay_figure.{brain}.log",
+    benchmark:
+        "results/study/benchmarks/overlay_figure.{brain}.tsv"
+    wildcard_constraints:
+        brain=one_of(OVERLAID),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        dpi=CONFIG.report.dpi,
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        title=lambda wildcards: f"{wildcards.brain}, {CONFIG.brain(wildcards.brain).week:g} GW",
+        code=code("report"),
+    script:
+        "../scripts/overlay_figure.py"
+
+
 rule runs_figure:
     input:
         runs=[file for run in RUNS for file in folded(run, weeks=[LAST_WEEK])],
@@ -208,6 +245,7 @@ rule figures:
         rules.bands_figure.output,
         rules.displacement_figure.output,
         rules.quality_figure.output,
+        expand(rules.overlay_figure.output, brain=OVERLAID),
         [
             expand(rule.output, run=RUNS, measure=SHAPE_MEASURES)
             for rule in SINGLE_RUN_FIGURES

@@ -1,4 +1,4 @@
-# Inputs that the workflow makes itself: synthetic brains and simple shapes.
+# Inputs that the workflow makes: synthetic brains, simple shapes, labels of the user's own segmentation.
 def shape_settings(wildcards):
     """Returns what a shape depends on; sizes of other kinds are no part of it."""
     shape = CONFIG.brain(wildcards.brain).shape
@@ -31,6 +31,32 @@ rule phantom:
         code=code("phantom"),
     script:
         "../scripts/phantom.py"
+
+
+rule segmentation:
+    input:
+        lambda wildcards: CONFIG.brain(wildcards.brain).image,
+    output:
+        "results/{brain}/surface/labels.nii.gz",
+    log:
+        "results/{brain}/logs/segmentation.log",
+    benchmark:
+        "results/{brain}/benchmarks/segmentation.tsv"
+    wildcard_constraints:
+        brain=one_of(brain.id for brain in CONFIG.brains if brain.segmentation),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=16000,
+        runtime=240,
+    params:
+        command=lambda wildcards: CONFIG.brain(wildcards.brain).segmentation.command,
+        container=lambda wildcards: CONFIG.brain(wildcards.brain).segmentation.container,
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
+        code=code(),
+    script:
+        "../scripts/segmentation.py"
 
 
 rule shape:

@@ -1,4 +1,6 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
+from gyriflow.surface.labels import label_scheme
+
 SURFACE_SETTINGS = {
     "labels": (
         "smoothing_voxels",
@@ -11,7 +13,19 @@ SURFACE_SETTINGS = {
     # made with the edge length that they keep
     "shape": (),
 }
-MADE_INPUTS = {"phantom": "labels.nii.gz", "shape": "shape.surf.gii"}
+MADE_INPUTS = {
+    "phantom": "labels.nii.gz",
+    "segmentation": "labels.nii.gz",
+    "shape": "shape.surf.gii",
+}
+# brains of which labels of the cortex give its thickness
+WITH_CORTEX = [
+    brain.id
+    for brain in CONFIG.brains
+    if brain.source in ("labels", "segmentation", "phantom")
+    and label_scheme(**CONFIG.scheme(brain)).cortex
+]
+WITHOUT_CORTEX = [brain for brain in BRAINS if brain not in WITH_CORTEX]
 
 
 def surface_files(wildcards):
@@ -20,9 +34,9 @@ def surface_files(wildcards):
 
 
 def surface_source(wildcards):
-    """Returns what the surface is made from; a phantom is a label volume."""
+    """Returns what the surface is made from; phantoms and segmentations are label volumes."""
     source = CONFIG.brain(wildcards.brain).source
-    return "labels" if source == "phantom" else source
+    return "labels" if source in ("phantom", "segmentation") else source
 
 
 def surface_settings(wildcards):
@@ -36,14 +50,17 @@ def surface_reading(wildcards):
     brain = CONFIG.brain(wildcards.brain)
     match surface_source(wildcards):
         case "labels":
-            return {
-                "scheme": brain.scheme or "spina-bifida-atlas",
-                "affine_from": brain.affine_from,
-            }
+            return {"affine_from": brain.affine_from}
         case "shape":
             return {}
         case _:
             return {"coordinates": brain.coordinates}
+
+
+def surface_scheme(wildcards):
+    """Returns what the labels of the brain's volume mean; None where it is given by surfaces."""
+    from_volume = surface_source(wildcards) == "labels"
+    return CONFIG.scheme(CONFIG.brain(wildcards.brain)) if from_volume else None
 
 
 rule pial_surface:
@@ -55,10 +72,13 @@ rule pial_surface:
         right="results/{brain}/surface/right.pial.surf.gii",
         stl="results/{brain}/surface/pial.stl",
         report="results/{brain}/surface/surface.json",
+        thickness="results/{brain}/surface/thickness.shape.gii",
     log:
         "results/{brain}/logs/pial_surface.log",
     benchmark:
         "results/{brain}/benchmarks/pial_surface.tsv"
+    wildcard_constraints:
+        brain=one_of(WITH_CORTEX),
     conda:
         ENVIRONMENT
     resources:
@@ -68,12 +88,27 @@ rule pial_surface:
         source=surface_source,
         week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
         reading=surface_reading,
+        scheme=surface_scheme,
         settings=surface_settings,
         code=code("surface"),
     script:
         "../scripts/pial_surface.py"
 
 
+use rule pial_surface as pial_surface_alone with:
+    output:
+        whole="results/{brain}/surface/pial.surf.gii",
+        left="results/{brain}/surface/left.pial.surf.gii",
+        right="results/{brain}/surface/right.pial.surf.gii",
+        stl="results/{brain}/surface/pial.stl",
+        report="results/{brain}/surface/surface.json",
+    benchmark:
+        "results/{brain}/benchmarks/pial_surface_alone.tsv"
+    wildcard_constraints:
+        brain=one_of(WITHOUT_CORTEX),
+
+
 rule surface:
     input:
-        expand(rules.pial_surface.output, brain=BRAINS),
+        expand(rules.pial_surface.output, brain=WITH_CORTEX),
+        expand(rules.pial_surface_alone.output, brain=WITHOUT_CORTEX),

@@ -1,27 +1,27 @@
 """The clean pial surface of a brain and of its hemispheres in RAS+ mm, from whatever the brain is given as."""
 
 from gyriflow.io.files import write_json
-from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.surfaces import read_surface, write_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.step import step
-from gyriflow.surface.labels import SCHEMES
+from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial, from_shape
 
 files, output, params = list(snakemake.input), snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     match params.source:
         case "labels":
-            volume = read_label_volume(files[0], affine_from=params.reading["affine_from"])
-            scheme = SCHEMES[params.reading["scheme"]]
+            scheme, volume = label_scheme(**params.scheme), read_label_volume(files[0], **params.reading)
             surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
         case "hemispheres":
             surface = from_hemispheres(*map(read_surface, files), week=params.week, **params.reading, **params.settings)
-        case "pial":
-            surface = from_pial(read_surface(files[0]), week=params.week, **params.reading, **params.settings)
-        case "shape":
-            surface = from_shape(read_surface(files[0]), week=params.week)
+        case source:
+            make = {"pial": from_pial, "shape": from_shape}[source]
+            surface = make(read_surface(files[0]), week=params.week, **params.reading, **params.settings)
     write_surface(output.whole, surface.whole)
     write_surface(output.left, surface.left, "CortexLeft")
     write_surface(output.right, surface.right, "CortexRight")
     write_surface(output.stl, surface.whole)
+    if surface.thickness:
+        write_vertex_maps(output.thickness, {"cortical thickness (mm)": surface.thickness.values_mm})
     write_json(output.report, {"week": params.week, "fissure_x_mm": surface.fissure_x_mm, **surface.report})

@@ -9,7 +9,7 @@ from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
 
-FIELDS = ("zones", "distance", "cortex_weight", "growth", "shear_modulus", "normal")
+FIELDS = ("zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal")
 
 files = snakemake.input
 with step(snakemake.log[0]):

@@ -14,8 +14,8 @@ class Settings(BaseModel):
     @classmethod
     def _refuse_truth_values_as_numbers(cls, value: Any, info: ValidationInfo) -> Any:
         # YAML reads `on`, `yes` and the like as true, which would pass as 1.0
-        if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation in (float, int):
-            raise ValueError("Input should be a number")
+        if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
+            raise ValueError("Input should be a number or text, not true or false")
         return value
 
 

@@ -6,12 +6,14 @@ from pydantic import Field
 
 from .base import Settings, setting
 
-SOURCES = ("labels", "hemispheres", "pial", "phantom", "shape")
+SOURCES = ("labels", "segmentation", "hemispheres", "pial", "phantom", "shape")
 """The keys of a brain of which exactly one is given."""
 
 SIDES = ("left", "right")
 
-Scheme = Literal["spina-bifida-atlas", "dhcp-19", "feta-7", "binary"]
+SINGLE_FILES = ("labels", "image", "pial")
+"""The keys of a brain that hold one file each."""
+
 ShapeKind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
 
 SHAPE_SIZES = {
@@ -65,6 +67,21 @@ class ShapeSettings(Settings):
         return (size, size, size) if self.kind == "sphere" else size
 
 
+class SegmentationSettings(Settings):
+    """Your own program that makes a label volume from the brain's `image`; gyriflow itself does not segment."""
+
+    command: str = setting(
+        ..., "",
+        "Shell command that reads the file {image} and writes the NIfTI file {labels}, of the same grid, with labels "
+        "of the brain's `scheme`.",
+    )  # fmt: skip
+    container: str | None = setting(
+        None, "",
+        "Image in which the command runs, with Apptainer, Singularity, Docker or Podman, whichever is there: "
+        "`docker://NAME` or a .sif file.",
+    )  # fmt: skip
+
+
 class HemisphereFiles(Settings):
     """The pial surfaces of one brain's hemispheres."""
 
@@ -73,7 +90,7 @@ class HemisphereFiles(Settings):
 
 
 class Brain(Settings):
-    """One brain. Exactly one of `labels`, `hemispheres`, `pial`, `phantom`, `shape` says where its surface comes from.
+    """One brain. Exactly one of `labels`, `segmentation`, `hemispheres`, `pial`, `phantom`, `shape` is its source.
 
     Paths are relative to the configuration file or, if no such file is there, to the working directory.
     """
@@ -83,9 +100,19 @@ class Brain(Settings):
     )
     week: float = setting(..., "GW", "Gestational age.", ge=15, le=45)
     labels: str | None = setting(None, "", "Tissue label volume (NIfTI).")
-    scheme: Scheme | None = setting(None, "", "What the labels of the volume mean. Needed with `labels`.")
+    image: str | None = setting(
+        None, "", "T2-weighted volume (NIfTI): what `segmentation` works on; with `labels`, for a figure only."
+    )
+    segmentation: SegmentationSettings | None = setting(
+        None, "", "A program of yours that makes the labels from `image`."
+    )
+    scheme: str | None = setting(
+        None, "",
+        "What the labels mean: `spina-bifida-atlas`, `dhcp-19`, `feta-7`, `binary`, or a name of `schemes`. Needed "
+        "with `labels` and `segmentation`.",
+    )  # fmt: skip
     affine_from: Literal["auto", "sform", "qform"] = setting(
-        "auto", "", "Which NIfTI affine is used with `labels`; `auto` refuses two that disagree."
+        "auto", "", "Which NIfTI affine of `labels` and `image` is used; `auto` refuses two that disagree."
     )
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
     pial: str | None = setting(None, "", "Surface file of the whole brain, closed.")
@@ -105,6 +132,6 @@ class Brain(Settings):
 
     @property
     def files(self) -> list[str]:
-        """The input files, the left hemisphere's first."""
+        """The files that the surface is made from, the left hemisphere's first."""
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
         return [path for path in (self.labels, self.pial, *sides) if path is not None]

@@ -1,11 +1,17 @@
 """Checks across keys, on raw values so that they are made even where another key is wrong."""
 
 from collections import Counter
+from collections.abc import Collection
 from typing import Any
 
 from .brains import SHAPE_SIZES, SOURCES, ShapeSettings
 from .folding import GROWTH_RATES, FoldingSettings
+from .schemes import BUILT_IN_SCHEMES
 
+VOLUMES = ("labels", "segmentation")
+"""Sources that give a label volume."""
+PLACEHOLDERS = ("{image}", "{labels}")
+"""What stands for the two files in a command that segments."""
 PHANTOM_WEEKS = (21, 36)
 """Gestational weeks of which synthetic brains can be made."""
 MOST_UNEQUAL_AXES = 2.0
@@ -18,18 +24,32 @@ RESERVED_RUNS = ("real",)
 """What stands for the run in tables of measured brains."""
 
 
-def brain_problems(raw: Any, where: str) -> list[str]:
-    """Returns what is wrong with one entry of `brains` beyond its single keys."""
+def brain_problems(raw: Any, where: str, schemes: Collection[str] = ()) -> list[str]:
+    """Returns what is wrong with one entry of `brains` beyond its single keys.
+
+    `schemes` are the names of the label schemes that the configuration adds.
+    """
     if not isinstance(raw, dict):
         return []
     given = [key for key in SOURCES if raw.get(key) is not None]
     problems = []
-    if len(given) != 1:
+    if not given and raw.get("image") is not None:
+        problems.append(
+            f"{where}.image: gyriflow does not segment images; give a label volume under labels, or under segmentation "
+            "your own command that makes one from the image"
+        )
+    elif len(given) != 1:
         found = " and ".join(given) or "none"
         problems.append(f"{where}: found {found} as its source; expected exactly one of {', '.join(SOURCES)}")
-    if "labels" in given and raw.get("scheme") is None:
-        problems.append(f"{where}.scheme: is missing; it says what the labels of {where}.labels mean")
-    for key, sources in {"scheme": ("labels",), "affine_from": ("labels",), "coordinates": SOURCES[1:3]}.items():
+    volumes = [key for key in VOLUMES if key in given]
+    if volumes and raw.get("scheme") is None:
+        problems.append(f"{where}.scheme: is missing; it says what the labels of {where}.{volumes[0]} mean")
+    scheme = raw.get("scheme")
+    if isinstance(scheme, str) and scheme not in (known := dict.fromkeys([*BUILT_IN_SCHEMES, *schemes])):
+        problems.append(f"{where}.scheme: found {scheme!r}; expected one of {', '.join(known)}, or a name of schemes")
+    problems += _segmentation_problems(raw, where)
+    meanings = {"scheme": VOLUMES, "image": VOLUMES, "affine_from": VOLUMES, "coordinates": ("hemispheres", "pial")}
+    for key, sources in meanings.items():
         if key in raw and len(given) == 1 and given[0] not in sources:
             problems.append(f"{where}.{key}: has no meaning with {given[0]}; only with {' or '.join(sources)}")
     week = _number(raw.get("week"))
@@ -37,6 +57,22 @@ def brain_problems(raw: Any, where: str) -> list[str]:
         problems.append(f"{where}.week: found {week:g}; a phantom's should be {PHANTOM_WEEKS[0]} to {PHANTOM_WEEKS[1]}")
     if isinstance(raw.get("shape"), dict):
         problems += [f"{where}.shape.{problem}" for problem in _shape_problems(raw["shape"])]
+    return problems
+
+
+def _segmentation_problems(raw: dict[str, Any], where: str) -> list[str]:
+    """Returns what is wrong with the `segmentation` of one brain (raw)."""
+    if not isinstance(raw.get("segmentation"), dict):
+        return []
+    where, problems = f"{where}.segmentation", []
+    if raw.get("image") is None:
+        problems.append(f"{where}: has no image to work on; give one under image")
+    command = raw["segmentation"].get("command")
+    missing = [place for place in PLACEHOLDERS if isinstance(command, str) and place not in command]
+    if missing:
+        problems.append(
+            f"{where}.command: lacks {' and '.join(missing)}, which stand for the files it reads and writes"
+        )
     return problems
 
 
@@ -128,6 +164,8 @@ def _run_problems(settings: dict[str, Any], start_week: float | None) -> list[tu
     end_week = _number(settings.get("end_week"))
     if start_week is not None and end_week is not None and end_week <= start_week:
         problems.append(("end_week", f"found {end_week:g}; it should be above the start brain's week, {start_week:g}"))
+    if start_week is not None and end_week is not None:
+        problems += _value_problems(settings, start_week, end_week)
     if settings.get("allow_negative_growth") not in (True, "true"):
         for key in GROWTH_RATES:
             value = settings.get(key, FoldingSettings.model_fields[key].default)
@@ -146,3 +184,43 @@ def _number(value: Any) -> float | None:
         return float(value)
     except (TypeError, ValueError):
         return None
+
+
+def _curve(settings: dict[str, Any], key: str) -> dict[float, float] | None:
+    """Returns the values of a parameter by week, one at week 0 for a number; None where it has a map or is wrong."""
+    value = settings.get(key, FoldingSettings.model_fields[key].default)
+    if isinstance(value, dict) and value.get("map") is None and isinstance(value.get("weeks"), dict):
+        points = {_number(week): _number(number) for week, number in value["weeks"].items()}
+    else:
+        points = {0.0: _number(value)}
+    known = {week: number for week, number in points.items() if week is not None and number is not None}
+    return dict(sorted(known.items())) if known and len(known) == len(points) else None
+
+
+def _value_problems(settings: dict[str, Any], start: float, end: float) -> list[tuple[str, str]]:
+    """Returns what is wrong with the values that parameters take from the start to the end, curves included."""
+    problems = []
+    loss = _number(settings.get("thickness_growth_mm_per_gw", 0.0))
+    thickness = _curve(settings, "thickness_mm")
+    if thickness is not None and loss is not None and min(thickness.values()) > 0:
+        for week in (start, *(week for week in thickness if start < week < end), end):
+            reached = _at(thickness, week) + loss * (week - start)
+            if reached <= 0:
+                problems.append(("thickness_mm", f"reaches {reached:g} mm at {week:g} GW; it should stay above 0"))
+                break
+    step = _number(settings.get("step_s", FoldingSettings.model_fields["step_s"].default))
+    rates = [curve for key in GROWTH_RATES if (curve := _curve(settings, key)) is not None]
+    growth = sum(max(map(abs, curve.values())) for curve in rates)
+    if step is not None and step > 0 and growth * step >= 1:
+        problems.append(("step_s", f"found {step:g}; tissue would grow by {growth * step:.3g} in a step, beyond 1"))
+    return problems
+
+
+def _at(curve: dict[float, float], week: float) -> float:
+    """Returns the value of a curve at a week: linear in between, constant beyond."""
+    weeks = list(curve)
+    if week <= weeks[0] or week >= weeks[-1]:
+        return curve[weeks[0] if week <= weeks[0] else weeks[-1]]
+    after = next(i for i, known in enumerate(weeks) if known >= week)
+    a, b = weeks[after - 1], weeks[after]
+    return curve[a] + (curve[b] - curve[a]) * (week - a) / (b - a)

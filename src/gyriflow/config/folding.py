@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from .base import Settings, setting
 from .varying import Varying, VaryingOrEstimated, VaryingSettings, require_bounds, varying
@@ -19,6 +19,10 @@ FieldName = Literal[
     "stress",
     "strain",
     "volume_ratio",
+]
+Memory = Annotated[
+    Annotated[float, Tag("number")] | Annotated[Literal["infinite"], Tag("word")],
+    Discriminator(lambda value: "word" if value == "infinite" else "number"),
 ]
 Fraction = Annotated[float, Field(gt=0, le=2)]
 VARYING = (
@@ -93,7 +97,7 @@ class FoldingSettings(Settings):
         "Growth rate in all directions, under the cortex; `estimated`: from the brains' volumes.", ge=-1e-5, le=1e-5,
     )  # fmt: skip
     allow_negative_growth: bool = setting(False, "", "Whether the growth rates may be negative (atrophy).")
-    stress_memory_gw: float | Literal["infinite"] = setting(
+    stress_memory_gw: Memory = setting(
         0.0, "GW",
         "Time in which elastic stress relaxes: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
     )  # fmt: skip
@@ -105,7 +109,7 @@ class FoldingSettings(Settings):
     contact: ContactSettings = setting(ContactSettings(), "", "The hemispheres' contact.")
     no_growth: NoGrowthSettings = setting(NoGrowthSettings(), "", "Where nothing grows.")
     output_every_gw: float = setting(
-        1.0, "GW", "Spacing of the output weeks; the start and the end are always among them.", gt=0, le=10
+        1.0, "GW", "Spacing of the output weeks; the start and the end are always among them.", ge=0.01, le=10
     )
     fields: tuple[FieldName, ...] = setting(
         ("displacement", "cortex_weight", "growth"), "", "Fields written for ParaView at each output week."
@@ -132,5 +136,5 @@ class FoldingSettings(Settings):
 def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:
     """Returns the output weeks of a run: the start, then every `every_gw` weeks, and the end."""
     steps = int((end_week - start_week) / every_gw + 1e-9)
-    weeks = [round(start_week + n * every_gw, 6) for n in range(steps + 1)]
+    weeks = [round(start_week + n * every_gw, 9) for n in range(steps + 1)]
     return weeks if end_week - weeks[-1] < 1e-6 else [*weeks, end_week]

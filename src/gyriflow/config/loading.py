@@ -1,6 +1,7 @@
 """From plain dictionaries to a validated configuration, with every problem named at once."""
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import UnionType
@@ -10,10 +11,11 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from ..errors import InputError
-from .brains import SIDES, Brain
+from .brains import SIDES, SINGLE_FILES, Brain
 from .checks import brain_problems, growth_problems, study_problems
 from .folding import VARYING, FoldingSettings
 from .root import Config
+from .schemes import scheme_problems
 from .varying import TAGS
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
@@ -44,7 +46,10 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
             valid[name] = _validated(field.annotation, plain.get(name, _ABSENT), (name,), problems)
     problems += [_unknown((key,), key, list(Config.model_fields)) for key in plain if key not in Config.model_fields]
 
-    valid["brains"] = _brains(plain.get("brains", _ABSENT), Path(base_dir), problems)
+    schemes = plain.get("schemes")
+    schemes = schemes if isinstance(schemes, dict) else {}
+    problems += [problem for name, scheme in schemes.items() for problem in scheme_problems(name, scheme)]
+    valid["brains"] = _brains(plain.get("brains", _ABSENT), list(schemes), Path(base_dir), problems)
     folding = _with_map_files(plain.get("folding", {}), Path(base_dir), "folding", problems)
     valid["folding"] = _validated(FoldingSettings, folding, ("folding",), problems)
     runs = _runs(plain.get("runs"), folding if isinstance(folding, dict) else {}, Path(base_dir), problems)
@@ -83,7 +88,7 @@ def _validated(kind: Any, value: Any, path: tuple, problems: list[str]) -> Any:
         return None
 
 
-def _brains(raw: Any, base_dir: Path, problems: list[str]) -> tuple[Brain, ...]:
+def _brains(raw: Any, schemes: list[str], base_dir: Path, problems: list[str]) -> tuple[Brain, ...]:
     if raw is _ABSENT or not isinstance(raw, list) or not raw:
         found = "nothing" if raw is _ABSENT else repr(raw)
         problems.append(f"brains: found {found}; expected a list of brains, each with id, week and a source")
@@ -91,7 +96,7 @@ def _brains(raw: Any, base_dir: Path, problems: list[str]) -> tuple[Brain, ...]:
     brains = []
     for number, entry in enumerate(raw):
         where = f"brains[{number}]"
-        problems += brain_problems(entry, where)
+        problems += brain_problems(entry, where, schemes)
         brains.append(_validated(Brain, _with_files(entry, base_dir, where, problems), ("brains", number), problems))
     return tuple(brains)
 
@@ -104,12 +109,11 @@ def _with_files(entry: Any, base_dir: Path, where: str, problems: list[str]) -> 
     if isinstance(entry.get("hemispheres"), dict):
         entry["hemispheres"] = dict(entry["hemispheres"])
         holders = [
-            (entry, "labels", ""),
-            (entry, "pial", ""),
+            *((entry, key, "") for key in SINGLE_FILES),
             *((entry["hemispheres"], s, "hemispheres.") for s in SIDES),
         ]
     else:
-        holders = [(entry, "labels", ""), (entry, "pial", "")]
+        holders = [(entry, key, "") for key in SINGLE_FILES]
     for holder, key, prefix in holders:
         if isinstance(holder.get(key), str):
             holder[key] = _found_file(holder[key], base_dir, f"{where}.{prefix}{key}", problems)
@@ -139,8 +143,18 @@ def _found_file(path: str, base_dir: Path, where: str, problems: list[str]) -> s
     places = [base_dir / Path(path).expanduser(), Path.cwd() / path]
     present = [place for place in places if place.is_file()]
     if not present:
-        problems.append(f"{where}: no such file: {places[0]}")
+        problems.append(f"{where}: no such file: {places[0]}{_present_instead(places[0])}")
     return str((present or places)[0].resolve())
+
+
+def _present_instead(path: Path) -> str:
+    """Returns the files beside a missing one that differ from it in a number only, such as those of other weeks."""
+    pattern = re.compile(re.sub(r"\d+(\\\.\d+)?", r"[0-9.]+", re.escape(path.name)))
+    try:
+        names = sorted(other.name for other in path.parent.iterdir() if pattern.fullmatch(other.name))
+    except OSError:
+        names = []
+    return f"; there are {', '.join(names)}" if names else ""
 
 
 def _runs(raw: Any, folding: dict[str, Any], base_dir: Path, problems: list[str]) -> dict[str, dict[str, Any]]:
@@ -197,6 +211,8 @@ def _unknown(where: tuple, key: str, known: list[str]) -> str:
 
 def _keys_at(kind: Any, path: tuple) -> list[str]:
     """Returns the known keys of the model that stands at `path` inside the type `kind`."""
+    if get_origin(kind) is dict:
+        return _keys_at(get_args(kind)[1], path[1:])
     models = _models(kind)
     if not models:
         return []

@@ -10,6 +10,7 @@ from .growth import GrowthSettings
 from .mesh import MeshSettings
 from .metrics import MetricsSettings
 from .report import ReportSettings
+from .schemes import SchemeSettings
 from .surface import SurfaceSettings
 from .varying import VaryingSettings
 
@@ -19,6 +20,9 @@ class Config(Settings):
 
     brains: tuple[Brain, ...] = setting(
         ..., "", "The brains: one the folding starts from, others to compare with and to estimate growth from."
+    )
+    schemes: dict[str, SchemeSettings] = setting(
+        {}, "", "Label schemes by name, beside those that gyriflow has; for the brains' `scheme`."
     )
     start: str = setting(..., "", "The id of the brain whose folding is simulated.")
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
@@ -51,6 +55,14 @@ class Config(Settings):
             (kinds[0] if len(kinds) == 1 else "simple shape") if kinds else "",
         ]
         return " or ".join(name for name in names if name) or "real brain"
+
+    def scheme(self, brain: Brain) -> dict[str, Any]:
+        """Returns the scheme of a brain's labels: its name, and what the configuration says about it.
+
+        Phantoms have the labels of the example atlas.
+        """
+        name = brain.scheme or "spina-bifida-atlas"
+        return {"name": name} | (self.schemes[name].model_dump() if name in self.schemes else {})
 
     @property
     def start_week(self) -> float:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from .base import Settings, setting
 
@@ -28,6 +28,16 @@ class VaryingSettings(Settings):
         None, "", "Surface file, or the left and the right one, of the map."
     )
 
+    @field_validator("weeks", mode="before")
+    @classmethod
+    def _numbers_by_week(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            if any(isinstance(number, bool) for number in value.values()):
+                raise ValueError("hold numbers, not true or false")
+            if len({float(week) for week in value}) < len(value):
+                raise ValueError("name each week once")
+        return value
+
     @model_validator(mode="after")
     def _has_something(self) -> "VaryingSettings":
         if not self.weeks and self.map is None:
@@ -36,6 +46,11 @@ class VaryingSettings(Settings):
             raise ValueError("have a `map` where it has a `surface`")
         if self.surface is not None and isinstance(self.map, str) != isinstance(self.surface, str):
             raise ValueError("have as many maps as surfaces")
+        files = [self.map] if isinstance(self.map, str) else list(self.map or ())
+        if self.surface is None and any(path.endswith(".gii") for path in files):
+            raise ValueError("name under `surface` the surface whose vertices the map belongs to")
+        if self.surface is not None and any(path.endswith((".nii", ".nii.gz")) for path in files):
+            raise ValueError("have no `surface` where the map is a volume")
         if isinstance(self.map, tuple) and self.surface is None:
             raise ValueError("name the surfaces of the two maps under `surface`")
         return self

@@ -95,8 +95,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
     zones = comm.bcast(zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0)
     maps: Maps = comm.bcast(read_maps(arguments.maps) if comm.rank == 0 and arguments.maps else {}, root=0)
-    require_maps(parameters, maps, len(mesh.vertices))
     if comm.rank == 0:
+        require_maps(parameters, maps, len(mesh.vertices))
         report = zone_report(mesh, zones, float(np.median(parameters.thickness_at(parameters.start_week, maps))))
         memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024
         say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")

@@ -101,7 +101,8 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) ->
         del values["solver"][name]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
     package = Path(__file__).parents[1]
-    for source in sorted([*package.glob("folding/*.py"), *package.glob("mechanics/*.py")]):
+    rooms = [path for room in ("folding", "mechanics", "geometry") for path in package.glob(f"{room}/*.py")]
+    for source in sorted([*rooms, package / "units.py"]):
         digest.update(source.read_bytes())
     digest.update(mesh.vertices.tobytes())
     digest.update(mesh.tets.tobytes())

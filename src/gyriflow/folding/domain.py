@@ -61,6 +61,7 @@ class Domain:
         self._counts = [3 * owned for owned in comm.allgather(self.owned)]
         self.volumes = self.cell_volumes(self.local(self.positions))
         self.tet_of_cell = np.array(self.mesh.topology.original_cell_index[: len(self.cells)])
+        self._cell_counts = comm.allgather(len(self.cells))
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
         self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.owned]))
 
@@ -74,8 +75,12 @@ class Domain:
 
     def gathered_cells(self, cell_values: Floats) -> Floats:
         """Returns on every rank the (m, k) values of all elements, in the file's order, from the local (c, k) ones."""
-        values = np.empty((len(self._tets), cell_values.shape[1]))
-        values[self._tets] = np.concatenate(self.comm.allgather(cell_values))
+        width = cell_values.shape[1]
+        received = np.empty((len(self._tets), width))
+        counts = [width * count for count in self._cell_counts]
+        self.comm.Allgatherv(np.ascontiguousarray(cell_values), (received, counts))
+        values = np.empty_like(received)
+        values[self._tets] = received
         return values
 
     def local(self, values: NDArray) -> NDArray:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.triangles import TriangleMesh, vertex_normals
+from ..geometry.triangles import TriangleMesh, unit, vertex_normals
 from .parameters import FoldingParameters
 from .varying import Maps
 
@@ -117,12 +117,23 @@ class PialSearch:
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
         """Returns for (k, 3) points the unit normals of the nearest of (k, c) candidate pial vertices.
 
-        Ties go to the vertex with the smaller coordinates, whatever the order of points and candidates.
+        Where several are as near it is their mean, so that mirrored brains have mirrored normals; where that all but
+        vanishes, as between opposed walls, that of the vertex with the smaller coordinates. The order of points and
+        candidates does not matter.
         """
         gaps = np.linalg.norm(self.surface.vertices[candidates] - points[:, None], axis=2)
         tied = gaps <= gaps.min(axis=1, keepdims=True) * (1 + TIE)
         first = np.where(tied, self._order[candidates], len(self.pial)).argmin(axis=1)
-        return self.normals[np.take_along_axis(candidates, first[:, None], axis=1)[:, 0]]
+        index = np.take_along_axis(candidates, first[:, None], axis=1)
+        normals = self.normals[index[:, 0]]
+        several = np.flatnonzero((tied & (candidates != index)).any(axis=1))
+        if len(several):
+            names = np.sort(np.where(tied[several], candidates[several], index[several]), axis=1)
+            once = np.hstack([np.ones((len(names), 1), bool), names[:, 1:] != names[:, :-1]])
+            mean = np.einsum("kc,kci->ki", once, self.normals[names]) / once.sum(axis=1, keepdims=True)
+            clear = np.linalg.norm(mean, axis=1) > 0.1
+            normals[several[clear]] = unit(mean[clear])
+        return normals
 
     def nearest_normals(self, points: Floats) -> Floats:
         """Returns the (k, 3) unit normals of the pial vertices nearest to (k, 3) points, ties as in `normals_from`."""

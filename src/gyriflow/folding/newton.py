@@ -20,8 +20,11 @@ ROUND_OFF = 1e-12
 NEAR = 100.0
 """Multiple of the tolerance below which the tangent of the iteration before is as good as a new one."""
 INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
-SHIFTS = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
-"""Parts of its diagonal that are added to a tangent that is not positive definite, one after the other."""
+SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
+"""Parts of its diagonal that are added to a tangent until it is positive definite."""
+FREE_SHIFT = 1e-6
+"""The same for the factorisation of a free body's tangent, which is singular."""
+FALLBACKS = {GMRES: ("gmres", "gamg"), DIRECT: ("preonly", "lu")}
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,11 @@ class NewtonSolver:
         Tolerances and limits.
     residual_floor
         Residual in N below which a step counts as solved whatever its start.
+
+    Attributes
+    ----------
+    inverting : (c,) float or None
+        det F of the local elements at the last trial of the present step that turned one inside out.
     """
 
     def __init__(self, problem: Problem, settings: NewtonSettings, residual_floor: float) -> None:
@@ -78,6 +86,9 @@ class NewtonSolver:
         self._wanted_reduction = settings.krylov_tolerance
         self._cg = self._new_krylov("cg", "gamg")
         self._fallbacks: dict[int, PETSc.KSP] = {}
+        self._level = 0  # of the shift that the last tangent needed
+        self._convex = True  # whether the last tangent was positive definite as it was
+        self.inverting: NDArray[np.float64] | None = None
 
     def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
         krylov = PETSc.KSP().create(self.problem.domain.comm)
@@ -116,48 +127,58 @@ class NewtonSolver:
         finite = bool(np.isfinite(self._direction.norm()))
         return krylov.getConvergedReason() if finite else 0, krylov.getIterationNumber()
 
-    def _run_shifted(self, matrix: PETSc.Mat) -> tuple[int, int]:
-        """Solves with a tangent whose diagonal is raised until conjugate gradients find it positive definite."""
-        diagonal, total = matrix.getDiagonal(), 0
-        for shift in SHIFTS:
-            raised = matrix.copy()
-            raised.setDiagonal(diagonal * (1 + shift))
-            raised.setNearNullSpace(self.problem.near_null_space())
-            reason, iterations = self._run(self._cg, raised, reuse=False)
-            total += iterations
-            if reason > 0:
-                break
-        self._stale = True
-        return reason, total
+    def _run_cg(self, matrix: PETSc.Mat, count: StepCount) -> int:
+        """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
+        if not self._stale:
+            reason, iterations = self._run(self._cg, matrix, reuse=True)
+            count.krylov += iterations
+            self._stale = reason <= 0 or iterations > 1.5 * self._fresh_iterations + 2
+            if reason > 0 or reason == INDEFINITE[0]:
+                # a matrix that is not positive definite is no fault of the preconditioner
+                self._stale &= reason > 0
+                return reason
+            count.rung = max(count.rung, REBUILT)
+        matrix.setNearNullSpace(self.problem.near_null_space())
+        reason, iterations = self._run(self._cg, matrix, reuse=False)
+        count.krylov += iterations
+        self._fresh_iterations, self._stale = iterations, reason <= 0
+        return reason
 
     def _solve_linear(self, matrix: PETSc.Mat, count: StepCount) -> None:
         """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
-        first, indefinite = REBUILT if self._stale else KEPT, False
-        for rung in range(first, DIRECT + 1):
-            if rung == KEPT:
-                reason, iterations = self._run(self._cg, matrix, reuse=True)
-                self._stale = reason <= 0 or iterations > 1.5 * self._fresh_iterations + 2
-            elif rung == REBUILT:
-                matrix.setNearNullSpace(self.problem.near_null_space())
-                reason, iterations = self._run(self._cg, matrix, reuse=False)
-                self._fresh_iterations, self._stale = iterations, reason <= 0
-                indefinite = reason in INDEFINITE
-            elif rung == SHIFTED:
-                if not indefinite:
-                    continue
-                reason, iterations = self._run_shifted(matrix)
-            else:
-                if rung not in self._fallbacks:
-                    method = ("gmres", "gamg") if rung == GMRES else ("preonly", "lu")
-                    self._fallbacks[rung] = self._new_krylov(*method)
-                reason, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
+        diagonal = matrix.getDiagonal()
+        abs_diagonal = diagonal.duplicate()
+        diagonal.copy(abs_diagonal)
+        abs_diagonal.abs()
+        # where the tangent was not positive definite before, it may still not be
+        for level in range(max(self._level - 1, 0), len(SHIFTS)):
+            if SHIFTS[level]:
+                matrix.setDiagonal(diagonal + SHIFTS[level] * abs_diagonal)
+                count.rung = max(count.rung, SHIFTED)
+            reason = self._run_cg(matrix, count)
+            if reason > 0 or reason not in INDEFINITE:
+                self._level = level
+                break
+        if SHIFTS[level]:
+            matrix.setDiagonal(diagonal)
+        self._convex = level == 0
+        if reason > 0 and self._direction.dot(self._residual) < 0:
+            return
+        self._convex = False
+        for rung, method in FALLBACKS.items():
+            if rung not in self._fallbacks:
+                # the operator of a free body is not its matrix, which is singular
+                iterated = rung == DIRECT and self.problem.free
+                self._fallbacks[rung] = self._new_krylov("gmres" if iterated else method[0], method[1])
+            if rung == DIRECT and self.problem.free:
+                matrix.setDiagonal(diagonal + FREE_SHIFT * abs_diagonal)
+            reason, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
             count.krylov += iterations
-            count.rung = max(count.rung, rung if rung > first else KEPT)
+            count.rung = max(count.rung, rung)
             slope = self._direction.dot(self._residual)
-            if rung in (GMRES, DIRECT) and slope > 0:
-                # the way to a saddle: the energy falls in the other direction
-                self._direction.scale(-1.0)
-            if reason > 0 and slope != 0 and (slope < 0 or rung in (GMRES, DIRECT)):
+            if reason > 0 and slope != 0:
+                if slope > 0:  # the way to a saddle: the energy falls in the other direction
+                    self._direction.scale(-1.0)
                 return
         raise NotConvergedError("no linear solver found a descent direction")
 
@@ -174,8 +195,9 @@ class NewtonSolver:
             problem.set_displacement(start + length * direction)
             if problem.smallest_volume_ratio() > 0:
                 trial = problem.residual(self._trial)
-                # where the slope has all but vanished, the energy fell by about half of it: no need to ask for it
-                if np.isfinite(trial) and trial < norm and abs(self._direction.dot(self._trial)) <= 0.1 * abs(slope):
+                # where a convex energy's slope has all but vanished, it fell by about half of it: no need to ask for it
+                flat = abs(self._direction.dot(self._trial)) <= 0.1 * abs(slope)
+                if self._convex and np.isfinite(trial) and trial < norm and flat:
                     return self._accept(trial)
                 if before is None:
                     problem.set_displacement(start)
@@ -187,6 +209,8 @@ class NewtonSolver:
                 # what is left to gain is below the energy's round-off: the residual decides
                 if trial < norm and abs(energy - before) <= ROUND_OFF * abs(before):
                     return self._accept(trial)
+            else:
+                self.inverting = problem.volume_ratios()
             length /= 2
         problem.set_displacement(start)
         raise NotConvergedError("the line search found no step that lowers the energy")
@@ -204,6 +228,7 @@ class NewtonSolver:
             Where the residual does not fall below the tolerance.
         """
         problem, count = self.problem, StepCount()
+        start, self.inverting = problem.admissible(start), None
         problem.set_displacement(np.zeros_like(start))
         at_rest = problem.residual(self._residual)
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)

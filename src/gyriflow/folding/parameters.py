@@ -141,16 +141,18 @@ class FoldingParameters:
 
 def value_problems(p: FoldingParameters, maps: Maps) -> list[str]:
     """Returns what is wrong with the values of parameters that may vary, over all weeks and places."""
-    smallest = {name: getattr(p, name).range(maps)[0] for name in VARYING}
-    largest = {name: max(map(abs, getattr(p, name).range(maps))) for name in GROWTH_RATES}
-    thickness_lost = min(0.0, p.thickness_growth_mm_per_gw * (p.end_week - p.start_week))
+    ranges = {name: getattr(p, name).range(maps, p.start_week, p.end_week) for name in VARYING}
+    smallest = {name: least for name, (least, _) in ranges.items()}
+    largest = [max(map(abs, ranges[name])) for name in GROWTH_RATES]
+    weeks = p.thickness_mm.weeks_within(p.start_week, p.end_week)
+    thinnest = min(float(np.min(p.thickness_at(week, maps))) for week in weeks)
     checks = {
-        "thickness_mm must be positive in all weeks": smallest["thickness_mm"] + thickness_lost > 0,
+        "thickness_mm must be positive in all weeks": thinnest > 0,
         "shear moduli must be positive": min(smallest["shear_modulus_cortex_pa"], smallest["shear_modulus_core_pa"])
         > 0,
         "growth rates must not be negative unless allow_negative_growth is true": p.allow_negative_growth
         or min(smallest[name] for name in GROWTH_RATES) >= 0,
-        "a growth rate times step_s must stay below 1": sum(largest.values()) * p.step_s < 1,
+        "a growth rate times step_s must stay below 1": sum(largest) * p.step_s < 1,
     }
     return [text for text, holds in checks.items() if not holds]
 
@@ -196,7 +198,7 @@ def _converted(value: Any, hint: Any, key: str) -> Any:
         return Varying.read(value, key)
     if isinstance(hint, type) and is_dataclass(hint):
         return parameters_from(value, hint, f"{key}.")
-    if hint is float and value == "infinite":
+    if key == "stress_memory_gw" and value == "infinite":
         return math.inf
     try:
         if get_origin(hint) is tuple:

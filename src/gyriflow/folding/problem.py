@@ -46,7 +46,10 @@ class Contribution(Protocol):
         """Adds the energy's derivative in N to the owned components of a vector."""
 
     def add_tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """Returns the matrix plus the energy's second derivative in N/m; the matrix itself may be changed."""
+        """Returns the matrix plus the energy's second derivative in N/m; the matrix itself may be changed.
+
+        Rows and columns of fixed components need no care.
+        """
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements that can safely be added: at most 1, equal on all ranks."""
@@ -70,8 +73,8 @@ class Problem:
         The displacement of the step in m, the unknown.
     contributions : list of Contribution
         Further parts of the energy.
-    last_residual : (3 · owned,) float
-        The residual that was assembled last, in N.
+    free : bool
+        Whether nothing holds the body.
     """
 
     def __init__(
@@ -122,16 +125,25 @@ class Problem:
 
         fixed = domain.local(zones.fixed)[: domain.owned]
         self._fixed_owned = np.flatnonzero(fixed.ravel())
+        first = 3 * domain.space.dofmap.index_map.local_range[0]
+        self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
         self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
-        self.last_residual = np.zeros(3 * domain.owned)
-        self._free = zones.free
-        self._motions = RigidMotions(domain, domain.part)
+        self.free = zones.free
         self.vector = self.u.x.petsc_vec
+        self.mesh_moved()
 
     def mesh_moved(self) -> None:
         """Takes note of a mesh that has been placed anew."""
-        if self._free:
-            self._motions = RigidMotions(self.domain, self.domain.part)
+        self._motions = RigidMotions(self.domain, self.domain.part) if self.free else None
+
+    def admissible(self, values: Floats) -> Floats:
+        """Returns (k, 3) displacements of the local nodes in m less the rigid motions of a body that nothing holds."""
+        if self._motions is None:
+            return values
+        self.displacement[:] = values
+        self._motions.remove(self.displacement[: self.domain.owned].reshape(-1))
+        self.u.x.scatter_forward()
+        return self.displacement.copy()
 
     def near_null_space(self) -> PETSc.NullSpace:
         """Returns the rigid motions of the present mesh as a whole."""
@@ -185,9 +197,8 @@ class Problem:
         for part in self.contributions:
             part.add_residual(out)
         out.array[self._fixed_owned] = 0.0
-        if self._free:
+        if self._motions is not None:
             self._motions.remove(out.array_w)
-        self.last_residual = out.array_r.copy()
         return out.norm()
 
     def tangent(self) -> PETSc.Mat:
@@ -196,13 +207,18 @@ class Problem:
         blocks.set_value(0.0)
         dolfinx.fem.assemble_matrix(blocks, self._tangent)
         matrix = self._blocks.assembled()
-        for part in self.contributions:
-            matrix = part.add_tangent(matrix)
+        if self.contributions:
+            # a copy: entries in new places would break the coordinate form of the next assembly
+            matrix = matrix.copy()
+            for part in self.contributions:
+                matrix = part.add_tangent(matrix)
+            # they may have filled rows and columns of fixed components
+            matrix.zeroRowsColumns(self._fixed_global, diag=1.0)
         return matrix
 
     def operator(self, tangent: PETSc.Mat) -> PETSc.Mat:
         """Returns what a tangent does to admissible displacements: for a free body, without rigid motions."""
-        return FreeOperator(tangent, self._motions).as_matrix() if self._free else tangent
+        return tangent if self._motions is None else FreeOperator(tangent, self._motions).as_matrix()
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""

@@ -72,7 +72,7 @@ class Folding:
         self._local_maps = {name: self.domain.local(values) for name, values in self.maps.items()}
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         # far below any force of growth: a brain that does not grow must stay where it is
-        stiffness = parameters.shear_modulus_cortex_pa.range(self.maps)[1]
+        stiffness = parameters.shear_modulus_cortex_pa.range(self.maps, parameters.start_week, parameters.end_week)[1]
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._bulk_ratio = bulk_to_shear_ratio(parameters.poisson_ratio)
@@ -143,8 +143,10 @@ class Folding:
         """Returns where the last solve stood worst: the most compressed element and the largest residual, in mm."""
         domain, problem = self.domain, self.problem
         before = domain.local(domain.positions)
-        ratios = problem.volume_ratios()
-        forces = -np.linalg.norm(problem.last_residual.reshape(-1, 3), axis=1)
+        ratios = problem.volume_ratios() if self.solver.inverting is None else self.solver.inverting
+        residual = problem.new_vector()
+        problem.residual(residual)
+        forces = -np.linalg.norm(residual.array_r.reshape(-1, 3), axis=1)
         ratio, tet, centre = domain.least(ratios, domain.tet_of_cell, before[domain.cells].mean(axis=1) * MM_PER_M)
         force, vertex, place = domain.least(forces, domain.vertex_of_node, before * MM_PER_M)
         return (
@@ -173,6 +175,13 @@ class Folding:
         energy = problem.energy()
         u = domain.gathered(problem.displacement[: domain.owned])
         length = np.linalg.norm(u, axis=1) * MM_PER_M
+        left = None
+        if stretch is not None or self._shows_stress:
+            before = domain.local(domain.positions)
+            F = deformation_gradients(before, before + problem.displacement, domain.cells)
+            self._elastic = elastic_part(F, np.eye(3) if stretch is None else stretch, *problem.growth)
+        if stretch is not None:
+            left = domain.gathered_cells(packed(left_stretch(self._elastic)))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
@@ -190,13 +199,6 @@ class Folding:
             "rung": RUNGS[count.rung],
             "seconds": time.monotonic() - began,
         }
-        left = None
-        if stretch is not None or self._shows_stress:
-            before = domain.local(domain.positions)
-            F = deformation_gradients(before, before + problem.displacement, domain.cells)
-            self._elastic = elastic_part(F, np.eye(3) if stretch is None else stretch, *problem.growth)
-        if stretch is not None:
-            left = domain.gathered_cells(packed(left_stretch(self._elastic)))
         after = state.after(u, step_s, row, left)
         domain.place(after.positions)
         return after
@@ -215,7 +217,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
     while True:
         left = until_s - state.time_s
         # a remainder of a rounding error's length is no step of its own
-        step_s = left if left < state.step_s * (1 + 1e-9) else state.step_s
+        step_s = left if left < state.step_s * (1 + 1e-6) else state.step_s
         try:
             after = folding.step(state, step_s)
         except NotConvergedError as error:

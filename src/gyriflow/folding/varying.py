@@ -70,8 +70,13 @@ class Varying:
         """Returns the value at a week: a number, or (n,) values where there is a map."""
         return self.factor(week) if self.map is None else self.factor(week) * maps[self.map]
 
-    def range(self, maps: Maps) -> tuple[float, float]:
-        """Returns the smallest and the largest value over all weeks and places."""
+    def weeks_within(self, start: float, end: float) -> list[float]:
+        """Returns start, end, and the weeks of the curve between them: where its extremes lie."""
+        return [start, *(week for week in self.weeks if start < week < end), end]
+
+    def range(self, maps: Maps, start: float, end: float) -> tuple[float, float]:
+        """Returns the smallest and the largest value from a week to a week, over all places."""
         places = np.ones(1) if self.map is None else maps[self.map]
-        products = np.outer(self.values, [places.min(), places.max()])
+        curve = [self.factor(week) for week in self.weeks_within(start, end)]
+        products = np.outer(curve, [places.min(), places.max()])
         return float(products.min()), float(products.max())

@@ -77,6 +77,21 @@ def read_values(
     return values, _checked_affine(np.array(affine, dtype=float), path)
 
 
+def require_same_grid(labels: LabelVolume, path: AnyPath, image_path: AnyPath, affine_from: AffineSource) -> None:
+    """Raises InputError where a label volume, read from `path`, is not on the grid of the image that it was made of."""
+    values, affine = read_values(image_path, affine_from, "grey values")
+    voxel = np.linalg.norm(affine[:3, :3], axis=0).min()
+    same = labels.labels.shape == values.shape
+    if not same or _farthest_corner(labels.affine - affine, values.shape) > AGREEMENT_VOXELS * voxel:
+        raise InputError(
+            "is not on the grid of its image",
+            path=path,
+            found=f"shape {labels.labels.shape}, affine\n{labels.affine}\n",
+            expected=f"those of {image_path}: shape {values.shape}, affine\n{affine}\n",
+            remedy="The segmentation must resample its labels to the image that it was given.",
+        )
+
+
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
     """Writes a label volume as NIfTI in mm, in the smallest integer type that holds its labels."""
     labels = volume.labels
@@ -115,12 +130,8 @@ def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPa
             remedy="Write the orientation into the file, or say which matrix holds with the brain's affine_from.",
         )
     if len(given) == 2:
-        shape = np.array(image.shape[:3]) - 1
-        ends = np.array(np.meshgrid(*[[0, n] for n in shape])).reshape(3, -1)
-        apart = matrices["sform"][:3, :3] @ ends - matrices["qform"][:3, :3] @ ends
-        apart += (matrices["sform"] - matrices["qform"])[:3, 3:]
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
-        distance = np.linalg.norm(apart, axis=0).max()
+        distance = _farthest_corner(matrices["sform"] - matrices["qform"], image.shape)
         if not distance <= AGREEMENT_VOXELS * voxel:
             raise InputError(
                 f"qform and sform disagree by up to {distance:.3g} {unit}",
@@ -131,6 +142,12 @@ def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPa
                 remedy="Say which one holds with the brain's affine_from: qform or sform.",
             )
     return scale @ matrices[given[0]]
+
+
+def _farthest_corner(difference: NDArray[np.float64], shape: tuple[int, ...]) -> float:
+    """Returns by how much two affines, whose difference is given, set the corners of a volume apart at most."""
+    ends = np.array(np.meshgrid(*[[0, n - 1] for n in shape[:3]])).reshape(3, -1)
+    return float(np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max())
 
 
 def _checked_affine(affine: NDArray[np.float64], path: AnyPath) -> NDArray[np.float64]:

@@ -12,13 +12,13 @@ from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from .style import FULL_WIDTH_IN, new_figure, styled
 
-_PLANES = {
+PLANES = {
     # name: (axis across the plane, axes to the right and up)
     "coronal": (1, 0, 2),
     "axial": (2, 0, 1),
     "sagittal": (0, 1, 2),
 }
-_AXIS_NAMES = ("x: left − to right + (mm)", "y: posterior − to anterior + (mm)", "z: inferior − to superior + (mm)")
+AXIS_NAMES = ("x: left − to right + (mm)", "y: posterior − to anterior + (mm)", "z: inferior − to superior + (mm)")
 
 
 @styled
@@ -43,13 +43,13 @@ def cross_sections(
     InputError
         For another plane, or values that do not fit the mesh.
     """
-    if plane not in _PLANES:
-        raise InputError("unknown plane", found=plane, expected=list(_PLANES))
+    if plane not in PLANES:
+        raise InputError("unknown plane", found=plane, expected=list(PLANES))
     for label, values in fields.items():
         if len(values) != len(mesh.vertices):
             expected = f"{len(mesh.vertices)}, one per vertex"
             raise InputError(f"{label}: values do not fit the mesh", found=len(values), expected=expected)
-    across, right, up = _PLANES[plane]
+    across, right, up = PLANES[plane]
     section = _cut(mesh, fields, across)
     points, triangles = np.asarray(section.points), section.regular_faces
     span = np.ptp(points, axis=0)
@@ -70,11 +70,11 @@ def cross_sections(
             rasterized=True,
         )
         axes.set_aspect("equal")
-        axes.set_xlabel(_AXIS_NAMES[right])
+        axes.set_xlabel(AXIS_NAMES[right])
         axes.set_title(f"{plane} section at {'xyz'[across]} = {points[0, across]:.1f} mm")
         axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(6))
         figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.8, aspect=30).set_label(label)
-    panels[0].set_ylabel(_AXIS_NAMES[up])
+    panels[0].set_ylabel(AXIS_NAMES[up])
     return figure
 
 

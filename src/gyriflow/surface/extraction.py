@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.special import ndtr
 from skimage.measure import marching_cubes
 
 from gyriflow.errors import MeshError
@@ -15,6 +16,8 @@ PAD_VOXELS = 6
 LEVEL = 0.5
 # slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
 EDGE_SLOPE = 0.4
+# smaller groups of voxels outside a mask that smoothing closes are roughness of the labels
+LEAST_SLIT_VOXELS = 20
 # a part of this size of the largest is kept: two hemispheres that do not touch
 COMPARABLE = 0.2
 
@@ -37,6 +40,28 @@ def shifted_affine(affine: NDArray[np.float64], first: NDArray[np.int64]) -> NDA
 def smoothed_mask(mask: NDArray[np.bool_], smoothing_voxels: float) -> NDArray[np.float32]:
     """Returns the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
+
+
+def unbridged(
+    mask: NDArray[np.bool_], field: NDArray[np.float32], smoothing_voxels: float
+) -> tuple[NDArray[np.float32], int]:
+    """Returns a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
+
+    A slit is a group of voxels outside the mask, open to the outside: a sulcus, the fissure or the Sylvian opening,
+    one voxel wide. Its voxels take the value with which the surface passes where the slit's walls are. Groups of a few
+    voxels are roughness of the labels, which smoothing is for.
+    """
+    if smoothing_voxels == 0:
+        return field, 0
+    number, _ = ndimage.label(~mask)
+    # the volume is padded, so its first voxel is outside
+    closed = (number == number[0, 0, 0]) & (field > LEVEL)
+    number, _ = ndimage.label(closed, np.ones((3, 3, 3)))
+    sizes = np.bincount(number.ravel())
+    slit = closed & (sizes >= LEAST_SLIT_VOXELS)[number]
+    # half-way between a slit's voxel and the next, whose value is that beside a slit one voxel wide, lies the wall
+    beside = 1.0 - (ndtr(1.5 / smoothing_voxels) - ndtr(0.5 / smoothing_voxels))
+    return np.where(slit, np.float32(1.0 - beside), field), int(slit.sum())
 
 
 def refined(field: NDArray, affine: NDArray[np.float64], factor: int) -> tuple[NDArray, NDArray[np.float64]]:

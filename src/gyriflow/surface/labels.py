@@ -1,5 +1,6 @@
 """Label schemes: which numbers of a tissue label volume make the cerebrum, the cortex, left and right."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,6 +103,25 @@ SCHEMES = {
 }
 
 
+def label_scheme(
+    name: str,
+    cerebrum: Sequence[int] = (),
+    cortex: Sequence[int] = (),
+    left: Sequence[int] = (),
+    right: Sequence[int] = (),
+    known: Mapping[int, str] | None = None,
+) -> LabelScheme:
+    """Returns the scheme of a name, or one of one's own, made of what its numbers are.
+
+    `known` gives the tissues of numbers, also of those outside the cerebrum; one of the cerebrum without a name there
+    is called after the list that it is in.
+    """
+    if not cerebrum:
+        return SCHEMES[name]
+    labels = {number: "cortex" if number in cortex else "cerebrum" for number in cerebrum} | dict(known or {})
+    return LabelScheme(name, dict(sorted(labels.items())), tuple(cerebrum), tuple(cortex), tuple(left), tuple(right))
+
+
 def cerebrum_mask(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[np.bool_]:
     """Returns where the (i, j, k) labels belong to the cerebrum.
 
@@ -115,7 +135,8 @@ def cerebrum_mask(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
             f"the label volume has labels that the scheme {scheme.name!r} does not know",
             found=f"{_listed(unknown)} among {_listed(sorted(present))}",
             expected=known,
-            remedy=f"Choose another scheme ({', '.join(sorted(SCHEMES))}).",
+            remedy=f"Choose another scheme ({', '.join(sorted(SCHEMES))}), or write one under schemes. Is this an "
+            "image? gyriflow does not segment.",
         )
     if not present & set(scheme.cerebrum):
         raise InputError(

@@ -1,6 +1,7 @@
 """A brain's pial surface from each kind of input, posed in RAS+ mm: the calls of the surface stage."""
 
 import logging
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from gyriflow.surface.extraction import (
     refined,
     shifted_affine,
     smoothed_mask,
+    unbridged,
 )
 from gyriflow.surface.fissure import Fissure, fissure_between, opened
 from gyriflow.surface.hemispheres import (
@@ -32,13 +34,18 @@ from gyriflow.surface.outcome import PialSurface, described, faults, require_sou
 from gyriflow.surface.remaking import remade
 from gyriflow.surface.remeshing import evened
 from gyriflow.surface.repair import cleaned, pieces
+from gyriflow.surface.sides import fissure_between_labels, sampled, to_the_right
 from gyriflow.surface.size import require_plausible_size
+from gyriflow.surface.thickness import cortical_thickness
+from gyriflow.surface.volume import KEPT, after_repairs, with_volume
 from gyriflow.units import ML_PER_MM3
 
 log = logging.getLogger(__name__)
 
 Coordinates = Literal["ras", "lps"]
 LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
+# labels of cortex below this many voxels are as thick as the voxels allow, not as the cortex is
+RESOLVED_VOXELS = 1.5
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
 
@@ -58,8 +65,9 @@ def from_labels(
 
     The cerebrum's mask is smoothed (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an
     isosurface, which is smoothed, remeshed to `edge_length_mm` and turned so that the mid-sagittal plane is
-    x = const. Where the scheme tells cortex from the tissue inside and cortex labels of both sides touch, the fissure
-    is opened to `fissure_mm` (0: left shut).
+    x = const, and set outwards by what smoothing took of the volume. Where the scheme tells cortex from the tissue
+    inside and cortex labels of both sides touch, the fissure is opened to `fissure_mm` (0: left shut), and cortical
+    thickness is estimated. The fissure is half-way between the labels of the two sides where the scheme has them.
     InputError for labels that don't fit the scheme or the week, MeshError where the surface stays tangled.
     """
     mask = cerebrum_mask(labels, scheme)
@@ -70,19 +78,38 @@ def from_labels(
     report: dict[str, Any] = {"source": "labels", "scheme": scheme.name, "mask_volume_mL": volume * ML_PER_MM3}
     mask, tissue = np.pad(mask[box], PAD_VOXELS), np.pad(labels[box], PAD_VOXELS)
     affine = shifted_affine(affine, first)
-    field = smoothed_mask(mask, smoothing_voxels)
+    field, report["slit_voxels_reopened"] = unbridged(mask, smoothed_mask(mask, smoothing_voxels), smoothing_voxels)
     core = mask & ~np.isin(tissue, scheme.cortex)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
     walls = isosurface(smoothed_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
     plane = mid_plane(walls)
     require_sides(tissue, scheme, affine, plane.normal)
     fissure = fissure_between(walls, plane)
+    to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
+    if to_right is not None:
+        fissure = fissure_between_labels(to_right, affine, fissure)
+    grid = affine
     if scheme.cortex and fissure_mm > 0:
         field, affine, report["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm)
     field, report["topology"] = made_simple(field)
-    mesh = _even(isosurface(field, affine), smoothing_iterations, edge_length_mm, report)
-    left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
-    return _posed(mesh, left, plane, report, week)
+    rough = isosurface(field, affine)
+    mesh = _even(rough, smoothing_iterations, edge_length_mm, report)
+    expected = after_repairs(volume, report["topology"], affine) - report.get("fissure_opened_mL", 0.0) / ML_PER_MM3
+    mesh, report["smoothing"] = with_volume(mesh, expected, area(rough))
+    if abs(change := report["smoothing"]["volume_change"]) > KEPT:
+        _warn(report, f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it")
+    centres = corners(mesh).mean(axis=1)
+    left = left_faces(mesh, fissure.height_above(centres) if to_right is None else sampled(to_right, grid, centres))
+    surface = _posed(mesh, left, plane, report, week)
+    if not scheme.cortex:
+        return surface
+    thickness = cortical_thickness(mesh, mask, np.isin(tissue, scheme.cortex), grid, smoothing_voxels)
+    report["cortical_thickness"] = thickness.report
+    suggested, voxels = thickness.report["suggested_thickness_mm"], thickness.report["voxels_through_cortex"]
+    log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
+    if voxels < RESOLVED_VOXELS:
+        _warn(report, f"the cortex's labels are {voxels:.1f} voxels thick: their thickness is a coarse one")
+    return replace(surface, thickness=thickness)
 
 
 def from_hemispheres(

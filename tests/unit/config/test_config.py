@@ -194,12 +194,10 @@ def test_measured_brains_are_phantoms_only_where_all_of_them_are(tmp_path, shown
 
 
 def test_label_schemes_are_those_of_the_surface_room():
-    from typing import get_args
-
-    from gyriflow.config.brains import Scheme
+    from gyriflow.config.schemes import BUILT_IN_SCHEMES
     from gyriflow.surface.labels import SCHEMES
 
-    assert set(get_args(Scheme)) == set(SCHEMES)
+    assert set(BUILT_IN_SCHEMES) == set(SCHEMES)
 
 
 def test_weeks_and_defaults_of_phantoms_are_those_of_the_phantom_room():
@@ -232,3 +230,48 @@ def test_the_page_of_all_keys_is_current():
 
     page = Path(__file__).parents[3] / "config" / "README.md"
     assert page.read_text() == documentation(), "run ./run python -m gyriflow.config"
+
+
+def test_names_that_config_and_folding_both_keep_are_the_same():
+    from typing import get_args
+
+    from gyriflow.config import folding as settings
+    from gyriflow.folding import parameters
+
+    assert settings.VARYING == parameters.VARYING
+    assert settings.GROWTH_RATES == parameters.GROWTH_RATES
+    assert get_args(settings.FieldName) == parameters.FIELDS
+    assert get_args(settings.FoldingSettings.model_fields["support"].annotation) == parameters.SUPPORTS
+    plain = settings.FoldingSettings(end_week=24).model_dump()
+    fixed = {"start_week": 21, "fissure_x_mm": 0, "output_weeks": [21, 24]}
+    assert parameters.parameters_from(plain | fixed | {"ranks": 1}) == parameters.FoldingParameters(21, 24, 0, (21, 24))
+
+
+@pytest.mark.parametrize("value", [{"weeks": {21: "on"}}, {"weeks": {21: True}}, True, "thick", {"map": "x.shape.gii"}])
+def test_what_cannot_vary_a_parameter_is_refused(value):
+    assert problems(study(folding={"end_week": 24, "thickness_mm": value}))[0].startswith("folding.thickness_mm")
+
+
+def test_truth_values_are_no_times():
+    (line,) = problems(study(folding={"end_week": 24, "stress_memory_gw": True}))
+    assert line.startswith("folding.stress_memory_gw: found True")
+    (line,) = problems(study(folding={"end_week": 24, "stress_memory_gw": "forever"}))
+    assert line.startswith("folding.stress_memory_gw: found 'forever'")
+
+
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        ({"thickness_mm": 1.0, "thickness_growth_mm_per_gw": -0.5}, "thickness_mm"),
+        ({"thickness_mm": {"weeks": {21: 1.0, 24: 0.4}}, "thickness_growth_mm_per_gw": -0.2}, "thickness_mm"),
+        ({"growth_rate_per_s": 1e-5, "step_s": 604800}, "step_s"),
+    ],
+)
+def test_values_that_fail_later_in_the_run_are_refused_before_it(settings, key):
+    (line,) = problems(study(folding={"end_week": 24} | settings))
+    assert line.startswith(f"folding.{key}")
+
+
+def test_a_thickness_whose_curve_outweighs_its_loss_is_allowed():
+    curve = {"thickness_mm": {"weeks": {21: 1.0, 24: 3.0}}, "thickness_growth_mm_per_gw": -0.5}
+    load(study(folding={"end_week": 24} | curve))

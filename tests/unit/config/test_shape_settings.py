@@ -91,8 +91,8 @@ def test_a_shape_is_the_only_source_of_its_brain_and_takes_no_keys_of_others():
         {"id": "b", "week": 50, "shape": {"kind": "sphere"}, "coordinates": "lps"},
     ]
     assert problems(study(brains=brains)) == [
-        "brains[0]: found phantom and shape as its source; expected exactly one of labels, hemispheres, pial, phantom, "
-        "shape",
+        "brains[0]: found phantom and shape as its source; expected exactly one of labels, segmentation, hemispheres, "
+        "pial, phantom, shape",
         "brains[1].coordinates: has no meaning with shape; only with hemispheres or pial",
         "brains[1].week: found 50; it should be less than or equal to 45",
     ]

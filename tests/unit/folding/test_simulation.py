@@ -1,9 +1,18 @@
-"""What a simulation says of its steps before it begins."""
+"""The steps of a simulation: which are shortened, and how halved ones grow back."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
+from mpi4py import MPI
 
+from gyriflow.config.folding import output_weeks
+from gyriflow.errors import SolverError
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.newton import NotConvergedError
 from gyriflow.folding.parameters import parameters_from
-from gyriflow.folding.run import shortened_steps
+from gyriflow.folding.run import seconds_to, shortened_steps
+from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 
@@ -23,3 +32,58 @@ def test_a_step_that_does_not_divide_the_time_between_outputs_is_said(step_s, we
     assert bool(said) == bool(shortened)
     assert shortened in said
     assert not said or said.startswith(f"step_s {step_s:g} does not divide")
+
+
+class Stepper:
+    """A folding whose steps fail where they are too long for the time."""
+
+    def __init__(self, longest, **changes):
+        self.parameters = parameters_from(RUN | {"output_weeks": [21.0, 22.0]} | changes)
+        self.domain = SimpleNamespace(comm=MPI.COMM_SELF)
+        self.longest = longest
+
+    def step(self, state, step_s):
+        if step_s > self.longest(state.time_s):
+            raise NotConvergedError("too long")
+        return state.after(np.zeros((1, 3)), step_s, {"dt_s": step_s})
+
+    def trouble(self):
+        return "at [1.0, 2.0, 3.0] mm"
+
+
+def steps_to(stepper, until_s):
+    state = State.at_start(np.zeros((1, 3)), stepper.parameters.step_s)
+    while state.time_s < until_s * (1 - 1e-12):
+        state = advance(stepper, state, until_s)
+    assert state.time_s == pytest.approx(until_s, rel=1e-12)
+    return [row["dt_s"] for row in state.rows]
+
+
+def test_a_failing_step_is_halved_and_grows_back():
+    # nothing longer than 11 000 s works before 60 000 s
+    lengths = steps_to(Stepper(lambda time_s: 11_000.0 if time_s < 60_000 else 1e9), 604_800.0)
+    assert lengths[0] == 10_800
+    assert max(lengths) == 43_200
+    first = lengths.index(21_600)
+    assert first >= STEPS_BEFORE_GROWING
+    assert lengths[first + STEPS_BEFORE_GROWING] == 43_200
+
+
+def test_where_the_smallest_step_fails_the_place_is_named():
+    stepper = Stepper(lambda time_s: 1.0, solver={"max_halvings": 2})
+    with pytest.raises(SolverError, match=r"fails even with 10800 s.*at \[1.0, 2.0, 3.0\] mm"):
+        steps_to(stepper, 604_800.0)
+
+
+def test_frames_of_every_step_need_no_other_steps():
+    weeks = output_weeks(21.0, 22.0, 1 / 14)
+    parameters = parameters_from(RUN | {"output_weeks": weeks})
+    assert len(weeks) == 15
+    assert shortened_steps(parameters) == ""
+    stepper, lengths = Stepper(lambda time_s: 1e9), []
+    state = State.at_start(np.zeros((1, 3)), 43_200.0)
+    for week in weeks[1:]:
+        while state.time_s < seconds_to(week, parameters) * (1 - 1e-12):
+            state = advance(stepper, state, seconds_to(week, parameters))
+            lengths.append(state.last_s)
+    assert lengths == pytest.approx([43_200.0] * 14, rel=1e-6)

@@ -23,7 +23,8 @@ def test_a_curve_is_linear_between_its_weeks_and_constant_beyond():
 def test_a_map_is_multiplied_with_the_curve():
     both = Varying.read({"weeks": {21: 1.0, 31: 2.0}, "map": "thickness_mm"}, "thickness")
     np.testing.assert_allclose(both.at(26.0, MAP), [1.5, 3.0, 6.0])
-    assert both.range(MAP) == (1.0, 8.0)
+    assert both.range(MAP, 21.0, 40.0) == (1.0, 8.0)
+    assert both.range(MAP, 21.0, 26.0) == (1.0, 6.0)
 
 
 @pytest.mark.parametrize("value", ["thick", True, {}, {"weeks": {}}, {"weeks": [1, 2]}, {"week": {21: 1}}, None])
@@ -40,6 +41,7 @@ def test_thickness_grows_with_time():
 def test_values_are_checked_over_all_weeks_and_places():
     with pytest.raises(InputError, match="thickness_mm must be positive"):
         parameters_from(RUN | {"thickness_mm": 1.5, "thickness_growth_mm_per_gw": -0.15})
+    parameters_from(RUN | {"thickness_mm": {"weeks": {21: 1.0, 31: 3.0}}, "thickness_growth_mm_per_gw": -0.15})
     with pytest.raises(InputError, match="must not be negative"):
         parameters_from(RUN | {"growth_rate_per_s": {"weeks": {21: 1e-7, 30: -1e-7}}})
     mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})

@@ -99,7 +99,8 @@ def test_phantoms_of_all_ages_are_sound_and_fold():
     ]
     for surface in surfaces:
         require_sound(surface)
-        assert not surface.report["warnings"]
+        # voxels this coarse say little about the cortex
+        assert [w for w in surface.report["warnings"] if "voxels thick" not in w] == []
     young, _, old = (surface.whole for surface in surfaces)
     assert area(old) / area(young) > 1.1 * (signed_volume(old) / signed_volume(young)) ** (2 / 3)
 

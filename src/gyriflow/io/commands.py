@@ -1,0 +1,88 @@
+"""A command of the user's own, run on files, alone or in a container."""
+
+import logging
+import os
+import shlex
+import shutil
+import subprocess
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+
+from gyriflow.errors import InputError
+from gyriflow.io.files import AnyPath
+
+log = logging.getLogger(__name__)
+
+LINES_SHOWN = 5
+DOCKER_PREFIX = "docker://"
+APPTAINER = ("apptainer", "singularity")
+DOCKER = ("docker", "podman")
+
+
+def run_command(command: str, files: Mapping[str, AnyPath], made: str, container: str | None = None) -> None:
+    """Runs a shell command, in the working directory, with its output in the log.
+
+    Parameters
+    ----------
+    command
+        With places such as {image} for the files.
+    files
+        Path of each such place.
+    made
+        The place of the file that the command has to make.
+    container
+        Image in which the command runs: "docker://NAME" or a .sif file. The files' folders are seen in it.
+
+    Raises
+    ------
+    InputError
+        With the last lines of the output, where the command ends in another code than 0 or makes no file.
+    """
+    paths = {name: Path(path).absolute() for name, path in files.items()}
+    for name, path in paths.items():
+        command = command.replace(f"{{{name}}}", shlex.quote(str(path)))
+    folders = sorted({str(path.parent) for path in paths.values()})
+    arguments = ["sh", "-c", command] if container is None else _contained(command, container, folders)
+    log.info("running %s", shlex.join(arguments))
+    last: deque[str] = deque(maxlen=LINES_SHOWN)
+    with subprocess.Popen(
+        arguments,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            log.info("%s", line.rstrip())
+            last.append(line.rstrip())
+    if process.returncode != 0 or not paths[made].is_file():
+        raise InputError(
+            "the command failed",
+            found=f"exit code {process.returncode} of {command!r}" + "".join(f"\n  {line}" for line in last) + "\n",
+            expected=f"exit code 0 and a file in the place of {{{made}}}",
+            remedy="It is yours: gyriflow only runs it. All of its output is in the log.",
+        )
+
+
+def _contained(command: str, container: str, folders: list[str]) -> list[str]:
+    """Returns the arguments that run a shell command in a container with the first program found that can do so."""
+    is_file = container.endswith(".sif")
+    programs = APPTAINER if is_file else APPTAINER + DOCKER
+    program = next((name for name in programs if shutil.which(name)), None)
+    if program is None:
+        raise InputError(
+            "no program that runs containers is on PATH",
+            path=container,
+            expected=" or ".join(programs),
+            remedy="Install one of them, or give a command that needs no container.",
+        )
+    if program in APPTAINER:
+        binds = [part for folder in folders for part in ("--bind", folder)]
+        return [program, "exec", *binds, container, "sh", "-c", command]
+    binds = [part for folder in folders for part in ("--volume", f"{folder}:{folder}")]
+    user = ["--user", f"{os.getuid()}:{os.getgid()}"] if program == "docker" else []
+    image = container.removeprefix(DOCKER_PREFIX)
+    return [program, "run", "--rm", *user, *binds, "--entrypoint", "sh", image, "-c", command]

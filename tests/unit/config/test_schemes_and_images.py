@@ -1,0 +1,113 @@
+"""Label schemes of one's own, images and their segmentation in the configuration."""
+
+import pytest
+
+from gyriflow.config import load
+from gyriflow.errors import InputError
+
+MINE = {"cerebrum": [1, 2], "cortex": [2], "known": {9: "outer CSF"}}
+
+
+def study(brain, **changes):
+    return {"brains": [{"id": "a", "week": 21} | brain], "start": "a", "folding": {"end_week": 22}} | changes
+
+
+def problems(raw, base_dir):
+    with pytest.raises(InputError) as caught:
+        load(raw, base_dir)
+    return [line.strip() for line in str(caught.value).splitlines()[1:-1]]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("labels.nii.gz", "t2w.nii.gz"):
+        (tmp_path / name).touch()
+    return tmp_path
+
+
+def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
+    config = load(study({"labels": "labels.nii.gz", "scheme": "mine"}, schemes={"mine": MINE}), folder)
+    assert config.scheme(config.brains[0]) == {
+        "name": "mine",
+        "cerebrum": (1, 2),
+        "cortex": (2,),
+        "left": (),
+        "right": (),
+        "known": {9: "outer CSF"},
+    }
+    plain = load(study({"phantom": {}}))
+    assert plain.scheme(plain.brains[0]) == {"name": "spina-bifida-atlas"}
+
+
+def test_all_mistakes_in_schemes_are_named_at_once(folder):
+    schemes = {
+        "feta-7": MINE,
+        "a": {"cerebrum": [1, 2, 2], "cortex": [3], "left": [1], "right": [1]},
+        "b": {"cerebrum": [1], "cortex": [1], "left": [1], "cortx": []},
+        "c": {"cerebrum": [0], "left": ["x"]},
+        "e": {"cerebrum": []},
+    }
+    assert problems(study({"labels": "labels.nii.gz", "scheme": "d"}, schemes=schemes), folder) == [
+        "schemes.b.cortx: unknown key; did you mean cortex?",
+        "schemes.c.cerebrum[0]: found 0; it should be greater than or equal to 1",
+        "schemes.c.left[0]: found 'x'; it should be a valid integer, unable to parse string as an integer",
+        "schemes.feta-7: the name is that of a scheme of gyriflow; choose another",
+        "schemes.a.cerebrum: found 2 more than once",
+        "schemes.a.cortex: found 3; it should have labels of the cerebrum only",
+        "schemes.a.right: found 1, which are in left too",
+        "schemes.b.cortex: found all of the cerebrum; the tissue inside the cortex is missing",
+        "schemes.b.right: is missing; hemispheres are told apart by both left and right",
+        "schemes.e.cerebrum: found no labels; it should have one or more",
+        "brains[0].scheme: found 'd'; expected one of spina-bifida-atlas, dhcp-19, feta-7, binary, a, b, c, e, or a "
+        "name of schemes",
+    ]
+
+
+def test_an_image_alone_is_refused_since_gyriflow_does_not_segment(folder):
+    (line,) = problems(study({"image": "t2w.nii.gz"}), folder)
+    assert line.startswith("brains[0].image: gyriflow does not segment images; give a label volume under labels")
+
+
+def test_an_image_with_a_command_or_with_labels_is_a_brain(folder):
+    command = {"command": "segment {image} {labels}"}
+    made = load(study({"image": "t2w.nii.gz", "scheme": "feta-7", "segmentation": command}), folder).brains[0]
+    assert (made.source, made.files, made.image) == ("segmentation", [], str(folder / "t2w.nii.gz"))
+    shown = load(study({"image": "t2w.nii.gz", "scheme": "feta-7", "labels": "labels.nii.gz"}), folder).brains[0]
+    assert (shown.source, shown.files) == ("labels", [str(folder / "labels.nii.gz")])
+
+
+@pytest.mark.parametrize(
+    ("brain", "found"),
+    [
+        (
+            {"segmentation": {"command": "x {image} {labels}"}, "scheme": "binary"},
+            "brains[0].segmentation: has no image to work on",
+        ),
+        (
+            {"segmentation": {"command": "x {image}"}, "image": "t2w.nii.gz", "scheme": "binary"},
+            "brains[0].segmentation.command: lacks {labels}",
+        ),
+        (
+            {"segmentation": {"command": "x {image} {labels}"}, "image": "t2w.nii.gz"},
+            "brains[0].scheme: is missing; it says what the labels of brains[0].segmentation mean",
+        ),
+        ({"segmentation": {}, "image": "t2w.nii.gz", "scheme": "binary"}, "brains[0].segmentation.command: is missing"),
+        ({"phantom": {}, "image": "t2w.nii.gz"}, "brains[0].image: has no meaning with phantom"),
+        (
+            {"segmentation": {"command": "x {image} {labels}"}, "image": "t2w.nii.gz", "labels": "labels.nii.gz"},
+            "brains[0]: found labels and segmentation as its source",
+        ),
+    ],
+)
+def test_a_mistake_around_a_segmentation_is_named(folder, brain, found):
+    assert any(line.startswith(found) for line in problems(study(brain), folder))
+
+
+def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
+    for name in ("week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz"):
+        (tmp_path / name).touch()
+    (line,) = problems(study({"labels": "week30_labels.nii.gz", "scheme": "binary"}), tmp_path)
+    assert line == (
+        f"brains[0].labels: no such file: {tmp_path / 'week30_labels.nii.gz'}; "
+        "there are week21_labels.nii.gz, week22.5_labels.nii.gz"
+    )

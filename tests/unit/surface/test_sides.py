@@ -1,0 +1,84 @@
+"""Left and right from labels that have sides, and the volume that smoothing gives back."""
+
+import numpy as np
+import pytest
+
+from gyriflow.geometry.triangles import area, corners, face_areas, signed_volume
+from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.surface.labels import label_scheme
+from gyriflow.surface.pial import from_labels
+from gyriflow.surface.volume import after_repairs, with_volume
+
+SIDED = label_scheme("sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A phantom whose sides meet at a surface bent by 4 mm, cortex on both sides of it and no gap between."""
+    labels, affine = phantom_labels(24.0, voxel_mm=1.2)
+    index = np.stack(np.indices(labels.shape), axis=-1)
+    x, y, _ = np.moveaxis(index @ affine[:3, :3].T + affine[:3, 3] - CENTRE_MM, -1, 0)
+    cerebrum = np.isin(labels, (1, 2, 5, 6, 8))
+    middle = 4.0 * np.sin(y / 12.0)
+    # the phantom's own fissure is filled
+    gap = (np.abs(x) < 3.0) & (labels == 4)
+    right = x > middle
+    cortex = (labels == 5) | gap
+    sided = np.where(cerebrum | gap, np.where(cortex, 3, 1) + right, 0)
+    sided[labels == 2] = 5
+    return sided, affine, middle
+
+
+def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet(bent):
+    sided, affine, _ = bent
+    surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=1.5)
+    inverse = np.array(surface.report["pose"])
+    expected = {"left": -1, "right": 1}
+    for name, sign in expected.items():
+        part = getattr(surface, name)
+        centres = corners(part).mean(axis=1) - inverse[:3, 3]
+        places = centres @ np.linalg.inv(inverse[:3, :3]).T - CENTRE_MM
+        wrong = sign * (places[:, 0] - 4.0 * np.sin(places[:, 1] / 12.0)) < -1.2
+        assert face_areas(part)[wrong].sum() < 0.005 * area(part)
+
+
+def test_a_scheme_of_ones_own_names_its_tissues():
+    scheme = label_scheme("mine", cerebrum=(2, 1), cortex=(2,), known={9: "outer CSF", 1: "inside"})
+    assert scheme.labels == {1: "inside", 2: "cortex", 9: "outer CSF"}
+    assert label_scheme("feta-7").cortex == (2,)
+
+
+def test_smoothing_keeps_volume_and_area(bent):
+    labels, affine = phantom_labels(22.0, voxel_mm=1.2)
+    surface = from_labels(labels, affine, label_scheme("spina-bifida-atlas"), week=22.0, edge_length_mm=1.5)
+    smoothing = surface.report["smoothing"]
+    assert abs(smoothing["volume_change"]) < 1e-4 < abs(smoothing["volume_change_before_correction"])
+    assert abs(smoothing["area_change"]) < 0.02
+    assert signed_volume(surface.whole) / 1e3 == pytest.approx(smoothing["volume_expected_mL"], rel=1e-4)
+    mask = np.isin(labels, (1, 2, 5, 6, 8)).sum() * 1.2**3 / 1e3
+    assert smoothing["volume_expected_mL"] == pytest.approx(mask - surface.report["fissure_opened_mL"], rel=2e-3)
+
+
+def test_a_volume_that_is_far_off_is_told_and_not_hidden():
+    from trimesh.creation import icosphere
+
+    from gyriflow.geometry.triangles import TriangleMesh
+
+    ball = TriangleMesh(*(np.array(a) for a in (icosphere(3, 20.0).vertices, icosphere(3, 20.0).faces)))
+    volume = signed_volume(ball)
+    near, report = with_volume(ball, 1.02 * volume, area(ball))
+    assert signed_volume(near) == pytest.approx(1.02 * volume, rel=1e-5)
+    assert report["area_change"] == pytest.approx(1.02 ** (2 / 3) - 1, rel=0.01)
+    far, report = with_volume(ball, 1.2 * volume, area(ball))
+    assert far is ball
+    assert report["volume_change"] == pytest.approx(1 / 1.2 - 1)
+
+
+def test_repairs_count_for_the_volume():
+    topology = {
+        "voxels_filled": 4,
+        "voxels_filled_in_tunnels": 3,
+        "voxels_dropped": 5,
+        "voxels_cut_from_bridges": 1,
+    }
+    assert after_repairs(100.0, topology, np.diag([2.0, 1.0, 1.0, 1.0])) == 102.0

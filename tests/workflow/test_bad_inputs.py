@@ -1,0 +1,125 @@
+"""Bad inputs end with a message in the real program, exit code 2 and nothing half-written; good ones do not."""
+
+import json
+from types import SimpleNamespace
+
+import nibabel as nib
+import numpy as np
+import pytest
+
+from gyriflow.phantom.brain import phantom_labels
+
+LABELS, AFFINE = phantom_labels(21.0, voxel_mm=2.0)
+
+
+def image(labels=LABELS, affine=AFFINE, kind=np.int16, unit="mm"):
+    made = nib.Nifti1Image(np.asarray(labels, dtype=kind), affine)
+    made.header.set_xyzt_units(unit)
+    made.set_sform(affine, code=1)
+    made.set_qform(affine, code=1)
+    return made
+
+
+def disagreeing():
+    made = image()
+    made.set_qform(np.diag([2.0, 2.0, 2.0, 1.0]), code=1)
+    return made
+
+
+def with_value(value):
+    labels = LABELS.astype(float)
+    labels[:2, 0, 0] = value
+    return image(labels, kind=np.float32)
+
+
+def with_labels(change):
+    labels = LABELS.copy()
+    change(labels)
+    return image(labels)
+
+
+def relabelled(old, new):
+    return with_labels(lambda labels: np.place(labels, np.isin(labels, old), new))
+
+
+BAD = {
+    "headers": (disagreeing, "qform and sform disagree by up to"),
+    "metres": (lambda: image(unit="meter"), "The file seems to be in micrometres"),
+    "series": (lambda: image(np.stack([LABELS] * 2, axis=-1)), "is not a volume of labels"),
+    "fractions": (lambda: with_value(1.5), "gyriflow does not segment images"),
+    "unknown": (lambda: relabelled([3], 30), "does not know; found 30 among"),
+    "missing": (lambda: relabelled([8], 1), "missing from the label volume"),
+    "empty": (lambda: relabelled([1, 2, 5, 6, 8], 0), "no voxel belongs to the cerebrum"),
+    "infinite": (lambda: with_value(np.inf), "values that are NaN or infinite; found 2 voxels"),
+}
+GOOD = "good"
+SHIFTED = "shifted"
+
+
+@pytest.fixture(scope="module")
+def study(checkout_copy, tmp_path_factory):
+    """One run of the surface stage over bad inputs and two good ones."""
+    from .conftest import Workflow
+
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("bad"))
+    brains = []
+    for name, (made, _) in BAD.items():
+        nib.save(made(), workflow.directory / f"{name}.nii.gz")
+        brains.append({"id": name, "week": 21, "labels": f"{name}.nii.gz", "scheme": "spina-bifida-atlas"})
+    nib.save(image(), workflow.directory / "whole.nii.gz")
+    whole = (workflow.directory / "whole.nii.gz").read_bytes()
+    (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
+    brains.append({"id": "torn", "week": 21, "labels": "torn.nii.gz", "scheme": "spina-bifida-atlas"})
+    nib.save(image(1000 + LABELS), workflow.directory / "t2w.nii.gz")
+    moved = AFFINE.copy()
+    moved[:3, 3] += 1.0
+    nib.save(image(affine=moved), workflow.directory / "moved.nii.gz")
+    for name, source in {GOOD: "whole", SHIFTED: "moved"}.items():
+        command = f"echo my model on {{image}}; cp {workflow.directory / source}.nii.gz {{labels}}"
+        segmented = {"image": "t2w.nii.gz", "scheme": "mine", "segmentation": {"command": command}}
+        brains.append({"id": name, "week": 21.5, **segmented})
+    mine = {"cerebrum": [1, 2, 5, 6, 8], "cortex": [5], "known": {3: "cerebellum", 4: "CSF", 7: "brainstem"}}
+    config = {
+        "schemes": {"mine": mine},
+        "brains": brains,
+        "start": GOOD,
+        "surface": {"edge_length_mm": 2.0},
+        "folding": {"end_week": 23},
+    }
+    name = workflow.write("study.yaml", config)
+    targets = [f"results/{brain['id']}/surface/pial.surf.gii" for brain in brains]
+    outcome = workflow.run(*targets, "--cores", "2", "--keep-going", "--configfile", name)
+    return SimpleNamespace(directory=workflow.directory, outcome=outcome, results=workflow.directory / "results")
+
+
+def test_the_run_ends_in_2_without_a_traceback(study):
+    assert study.outcome.returncode == 2
+    assert "Traceback" not in study.outcome.stderr
+
+
+@pytest.mark.parametrize("name", [*BAD, "torn"])
+def test_a_bad_input_is_refused_with_a_message_and_nothing_is_left(study, name):
+    expected = BAD[name][1] if name in BAD else f"{study.directory / 'torn.nii.gz'}: cannot be read as an image"
+    log = (study.results / name / "logs" / "pial_surface.log").read_text()
+    assert expected in log
+    assert expected in study.outcome.stderr
+    assert not [path for path in (study.results / name / "surface").rglob("*") if path.is_file()]
+
+
+def test_labels_on_another_grid_than_their_image_are_refused(study):
+    log = (study.results / SHIFTED / "logs" / "segmentation.log").read_text()
+    assert "labels.nii.gz: is not on the grid of its image" in log
+    assert not [path for path in (study.results / SHIFTED / "surface").rglob("*") if path.is_file()]
+
+
+def test_a_segmentation_of_ones_own_gives_a_surface_with_its_thickness_at_its_week(study):
+    folder = study.results / GOOD / "surface"
+    log = (study.results / GOOD / "logs" / "segmentation.log").read_text()
+    assert f"my model on {study.directory / 't2w.nii.gz'}" in log
+    report = json.loads((folder / "surface.json").read_text())
+    assert (report["week"], report["scheme"], report["euler_number"]) == (21.5, "mine", 2)
+    assert abs(report["smoothing"]["volume_change"]) < 0.01
+    thickness = nib.load(folder / "thickness.shape.gii").darrays
+    assert [len(array.data) for array in thickness] == [report["vertices"]]
+    assert report["cortical_thickness"]["mean_mm"] == pytest.approx(thickness[0].data.mean(), abs=0.2)
+    assert "a suggestion for thickness_mm" in (study.results / GOOD / "logs" / "pial_surface.log").read_text()
