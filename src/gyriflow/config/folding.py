@@ -65,7 +65,7 @@ class SolverSettings(Settings):
     """The nonlinear and the linear solver."""
 
     newton_tolerance: float = setting(
-        1e-5, "", "Newton ends where the residual has fallen to this part of that at u = 0.", gt=0, lt=1
+        1e-6, "", "Newton ends where the residual has fallen to this part of that at u = 0.", gt=0, lt=1
     )
     krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
     max_newton: int = setting(20, "", "Newton iterations before a step is halved.", ge=1, le=200)

@@ -35,7 +35,7 @@ class NewtonSettings:
     linear solve can end the step, it is solved as far as that takes, down to a tenth of `krylov_tolerance`.
     """
 
-    newton_tolerance: float = 1e-5
+    newton_tolerance: float = 1e-6
     krylov_tolerance: float = 1e-3
     max_newton: int = 20
     max_krylov: int = 300

@@ -60,7 +60,7 @@ class NoGrowth:
 class Solver:
     """Tolerances of the solvers and the number of times that a step may be halved."""
 
-    newton_tolerance: float = 1e-5
+    newton_tolerance: float = 1e-6
     krylov_tolerance: float = 1e-3
     max_newton: int = 20
     max_halvings: int = 6

@@ -10,7 +10,7 @@ from skimage.measure import marching_cubes
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
-from gyriflow.surface.topology import unambiguous, without_handles
+from gyriflow.surface.topology import euler_gain, unambiguous, without_handles
 
 PAD_VOXELS = 6
 LEVEL = 0.5
@@ -43,25 +43,30 @@ def smoothed_mask(mask: NDArray[np.bool_], smoothing_voxels: float) -> NDArray[n
 
 
 def unbridged(
-    mask: NDArray[np.bool_], field: NDArray[np.float32], smoothing_voxels: float
+    mask: NDArray[np.bool_], field: NDArray[np.float32], smoothing_voxels: float, left_shut: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], int]:
     """Returns a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
 
     A slit is a group of voxels outside the mask, open to the outside: a sulcus, the fissure or the Sylvian opening,
     one voxel wide. Its voxels take the value with which the surface passes where the slit's walls are. Groups of a few
-    voxels are roughness of the labels, which smoothing is for.
+    voxels are roughness of the labels, which smoothing is for; a slit that would pierce the mask stays shut, and so
+    does what is in the mask `left_shut`.
     """
-    if smoothing_voxels == 0:
-        return field, 0
     number, _ = ndimage.label(~mask)
     # the volume is padded, so its first voxel is outside
-    closed = (number == number[0, 0, 0]) & (field > LEVEL)
+    closed = (number == number[0, 0, 0]) & (field > LEVEL) & ~left_shut
     number, _ = ndimage.label(closed, np.ones((3, 3, 3)))
-    sizes = np.bincount(number.ravel())
-    slit = closed & (sizes >= LEAST_SLIT_VOXELS)[number]
+    inside, slits = field > LEVEL, np.zeros_like(mask)
+    for index, tight in enumerate(ndimage.find_objects(number), start=1):
+        box = tuple(slice(side.start - 1, side.stop + 1) for side in tight)
+        slit = number[box] == index
+        opened = inside[box] & ~slit
+        if slit.sum() >= LEAST_SLIT_VOXELS and euler_gain(inside[box], opened) == 0:
+            inside[box] = opened
+            slits[box] |= slit
     # half-way between a slit's voxel and the next, whose value is that beside a slit one voxel wide, lies the wall
-    beside = 1.0 - (ndtr(1.5 / smoothing_voxels) - ndtr(0.5 / smoothing_voxels))
-    return np.where(slit, np.float32(1.0 - beside), field), int(slit.sum())
+    beside = 1.0 - (ndtr(1.5 / smoothing_voxels) - ndtr(0.5 / smoothing_voxels)) if smoothing_voxels > 0 else 1.0
+    return np.where(slits, np.float32(1.0 - beside), field), int(slits.sum())
 
 
 def refined(field: NDArray, affine: NDArray[np.float64], factor: int) -> tuple[NDArray, NDArray[np.float64]]:

@@ -49,6 +49,11 @@ class Fissure:
         middle = ndimage.map_coordinates(self.heights, index, order=1, mode="nearest")
         return points @ self.plane.normal - self.plane.offset - middle
 
+    def near(self, shape: tuple[int, ...], affine: Floats, reach_mm: float) -> Mask:
+        """Returns which voxels of an (i, j, k) volume are within a distance of the mid-surface."""
+        points = np.indices(shape).reshape(3, -1).T @ affine[:3, :3].T + affine[:3, 3]
+        return np.asarray(np.abs(self.height_above(points)) < reach_mm).reshape(shape)
+
 
 def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
     """Returns the mid-surface half-way between medial walls of a closed surface that face each other."""

@@ -46,6 +46,8 @@ Coordinates = Literal["ras", "lps"]
 LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 # labels of cortex below this many voxels are as thick as the voxels allow, not as the cortex is
 RESOLVED_VOXELS = 1.5
+# slits this near to the mid-surface belong to the fissure
+FISSURE_REACH_MM = 3.0
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
 
@@ -78,7 +80,7 @@ def from_labels(
     report: dict[str, Any] = {"source": "labels", "scheme": scheme.name, "mask_volume_mL": volume * ML_PER_MM3}
     mask, tissue = np.pad(mask[box], PAD_VOXELS), np.pad(labels[box], PAD_VOXELS)
     affine = shifted_affine(affine, first)
-    field, report["slit_voxels_reopened"] = unbridged(mask, smoothed_mask(mask, smoothing_voxels), smoothing_voxels)
+    field = smoothed_mask(mask, smoothing_voxels)
     core = mask & ~np.isin(tissue, scheme.cortex)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
     walls = isosurface(smoothed_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
@@ -88,8 +90,11 @@ def from_labels(
     to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
     if to_right is not None:
         fissure = fissure_between_labels(to_right, affine, fissure)
-    grid = affine
-    if scheme.cortex and fissure_mm > 0:
+    grid, opens = affine, bool(scheme.cortex) and fissure_mm > 0
+    # the fissure is opened whole, down to what joins the hemispheres
+    left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM) if opens else np.zeros_like(mask)
+    field, report["slit_voxels_reopened"] = unbridged(mask, field, smoothing_voxels, left_shut)
+    if opens:
         field, affine, report["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm)
     field, report["topology"] = made_simple(field)
     rough = isosurface(field, affine)

@@ -70,7 +70,7 @@ def without_handles(field: NDArray[np.float32]) -> TopologyRepair:
             # an earlier change may have touched this patch
             patch = patch & (now != fills)
             changed = np.where(patch, fills, now)
-            if left == 0 or not patch.any() or _gain(now, changed) <= 0:
+            if left == 0 or not patch.any() or euler_gain(now, changed) <= 0:
                 continue
             trial = mask.copy()
             trial[box] = _least_change(now, changed, field[box])
@@ -133,7 +133,7 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
     return [(fills, box, patch) for _, fills, box, patch in found]
 
 
-def _gain(before: Mask, after: Mask) -> int:
+def euler_gain(before: Mask, after: Mask) -> int:
     """Returns by how much the Euler number rises; inside a box that holds the change with a margin of one voxel."""
     return int(euler_number(after, connectivity=FACES) - euler_number(before, connectivity=FACES))
 

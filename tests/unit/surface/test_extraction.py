@@ -14,6 +14,7 @@ from gyriflow.surface.extraction import (
     refined,
     shifted_affine,
     smoothed_mask,
+    unbridged,
 )
 
 RADIUS = 12.0
@@ -92,3 +93,41 @@ def test_structure_thinner_than_the_smoothing_is_refused():
     thin[10, 5:15, 5:15] = True
     with pytest.raises(MeshError, match="nothing is left"):
         made_simple(smoothed_mask(thin, 2.0))
+
+
+def test_slit_one_voxel_wide_stays_open_at_its_width():
+    solid = np.zeros((44, 44, 44), dtype=bool)
+    solid[10:34, 10:34, 10:34] = True
+    split = solid.copy()
+    # from above, 16 voxels deep: a narrow fissure
+    split[21, :, 18:] = False
+    whole = smoothed_mask(solid, 1.0)
+    field, reopened = unbridged(split, smoothed_mask(split, 1.0), 1.0, np.zeros_like(split))
+    affine = np.diag([0.5, 0.5, 0.5, 1.0])
+    block, opened = isosurface(whole, affine), isosurface(field, affine)
+    removed = signed_volume(block) - signed_volume(opened)
+    assert reopened == pytest.approx(24 * 16, rel=0.2)
+    assert removed == pytest.approx(24 * 16 * 0.5**3, rel=0.2)
+    # two walls more, less the slit's own opening
+    assert area(opened) - area(block) == pytest.approx(2 * 24 * 16 * 0.5**2, rel=0.2)
+
+
+def test_rough_labels_are_smoothed_as_before():
+    random = np.random.default_rng(0)
+    mask = np.zeros((40, 40, 40), dtype=bool)
+    mask[8:32, 8:32, 8:32] = True
+    mask[8, 8:32, 8:32] = random.random((24, 24)) > 0.2
+    field = smoothed_mask(mask, 1.0)
+    same, reopened = unbridged(mask, field, 1.0, np.zeros_like(mask))
+    assert reopened == 0
+    np.testing.assert_array_equal(same, field)
+
+
+def test_slit_that_pierces_the_mask_stays_shut():
+    mask = np.zeros((40, 40, 40), dtype=bool)
+    mask[8:32, 8:32, 8:32] = True
+    mask[20, 14:26, :] = False
+    field = smoothed_mask(mask, 1.0)
+    same, reopened = unbridged(mask, field, 1.0, np.zeros_like(mask))
+    assert reopened == 0
+    np.testing.assert_array_equal(same, field)

@@ -274,6 +274,8 @@ def test_real_atlas_labels_give_sound_surfaces(week):
     report = surface.report
     expected = report["mask_volume_mL"] - report["fissure_opened_mL"]
     assert report["volume_mL"] == pytest.approx(expected, rel=0.01)
+    # tissue across the open fissure would be a filled tunnel
+    assert report["topology"]["voxels_filled_in_tunnels"] < 10
     # this atlas is mirror-symmetric about x = 0
     assert surface.fissure_x_mm == pytest.approx(0.0, abs=0.1)
     assert report["area_cm2"]["left"] == pytest.approx(report["area_cm2"]["right"], rel=0.02)
