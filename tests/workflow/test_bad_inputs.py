@@ -123,3 +123,31 @@ def test_a_segmentation_of_ones_own_gives_a_surface_with_its_thickness_at_its_we
     assert [len(array.data) for array in thickness] == [report["vertices"]]
     assert report["cortical_thickness"]["mean_mm"] == pytest.approx(thickness[0].data.mean(), abs=0.2)
     assert "a suggestion for thickness_mm" in (study.results / GOOD / "logs" / "pial_surface.log").read_text()
+
+
+def test_images_are_segmented_and_shown_where_they_are_given(workflow):
+    for name in ("t2w.nii.gz", "labels.nii.gz"):
+        (workflow.directory / name).touch()
+    volume = {"image": "t2w.nii.gz", "scheme": "feta-7"}
+    brains = [
+        {"id": "a", "week": 21, **volume, "segmentation": {"command": "model {image} {labels}"}},
+        {"id": "b", "week": 22, **volume, "labels": "labels.nii.gz"},
+        {"id": "c", "week": 23, "labels": "labels.nii.gz", "scheme": "binary"},
+    ]
+    study = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
+    jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
+    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_surface"], jobs["pial_surface_alone"]) == (
+        1,
+        2,
+        2,
+        1,
+    )
+
+
+def test_an_image_alone_is_refused_before_any_job(workflow):
+    (workflow.directory / "t2w.nii.gz").touch()
+    study = {"brains": [{"id": "a", "week": 21, "image": "t2w.nii.gz"}], "start": "a", "folding": {"end_week": 22}}
+    outcome = workflow.run("--cores", "1", "--configfile", workflow.write("study.yaml", study))
+    assert outcome.returncode == 2
+    assert "brains[0].image: gyriflow does not segment images" in outcome.stderr
+    assert not (workflow.directory / "results").exists()

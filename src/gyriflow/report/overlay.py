@@ -71,7 +71,7 @@ def _grid(plane: str, at: float, low: Floats, high: Floats) -> tuple[Floats, tup
 def _outline(axes: Axes, surface: TriangleMesh, plane: str, at: float) -> None:
     """Draws the lines in which a plane cuts a surface."""
     across, right, up = PLANES[plane]
-    body = pv.make_tri_mesh(np.array(surface.vertices), np.array(surface.faces))
+    body = pv.PolyData.from_regular_faces(np.array(surface.vertices), np.array(surface.faces, dtype=int))
     cut = body.slice(normal=np.eye(3)[across], origin=np.eye(3)[across] * at)
     segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
     axes.add_collection(LineCollection(list(segments), colors=RUN_COLOURS[4], linewidths=0.8, capstyle="round"))
