@@ -61,6 +61,9 @@ rule parameter_maps:
         runtime=15,
     params:
         maps=lambda wildcards: CONFIG.maps(wildcards.run),
+        bounds=lambda wildcards: {
+            name: CONFIG.bounds(name) for name in CONFIG.maps(wildcards.run)
+        },
         # files of maps are understood as those of the brain
         reading=CONFIG.brain(START).model_dump(include={"coordinates", "affine_from"}),
         code=code("mesh"),

@@ -6,15 +6,14 @@ from gyriflow.geometry.tetrahedra import boundary_faces
 from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.mesh.maps import placed, vertex_map_on_mesh, volume_map_on_mesh
+from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh
 from gyriflow.step import step
 from gyriflow.surface.pial import LPS_TO_RAS
 
 files, reading, maps = snakemake.input, snakemake.params.reading, {}
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
-    facets, _ = boundary_faces(mesh)
-    pose = np.array(read_json(files.surface)["pose"])
+    facets, pose = boundary_faces(mesh)[0], np.array(read_json(files.surface)["pose"])
     # surfaces of the input are turned as the brain was; those that gyriflow made are turned already
     poses = [pose @ LPS_TO_RAS if reading["coordinates"] == "lps" else pose, np.eye(4)]
     for name, source in snakemake.params.maps.items():
@@ -26,4 +25,5 @@ with step(snakemake.log[0]):
         else:
             volume = read_volume_map(path, reading["affine_from"])
             maps[name] = volume_map_on_mesh(mesh.vertices, volume.values, pose @ volume.affine, path)
+        require_within(maps[name], snakemake.params.bounds[name], path)
     write_maps(snakemake.output[0], maps)

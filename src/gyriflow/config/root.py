@@ -91,6 +91,12 @@ class Config(Settings):
             settings[name] = curve | ({"map": name} if value.map is not None else {})
         return settings
 
+    def bounds(self, parameter: str) -> dict[str, float]:
+        """Returns the bounds (gt, ge, le) of a parameter of the folding that may vary."""
+        extra = FoldingSettings.model_fields[parameter].json_schema_extra
+        assert isinstance(extra, dict)
+        return dict(extra["bounds"])  # type: ignore[arg-type]
+
     def maps(self, run: str) -> dict[str, dict[str, list[str]]]:
         """Returns for each parameter of a run that has a map its files under "map" and "surface", none for volumes."""
 

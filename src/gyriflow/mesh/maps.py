@@ -1,7 +1,7 @@
 """Maps over a brain brought onto the vertices of its tetrahedral mesh: from surfaces and from volumes."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import igl
 import numpy as np
@@ -121,6 +121,25 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
             remedy="Continue the map over the whole brain, or give it on a surface.",
         )
     return values
+
+
+def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:
+    """Raises InputError where values of a map are not within the bounds (gt, ge, le) of its parameter.
+
+    `values` are (n,) at the vertices of the mesh, in the unit of the parameter.
+    """
+    holds = {"gt": np.greater, "ge": np.greater_equal, "le": np.less_equal}
+    signs = {"gt": ">", "ge": "≥", "le": "≤"}
+    outside = ~np.logical_and.reduce([holds[name](values, bound) for name, bound in bounds.items()])
+    if outside.any():
+        wrong = values[outside]
+        raise InputError(
+            "holds values that the parameter cannot have",
+            path=path,
+            found=f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to {wrong.max():g}",
+            expected=" and ".join(f"{signs[name]} {bound:g}" for name, bound in bounds.items()),
+            remedy="Fill places without a value, such as the medial wall, and check the map's unit.",
+        )
 
 
 def placed(points: Floats, surface: TriangleMesh, matrices: Sequence[ArrayLike]) -> TriangleMesh:

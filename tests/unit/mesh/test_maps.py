@@ -9,7 +9,7 @@ from shapes import box_mesh, ellipsoid_mesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
-from gyriflow.mesh.maps import placed, vertex_map_on_mesh, volume_map_on_mesh
+from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh
 
 RADIUS = 20.0
 SLOPE = np.array([0.3, -0.7, 0.2])
@@ -184,3 +184,13 @@ def test_vertices_without_a_number_are_counted_with_the_distance_to_one(ball):
         found = str(caught.value).split("found ")[1]
         assert inside <= int(found.split()[0]) <= (np.linalg.norm(ball.vertices, axis=1) < 12.0).sum()
         assert 9.0 <= float(found.split("up to ")[1].split()[0]) <= 10.0
+
+
+def test_values_that_a_parameter_cannot_have_are_refused_with_their_count():
+    bounds = {"gt": 0.0, "le": 10.0}
+    require_within(np.array([0.1, 10.0]), bounds, "thickness.shape.gii")
+    with pytest.raises(
+        InputError, match=r"thickness.shape.gii.*2 of 3 vertices, from 0 to 1500.*> 0 and ≤ 10"
+    ) as caught:
+        require_within(np.array([0.0, 1.5, 1500.0]), bounds, "thickness.shape.gii")
+    assert all(words in str(caught.value) for words in ("thickness.shape.gii", "medial wall"))
