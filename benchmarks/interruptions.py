@@ -87,10 +87,13 @@ def main() -> None:
         step_s = (time.perf_counter() - began) / len(steps)
         expected = read_positions(whole / "frames.h5", end)
         lost, distances, killed = [], [], []
-        for number in range(arguments.runs):
-            out = Path(folder, f"run{number}")
+        while len(killed) < arguments.runs:
+            out = Path(folder, "killed")
             step = chance.randrange(1, len(steps))
             reported = kill_at(start(arguments, out), step, chance.uniform(0, step_s))
+            if (out / "summary.json").exists():  # it had ended before
+                shutil.rmtree(out)
+                continue
             resumed = RESUMED.search(finish(start(arguments, out)))
             after = int(resumed.group(1)) if resumed else 0
             killed.append(reported)

@@ -136,8 +136,8 @@ def test_a_lower_rung_takes_over_where_the_upper_ones_fail(rung, monkeypatch):
     solver = NewtonSolver(problem, NewtonSettings(1e-9, krylov_tolerance=1e-6), residual_floor=0.0)
     honest = solver._run
 
-    def failing(krylov, matrix, reuse):
-        reason, iterations = honest(krylov, matrix, reuse)
+    def failing(krylov, matrix, reuse, products=None):
+        reason, iterations = honest(krylov, matrix, reuse, products)
         failed = krylov is solver._cg or (rung == DIRECT and krylov.getType() == "gmres")
         return 0 if failed else reason, iterations
 
@@ -207,3 +207,16 @@ def test_a_rebuilt_preconditioner_is_as_good_as_a_new_one():
     new = NewtonSolver(problem, settings, residual_floor=0.0)
     fresh = new.solve(np.zeros_like(problem.displacement))
     assert count.krylov / count.newton <= 1.2 * fresh.krylov / fresh.newton + 1
+
+
+def test_the_tangent_for_products_is_the_tangent():
+    problem = growing_problem(contact=True)
+    for size in (1e-4, 3e-4):  # the second time into the same places
+        problem.set_displacement(smooth_displacement(problem.domain, size))
+        tangent, products = problem.tangent(), problem.for_products()
+        x, one, other = (problem.new_vector() for _ in range(3))
+        x.array[:] = smooth_displacement(problem.domain, 1.0)[: problem.domain.owned].ravel()
+        tangent.mult(x, one)
+        products.mult(x, other)
+        other.axpy(-1.0, one)
+        assert other.norm() <= 1e-13 * one.norm()

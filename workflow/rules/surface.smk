@@ -26,6 +26,12 @@ WITH_CORTEX = [
     and label_scheme(**CONFIG.scheme(brain)).cortex
 ]
 WITHOUT_CORTEX = [brain for brain in BRAINS if brain not in WITH_CORTEX]
+# hemispheres whose pose is to be found, for all of a study at once
+TO_POSE = [
+    brain
+    for brain in CONFIG.brains
+    if brain.source == "hemispheres" and brain.coordinates == "auto"
+]
 
 
 def surface_files(wildcards):
@@ -53,6 +59,8 @@ def surface_reading(wildcards):
             return {"affine_from": brain.affine_from}
         case "shape":
             return {}
+        case "pial" if brain.coordinates == "auto":
+            return {"coordinates": "ras"}
         case _:
             return {"coordinates": brain.coordinates}
 
@@ -63,9 +71,40 @@ def surface_scheme(wildcards):
     return CONFIG.scheme(CONFIG.brain(wildcards.brain)) if from_volume else None
 
 
+def poses_of(wildcards):
+    """Returns the file with the pose of a brain, where it has to be found."""
+    if wildcards.brain in [brain.id for brain in TO_POSE]:
+        return f"results/{wildcards.brain}/surface/pose.json"
+    return []
+
+
+if TO_POSE:
+
+    rule poses:
+        input:
+            [path for brain in TO_POSE for path in brain.files],
+        output:
+            [f"results/{brain.id}/surface/pose.json" for brain in TO_POSE],
+        log:
+            "results/study/logs/poses.log",
+        benchmark:
+            "results/study/benchmarks/poses.tsv"
+        conda:
+            ENVIRONMENT
+        resources:
+            mem_mb=2000,
+            runtime=30,
+        params:
+            max_hole_mm=CONFIG.surface.max_hole_mm,
+            code=code("surface"),
+        script:
+            "../scripts/poses.py"
+
+
 rule pial_surface:
     input:
         surface_files,
+        pose=poses_of,
     output:
         whole="results/{brain}/surface/pial.surf.gii",
         left="results/{brain}/surface/left.pial.surf.gii",

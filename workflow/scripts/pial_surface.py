@@ -1,11 +1,12 @@
 """The clean pial surface of a brain and of its hemispheres in RAS+ mm, from whatever the brain is given as."""
 
-from gyriflow.io.files import write_json
+from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_surface, write_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.step import step
 from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial, from_shape
+from gyriflow.surface.posing import as_poses
 
 files, output, params = list(snakemake.input), snakemake.output, snakemake.params
 with step(snakemake.log[0]):
@@ -14,7 +15,9 @@ with step(snakemake.log[0]):
             scheme, volume = label_scheme(**params.scheme), read_label_volume(files[0], **params.reading)
             surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
         case "hemispheres":
-            surface = from_hemispheres(*map(read_surface, files), week=params.week, **params.reading, **params.settings)
+            left, right = map(read_surface, files[:2])
+            posed = as_poses(read_json(snakemake.input.pose)) if snakemake.input.pose else None
+            surface = from_hemispheres(left, right, week=params.week, posed=posed, **params.reading, **params.settings)
         case source:
             make = {"pial": from_pial, "shape": from_shape}[source]
             surface = make(read_surface(files[0]), week=params.week, **params.reading, **params.settings)

@@ -116,7 +116,11 @@ class Brain(Settings):
     )
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
     pial: str | None = setting(None, "", "Surface file of the whole brain, closed.")
-    coordinates: Literal["ras", "lps"] = setting("ras", "", "Axes of the coordinates in `hemispheres` or `pial` files.")
+    coordinates: Literal["auto", "ras", "lps"] = setting(
+        "auto", "",
+        "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose of `hemispheres` in any rigid "
+        "pose, and takes `pial` as RAS+.",
+    )  # fmt: skip
     phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
     shape: ShapeSettings | None = setting(None, "", "A simple geometry in the place of a brain.")
 

@@ -114,12 +114,21 @@ class NewtonSolver:
         krylov.setFromOptions()
         return krylov
 
-    def _run(self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool) -> tuple[int, int]:
-        """Solves into the direction; returns PETSc's reason for the end, 0 for one without, and the iterations."""
+    def _run(
+        self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool, products: PETSc.Mat | None = None
+    ) -> tuple[int, int]:
+        """Solves into the direction; returns PETSc's reason for the end, 0 for one without, and the iterations.
+
+        `products` is the same matrix in a form with faster products.
+        """
         krylov.setTolerances(rtol=self._wanted_reduction)
-        krylov.setOperators(self.problem.operator(matrix), matrix)
-        krylov.getPC().setReusePreconditioner(reuse)
+        krylov.setOperators(self.problem.operator(matrix if products is None else products), matrix)
+        multigrid = krylov.getPC()
+        multigrid.setReusePreconditioner(reuse)
         try:
+            if products is not None:
+                krylov.setUp()
+                multigrid.getMGSmoother(multigrid.getMGLevels() - 1).setOperators(products, matrix)
             krylov.solve(self._residual, self._direction)
         except PETSc.Error:  # a factorisation that broke down
             return 0, 0
@@ -127,10 +136,11 @@ class NewtonSolver:
         finite = bool(np.isfinite(self._direction.norm()))
         return krylov.getConvergedReason() if finite else 0, krylov.getIterationNumber()
 
-    def _run_cg(self, matrix: PETSc.Mat, count: StepCount) -> int:
+    def _run_cg(self, matrix: PETSc.Mat, count: StepCount, *, shifted: bool) -> int:
         """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
+        products = None if shifted else self.problem.for_products()
         if not self._stale:
-            reason, iterations = self._run(self._cg, matrix, reuse=True)
+            reason, iterations = self._run(self._cg, matrix, True, products)
             count.krylov += iterations
             self._stale = reason <= 0 or iterations > 1.5 * self._fresh_iterations + 2
             if reason > 0 or reason == INDEFINITE[0]:
@@ -139,7 +149,7 @@ class NewtonSolver:
                 return reason
             count.rung = max(count.rung, REBUILT)
         matrix.setNearNullSpace(self.problem.near_null_space())
-        reason, iterations = self._run(self._cg, matrix, reuse=False)
+        reason, iterations = self._run(self._cg, matrix, False, products)
         count.krylov += iterations
         self._fresh_iterations, self._stale = iterations, reason <= 0
         return reason
@@ -155,7 +165,7 @@ class NewtonSolver:
             if SHIFTS[level]:
                 matrix.setDiagonal(diagonal + SHIFTS[level] * abs_diagonal)
                 count.rung = max(count.rung, SHIFTED)
-            reason = self._run_cg(matrix, count)
+            reason = self._run_cg(matrix, count, shifted=level > 0)
             if reason > 0 or reason not in INDEFINITE:
                 self._level = level
                 break

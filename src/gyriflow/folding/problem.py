@@ -128,6 +128,7 @@ class Problem:
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
         self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
+        self._products: PETSc.Mat | None = None
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
         self.mesh_moved()
@@ -207,6 +208,7 @@ class Problem:
         blocks.set_value(0.0)
         dolfinx.fem.assemble_matrix(blocks, self._tangent)
         matrix = self._blocks.assembled()
+        self._products = None if self.contributions else self._blocks.for_products()
         if self.contributions:
             # a copy: entries in new places would break the coordinate form of the next assembly
             matrix = matrix.copy()
@@ -219,6 +221,10 @@ class Problem:
     def operator(self, tangent: PETSc.Mat) -> PETSc.Mat:
         """Returns what a tangent does to admissible displacements: for a free body, without rigid motions."""
         return tangent if self._motions is None else FreeOperator(tangent, self._motions).as_matrix()
+
+    def for_products(self) -> PETSc.Mat | None:
+        """Returns the tangent that was assembled last in a form with faster products, where there is one."""
+        return self._products
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""

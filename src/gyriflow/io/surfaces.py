@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 from nibabel.filebasedimages import ImageFileError
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
+from nibabel.nifti1 import xform_codes
 from numpy.typing import NDArray
 
 from gyriflow.errors import InputError
@@ -49,6 +50,24 @@ def read_surface(path: AnyPath) -> TriangleMesh:
             expected=f"whole numbers from 0 to {len(vertices) - 1}",
         )
     return TriangleMesh(vertices, whole)
+
+
+def declared(path: AnyPath) -> tuple[str | None, str | None]:
+    """Returns what a surface's file says of itself: its coordinate system, and its anatomical structure.
+
+    Both are None where it does not say so, as in all files but GIFTI. The system is a NIfTI transform code's name, such
+    as "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
+    """
+    if Path(path).suffix.lower() in MESH_SUFFIXES:
+        return None, None
+    image = load_gifti(path)
+    points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
+    if not points:
+        return None, None
+    system = points[0].coordsys
+    space = "NIFTI_XFORM_UNKNOWN" if system is None else str(xform_codes.niistring[system.xformspace])
+    structure = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
+    return (None if space == "NIFTI_XFORM_UNKNOWN" else space), structure
 
 
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:

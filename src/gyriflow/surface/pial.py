@@ -19,6 +19,7 @@ from gyriflow.surface.extraction import (
     unbridged,
 )
 from gyriflow.surface.fissure import Fissure, fissure_between, opened
+from gyriflow.surface.halves import pair_by_shape
 from gyriflow.surface.hemispheres import (
     least_gap,
     left_faces,
@@ -31,6 +32,7 @@ from gyriflow.surface.hemispheres import (
 from gyriflow.surface.labels import LabelScheme, cerebrum_mask, require_sides
 from gyriflow.surface.orientation import MidPlane, mid_plane, upright
 from gyriflow.surface.outcome import PialSurface, described, faults, require_sound
+from gyriflow.surface.posing import Poses, placed, poses
 from gyriflow.surface.remaking import remade
 from gyriflow.surface.remeshing import evened
 from gyriflow.surface.repair import cleaned, pieces
@@ -42,7 +44,7 @@ from gyriflow.units import ML_PER_MM3
 
 log = logging.getLogger(__name__)
 
-Coordinates = Literal["ras", "lps"]
+Coordinates = Literal["auto", "ras", "lps"]
 LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 # labels of cortex below this many voxels are as thick as the voxels allow, not as the cortex is
 RESOLVED_VOXELS = 1.5
@@ -123,6 +125,7 @@ def from_hemispheres(
     *,
     week: float,
     coordinates: Coordinates = "ras",
+    posed: Poses | None = None,
     gap_mm: float = 0.5,
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
@@ -130,29 +133,43 @@ def from_hemispheres(
 ) -> PialSurface:
     """Returns the pial surface of a brain from closed surfaces of its hemispheres.
 
-    The surfaces are repaired (holes up to `max_hole_mm`), smoothed, remeshed to `edge_length_mm`, turned together so
-    that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each other.
-    InputError where they are swapped, of different size or not of the week's size; MeshError where one can't be made
-    a closed surface without handles and intersections.
+    The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
+    together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
+    other. With coordinates "auto" each may be in any rigid pose; `posed` is then the pose if it is known already, as
+    from all brains of a study. InputError where the pose cannot be told, where they are swapped, of different size or
+    not of the week's size; MeshError where one can't be made a closed surface without handles and intersections.
     """
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
-    left, report["repair_left"] = _hemisphere(_in_ras(left, coordinates), max_hole_mm)
-    right, report["repair_right"] = _hemisphere(_in_ras(right, coordinates), max_hole_mm)
+    left, report["repair_left"] = hemisphere(_in_ras(left, coordinates), max_hole_mm)
+    right, report["repair_right"] = hemisphere(_in_ras(right, coordinates), max_hole_mm)
+    volume = signed_volume(left) + signed_volume(right)
+    require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week)
+    if coordinates == "auto":
+        posed = posed or poses([pair_by_shape(left, right)], [False])[0]
+        left, right = transformed(left, posed.left), transformed(right, posed.right)
+        for warning in posed.report["warnings"]:
+            _warn(report, warning)
     both = merged(left, right)
-    require_plausible_size(signed_volume(both), np.ptp(both.vertices, axis=0), week)
     require_pair(left, right)
     left = _even(left, smoothing_iterations, edge_length_mm, report, "mesh_left")
     right = _even(right, smoothing_iterations, edge_length_mm, report, "mesh_right")
     plane = mid_plane(merged(left, right))
     require_common_pose(plane.asymmetry_mm, float(np.ptp(both.vertices, axis=0).max()))
     report["gap_before_mm"] = least_gap(left, right)
-    left, right, moved = set_apart(left, right, gap_mm, plane.normal)
+    to_right = plane.normal
+    left, right, moved = set_apart(left, right, gap_mm, to_right)
     report["moved_apart_mm"] = moved
     if moved > 0:
         _warn(report, f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm")
         plane = mid_plane(merged(left, right))
     mesh = merged(left, right)
-    return _posed(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, report, week)
+    surface = _posed(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, report, week)
+    if coordinates == "auto" and posed:
+        turn = np.array(report["pose"])
+        report["posing"] = placed(posed, turn, moved * to_right)
+        if posed.report["together"]:
+            report["pose"] = (turn @ posed.left).tolist()
+    return surface
 
 
 def from_pial(
@@ -210,7 +227,7 @@ def _with_fissure(
     return wide, affine, float((field - wide).sum(dtype=float) * voxel_ml)
 
 
-def _hemisphere(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def hemisphere(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the largest piece of a surface, clean, and the repairs."""
     mesh, repairs = cleaned(mesh, max_hole_mm)
     largest, *others = pieces(mesh)

@@ -1,0 +1,153 @@
+"""How well hemispheres are posed: surfaces in known wrong poses against the truth, as one line of JSON.
+
+FOLDER holds pairs of surfaces whose names differ by `left` and `right` only, and `truth.json`: for each file the rigid
+motion `to_ras` (4, 4) back to RAS+ mm and whether it is `inside_out`.
+"""
+
+import argparse
+import json
+import logging
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gyriflow.errors import GyriflowError, InputError
+from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, signed_volume
+from gyriflow.io.files import read_json
+from gyriflow.io.surfaces import declared, read_surface
+from gyriflow.surface.halves import Pair, pair_by_shape
+from gyriflow.surface.pial import from_hemispheres, hemisphere
+from gyriflow.surface.posing import Poses, poses
+from gyriflow.surface.repair import pieces
+from gyriflow.surface.size import expected_volume_ml
+
+Floats = NDArray[np.float64]
+Files = tuple[Path, Path]
+
+SIDES = ("left", "right")
+MAX_HOLE_MM = 3.0
+WEEKS = np.arange(18.0, 45.5, 0.5)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    logging.disable(logging.WARNING)
+    folder = parser.parse_args().folder
+    truth = read_json(folder / "truth.json")
+    began = time.perf_counter()
+    found, refused = posed(pairs_of_files(folder))
+    seconds = time.perf_counter() - began
+    result = {"n": 2 * len(found)} | errors(found, truth) | surfaces(found, truth)
+    print(json.dumps(result | {"seconds": round(seconds, 1), "refused": refused}))
+
+
+def pairs_of_files(folder: Path) -> list[Files]:
+    """Returns the files of each brain in a folder, the left hemisphere's first."""
+    found = []
+    for left in sorted(folder.iterdir()):
+        right = left.with_name(re.sub(r"left", "right", left.name))
+        if left.name != right.name and right.exists():
+            found.append((left, right))
+    return found
+
+
+def posed(files: list[Files]) -> tuple[dict[Files, Poses], list[str]]:
+    """Returns the poses of the brains, and what was refused."""
+    pairs: dict[Files, tuple[Pair, bool]] = {}
+    refused = []
+    for brain in files:
+        try:
+            sides = [hemisphere(read_surface(path), MAX_HOLE_MM)[0] for path in brain]
+            spaces = [declared(path)[0] for path in brain]
+            pairs[brain] = pair_by_shape(*sides), spaces[0] is not None and spaces[0] == spaces[1]
+        except GyriflowError as error:
+            refused.append(f"{brain[0].name}: {error}")
+    if not pairs:
+        raise InputError("no pair of hemispheres could be posed", found="; ".join(refused) or "no pair of files")
+    return dict(zip(pairs, poses(*zip(*pairs.values(), strict=True)), strict=True)), refused
+
+
+def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:
+    """Returns the worst errors once one rotation, the same for all, has been taken off.
+
+    Offset and gap are the places of left and right relative to each other: within the sagittal plane, and along x.
+    `worst_place_mm` is the place of a brain in the sagittal plane relative to the mean of all.
+    """
+    motions, centres = [], []
+    for brain, pose in found.items():
+        for path, motion in zip(brain, (pose.left, pose.right), strict=True):
+            true = np.array(truth[path.name]["to_ras"])
+            motions.append(motion @ np.linalg.inv(true))
+            centres.append(true[:3, :3] @ read_surface(path).vertices.mean(axis=0) + true[:3, 3])
+    common = _common([motion[:3, :3] for motion in motions])
+    off = [Rotation.from_matrix(motion[:3, :3]) * common.inv() for motion in motions]
+    away = np.array([
+        common.inv().apply(motion[:3, :3] @ centre + motion[:3, 3]) - centre
+        for motion, centre in zip(motions, centres, strict=True)
+    ])  # fmt: skip
+    apart, places = away[1::2] - away[::2], 0.5 * (away[::2] + away[1::2])
+    return {
+        "worst_angle_deg": _worst(np.degrees([turn.magnitude() for turn in off])),
+        "common_angle_deg": _worst(np.degrees([common.magnitude()])),
+        "worst_offset_mm": _worst(np.linalg.norm(apart[:, 1:], axis=1)),
+        "worst_gap_mm": _worst(np.abs(apart[:, 0])),
+        "worst_place_mm": _worst(np.linalg.norm((places - places.mean(axis=0))[:, 1:], axis=1)),
+    }
+
+
+def surfaces(found: dict[Files, Poses], truth: dict) -> dict[str, int]:
+    """Returns how many files were recognised as inside out or not, and how many brains became closed surfaces."""
+    right, closed = 0, 0
+    for brain, pose in found.items():
+        left, other = map(read_surface, brain)
+        size = (abs(signed_volume(left))) ** (1 / 3)
+        surface = from_hemispheres(
+            left,
+            other,
+            week=_week(brain[0], left),
+            coordinates="auto",
+            posed=pose,
+            edge_length_mm=max(1.2, size / 25),
+        )
+        sound = [is_closed(piece) and euler_number(piece) == 2 for piece in pieces(surface.whole)]
+        closed += sound == [True, True]
+        for side, path in zip(SIDES, brain, strict=True):
+            turned = surface.report[f"repair_{side}"]["pieces_turned_outward"] > 0
+            outward = signed_volume(getattr(surface, side)) > 0
+            right += outward and turned == truth[path.name]["inside_out"]
+    return {"inside_out_right": right, "merged_closed": closed}
+
+
+def _common(rotations: list[Floats]) -> Rotation:
+    """Returns the rotation from which the furthest of others is nearest, by weights moved to the furthest ones."""
+    every, weights = Rotation.from_matrix(rotations), np.ones(len(rotations))
+    best, least = every.mean(), np.inf
+    for _ in range(300):
+        mean = every.mean(weights=weights)
+        angles = (every * mean.inv()).magnitude()
+        if angles.max() < least:
+            best, least = mean, angles.max()
+        weights = weights * (1e-9 + angles / max(angles.max(), 1e-9)) ** 0.5 + 1e-6
+        weights /= weights.sum()
+    return best
+
+
+def _week(path: Path, left: TriangleMesh) -> float:
+    """Returns the week in a file's name, or the one whose brains are nearest in size."""
+    if named := re.search(r"week(\d+(?:\.\d+)?)", path.name):
+        return float(named[1])
+    volume = 2e-3 * abs(signed_volume(left))
+    return float(min(WEEKS, key=lambda week: abs(np.log(expected_volume_ml(week) / volume))))
+
+
+def _worst(values: Floats) -> float:
+    return round(float(np.max(values)), 3)
+
+
+if __name__ == "__main__":
+    main()

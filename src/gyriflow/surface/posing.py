@@ -1,0 +1,211 @@
+"""Poses of hemispheres in any rigid pose: from their files where these are well posed, else from their shapes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gyriflow.surface.halves import MIRROR, SYLVIAN_AHEAD, Pair, about_x, pitch_deg
+from gyriflow.surface.registration import Target, angle_deg, registered
+
+Floats = NDArray[np.float64]
+
+FRAMES = {"ras": np.eye(3), "lps": np.diag([-1.0, -1.0, 1.0])}
+# how well the shape has to agree with axes for the file to be in them: tilts (of the wall), and pitch, in degrees
+EXACT_DEG, DECLARED_DEG, SAME_PITCH_DEG = 1.5, 10.0, 15.0
+# files of one brain share their coordinates where their poses differ by less; distances are relative to the size
+COMMON_DEG, COMMON_OFFSET, COMMON_DISTANCE = 4.0, 0.08, 0.15
+# the medial walls' distance from the mid-sagittal plane where the files do not say it
+BESIDE_MM = 0.5
+# each brain is registered with so many that are smaller and larger
+NEIGHBOURS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Rigid motions (4, 4) from the coordinates of the files of a brain to RAS+ mm, and how they were found."""
+
+    left: Floats
+    right: Floats
+    report: dict[str, Any]
+
+
+def poses(pairs: Sequence[Pair], declared: Sequence[bool]) -> list[Poses]:
+    """Returns the poses of the brains of one study, given what `pair_by_shape` says of each.
+
+    Shape tells each hemisphere's pose but for the pitch, in which brains of different age differ: there they are
+    registered with each other. Where hemispheres share coordinates of which one axis is exactly left-right, and shape
+    says that these are RAS or LPS, they keep the file's pose, and the other brains follow them; else the reference
+    shape's pitch is zero. The mid-sagittal plane is x = 0. For brains where `declared` holds, whose files name their
+    coordinate system, the axis need not be exact.
+    """
+    frames = [_frame(pair, named) for pair, named in zip(pairs, declared, strict=True)]
+    pitches, places = _pitches(pairs, frames), _places(pairs, frames)
+    return [_posed(*brain) for brain in zip(pairs, frames, pitches, places, strict=True)]
+
+
+def as_poses(report: dict[str, Any]) -> Poses:
+    """Returns the poses that a report of them holds."""
+    matrices = report["matrices"]
+    return Poses(np.array(matrices["left"]), np.array(matrices["right"]), report)
+
+
+def placed(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any]:
+    """Returns the report with the whole motions: the pose, then left by −`moved` and right by +`moved`, then `turn`."""
+    matrices = {}
+    for side, motion, sign in (("left", poses.left, -1.0), ("right", poses.right, 1.0)):
+        shift = np.eye(4)
+        shift[:3, 3] = sign * moved
+        matrices[side] = (turn @ shift @ motion).tolist()
+    return poses.report | {"matrices": matrices}
+
+
+def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
+    both = {"left": pair.left, "right": pair.right}
+    report: dict[str, Any] = {
+        "method": "file" if frame else "shape",
+        "coordinates": frame,
+        "pitch_deg": pitch,
+        "residual": {side: half.residual for side, half in both.items()},
+        "confidence": {side: half.confidence for side, half in both.items()},
+        "mirror_residual": pair.fit.residual,
+        "sylvian_ahead": {side: half.sylvian for side, half in both.items()},
+        "warnings": [],
+    }
+    if np.mean(list(report["sylvian_ahead"].values())) < SYLVIAN_AHEAD:
+        report["warnings"].append(
+            "left and right are what the configuration says: the shapes do not tell whether the files are swapped"
+        )
+    if frame:
+        motion = np.eye(4)
+        motion[:3, :3] = FRAMES[frame]
+        left = right = motion
+    else:
+        left, right = _separate(pair, pitch, place)
+        if _share_coordinates(pair):
+            left = right = _mean_motion(left, right, pair)
+    report["together"] = left is right
+    report["matrices"] = {"left": left.tolist(), "right": right.tolist()}
+    return Poses(left, right, report)
+
+
+def _separate(pair: Pair, pitch: float, place: Floats) -> tuple[Floats, Floats]:
+    """Returns the motions that put the medial walls beside x = 0 and the centres around `place` (y and z)."""
+    motions = []
+    for half, sign in ((pair.left, 0.5), (pair.right, -0.5)):
+        motion = np.eye(4)
+        motion[:3, :3] = about_x(pitch) @ half.rotation
+        target = np.zeros(3)
+        target[1:] = place + sign * (about_x(pitch) @ pair.offset_mm)[1:]
+        target[0] = BESIDE_MM - half.wall_mm
+        motion[:3, 3] = target - motion[:3, :3] @ half.outline.centre
+        motions.append(motion)
+    return MIRROR @ motions[0] @ MIRROR, motions[1]
+
+
+def _share_coordinates(pair: Pair) -> bool:
+    """Returns whether the files have both hemispheres where one rigid motion brings them to a brain."""
+    left, right = _separate(pair, 0.0, np.zeros(2))
+    if angle_deg(right[:3, :3].T @ left[:3, :3]) > COMMON_DEG:
+        return False
+    centre = MIRROR[:3, :3] @ pair.left.outline.centre
+    away = np.abs((right - left)[:3, :3] @ centre + (right - left)[:3, 3]) / pair.right.outline.size_mm
+    return bool(away[0] < COMMON_DISTANCE and np.linalg.norm(away[1:]) < COMMON_OFFSET)
+
+
+def _mean_motion(left: Floats, right: Floats, pair: Pair) -> Floats:
+    """Returns one motion half-way between two, measured at the brain's centre."""
+    centre = 0.5 * (MIRROR[:3, :3] @ pair.left.outline.centre + pair.right.outline.centre)
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_matrix([left[:3, :3], right[:3, :3]]).mean().as_matrix()
+    there = 0.5 * sum(side[:3, :3] @ centre + side[:3, 3] for side in (left, right))
+    motion[:3, 3] = there - motion[:3, :3] @ centre
+    return motion
+
+
+def _frame(pair: Pair, declared: bool) -> str | None:
+    """Returns "ras" or "lps" where both files are in these coordinates, to the accuracy of the shape, else None."""
+    if not _share_coordinates(pair):
+        return None
+    for name, axes in FRAMES.items():
+        turns = [half.rotation @ axes.T for half in (pair.left, pair.right)]
+        # mirrored files have the same axes up to signs, which cancel
+        tilts = [np.degrees(np.arccos(np.clip(turn[0, 0], -1.0, 1.0))) for turn in turns]
+        if (
+            max(tilts) < (DECLARED_DEG if declared else EXACT_DEG)
+            and max(abs(pitch_deg(turn)) for turn in turns) < SAME_PITCH_DEG
+        ):
+            return name
+    return None
+
+
+def _pitches(pairs: Sequence[Pair], frames: list[str | None]) -> list[float]:
+    """Returns the pitch of each brain in degrees, beyond its shape's.
+
+    Brains next to each other in size are registered, and least squares make of this one pitch for each. Where files
+    say the pitch of some brains, the difference is interpolated over the logarithm of size: brains change as they grow.
+    """
+    sizes = np.log([_size(pair) for pair in pairs])
+    rank = np.argsort(np.argsort(sizes))
+    rows, values = [], []
+    unit_rows = np.eye(len(pairs))
+    for i, j in combinations(range(len(pairs)), 2):
+        if abs(rank[i] - rank[j]) <= NEIGHBOURS:
+            turn, weight = _registered(pairs[i], pairs[j])
+            rows.append(weight * (unit_rows[i] - unit_rows[j]))
+            values.append(weight * turn)
+    for row, pair in zip(unit_rows, pairs, strict=True):
+        rows.append(row / np.mean([pair.left.residual, pair.right.residual]) ** 2)
+        values.append(0.0)
+    solution = np.linalg.lstsq(np.array(rows), np.array(values), rcond=None)[0]
+    known = [
+        (size, _pitch_in_file(pair, frame) - found)
+        for size, pair, frame, found in zip(sizes, pairs, frames, solution, strict=True)
+        if frame
+    ]
+    if known:
+        at, differences = np.array(sorted(known)).T
+        solution = solution + np.interp(sizes, at, differences)
+    return [float(value) for value in solution]
+
+
+def _pitch_in_file(pair: Pair, frame: str) -> float:
+    return float(np.mean([pitch_deg(FRAMES[frame] @ half.rotation.T) for half in (pair.left, pair.right)]))
+
+
+def _registered(one: Pair, other: Pair) -> tuple[float, float]:
+    """Returns by how much more than the other brain the one is to be pitched to lie alike, and the result's weight."""
+    turns, residuals = [], []
+    for a, b in ((one.left, other.left), (one.right, other.right)):
+        fit = registered(a.outline, Target(b.outline), b.rotation.T @ a.rotation)
+        turns.append(pitch_deg(b.rotation @ fit.rotation @ a.rotation.T))
+        residuals.append(fit.residual)
+    return float(np.mean(turns)), float(np.mean(residuals)) ** -2
+
+
+def _places(pairs: Sequence[Pair], frames: list[str | None]) -> list[Floats]:
+    """Returns where the centres of the brains come to lie in the sagittal plane; (2,) in mm.
+
+    In proportion to size as far from the origin as in the brains that are posed by their files; else at the origin.
+    """
+    known = [
+        [_size(pair), *(_centre(pair, frame) / _size(pair))] for pair, frame in zip(pairs, frames, strict=True) if frame
+    ]
+    if not known:
+        return [np.zeros(2) for _ in pairs]
+    sizes, *centres = np.array(sorted(known)).T
+    return [_size(pair) * np.array([np.interp(_size(pair), sizes, values) for values in centres]) for pair in pairs]
+
+
+def _centre(pair: Pair, frame: str) -> Floats:
+    """Returns y and z of a brain's centre in RAS+, of files in these axes."""
+    centres = [FRAMES[frame] @ half.outline.centre for half in (pair.left, pair.right)]
+    return np.asarray(np.mean(centres, axis=0)[1:])
+
+
+def _size(pair: Pair) -> float:
+    return float(np.mean([half.outline.size_mm for half in (pair.left, pair.right)]))

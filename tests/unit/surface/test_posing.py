@@ -1,0 +1,183 @@
+"""Hemispheres in any pose: found again by their shape or their files, or refused."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
+from gyriflow.io.surfaces import declared, read_surface, write_surface
+from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.halves import about_x, pair_by_shape, pitch_deg
+from gyriflow.surface.hemispheres import least_gap
+from gyriflow.surface.labels import SCHEMES
+from gyriflow.surface.pial import from_hemispheres
+from gyriflow.surface.posing import as_poses, poses
+from gyriflow.surface.repair import pieces
+
+DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
+LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def halves():
+    """A phantom's left and right hemispheres in RAS+, a millimetre apart, the fissure at x = 0."""
+    labels, affine = phantom_labels(24.0, voxel_mm=1.2)
+    x = affine[0, 2] * np.arange(labels.shape[2]) + affine[0, 3] - CENTRE_MM[0]
+    cerebrum = np.isin(labels, SCHEMES["spina-bifida-atlas"].cerebrum)
+    centred = affine.copy()
+    centred[:3, 3] -= CENTRE_MM
+    return [isosurface(made_simple(smoothed_mask(cerebrum & side, 1.0))[0], centred) for side in (x < -0.6, x > 0.6)]
+
+
+def rigid(seed):
+    random = np.random.default_rng(seed)
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.random(random_state=random).as_matrix()
+    motion[:3, 3] = random.normal(0, 30, 3)
+    return motion
+
+
+def linear(mesh, matrix):
+    motion = np.eye(4)
+    motion[:3, :3] = matrix
+    return transformed(mesh, motion)
+
+
+def found(left, right, *, named=False):
+    return poses([pair_by_shape(left, right)], [named])[0]
+
+
+def errors(pose, moved, halves):
+    """Returns the angles (degrees) of what is left of the motions, and by how much (mm) both halves are apart more."""
+    rest = [side @ motion for side, motion in zip((pose.left, pose.right), moved, strict=True)]
+    angles = [np.degrees(Rotation.from_matrix(motion[:3, :3]).magnitude()) for motion in rest]
+    left, right = (
+        transformed(half, motion).vertices.mean(axis=0) - half.vertices.mean(axis=0)
+        for half, motion in zip(halves, rest, strict=True)
+    )
+    return angles, right - left
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_separately_moved_hemispheres_are_posed(halves, seed):
+    moved = [rigid(seed), rigid(seed + 100)]
+    pose = found(*(transformed(half, motion) for half, motion in zip(halves, moved, strict=True)))
+    angles, apart = errors(pose, moved, halves)
+    assert max(angles) < 3.0
+    assert np.abs(apart[1:]).max() < 1.0
+    assert not pose.report["together"]
+    assert min(pose.report["confidence"].values()) > 1.5
+
+
+def test_hemispheres_of_one_pose_keep_their_distance(halves):
+    motion = rigid(3)
+    pose = found(*(transformed(half, motion) for half in halves))
+    angles, apart = errors(pose, [motion, motion], halves)
+    assert pose.report["together"]
+    assert max(angles) < 3.0
+    np.testing.assert_allclose(apart, 0.0, atol=0.1)
+
+
+@pytest.mark.parametrize("frame", ["ras", "lps"])
+def test_exact_axes_of_the_file_are_kept(halves, frame):
+    motion = LPS if frame == "lps" else np.eye(4)
+    pose = found(*(transformed(half, motion) for half in halves))
+    assert (pose.report["method"], pose.report["coordinates"]) == ("file", frame)
+    np.testing.assert_array_equal(pose.left, motion)
+
+
+def test_tilted_axes_are_kept_where_the_file_names_them(halves):
+    tilt = Rotation.from_euler("y", 5, degrees=True).as_matrix()
+    tilted = [linear(half, tilt) for half in halves]
+    assert found(*tilted).report["method"] == "shape"
+    assert found(*tilted, named=True).report["method"] == "file"
+
+
+def test_other_brains_follow_the_one_whose_file_is_right(halves):
+    # a pitch of the convention that no shape tells
+    pitched = [linear(half, about_x(8.0)) for half in halves]
+    moved = [rigid(5), rigid(6)]
+    larger = [transformed(linear(half, 1.1 * np.eye(3)), motion) for half, motion in zip(halves, moved, strict=True)]
+    first, second = poses([pair_by_shape(*pitched), pair_by_shape(*larger)], [False, False])
+    assert first.report["method"] == "file"
+    for side, motion in zip((second.left, second.right), moved, strict=True):
+        assert pitch_deg((side @ motion)[:3, :3]) == pytest.approx(8.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [3.0 * np.eye(3), np.diag([1.05, 0.95, 1.03]), [[1, 0.03, 0], [0.05, 1, 0], [0, 0.03, 1]]],
+    ids=["adult size", "stretched", "sheared"],
+)
+def test_other_sizes_and_asymmetric_brains_are_posed(halves, change):
+    # the right hemisphere only: a brain that is not its own mirror image
+    size = np.cbrt(np.linalg.det(change))
+    changed = [linear(halves[0], size * np.eye(3)), linear(halves[1], np.array(change))]
+    moved = [rigid(7), rigid(8)]
+    pose = found(*(transformed(half, motion) for half, motion in zip(changed, moved, strict=True)))
+    angles, apart = errors(pose, moved, changed)
+    assert max(angles) < 6.0
+    assert np.linalg.norm(apart[1:]) < 2.0 * size
+
+
+def test_swapped_hemispheres_are_refused(halves):
+    left, right = (transformed(half, rigid(seed)) for half, seed in zip(halves, (9, 10), strict=True))
+    with pytest.raises(InputError, match="seem to be swapped"):
+        pair_by_shape(right, left)
+    with pytest.raises(InputError, match="of one side"):
+        pair_by_shape(left, left)
+
+
+@pytest.mark.parametrize("half_lengths", [(20, 20, 20), (9, 24, 16)])
+def test_shapes_without_a_pose_are_refused(half_lengths):
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    shape = TriangleMesh(ball.vertices * half_lengths, ball.faces)
+    with pytest.raises(InputError, match="cannot be told from its shape"):
+        pair_by_shape(shape, shape)
+
+
+def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
+    left, right = (flipped(transformed(half, rigid(seed))) for half, seed in zip(halves, (11, 12), strict=True))
+    surface = from_hemispheres(left, right, week=24.0, coordinates="auto", edge_length_mm=1.6)
+    assert is_closed(surface.whole)
+    sides = pieces(surface.whole)
+    assert [euler_number(side) for side in sides] == [2, 2]
+    assert all(signed_volume(side) > 0 for side in sides)
+    assert least_gap(*sides) > 0.4
+    assert surface.left.vertices[:, 0].mean() < surface.fissure_x_mm < surface.right.vertices[:, 0].mean()
+    again = as_poses(surface.report["posing"])
+    for name, file, matrix in (("left", left, again.left), ("right", right, again.right)):
+        there, ended = transformed(file, matrix).vertices, getattr(surface, name).vertices
+        for edge in (np.min, np.max):
+            np.testing.assert_allclose(edge(there, axis=0), edge(ended, axis=0), atol=1.0)
+
+
+def test_files_say_their_axes_and_side(tmp_path, halves):
+    write_surface(tmp_path / "left.surf.gii", halves[0], "CortexLeft")
+    assert declared(tmp_path / "left.surf.gii") == ("NIFTI_XFORM_SCANNER_ANAT", "CortexLeft")
+    write_surface(tmp_path / "left.stl", halves[0])
+    assert declared(tmp_path / "left.stl") == (None, None)
+
+
+@pytest.mark.skipif(not (DATA / "hemispheres").is_dir(), reason=f"no example hemispheres in {DATA}")
+def test_real_hemispheres_in_different_poses_are_posed_alike():
+    weeks = (21, 22)
+    files = [
+        [read_surface(DATA / "hemispheres" / f"fetal.week{week}.{side}.pial.surf.gii") for side in ("left", "right")]
+        for week in weeks
+    ]
+    exact, tilted = poses([pair_by_shape(*sides) for sides in files], [False, False])
+    # week 21 is in LPS; week 22, each hemisphere tilted on its own, has to come to lie like it
+    assert exact.report["coordinates"] == "lps"
+    assert tilted.report["method"] == "shape"
+    posed = [[transformed(side, m) for side, m in zip(sides, (p.left, p.right), strict=True)]
+             for sides, p in zip(files, (exact, tilted), strict=True)]  # fmt: skip
+    for side in (0, 1):
+        first, second = (brain[side].vertices for brain in posed)
+        np.testing.assert_allclose(np.ptp(second, axis=0) / np.ptp(first, axis=0), 1.06, atol=0.05)
