@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from gyriflow.errors import GyriflowError, InputError
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, signed_volume
 from gyriflow.io.files import read_json
-from gyriflow.io.surfaces import declared, read_surface
+from gyriflow.io.surfaces import read_hemispheres, read_surface
 from gyriflow.surface.halves import Pair, pair_by_shape
 from gyriflow.surface.pial import from_hemispheres, hemisphere
 from gyriflow.surface.posing import Poses, poses
@@ -62,9 +62,8 @@ def posed(files: list[Files]) -> tuple[dict[Files, Poses], list[str]]:
     refused = []
     for brain in files:
         try:
-            sides = [hemisphere(read_surface(path), MAX_HOLE_MM)[0] for path in brain]
-            spaces = [declared(path)[0] for path in brain]
-            pairs[brain] = pair_by_shape(*sides), spaces[0] is not None and spaces[0] == spaces[1]
+            *read, named = read_hemispheres(*brain)
+            pairs[brain] = pair_by_shape(*(hemisphere(side, MAX_HOLE_MM)[0] for side in read)), named
         except GyriflowError as error:
             refused.append(f"{brain[0].name}: {error}")
     if not pairs:
@@ -109,9 +108,9 @@ def surfaces(found: dict[Files, Poses], truth: dict) -> dict[str, int]:
         surface = from_hemispheres(
             left,
             other,
+            pose.report,
             week=_week(brain[0], left),
             coordinates="auto",
-            posed=pose,
             edge_length_mm=max(1.2, size / 25),
         )
         sound = [is_closed(piece) and euler_number(piece) == 2 for piece in pieces(surface.whole)]

@@ -78,27 +78,25 @@ def poses_of(wildcards):
     return []
 
 
-if TO_POSE:
-
-    rule poses:
-        input:
-            [path for brain in TO_POSE for path in brain.files],
-        output:
-            [f"results/{brain.id}/surface/pose.json" for brain in TO_POSE],
-        log:
-            "results/study/logs/poses.log",
-        benchmark:
-            "results/study/benchmarks/poses.tsv"
-        conda:
-            ENVIRONMENT
-        resources:
-            mem_mb=2000,
-            runtime=30,
-        params:
-            max_hole_mm=CONFIG.surface.max_hole_mm,
-            code=code("surface"),
-        script:
-            "../scripts/poses.py"
+rule poses:
+    input:
+        [path for brain in TO_POSE for path in brain.files],
+    output:
+        [f"results/{brain.id}/surface/pose.json" for brain in TO_POSE],
+    log:
+        "results/study/logs/poses.log",
+    benchmark:
+        "results/study/benchmarks/poses.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        max_hole_mm=CONFIG.surface.max_hole_mm,
+        code=code("surface"),
+    script:
+        "../scripts/poses.py"
 
 
 rule pial_surface:

@@ -6,7 +6,6 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.step import step
 from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial, from_shape
-from gyriflow.surface.posing import as_poses
 
 files, output, params = list(snakemake.input), snakemake.output, snakemake.params
 with step(snakemake.log[0]):
@@ -15,15 +14,13 @@ with step(snakemake.log[0]):
             scheme, volume = label_scheme(**params.scheme), read_label_volume(files[0], **params.reading)
             surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
         case "hemispheres":
-            left, right = map(read_surface, files[:2])
-            posed = as_poses(read_json(snakemake.input.pose)) if snakemake.input.pose else None
-            surface = from_hemispheres(left, right, week=params.week, posed=posed, **params.reading, **params.settings)
+            given = *map(read_surface, files[:2]), *map(read_json, files[2:])
+            surface = from_hemispheres(*given, week=params.week, **params.reading, **params.settings)
         case source:
             make = {"pial": from_pial, "shape": from_shape}[source]
             surface = make(read_surface(files[0]), week=params.week, **params.reading, **params.settings)
-    write_surface(output.whole, surface.whole)
-    write_surface(output.left, surface.left, "CortexLeft")
-    write_surface(output.right, surface.right, "CortexRight")
+    for part, structure in (("whole", None), ("left", "CortexLeft"), ("right", "CortexRight")):
+        write_surface(getattr(output, part), getattr(surface, part), structure)
     write_surface(output.stl, surface.whole)
     if surface.thickness:
         write_vertex_maps(output.thickness, {"cortical thickness (mm)": surface.thickness.values_mm})

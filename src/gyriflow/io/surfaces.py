@@ -70,6 +70,26 @@ def declared(path: AnyPath) -> tuple[str | None, str | None]:
     return (None if space == "NIFTI_XFORM_UNKNOWN" else space), structure
 
 
+def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
+    """Returns the surfaces of two hemispheres, and whether both files name one and the same coordinate system.
+
+    InputError as for `read_surface`, and where a file names the other hemisphere as its structure.
+    """
+    spaces = []
+    for path, structure, other in ((left, "CortexLeft", "CortexRight"), (right, "CortexRight", "CortexLeft")):
+        space, found = declared(path)
+        spaces.append(space)
+        if found == other:
+            raise InputError(
+                "is of the other hemisphere",
+                path=path,
+                found=found,
+                expected=structure,
+                remedy="Swap `left` and `right` in the configuration.",
+            )
+    return read_surface(left), read_surface(right), spaces[0] is not None and len(set(spaces)) == 1
+
+
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
     """Writes a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
     suffix = Path(path).suffix.lower()

@@ -72,18 +72,19 @@ class Pair:
         return np.asarray(self.right.rotation @ self.fit.shift * self.right.outline.size_mm)
 
 
-def pair_by_shape(left: TriangleMesh, right: TriangleMesh) -> Pair:
-    """Returns the poses that the shapes of two closed, outward surfaces say.
+def pair_by_shape(left: TriangleMesh, right: TriangleMesh, path: str | None = None) -> Pair:
+    """Returns the poses that the shapes of two closed, outward surfaces say; `path` is for messages.
 
     InputError where a hemisphere fits the reference badly or in more than one way, where the two are no mirror images
     of each other, and where they seem to be swapped.
     """
-    halves = [_half(transformed(left, MIRROR), "left"), _half(right, "right")]
+    halves = [_half(transformed(left, MIRROR), "left", path), _half(right, "right", path)]
     one, other = halves
     fit = registered(one.outline, Target(other.outline), other.rotation.T @ one.rotation)
     if fit.residual > WORST_PAIR_RESIDUAL:
         raise InputError(
             "the hemispheres are no mirror images of each other",
+            path=path,
             found=f"a mean distance of {fit.residual:.3f} of their size between one and the other's mirror image",
             expected=f"at most {WORST_PAIR_RESIDUAL}",
             remedy="Give both hemispheres of one subject and week. Are both files of the same side?",
@@ -92,6 +93,7 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh) -> Pair:
     if min(ahead) < -SYLVIAN_AHEAD and max(ahead) > SYLVIAN_AHEAD:
         raise InputError(
             "both hemispheres seem to be of one side",
+            path=path,
             found=f"the Sylvian fissure {ahead[0]:+.2f} (left) and {ahead[1]:+.2f} (right) of the size off the middle",
             expected="in front of the middle in both, mirrored",
             remedy="Give one left and one right hemisphere.",
@@ -99,6 +101,7 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh) -> Pair:
     if np.mean(ahead) < -SYLVIAN_AHEAD:
         raise InputError(
             "the hemispheres seem to be swapped",
+            path=path,
             found=f"the Sylvian fissure {-np.mean(ahead):.2f} of the size behind the middle",
             expected="in front of the middle",
             remedy="Swap `left` and `right`; or, if they are right, pose the files yourself and set coordinates: ras.",
@@ -121,12 +124,13 @@ def pitch_deg(rotation: Floats) -> float:
     return float(np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1])))
 
 
-def _half(mesh: TriangleMesh, side: str) -> Half:
+def _half(mesh: TriangleMesh, side: str, path: str | None) -> Half:
     shape = outline(mesh)
     fit, confidence = found(shape, Target(reference()))
     if confidence < LEAST_CONFIDENCE or fit.residual > WORST_RESIDUAL:
         raise InputError(
             f"the pose of the {side} hemisphere cannot be told from its shape",
+            path=path,
             found=f"a residual of {fit.residual:.3f}, the next best pose {confidence:.2f} times worse",
             expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times",
             remedy="Is it a cerebral hemisphere's closed pial surface? If so, pose it and set coordinates: ras or lps.",

@@ -32,7 +32,7 @@ from gyriflow.surface.hemispheres import (
 from gyriflow.surface.labels import LabelScheme, cerebrum_mask, require_sides
 from gyriflow.surface.orientation import MidPlane, mid_plane, upright
 from gyriflow.surface.outcome import PialSurface, described, faults, require_sound
-from gyriflow.surface.posing import Poses, placed, poses
+from gyriflow.surface.posing import as_poses, placed, poses
 from gyriflow.surface.remaking import remade
 from gyriflow.surface.remeshing import evened
 from gyriflow.surface.repair import cleaned, pieces
@@ -122,10 +122,10 @@ def from_labels(
 def from_hemispheres(
     left: TriangleMesh,
     right: TriangleMesh,
+    posing: dict[str, Any] | None = None,
     *,
     week: float,
     coordinates: Coordinates = "ras",
-    posed: Poses | None = None,
     gap_mm: float = 0.5,
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
@@ -135,17 +135,19 @@ def from_hemispheres(
 
     The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
-    other. With coordinates "auto" each may be in any rigid pose; `posed` is then the pose if it is known already, as
-    from all brains of a study. InputError where the pose cannot be told, where they are swapped, of different size or
-    not of the week's size; MeshError where one can't be made a closed surface without handles and intersections.
+    other. With coordinates "auto" each may be in any rigid pose; `posing` is then the report of the pose if it is
+    known already, as from all brains of a study. InputError where the pose cannot be told, where they are swapped, of
+    different size or not of the week's size; MeshError where one can't be made a closed surface without handles and
+    intersections.
     """
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
     left, report["repair_left"] = hemisphere(_in_ras(left, coordinates), max_hole_mm)
     right, report["repair_right"] = hemisphere(_in_ras(right, coordinates), max_hole_mm)
     volume = signed_volume(left) + signed_volume(right)
     require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week)
+    posed = None
     if coordinates == "auto":
-        posed = posed or poses([pair_by_shape(left, right)], [False])[0]
+        posed = as_poses(posing) if posing else poses([pair_by_shape(left, right)], [False])[0]
         left, right = transformed(left, posed.left), transformed(right, posed.right)
         for warning in posed.report["warnings"]:
             _warn(report, warning)
@@ -164,7 +166,7 @@ def from_hemispheres(
         plane = mid_plane(merged(left, right))
     mesh = merged(left, right)
     surface = _posed(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, report, week)
-    if coordinates == "auto" and posed:
+    if posed:
         turn = np.array(report["pose"])
         report["posing"] = placed(posed, turn, moved * to_right)
         if posed.report["together"]:
