@@ -60,6 +60,18 @@ def fold(mesh, out, ranks=1, **changes):
     )
 
 
+def failing_after(steps):
+    """Returns a step of the folding that fails once a number of steps has been done."""
+    honest = Folding.step
+
+    def step(self, state, step_s):
+        if len(state.rows) == steps:
+            raise NotConvergedError("no way on")
+        return honest(self, state, step_s)
+
+    return step
+
+
 @pytest.fixture(scope="module")
 def tight_run(mesh, tmp_path_factory):
     out = tmp_path_factory.mktemp("tight") / "out"
@@ -205,14 +217,7 @@ def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_pat
     brain = read_tetrahedral_mesh(mesh)
     weeks = WEEK | {"output_weeks": [21.0, 21.25, 21.5], "ranks": 1}
     parameters = parameters_from(weeks)
-    honest = Folding.step
-
-    def failing(self, state, step_s):
-        if len(state.rows) == 5:
-            raise NotConvergedError("no way on")
-        return honest(self, state, step_s)
-
-    monkeypatch.setattr(Folding, "step", failing)
+    monkeypatch.setattr(Folding, "step", failing_after(5))
     zones = zones_of_run(brain, parameters)
     with pytest.raises(SolverError, match="The last good state is kept"):
         run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path)
@@ -231,14 +236,7 @@ def test_stress_is_remembered_across_an_interruption(mesh, tmp_path, monkeypatch
     parameters = parameters_from(WEEK | {"stress_memory_gw": 0.5, "solver": TIGHT})
     zones = zones_of_run(brain, parameters)
     run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "whole")
-    honest = Folding.step
-
-    def failing(self, state, step_s):
-        if len(state.rows) == 4:
-            raise NotConvergedError("no way on")
-        return honest(self, state, step_s)
-
-    monkeypatch.setattr(Folding, "step", failing)
+    monkeypatch.setattr(Folding, "step", failing_after(4))
     with pytest.raises(SolverError):
         run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "cut")
     monkeypatch.undo()

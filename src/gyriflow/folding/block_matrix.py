@@ -75,8 +75,7 @@ class BlockMatrix:
     def assembled(self) -> PETSc.Mat:
         """Returns the PETSc matrix with the present values of the blocks, contributions to ghost rows added."""
         self.blocks.scatter_reverse()
-        values = np.array(self.blocks.data[: self._entries], dtype=PETSc.ScalarType)
-        self._values = values
+        values = self.blocks.data[: self._entries]
         values[self._crossed] = 0.0
         values[self._fixed_diagonal] = 1.0
         _check(
@@ -94,7 +93,7 @@ class BlockMatrix:
             kept = int(self._products.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"])
             if kept != self._entries:
                 raise RuntimeError(f"PETSc kept {kept} of {self._entries} entries")
-        values = self._values.reshape(-1, 9)
+        values = self.blocks.data[: self._entries].reshape(-1, 9)
         parts = _sequential_parts(self._products)
         for part, stored in zip(parts, self._stored, strict=False):
             if not len(stored):  # a rank whose part of the mesh touches no other

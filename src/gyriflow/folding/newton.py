@@ -4,6 +4,8 @@ The preconditioner is kept across iterations and steps and rebuilt when it has g
 follows when conjugate gradients fail; the rung used is reported.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,10 +144,11 @@ class NewtonSolver:
         if not self._stale:
             reason, iterations = self._run(self._cg, matrix, True, products)
             count.krylov += iterations
+            # a matrix that is not positive definite is no fault of the preconditioner
+            if reason == INDEFINITE[0]:
+                return reason
             self._stale = reason <= 0 or iterations > 1.5 * self._fresh_iterations + 2
-            if reason > 0 or reason == INDEFINITE[0]:
-                # a matrix that is not positive definite is no fault of the preconditioner
-                self._stale &= reason > 0
+            if reason > 0:
                 return reason
             count.rung = max(count.rung, REBUILT)
         matrix.setNearNullSpace(self.problem.near_null_space())
@@ -156,33 +159,25 @@ class NewtonSolver:
 
     def _solve_linear(self, matrix: PETSc.Mat, count: StepCount) -> None:
         """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
-        diagonal = matrix.getDiagonal()
-        abs_diagonal = diagonal.duplicate()
-        diagonal.copy(abs_diagonal)
-        abs_diagonal.abs()
         # where the tangent was not positive definite before, it may still not be
         for level in range(max(self._level - 1, 0), len(SHIFTS)):
-            if SHIFTS[level]:
-                matrix.setDiagonal(diagonal + SHIFTS[level] * abs_diagonal)
-                count.rung = max(count.rung, SHIFTED)
-            reason = self._run_cg(matrix, count, shifted=level > 0)
+            with raised_diagonal(matrix, SHIFTS[level]):
+                reason = self._run_cg(matrix, count, shifted=level > 0)
+            count.rung = max(count.rung, SHIFTED if level else KEPT)
             if reason > 0 or reason not in INDEFINITE:
                 self._level = level
                 break
-        if SHIFTS[level]:
-            matrix.setDiagonal(diagonal)
         self._convex = level == 0
         if reason > 0 and self._direction.dot(self._residual) < 0:
             return
         self._convex = False
         for rung, method in FALLBACKS.items():
+            # the operator of a free body is not its matrix, which is singular
+            singular = rung == DIRECT and self.problem.free
             if rung not in self._fallbacks:
-                # the operator of a free body is not its matrix, which is singular
-                iterated = rung == DIRECT and self.problem.free
-                self._fallbacks[rung] = self._new_krylov("gmres" if iterated else method[0], method[1])
-            if rung == DIRECT and self.problem.free:
-                matrix.setDiagonal(diagonal + FREE_SHIFT * abs_diagonal)
-            reason, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
+                self._fallbacks[rung] = self._new_krylov("gmres" if singular else method[0], method[1])
+            with raised_diagonal(matrix, FREE_SHIFT if singular else 0.0):
+                reason, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
             count.krylov += iterations
             count.rung = max(count.rung, rung)
             slope = self._direction.dot(self._residual)
@@ -269,3 +264,17 @@ class NewtonSolver:
             norm = self._advance(norm)
         count.residual = norm / at_rest if at_rest > 0 else 0.0
         return count
+
+
+@contextmanager
+def raised_diagonal(matrix: PETSc.Mat, part: float) -> Iterator[None]:
+    """Raises the diagonal of a matrix by a part of its absolute values for the time of the block."""
+    if not part:
+        yield
+        return
+    diagonal = matrix.getDiagonal()
+    size = diagonal.copy()
+    size.abs()
+    matrix.setDiagonal(diagonal + part * size)
+    yield
+    matrix.setDiagonal(diagonal)

@@ -25,16 +25,6 @@ FIELDS = (
 )
 """All fields that a run can write."""
 SUPPORTS = ("ellipsoid", "base", "box", "free")
-VARYING = (
-    "thickness_mm",
-    "shear_modulus_cortex_pa",
-    "shear_modulus_core_pa",
-    "growth_rate_per_s",
-    "radial_growth_rate_per_s",
-    "core_growth_rate_per_s",
-)
-"""Parameters that may vary with week and place."""
-GROWTH_RATES = VARYING[3:]
 
 
 @dataclass(frozen=True)
@@ -137,6 +127,11 @@ class FoldingParameters:
     def thickness_at(self, week: float, maps: Maps) -> float | np.ndarray:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
         return self.thickness_mm.at(week, maps) + self.thickness_growth_mm_per_gw * (week - self.start_week)
+
+
+VARYING = tuple(name for name, hint in get_type_hints(FoldingParameters).items() if hint is Varying)
+"""Parameters that may vary with week and place."""
+GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_s"))
 
 
 def value_problems(p: FoldingParameters, maps: Maps) -> list[str]:

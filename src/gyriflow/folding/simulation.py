@@ -15,11 +15,11 @@ from ..mechanics.neo_hookean import bulk_to_shear_ratio
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .domain import Domain
-from .layers import WEIGHT_REACH, Layers, PialSearch, layers_at
+from .layers import WEIGHT_REACH, PialSearch, layers_at
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError
 from .output import say
-from .parameters import FoldingParameters, require_maps
+from .parameters import ELEMENT_FIELDS, FoldingParameters, require_maps
 from .problem import Material, Problem
 from .stress import deformation_gradients, elastic_part, strain_fields, stress_fields, volume_ratio_fields
 from .varying import Maps
@@ -76,8 +76,7 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._bulk_ratio = bulk_to_shear_ratio(parameters.poisson_ratio)
-        self._shows_stress = not {"stress", "strain"}.isdisjoint(parameters.fields)
-        self._elastic = np.tile(np.eye(3), (len(self.domain.cells), 1, 1))
+        self._stretch: Floats | None = None  # what the last step started with
         self._start = self.domain.positions
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
@@ -86,11 +85,8 @@ class Folding:
         settings = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
         self.solver = NewtonSolver(self.problem, settings, floor)
 
-    def set_layers(self, time_s: float, step_s: float) -> Layers:
-        """Sets stiffness, growth and normals for a step from a time on, with parameters as in its middle.
-
-        Returns the fields at the local nodes.
-        """
+    def set_layers(self, time_s: float, step_s: float) -> None:
+        """Sets stiffness, growth and normals for a step from a time on, with parameters as in its middle."""
         p, domain = self.parameters, self.domain
         week = p.start_week + (time_s + step_s / 2) / SECONDS_PER_GW
         reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
@@ -106,7 +102,6 @@ class Folding:
         normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
         self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
         self.problem.mesh_moved()
-        return layers
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
@@ -117,6 +112,10 @@ class Folding:
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
 
+    def _elastic(self, F: Floats) -> Floats:
+        """Returns the (c, 3, 3) elastic parts of the last step's deformation gradients of the local elements."""
+        return elastic_part(F, np.eye(3) if self._stretch is None else self._stretch, *self.problem.growth)
+
     def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
 
@@ -124,18 +123,19 @@ class Folding:
         """
         domain = self.domain
         fields: dict[str, Floats] = {}
+        if set(ELEMENT_FIELDS).isdisjoint(wanted):
+            return fields
         after = domain.local(domain.positions)
         F = deformation_gradients(after - self.problem.displacement, after, domain.cells)
         total = deformation_gradients(domain.local(self._start), after, domain.cells)
+        Fe = self._elastic(F)
         if "stress" in wanted:
             mu = self.problem.shear_modulus
-            fields |= stress_fields(self._elastic, mu, self._bulk_ratio * mu)
+            fields |= stress_fields(Fe, mu, self._bulk_ratio * mu)
         if "strain" in wanted:
-            fields |= strain_fields(self._elastic, total, self._start_normals)
+            fields |= strain_fields(Fe, total, self._start_normals)
         if "volume_ratio" in wanted:
             fields |= volume_ratio_fields(F, total)
-        if not fields:
-            return fields
         together = domain.gathered_cells(np.stack(list(fields.values()), axis=1))
         return dict(zip(fields, together.T, strict=True))
 
@@ -167,21 +167,19 @@ class Folding:
         if domain.positions is not state.positions:
             domain.place(state.positions)
         self.set_layers(state.time_s, step_s)
-        stretch = self._kept_stretch(state, step_s)
-        if stretch is not None:
-            problem.set_stretch(stretch)
+        self._stretch = self._kept_stretch(state, step_s)
+        if self._stretch is not None:
+            problem.set_stretch(self._stretch)
         count = self.solver.solve(domain.local(state.predicted(step_s)))
         ratios = problem.volume_ratios()
         energy = problem.energy()
         u = domain.gathered(problem.displacement[: domain.owned])
         length = np.linalg.norm(u, axis=1) * MM_PER_M
         left = None
-        if stretch is not None or self._shows_stress:
+        if self._stretch is not None:
             before = domain.local(domain.positions)
             F = deformation_gradients(before, before + problem.displacement, domain.cells)
-            self._elastic = elastic_part(F, np.eye(3) if stretch is None else stretch, *problem.growth)
-        if stretch is not None:
-            left = domain.gathered_cells(packed(left_stretch(self._elastic)))
+            left = domain.gathered_cells(packed(left_stretch(self._elastic(F))))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
