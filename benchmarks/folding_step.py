@@ -45,7 +45,7 @@ def relaxed_lu_step(problem, krylov, residual, direction, start: np.ndarray) -> 
     problem.set_displacement(start)
     first = norm = problem.residual(residual)
     for iteration in range(1, 51):
-        krylov.setOperators(problem.tangent())
+        krylov.setOperators(problem.tangent().whole())
         krylov.solve(residual, direction)
         problem.vector.axpy(-0.8, direction)
         problem.vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
@@ -72,6 +72,7 @@ def measure(arguments: argparse.Namespace) -> None:
     mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
     middle = float(mesh.vertices[:, 0].min() + mesh.vertices[:, 0].max()) / 2
     values = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": middle, "output_weeks": [21.0, 36.0]}
+    values["contact"] = {"kind": "planes"}  # as the prototype has it
     values |= yaml.safe_load(arguments.params.read_text()) if arguments.params else {}
     p = parameters_from(values)
     zones = zones_of_run(mesh, p)

@@ -69,7 +69,8 @@ def reference_parameters():
     from gyriflow.folding.parameters import parameters_from
 
     values = {"start_week": 21.0, "end_week": 36.0, "output_weeks": [21.0, 36.0], "fissure_x_mm": 0.0}
-    return parameters_from(values | {"thickness_mm": THICKNESS_MM, "contact": {"gap_mm": CONTACT_GAP_MM}})
+    contact = {"kind": "planes", "gap_mm": CONTACT_GAP_MM}
+    return parameters_from(values | {"thickness_mm": THICKNESS_MM, "contact": contact})
 
 
 def do_steps(mesh_file: Path, steps: int) -> None:

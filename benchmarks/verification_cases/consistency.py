@@ -79,7 +79,7 @@ def remainders(comm: MPI.Comm = MPI.COMM_WORLD) -> Remainders:
     problem.set_displacement(u)
     energy = problem.energy()
     problem.residual(residual)
-    problem.tangent().mult(direction, change)
+    problem.tangent().whole().mult(direction, change)
     by_energy, by_residual = [], []
     for h in LENGTHS:
         problem.set_displacement(u + h * v)

@@ -70,8 +70,8 @@ class BodyForce:
     def add_residual(self, out: PETSc.Vec) -> None:
         out.array[:] -= self.load.array
 
-    def add_tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        return matrix
+    def stiffness(self, *, convex: bool = False) -> None:
+        return None
 
     def largest_step(self, direction: Floats) -> float:
         return 1.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.parameters import FoldingParameters, parameters_from
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import LEFT_CONTACT, RIGHT_CONTACT, Zones, zones_of_run
+from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
 from gyriflow.units import M_PER_MM, MM_PER_M
 
@@ -93,10 +93,7 @@ def asymmetry(mesh: TetrahedralMesh, state: State, zones: Zones) -> Asymmetry:
     one, other = np.split(state.positions * MM_PER_M, 2)
     moved = np.linalg.norm(state.positions * MM_PER_M - mesh.vertices, axis=1).max()
     gap = np.linalg.norm(one - other * [-1.0, 1.0, 1.0], axis=1).max()
-    x = state.positions[:, 0] * MM_PER_M
-    beyond = [x[zones.vertices_of(LEFT_CONTACT)] - zones.planes_mm[0]]
-    beyond.append(zones.planes_mm[1] - x[zones.vertices_of(RIGHT_CONTACT)])
-    return Asymmetry(float(gap / moved), float(moved), float(max(depth.max() for depth in beyond)))
+    return Asymmetry(float(gap / moved), float(moved), zones.penetration_mm(state.positions * MM_PER_M))
 
 
 def folded(half: TetrahedralMesh, steps: int, comm: MPI.Comm = MPI.COMM_WORLD, **changes) -> tuple[State, Asymmetry]:

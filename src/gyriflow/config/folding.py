@@ -16,6 +16,7 @@ FieldName = Literal[
     "bulk_modulus",
     "normal",
     "zones",
+    "contact_pressure",
     "stress",
     "strain",
     "volume_ratio",
@@ -38,13 +39,28 @@ GROWTH_RATES = VARYING[3:]
 
 
 class ContactSettings(Settings):
-    """The two hemispheres' contact at the fissure."""
+    """Contact between folds, and between the two hemispheres."""
 
-    kind: Literal["planes", "none"] = setting(
-        "planes", "", "`planes`: neither hemisphere passes the fissure's plane; `none`: no contact."
-    )
-    penalty_pa_per_m: float = setting(5.0e5, "Pa/m", "Pressure per depth of penetration.", gt=0, le=1e9)
-    gap_mm: float = setting(2.5, "mm", "Width of the fissure; each contact plane is a quarter of it off.", gt=0, le=20)
+    kind: Literal["global", "planes", "none"] = setting(
+        "global", "",
+        "`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's "
+        "plane, folds run through each other (the paper); `none`: no contact.",
+    )  # fmt: skip
+    distance_mm: float | None = setting(
+        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's edge length.",
+        gt=0, le=5,
+    )  # fmt: skip
+    stiffness_pa: float | None = setting(
+        None, "Pa", "With `global`, stiffness of the barrier; null: a tenth of the cortex's largest shear modulus.",
+        gt=0, le=1e9,
+    )  # fmt: skip
+    penalty_pa_per_m: float = setting(5.0e5, "Pa/m", "With `planes`, pressure per depth of penetration.", gt=0, le=1e9)
+    gap_mm: float = setting(
+        2.5, "mm",
+        "Width of the fissure: the planes are a quarter of it off; between them nothing grows. With all kinds but "
+        "`none`.",
+        gt=0, le=20,
+    )  # fmt: skip
 
 
 class NoGrowthSettings(Settings):
@@ -106,7 +122,7 @@ class FoldingSettings(Settings):
         "What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth, `base` the flat base, "
         "`box` too and lets the upright sides slide, `free` nothing (rigid motions are removed).",
     )  # fmt: skip
-    contact: ContactSettings = setting(ContactSettings(), "", "The hemispheres' contact.")
+    contact: ContactSettings = setting(ContactSettings(), "", "Contact.")
     no_growth: NoGrowthSettings = setting(NoGrowthSettings(), "", "Where nothing grows.")
     output_every_gw: float = setting(
         1.0, "GW", "Spacing of the output weeks; the start and the end are always among them.", ge=0.01, le=10

@@ -40,6 +40,8 @@ class Domain:
         File index of each local element.
     volumes : (c,) float
         Volumes of the local elements in m³.
+    node_of_vertex : (n,) int
+        The global node of each vertex: rank by rank, owned nodes in their order.
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
@@ -64,6 +66,8 @@ class Domain:
         self._cell_counts = comm.allgather(len(self.cells))
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
         self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.owned]))
+        self.node_of_vertex = np.empty_like(self._order)
+        self.node_of_vertex[self._order] = np.arange(len(self._order))
 
     def gathered(self, owned_values: Floats) -> Floats:
         """Returns on every rank the (n, 3) vectors of all vertices from the owned (owned, 3) ones of each."""

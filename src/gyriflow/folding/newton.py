@@ -4,8 +4,6 @@ The preconditioner is kept across iterations and steps and rebuilt when it has g
 follows when conjugate gradients fail; the rung used is reported.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +12,7 @@ from petsc4py import PETSc
 
 from ..errors import SolverError
 from .problem import Problem
+from .tangent import Tangent
 
 RUNGS = ("cg", "cg, preconditioner rebuilt", "cg, tangent shifted", "gmres", "mumps")
 KEPT, REBUILT, SHIFTED, GMRES, DIRECT = range(5)
@@ -21,6 +20,8 @@ ROUND_OFF = 1e-12
 """Relative error of an energy, a sum over elements."""
 NEAR = 100.0
 """Multiple of the tolerance below which the tangent of the iteration before is as good as a new one."""
+LOOSE = 0.03
+"""Relative tolerance of a linear solve that need not be good."""
 INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
 """Parts of its diagonal that are added to a tangent until it is positive definite."""
@@ -83,13 +84,14 @@ class NewtonSolver:
         self._residual = problem.new_vector()
         self._trial = problem.new_vector()
         self._direction = problem.new_vector()
-        self._fresh_iterations = 0  # Krylov iterations with a new preconditioner
+        self._fresh_iterations = 0.0  # Krylov iterations with a new preconditioner, per power of ten
         self._stale = True
         self._wanted_reduction = settings.krylov_tolerance
         self._cg = self._new_krylov("cg", "gamg")
         self._fallbacks: dict[int, PETSc.KSP] = {}
         self._level = 0  # of the shift that the last tangent needed
         self._convex = True  # whether the last tangent was positive definite as it was
+        self._exhausted = False  # whether nothing is left to gain but round-off
         self.inverting: NDArray[np.float64] | None = None
 
     def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
@@ -116,53 +118,70 @@ class NewtonSolver:
         krylov.setFromOptions()
         return krylov
 
-    def _run(
-        self, krylov: PETSc.KSP, matrix: PETSc.Mat, reuse: bool, products: PETSc.Mat | None = None
-    ) -> tuple[int, int]:
+    def _run(self, krylov: PETSc.KSP, tangent: Tangent, *, reuse: bool, fast: bool = False) -> tuple[int, int]:
         """Solves into the direction; returns PETSc's reason for the end, 0 for one without, and the iterations.
 
-        `products` is the same matrix in a form with faster products.
+        `fast` takes the forms of the tangent that are made for products and smoothing.
         """
         krylov.setTolerances(rtol=self._wanted_reduction)
-        krylov.setOperators(self.problem.operator(matrix if products is None else products), matrix)
+        matrix = tangent.smoothing if fast and reuse else tangent.whole()
+        krylov.setOperators(self.problem.operator(tangent.products if fast else matrix), matrix)
         multigrid = krylov.getPC()
         multigrid.setReusePreconditioner(reuse)
         try:
-            if products is not None:
+            if fast:
                 krylov.setUp()
-                multigrid.getMGSmoother(multigrid.getMGLevels() - 1).setOperators(products, matrix)
+                smoother = multigrid.getMGSmoother(multigrid.getMGLevels() - 1)
+                smoother.setOperators(tangent.products, tangent.smoothing)
             krylov.solve(self._residual, self._direction)
         except PETSc.Error:  # a factorisation that broke down
             return 0, 0
         self._direction.scale(-1.0)
+        self.problem.hold(self._direction)
         finite = bool(np.isfinite(self._direction.norm()))
         return krylov.getConvergedReason() if finite else 0, krylov.getIterationNumber()
 
-    def _run_cg(self, matrix: PETSc.Mat, count: StepCount, *, shifted: bool) -> int:
+    def _too_many(self) -> float:
+        """Returns the number of iterations above which the kept preconditioner counts as stale."""
+        return 1.5 * self._fresh_iterations * self._decades() + 2
+
+    def _decades(self) -> float:
+        """Returns by how many powers of ten a linear solve is to reduce its residual."""
+        return -np.log10(self._wanted_reduction)
+
+    def _run_cg(self, tangent: Tangent, count: StepCount, *, shifted: bool) -> int:
         """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
-        products = None if shifted else self.problem.for_products()
         if not self._stale:
-            reason, iterations = self._run(self._cg, matrix, True, products)
+            reason, iterations = self._run(self._cg, tangent, reuse=True, fast=not shifted)
             count.krylov += iterations
             # a matrix that is not positive definite is no fault of the preconditioner
             if reason == INDEFINITE[0]:
                 return reason
-            self._stale = reason <= 0 or iterations > 1.5 * self._fresh_iterations + 2
+            self._stale = reason <= 0 or iterations > self._too_many()
             if reason > 0:
                 return reason
             count.rung = max(count.rung, REBUILT)
-        matrix.setNearNullSpace(self.problem.near_null_space())
-        reason, iterations = self._run(self._cg, matrix, False, products)
+        tangent.whole().setNearNullSpace(self.problem.near_null_space())
+        reason, iterations = self._run(self._cg, tangent, reuse=False, fast=not shifted)
         count.krylov += iterations
-        self._fresh_iterations, self._stale = iterations, reason <= 0
+        self._fresh_iterations, self._stale = iterations / self._decades(), reason <= 0
         return reason
 
-    def _solve_linear(self, matrix: PETSc.Mat, count: StepCount) -> None:
+    def _solve_linear(self, tangent: Tangent, count: StepCount) -> None:
         """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
+        if self.problem.contributions:
+            if not self._stale:
+                reason, iterations = self._run(self._cg, tangent, reuse=True, fast=True)
+                count.krylov += iterations
+                if reason > 0 and iterations <= self._too_many() and self._direction.dot(self._residual) < 0:
+                    self._convex = True
+                    return
+            # folds pressed together would rather slide aside: without that, the tangent is hardly ever indefinite
+            tangent = self.problem.tangent(convex=True)
         # where the tangent was not positive definite before, it may still not be
         for level in range(max(self._level - 1, 0), len(SHIFTS)):
-            with raised_diagonal(matrix, SHIFTS[level]):
-                reason = self._run_cg(matrix, count, shifted=level > 0)
+            with tangent.raised(SHIFTS[level]):
+                reason = self._run_cg(tangent, count, shifted=level > 0)
             count.rung = max(count.rung, SHIFTED if level else KEPT)
             if reason > 0 or reason not in INDEFINITE:
                 self._level = level
@@ -176,8 +195,8 @@ class NewtonSolver:
             singular = rung == DIRECT and self.problem.free
             if rung not in self._fallbacks:
                 self._fallbacks[rung] = self._new_krylov("gmres" if singular else method[0], method[1])
-            with raised_diagonal(matrix, FREE_SHIFT if singular else 0.0):
-                reason, iterations = self._run(self._fallbacks[rung], matrix, reuse=False)
+            with tangent.raised(FREE_SHIFT if singular else 0.0):
+                reason, iterations = self._run(self._fallbacks[rung], tangent, reuse=False)
             count.krylov += iterations
             count.rung = max(count.rung, rung)
             slope = self._direction.dot(self._residual)
@@ -191,7 +210,8 @@ class NewtonSolver:
         """Moves along the direction as far as energy and elements allow; returns the new residual norm."""
         problem, start = self.problem, self.problem.displacement.copy()
         slope = self._direction.dot(self._residual)
-        before = None
+        # what contributions add is not convex, and their state at the start is still known here
+        before = problem.energy() if problem.contributions else None
         self._direction.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
         with self._direction.localForm() as local:
             direction = local.array_r.reshape(-1, 3).copy()
@@ -202,7 +222,7 @@ class NewtonSolver:
                 trial = problem.residual(self._trial)
                 # where a convex energy's slope has all but vanished, it fell by about half of it: no need to ask for it
                 flat = abs(self._direction.dot(self._trial)) <= 0.1 * abs(slope)
-                if self._convex and np.isfinite(trial) and trial < norm and flat:
+                if self._convex and before is None and np.isfinite(trial) and trial < norm and flat:
                     return self._accept(trial)
                 if before is None:
                     problem.set_displacement(start)
@@ -218,6 +238,9 @@ class NewtonSolver:
                 self.inverting = problem.volume_ratios()
             length /= 2
         problem.set_displacement(start)
+        if before is not None and abs(slope) <= ROUND_OFF * abs(before):
+            self._exhausted = True
+            return norm
         raise NotConvergedError("the line search found no step that lowers the energy")
 
     def _accept(self, norm: float) -> float:
@@ -245,8 +268,8 @@ class NewtonSolver:
             if not norm < at_rest:  # also where it is not a number
                 problem.set_displacement(np.zeros_like(start))
                 norm = problem.residual(self._residual)
-        tangent, before = None, np.inf
-        while not norm <= tolerance:
+        tangent, before, self._exhausted = None, np.inf, False
+        while not (norm <= tolerance or self._exhausted):
             if count.newton >= self.settings.max_newton:
                 raise NotConvergedError(
                     "Newton's method did not converge",
@@ -256,6 +279,9 @@ class NewtonSolver:
             count.newton += 1
             enough = 0.4 * tolerance / norm
             floor = self.settings.krylov_tolerance
+            if problem.contributions and np.isfinite(before):
+                # while contact changes from one iterate to the next, a direction need not be better than the last was
+                floor = max(floor, min(LOOSE, (norm / before) ** 2))
             self._wanted_reduction = enough if enough >= 0.1 * floor else floor
             if tangent is None or norm > NEAR * tolerance or norm > before / 4:
                 tangent = problem.tangent()
@@ -264,17 +290,3 @@ class NewtonSolver:
             norm = self._advance(norm)
         count.residual = norm / at_rest if at_rest > 0 else 0.0
         return count
-
-
-@contextmanager
-def raised_diagonal(matrix: PETSc.Mat, part: float) -> Iterator[None]:
-    """Raises the diagonal of a matrix by a part of its absolute values for the time of the block."""
-    if not part:
-        yield
-        return
-    diagonal = matrix.getDiagonal()
-    size = diagonal.copy()
-    size.abs()
-    matrix.setDiagonal(diagonal + part * size)
-    yield
-    matrix.setDiagonal(diagonal)

@@ -87,16 +87,18 @@ def save_frame(
     zones: Zones,
     parameters: FoldingParameters,
     maps: Maps,
+    contact: dict[str, Floats],
     elements: dict[str, Floats],
 ) -> None:
     """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name.
 
-    `elements` are the (m,) fields of the elements that are among them.
+    `contact` holds the (n,) fields that contact has left, `elements` the (m,) fields of the elements.
     """
     fields: dict[str, NDArray] = {"positions": positions * MM_PER_M}
     if "displacement" in parameters.fields:
         fields["displacement_mm"] = (positions - start) * MM_PER_M
     fields |= layer_fields(fields["positions"], zones, parameters, maps, week, parameters.fields)
+    fields |= contact
     write_frame(frame_path(folder, week), week, fields, elements)
 
 

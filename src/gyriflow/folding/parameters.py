@@ -21,19 +21,27 @@ FIELDS = (
     "bulk_modulus",
     "normal",
     "zones",
+    "contact_pressure",
     *ELEMENT_FIELDS,
 )
 """All fields that a run can write."""
+CONTACTS = ("global", "planes", "none")
 SUPPORTS = ("ellipsoid", "base", "box", "free")
 
 
 @dataclass(frozen=True)
 class Contact:
-    """The hemispheres' contact: `kind` is "planes" or "none"."""
+    """Contact: `kind` is "global" (the pial surface with itself), "planes" (hemispheres and fissure) or "none".
 
-    kind: str = "planes"
+    `distance_mm` and `stiffness_pa` belong to "global", where None takes them from mesh and material (see `contact`);
+    `penalty_pa_per_m` to "planes". `gap_mm` places the zones at the fissure for all kinds but "none".
+    """
+
+    kind: str = "global"
     penalty_pa_per_m: float = 5e5
     gap_mm: float = 2.5
+    distance_mm: float | None = None
+    stiffness_pa: float | None = None
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,7 @@ class FoldingParameters:
     ranks: int = 1
 
     def __post_init__(self) -> None:
-        axes, solver = self.no_growth.semi_axes, self.solver
+        axes, solver, contact = self.no_growth.semi_axes, self.solver, self.contact
         checks = {
             "end_week must come after start_week": self.end_week > self.start_week,
             "step_s must be positive": self.step_s > 0,
@@ -97,9 +105,9 @@ class FoldingParameters:
             "stress_memory_gw must not be negative": self.stress_memory_gw >= 0,
             f"support must be among {', '.join(SUPPORTS)}": self.support in SUPPORTS,
             "no_growth.kind must be ellipsoid or none": self.no_growth.kind in ("ellipsoid", "none"),
-            "contact.kind must be planes or none": self.contact.kind in ("planes", "none"),
-            "contact.penalty_pa_per_m and contact.gap_mm must be positive": min(
-                self.contact.penalty_pa_per_m, self.contact.gap_mm
+            f"contact.kind must be among {', '.join(CONTACTS)}": contact.kind in CONTACTS,
+            "contact.penalty_pa_per_m, gap_mm, distance_mm and stiffness_pa must be positive": min(
+                contact.penalty_pa_per_m, contact.gap_mm, contact.distance_mm or 1.0, contact.stiffness_pa or 1.0
             )
             > 0,
             "no_growth.semi_axes must be three positive numbers": len(axes) == 3 and min(axes) > 0,
@@ -195,6 +203,8 @@ def _converted(value: Any, hint: Any, key: str) -> Any:
         return parameters_from(value, hint, f"{key}.")
     if key == "stress_memory_gw" and value == "infinite":
         return math.inf
+    if hint == float | None:
+        return None if value is None else _converted(value, float, key)
     try:
         if get_origin(hint) is tuple:
             return tuple(_converted(item, get_args(hint)[0], key) for item in value)

@@ -23,6 +23,7 @@ from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
 from .rigid import FreeOperator, RigidMotions
+from .tangent import SumOperator, Tangent
 from .zones import LEFT_CONTACT, RIGHT_CONTACT, Zones
 
 Floats = NDArray[np.float64]
@@ -30,7 +31,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Material:
-    """What the problem needs of the parameters, in SI units."""
+    """What the problem needs of the parameters, in SI units; without a penalty the planes hold nothing back."""
 
     poisson_ratio: float
     penalty_pa_per_m: float
@@ -45,10 +46,10 @@ class Contribution(Protocol):
     def add_residual(self, out: PETSc.Vec) -> None:
         """Adds the energy's derivative in N to the owned components of a vector."""
 
-    def add_tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """Returns the matrix plus the energy's second derivative in N/m; the matrix itself may be changed.
+    def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
+        """Returns the energy's second derivative in N/m, or one made positive semidefinite; None where it is zero.
 
-        Rows and columns of fixed components need no care.
+        A sum of terms that couple at most four nodes each. Rows and columns of fixed components need no care.
         """
 
     def largest_step(self, direction: Floats) -> float:
@@ -113,7 +114,7 @@ class Problem:
             Fe = elastic_deformation(F, Fg_inverse)
             energy = strain_energy_density(Fe, self._mu, ratio * self._mu) * dx
         x = ufl.SpatialCoordinate(mesh)[0] + self.u[0]
-        if len(zones.vertices_of(LEFT_CONTACT)) or len(zones.vertices_of(RIGHT_CONTACT)):
+        if material.penalty_pa_per_m and len(zones.vertices_of(LEFT_CONTACT, RIGHT_CONTACT)):
             energy += contact_energy_density(x, planes[0], -1, penalty) * ds(LEFT_CONTACT)
             energy += contact_energy_density(x, planes[1], +1, penalty) * ds(RIGHT_CONTACT)
         residual = ufl.derivative(energy, self.u)
@@ -128,7 +129,7 @@ class Problem:
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
         self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
-        self._products: PETSc.Mat | None = None
+        self._sum: SumOperator | None = None
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
         self.mesh_moved()
@@ -202,29 +203,34 @@ class Problem:
             self._motions.remove(out.array_w)
         return out.norm()
 
-    def tangent(self) -> PETSc.Mat:
-        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed."""
+    def tangent(self, *, convex: bool = False) -> Tangent:
+        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
+
+        With `convex`, contributions leave out what is negative of theirs.
+        """
         blocks = self._blocks.blocks
         blocks.set_value(0.0)
         dolfinx.fem.assemble_matrix(blocks, self._tangent)
-        matrix = self._blocks.assembled()
-        self._products = None if self.contributions else self._blocks.for_products()
-        if self.contributions:
-            # a copy: entries in new places would break the coordinate form of the next assembly
-            matrix = matrix.copy()
-            for part in self.contributions:
-                matrix = part.add_tangent(matrix)
-            # they may have filled rows and columns of fixed components
-            matrix.zeroRowsColumns(self._fixed_global, diag=1.0)
-        return matrix
+        matrix, products = self._blocks.assembled(), self._blocks.for_products()
+        if not self.contributions:
+            return Tangent(matrix, products, ())
+        if self._sum is None:
+            # one object for all iterates, since multigrid keeps the first it is given
+            self._sum = SumOperator(products)
+            self._sum_matrix = self._sum.as_matrix()
+        parts = [part for part in (part.stiffness(convex=convex) for part in self.contributions) if part is not None]
+        for part in parts:
+            part.zeroRowsColumns(self._fixed_global, diag=0.0)
+        self._sum.parts = parts
+        return Tangent(matrix, self._sum_matrix, parts)
+
+    def hold(self, direction: PETSc.Vec) -> None:
+        """Sets the fixed components of a direction to exactly 0, which preconditioners miss by their tolerance."""
+        direction.array[self._fixed_owned] = 0.0
 
     def operator(self, tangent: PETSc.Mat) -> PETSc.Mat:
         """Returns what a tangent does to admissible displacements: for a free body, without rigid motions."""
         return tangent if self._motions is None else FreeOperator(tangent, self._motions).as_matrix()
-
-    def for_products(self) -> PETSc.Mat | None:
-        """Returns the tangent that was assembled last in a form with faster products, where there is one."""
-        return self._products
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""

@@ -45,19 +45,20 @@ def run(
     weeks = parameters.output_weeks
     if state is None:
         state = State.at_start(start, parameters.step_s)
-        elements = folding.element_fields(parameters.fields)
+        contact, elements = folding.contact_fields(parameters.fields), folding.element_fields(parameters.fields)
         if comm.rank == 0:
-            save_frame(folder, weeks[0], start, start, zones, parameters, maps, elements)
+            save_frame(folder, weeks[0], start, start, zones, parameters, maps, contact, elements)
     first, resumed = len(state.rows), time.monotonic()
     for week in weeks[1:]:
         until = seconds_to(week, parameters)
         while state.time_s < until * (1 - 1e-12):
             state = advance(folding, state, until)
             arrived = until - state.time_s < 1e-9 * until
-            elements = folding.element_fields(parameters.fields) if arrived else {}
+            asked = parameters.fields if arrived else ()
+            contact, elements = folding.contact_fields(asked), folding.element_fields(asked)
             if comm.rank == 0:
                 if arrived:
-                    save_frame(folder, week, state.positions, start, zones, parameters, maps, elements)
+                    save_frame(folder, week, state.positions, start, zones, parameters, maps, contact, elements)
                 write_checkpoint(folder / "state.h5", key, state)
                 rate = (time.monotonic() - resumed) / (len(state.rows) - first)
                 steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s

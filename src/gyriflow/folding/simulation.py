@@ -14,6 +14,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..mechanics.neo_hookean import bulk_to_shear_ratio
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
+from .contact import SelfContact, contact_settings
 from .domain import Domain
 from .layers import WEIGHT_REACH, PialSearch, layers_at
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
@@ -62,11 +63,17 @@ class Folding:
         self.maps = maps or {}
         require_maps(parameters, self.maps, len(mesh.vertices))
         self.domain = Domain(comm, mesh)
-        material = Material(parameters.poisson_ratio, parameters.contact.penalty_pa_per_m)
+        by_planes = parameters.contact.kind == "planes"
+        material = Material(parameters.poisson_ratio, parameters.contact.penalty_pa_per_m if by_planes else 0.0)
         self._remembers = parameters.stress_memory_gw > 0
         self.problem = Problem(
             self.domain, zones, material, quadrature_degree=quadrature_degree, remembers_stress=self._remembers
         )
+        self.contact: SelfContact | None = None
+        if parameters.contact.kind == "global":
+            settings = contact_settings(parameters, mesh, zones.facets, self.maps)
+            self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, settings)
+            self.problem.contributions.append(self.contact)
         self._pial = np.unique(zones.cortex_facets)
         self._growth = self.domain.local(zones.growth)
         self._local_maps = {name: self.domain.local(values) for name, values in self.maps.items()}
@@ -82,8 +89,8 @@ class Folding:
             nodes = self.domain.local(self._start)
             centres = nodes[self.domain.cells].mean(axis=1)
             self._start_normals = PialSearch(self._start, zones.cortex_facets).nearest_normals(centres)
-        settings = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
-        self.solver = NewtonSolver(self.problem, settings, floor)
+        limits = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
+        self.solver = NewtonSolver(self.problem, limits, floor)
 
     def set_layers(self, time_s: float, step_s: float) -> None:
         """Sets stiffness, growth and normals for a step from a time on, with parameters as in its middle."""
@@ -102,6 +109,8 @@ class Folding:
         normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
         self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
         self.problem.mesh_moved()
+        if self.contact is not None:
+            self.contact.mesh_moved()
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
@@ -138,6 +147,21 @@ class Folding:
             fields |= volume_ratio_fields(F, total)
         together = domain.gathered_cells(np.stack(list(fields.values()), axis=1))
         return dict(zip(fields, together.T, strict=True))
+
+    def contact_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
+        """Returns the contact pressure (n,) in Pa at all vertices if it is among `wanted`. Right after a step only."""
+        if self.contact is None or "contact_pressure" not in wanted:
+            return {}
+        return {"contact_pressure_pa": self.contact.pressure()}
+
+    def _contact_row(self, positions: Floats) -> dict[str, float]:
+        """Returns what the step table says of contact right after a solve that led to (n, 3) positions in m."""
+        if self.contact is not None:
+            distance = self.contact.smallest_distance_mm()
+            # what is farther apart than the barrier reaches is not looked for
+            near = {"min_distance_mm": distance if distance < math.inf else math.nan}
+            return {"contact_pairs": self.contact.pair_count(), **near}
+        return {"plane_penetration_mm": self.zones.penetration_mm(positions * MM_PER_M)}
 
     def trouble(self) -> str:
         """Returns where the last solve stood worst: the most compressed element and the largest residual, in mm."""
@@ -194,6 +218,7 @@ class Folding:
             "mean_u_mm": float(length.mean()),
             "max_u_pial_mm": float(length[self._pial].max()),
             "mean_u_pial_mm": float(length[self._pial].mean()),
+            **self._contact_row(domain.positions + u),
             "rung": RUNGS[count.rung],
             "seconds": time.monotonic() - began,
         }

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError, MeshError
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas
-from .zones import BASE, BETWEEN_PLANES, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, ZONE_NAMES, Zones
+from .zones import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES, Zones
 
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
@@ -23,8 +23,6 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
     centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
     clamped = np.isin(zones.facet_zone, (CLAMPED, BASE))
     sides = {"left": centroid_x < zones.fissure_x_mm, "right": centroid_x >= zones.fissure_x_mm}
-    beyond = [mesh.vertices[zones.vertices_of(LEFT_CONTACT), 0] - zones.planes_mm[0]]
-    beyond += [zones.planes_mm[1] - mesh.vertices[zones.vertices_of(RIGHT_CONTACT), 0]]
     return {
         "zones": {
             name: {"facets": int((zones.facet_zone == i).sum()), "area_mm2": float(areas[zones.facet_zone == i].sum())}
@@ -34,9 +32,7 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
             side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
         },
         "growing_vertices": int((zones.growth > 0).sum()),
-        "initial_penetration_mm": float(
-            max(0.0, *(gap.max() for gap in beyond if gap.size)) if any(gap.size for gap in beyond) else 0.0
-        ),
+        "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
         "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
     }
 

@@ -51,6 +51,12 @@ class Zones:
         """Returns the vertices of the facets of some zones, each once."""
         return np.unique(self.facets[np.isin(self.facet_zone, zones)])
 
+    def penetration_mm(self, positions: NDArray[np.float64]) -> float:
+        """Returns how far the fissure's walls stand beyond their planes at most, for (n, 3) positions in mm."""
+        left = positions[self.vertices_of(LEFT_CONTACT), 0] - self.planes_mm[0]
+        right = self.planes_mm[1] - positions[self.vertices_of(RIGHT_CONTACT), 0]
+        return float(max(left.max(initial=0.0), right.max(initial=0.0)))
+
     @property
     def cortex_facets(self) -> NDArray[np.int64]:
         """The (c, 3) facets under which the cortex lies: all but flat cuts."""
@@ -115,7 +121,7 @@ def find_zones(
     gap_mm
         Width of the fissure; the planes stand a quarter of it to the left and to the right of its middle.
     contact
-        Whether the hemispheres are kept apart by the planes.
+        Whether there is contact of any kind: facets near the fissure then are not clamped.
     shift_y, shift_z, semi_axes
         The ellipsoid of no growth, in fractions of the brain's extents (Tallinen et al. 2016).
     support
@@ -168,7 +174,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         mesh,
         fissure_x_mm=p.fissure_x_mm,
         gap_mm=p.contact.gap_mm,
-        contact=p.contact.kind == "planes",
+        contact=p.contact.kind != "none",
         shift_y=p.no_growth.shift_y,
         shift_z=p.no_growth.shift_z,
         semi_axes=p.no_growth.semi_axes,

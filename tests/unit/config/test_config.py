@@ -61,7 +61,7 @@ def test_all_mistakes_are_named_at_once():
         ("growth_rate_per_s", float("nan"), "finite"),
         ("ranks", 1.5, "integer"),
         ("fields", ["tension"], "'displacement'"),
-        ("contact", {"kind": "walls"}, "'planes' or 'none'"),
+        ("contact", {"kind": "walls"}, "'global', 'planes' or 'none'"),
     ],
 )
 def test_a_value_out_of_bounds_is_refused_with_the_bound(key, value, bound):

@@ -1,0 +1,213 @@
+"""Contact of the pial surface with itself: Incremental Potential Contact (Li et al. 2020), with the IPC Toolkit.
+
+Pairs of surface parts nearer than a distance d̂ repel each other with a barrier that grows without bound as they close
+in, and no displacement may cross a pair on its way. Every rank has the whole surface and does the same work, so that
+nothing but owned rows has to be agreed on.
+"""
+
+from dataclasses import dataclass
+
+import ipctk
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
+from ..errors import MeshError
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.triangles import TriangleMesh, edges
+from ..units import M_PER_MM, MM_PER_M
+from .domain import Domain
+from .parameters import FoldingParameters
+from .varying import Maps
+
+Floats = NDArray[np.float64]
+DISTANCE_PER_EDGE = 0.2
+"""Distance at which contact begins, in mean edge lengths of the surface: well below what the mesh resolves."""
+STIFFNESS_PER_MODULUS = 0.1
+"""The barrier's stiffness in shear moduli of the cortex. The pressure between folds, some tenths of the modulus, holds
+them at about half of the distance then; a stiffer barrier takes more iterations and changes nothing else."""
+BARRIER = ipctk.TwoStageBarrier()
+MARGIN_MM = 0.05
+"""How far the surface may move before pairs that can come near are looked for anew."""
+SWEEP = ipctk.AdditiveCCD(conservative_rescaling=0.9)
+"""Search for the first touch on a way (Li et al. 2021); it leaves a tenth of each pair's distance. Where surfaces meet
+flat on, interval bisection, the other choice, takes minutes."""
+N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """Distance d̂ in mm below which parts of the surface repel each other, and the barrier's stiffness in Pa."""
+
+    distance_mm: float
+    stiffness_pa: float
+
+
+def contact_settings(
+    parameters: FoldingParameters, mesh: TetrahedralMesh, facets: NDArray[np.int64], maps: Maps
+) -> ContactSettings:
+    """Returns the settings of a run: as given, or from the mesh at the start (mm) and the stiffest cortex."""
+    p = parameters
+    pairs, _ = edges(TriangleMesh(mesh.vertices, facets))
+    edge = float(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1), axis=-1).mean())
+    stiffest = p.shear_modulus_cortex_pa.range(maps, p.start_week, p.end_week)[1]
+    return ContactSettings(
+        p.contact.distance_mm or DISTANCE_PER_EDGE * edge, p.contact.stiffness_pa or STIFFNESS_PER_MODULUS * stiffest
+    )
+
+
+class SelfContact:
+    """The barrier between all parts of the pial surface: a contribution to the problem of a step.
+
+    Parameters
+    ----------
+    domain
+        The mesh.
+    displacement : (k, 3) float
+        The displacements in m of the local nodes that all methods refer to: the problem's own array.
+    facets : (f, 3) int
+        The surface, as vertex indices of the file.
+    settings
+        Distance and stiffness.
+
+    Raises
+    ------
+    MeshError
+        Where the surface crosses itself at the start.
+    """
+
+    def __init__(
+        self, domain: Domain, displacement: Floats, facets: NDArray[np.int64], settings: ContactSettings
+    ) -> None:
+        # the ranks do the same, one thread each: sums in the same order, and no thread in the way of another rank
+        ipctk.set_num_threads(1)
+        self.domain = domain
+        self.settings = settings
+        self._displacement = displacement
+        self._vertices, faces = np.unique(facets, return_inverse=True)
+        self._faces = np.asfortranarray(faces.reshape(-1, 3), dtype=np.int32)
+        surface = TriangleMesh(domain.positions[self._vertices], faces.reshape(-1, 3))
+        self._edges = np.asfortranarray(edges(surface)[0], dtype=np.int32)
+        self._barrier = ipctk.BarrierPotential(
+            BARRIER, settings.distance_mm, settings.stiffness_pa, use_physical_barrier=True
+        )
+        owned = domain.vertex_of_node[: domain.owned]
+        place = np.searchsorted(self._vertices, owned).clip(max=len(self._vertices) - 1)
+        self._owned_nodes = np.flatnonzero(self._vertices[place] == owned)
+        self._owned_rows = place[self._owned_nodes]
+        self._columns = domain.node_of_vertex[self._vertices]
+        self._search = ipctk.LBVH()
+        self._candidates = ipctk.Candidates()
+        self._centre: Floats | None = None  # where the candidates hold
+        self.mesh_moved()
+        if ipctk.has_intersections(self._surface, self._start):
+            raise MeshError(
+                "the pial surface of the mesh crosses itself",
+                expected="a surface without self-intersections, which contact could not undo",
+                remedy="Repair the surface, mesh with a smaller mesh.envelope_mm, or choose another "
+                "folding.contact.kind.",
+            )
+
+    def mesh_moved(self) -> None:
+        """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
+        self._start = np.asfortranarray(self.domain.positions[self._vertices] * MM_PER_M)
+        self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
+        self._known: Floats | None = None
+
+    def _on_surface(self, local: Floats) -> Floats:
+        """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""
+        return self.domain.gathered(local[: self.domain.owned])[self._vertices]
+
+    def _within_reach(self, positions: Floats) -> bool:
+        """Returns whether the known candidates hold all pairs that can be near at (s, 3) positions in mm."""
+        return self._centre is not None and bool(np.abs(positions - self._centre).max() <= MARGIN_MM)
+
+    def _state(self) -> tuple[Floats, ipctk.NormalCollisions]:
+        """Returns the (s, 3) positions in mm at the present displacement, and the pairs within the distance."""
+        u = self._on_surface(self._displacement)
+        if self._known is None or not np.array_equal(u, self._known):
+            self._known = u
+            self._positions = np.asfortranarray(self._start + u * MM_PER_M)
+            distance = self.settings.distance_mm
+            if not self._within_reach(self._positions):
+                self._centre = self._positions
+                self._candidates.build(self._surface, self._positions, distance / 2 + MARGIN_MM, self._search)
+            self._pairs = ipctk.NormalCollisions()
+            self._pairs.use_area_weighting = True
+            self._pairs.build(self._candidates, self._surface, self._positions, distance)
+        return self._positions, self._pairs
+
+    def energy(self) -> float:
+        """Returns the barrier's energy in J."""
+        positions, pairs = self._state()
+        return float(self._barrier(pairs, self._surface, positions)) * J_PER_PA_MM3
+
+    def forces(self) -> Floats:
+        """Returns the (s, 3) derivative of the energy in N at the surface's vertices."""
+        positions, pairs = self._state()
+        if not len(pairs):
+            return np.zeros_like(positions)
+        return self._barrier.gradient(pairs, self._surface, positions).reshape(-1, 3) * N_PER_PA_MM2
+
+    def add_residual(self, out: PETSc.Vec) -> None:
+        """Adds the forces in N to the owned components of a vector."""
+        out.array.reshape(-1, 3)[self._owned_nodes] += self.forces()[self._owned_rows]
+
+    def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
+        """Returns the second derivative in N/m, None without any pair; `convex` leaves out what is negative of each."""
+        positions, pairs = self._state()
+        if not len(pairs):
+            return None
+        kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
+        hessian = self._barrier.hessian(pairs, self._surface, positions, kind) * N_PER_M_PER_PA_MM
+        return self._distributed(sparse.csr_matrix(hessian))
+
+    def _distributed(self, matrix: sparse.csr_matrix) -> PETSc.Mat:
+        """Returns the PETSc matrix of all unknowns from one of the surface's, of which each rank takes its rows."""
+        components = np.arange(3)
+        rows = matrix[(3 * self._owned_rows[:, None] + components).ravel()]
+        counts = np.zeros((self.domain.owned, 3), dtype=PETSc.IntType)
+        counts[self._owned_nodes] = np.diff(rows.indptr).reshape(-1, 3)
+        # owned rows are in the order of the nodes
+        start = np.concatenate([[0], np.cumsum(counts.ravel())]).astype(PETSc.IntType)
+        vertex, component = np.divmod(rows.indices, 3)
+        columns = (3 * self._columns[vertex] + component).astype(PETSc.IntType)
+        size = (3 * self.domain.owned, 3 * len(self.domain.positions))
+        result = PETSc.Mat().createAIJ((size, size), bsize=3, csr=(start, columns, rows.data), comm=self.domain.comm)
+        result.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        return result
+
+    def largest_step(self, direction: Floats) -> float:
+        """Returns the part of (k, 3) local displacements that can be added without any touch on the way."""
+        positions, _ = self._state()
+        target = np.asfortranarray(positions + self._on_surface(direction) * MM_PER_M)
+        if self._within_reach(positions) and self._within_reach(target):
+            free = self._candidates.compute_collision_free_stepsize(
+                self._surface, positions, target, narrow_phase_ccd=SWEEP
+            )
+        else:
+            free = ipctk.compute_collision_free_stepsize(
+                self._surface, positions, target, broad_phase=self._search, narrow_phase_ccd=SWEEP
+            )
+        # the same on every rank whatever its processor rounds
+        return self.domain.comm.allreduce(float(free), op=MPI.MIN)
+
+    def smallest_distance_mm(self) -> float:
+        """Returns the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""
+        positions, pairs = self._state()
+        if not len(pairs):
+            return np.inf
+        return float(np.sqrt(pairs.compute_minimum_distance(self._surface, positions)))
+
+    def pair_count(self) -> int:
+        """Returns the number of pairs within the distance."""
+        return len(self._state()[1])
+
+    def pressure(self) -> Floats:
+        """Returns the (n,) contact pressure in Pa at all vertices of the file, 0 off the surface: force per area."""
+        areas = np.array(self._surface.vertex_areas) * M_PER_MM**2
+        values = np.zeros(len(self.domain.positions))
+        values[self._vertices] = np.linalg.norm(self.forces(), axis=1) / areas
+        return values

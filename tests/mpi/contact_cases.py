@@ -1,0 +1,248 @@
+"""Contact of the surface with itself: forces, pressed blocks, large steps, a closing sulcus, mirrored hemispheres."""
+
+import sys
+from pathlib import Path
+
+import igl.predicates
+import ipctk
+import numpy as np
+import pytest
+from boxes import COMM, MATERIAL, everywhere_known, smooth_displacement
+from scipy.optimize import brentq
+from shapes import box_mesh, ellipsoid_mesh
+
+from gyriflow.errors import MeshError
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.contact import ContactSettings, SelfContact
+from gyriflow.folding.domain import Domain
+from gyriflow.folding.newton import NewtonSettings, NewtonSolver
+from gyriflow.folding.parameters import parameters_from
+from gyriflow.folding.problem import Problem
+from gyriflow.folding.simulation import Folding
+from gyriflow.folding.zones import CLAMPED, FREE, SIDE_X, SIDE_Y, Zones, zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.units import M_PER_MM, MM_PER_M
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from verification_cases.mirrored import folded, hemisphere
+
+HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2
+MU, NU = 1000.0, MATERIAL.poisson_ratio
+
+
+def two_blocks(cells=(5, 5, 3), other=(5, 5, 3), gap=GAP_MM):
+    """Returns two boxes, one above the other, a gap apart."""
+    low, high = (box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM)) for n in (cells, other))
+    shift = np.array([0.0, 0.0, (HEIGHT_MM + gap) / 2])
+    vertices = np.concatenate([low.vertices - shift, high.vertices + shift])
+    return TetrahedralMesh(vertices, np.concatenate([low.tets, high.tets + len(low.vertices)]))
+
+
+def in_a_tube(mesh):
+    """Returns zones that hold the ends of two blocks and let their sides slide."""
+    facets, _ = boundary_faces(mesh)
+    centre = mesh.vertices[facets].mean(axis=1)
+    zone = np.full(len(facets), FREE)
+    zone[np.abs(centre[:, 0]) > SIDE_MM / 2 - 1e-6] = SIDE_X
+    zone[np.abs(centre[:, 1]) > SIDE_MM / 2 - 1e-6] = SIDE_Y
+    zone[np.abs(centre[:, 2]) > np.abs(mesh.vertices[:, 2]).max() - 1e-6] = CLAMPED
+    return Zones(facets, zone, np.ones(len(mesh.vertices)), 0.0, (-0.5, 0.5))
+
+
+def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z=0.0):
+    domain = Domain(COMM, mesh)
+    problem = Problem(domain, zones, MATERIAL)
+    nodes, cells = len(domain.vertex_of_node), len(domain.cells)
+    normal = np.tile([0.0, 0.0, 1.0], (cells, 1))
+    problem.set_layers(np.full(nodes, MU), np.zeros(nodes), np.full(nodes, growth_along_z), normal)
+    contact = SelfContact(domain, problem.displacement, zones.facets, ContactSettings(distance, stiffness))
+    problem.contributions.append(contact)
+    return problem, contact
+
+
+def approach(domain):
+    """Returns displacements of the local nodes in m by which two blocks close half of their gap, not evenly."""
+    x = domain.local(domain.positions)
+    u = smooth_displacement(domain, 1e-5)
+    u[:, 2] -= np.sign(x[:, 2]) * GAP_MM / 4 * M_PER_MM
+    return u
+
+
+def test_forces_fit_the_energy_and_stiffness_the_forces():
+    # grids that do not match: where edges are parallel, which parts are nearest changes at once
+    mesh = two_blocks(other=(4, 3, 3))
+    problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
+    domain, u = problem.domain, approach(problem.domain)
+    v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
+    problem.set_displacement(u)
+    energy, residual, change = contact.energy(), problem.new_vector(), problem.new_vector()
+    direction, other = problem.new_vector(), problem.new_vector()
+    direction.array[:] = v[: domain.owned].ravel()
+    residual.set(0.0)
+    contact.add_residual(residual)
+    contact.stiffness().mult(direction, change)
+    errors = []
+    for h in (0.2, 0.1):
+        problem.set_displacement(u + h * v)
+        first = abs(contact.energy() - energy - h * residual.dot(direction))
+        other.set(0.0)
+        contact.add_residual(other)
+        other.axpy(-1.0, residual)
+        other.axpy(-h, change)
+        errors.append((first, other.norm()))
+    assert energy > 0
+    assert np.log2(np.array(errors[0]) / errors[1]) == pytest.approx([2.0, 2.0], abs=0.15)
+
+
+def test_forces_have_no_sum_and_no_moment():
+    mesh = two_blocks()
+    problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
+    problem.set_displacement(approach(problem.domain))
+    forces = contact.forces()
+    places = (problem.domain.positions + everywhere_known(problem))[np.unique(boundary_faces(mesh)[0])]
+    size = np.abs(forces).sum()
+    assert size > 0
+    assert np.abs(forces.sum(axis=0)).max() <= 1e-12 * size
+    assert np.abs(np.cross(places, forces).sum(axis=0)).max() <= 1e-12 * size * np.abs(places).max()
+
+
+def test_the_preconditioner_sees_contact_and_the_forms_of_the_tangent_agree():
+    mesh = two_blocks()
+    problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
+    for part in (1.0, 0.9):  # the second time into the same places
+        problem.set_displacement(part * approach(problem.domain))
+        tangent = problem.tangent()
+        x, one, other, bound = (problem.new_vector() for _ in range(4))
+        x.array[:] = smooth_displacement(problem.domain, 1.0)[: problem.domain.owned].ravel()
+        tangent.products.mult(x, one)
+        tangent.whole().mult(x, other)
+        tangent.smoothing.mult(x, bound)
+        other.axpy(-1.0, one)
+        assert other.norm() <= 1e-12 * one.norm()
+        assert contact.pair_count() > 0
+        assert bound.dot(x) >= one.dot(x)
+
+
+def stress_at(stretch, growth):
+    """Returns the first Piola-Kirchhoff stress in Pa along z of uniaxial strain after growth along z."""
+    K = 2 * MU * (1 + NU) / (3 * (1 - 2 * NU))
+    Fe = stretch / (1 + growth)
+    by_Fe = MU / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3)) + K * (Fe - 1)
+    return by_Fe / (1 + growth)
+
+
+def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance():
+    growth, gaps = 0.2, []
+    mesh = two_blocks()
+    zones = in_a_tube(mesh)
+    for distance in (0.2, 0.1, 0.05):
+        problem, contact = problem_with_contact(mesh, zones, distance, growth_along_z=growth)
+        solver = NewtonSolver(problem, NewtonSettings(1e-9, 1e-6, max_newton=60), residual_floor=0.0)
+        solver.solve(np.zeros_like(problem.displacement))
+        place = mesh.vertices + everywhere_known(problem) * MM_PER_M
+        on_top = np.isclose(mesh.vertices[:, 2], -GAP_MM / 2)
+        below = np.isclose(mesh.vertices[:, 2], GAP_MM / 2)
+        gaps.append(place[below, 2].mean() - place[on_top, 2].mean())
+        forces = np.zeros_like(place)
+        forces[np.unique(zones.facets)] = contact.forces()
+        pressure = forces[on_top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
+        stretch = 1 + (GAP_MM - gaps[-1]) / 2 / HEIGHT_MM
+        assert pressure == pytest.approx(-stress_at(stretch, growth), rel=0.01)
+    assert 0 < gaps[2] < gaps[1] < gaps[0] < 0.2
+    # to each pressure belongs a part of the distance
+    assert gaps[2] / gaps[1] == pytest.approx(0.5, abs=0.1)
+    # close to that of blocks that touch
+    assert pressure == pytest.approx(-stress_at(1 + GAP_MM / 2 / HEIGHT_MM, growth), rel=0.05)
+    assert brentq(lambda stretch: stress_at(stretch, growth), 0.9, 1.4) == pytest.approx(1 + growth)
+
+
+def two_balls():
+    ball = ellipsoid_mesh(2, (4.0, 4.0, 4.0))
+    vertices = np.concatenate([ball.vertices - [4.1, 0.0, 0.0], ball.vertices + [4.1, 0.0, 0.0]])
+    return TetrahedralMesh(vertices, np.concatenate([ball.tets, ball.tets + len(ball.vertices)]))
+
+
+def test_ten_thousand_large_random_steps_cross_nothing():
+    mesh = two_balls()
+    facets, _ = boundary_faces(mesh)
+    domain = Domain(COMM, mesh)
+    displacement = np.zeros((len(domain.vertex_of_node), 3))
+    contact = SelfContact(domain, displacement, facets, ContactSettings(0.2, 1000.0))
+    random = np.random.default_rng(5)
+    surface = ipctk.CollisionMesh(mesh.vertices, ipctk.edges(facets.astype(np.int32)), facets.astype(np.int32))
+    cut = 0
+    for _ in range(10_000 // COMM.size**2):
+        # each vertex by millimetres, the balls towards each other
+        direction = random.normal(0.0, 1.0, mesh.vertices.shape) * M_PER_MM
+        direction[:, 0] -= np.sign(mesh.vertices[:, 0]) * 0.5 * M_PER_MM
+        length = contact.largest_step(domain.local(direction))
+        cut += length < 1
+        displacement += length * domain.local(direction)
+        place = mesh.vertices + domain.gathered(displacement[: domain.owned]) * MM_PER_M
+        assert not ipctk.has_intersections(surface, np.asfortranarray(place))
+        # no force drives apart here what has come near
+        if contact.smallest_distance_mm() < 1e-3:
+            displacement[:] = 0.0
+    assert cut > 100
+
+
+def test_a_surface_that_crosses_itself_is_refused():
+    mesh = two_balls()
+    mesh = TetrahedralMesh(mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets)
+    facets, _ = boundary_faces(mesh)
+    with pytest.raises(MeshError, match="crosses itself"):
+        SelfContact(Domain(COMM, mesh), np.zeros((1, 3)), facets, ContactSettings(0.2, 1000.0))
+
+
+def slab_with_a_sulcus():
+    """Returns a block with a narrow groove along y in its top, in mm."""
+    mesh = grid([np.linspace(-6.0, 6.0, 25), np.linspace(-1.5, 1.5, 4), np.linspace(0.0, 6.0, 11)])
+    x, y, z = mesh.vertices.T
+    groove = 3.0 * np.exp(-((x / 0.5) ** 2))
+    # even in y but for a trace, so that nothing meets exactly
+    lift = 1 - groove / 6.0 + 1e-3 * np.sin(1.3 * y + x)
+    return TetrahedralMesh(np.stack([x, y, z * lift], axis=1), mesh.tets)
+
+
+def closed_sulcus(kind):
+    mesh = slab_with_a_sulcus()
+    p = parameters_from(
+        {
+            "start_week": 21.0,
+            "end_week": 30.0,
+            "output_weeks": [21.0, 30.0],
+            "fissure_x_mm": 0.0,
+            "thickness_mm": 2.0,
+            "growth_rate_per_s": 1e-6,
+            "support": "box",
+            "contact": {"kind": kind},
+            "no_growth": {"kind": "none"},
+        }
+    )
+    zones = zones_of_run(mesh, p)
+    folding = Folding(COMM, mesh, zones, p)
+    state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    for _ in range(12):
+        state = folding.step(state, p.step_s)
+    _, crossing, _ = igl.predicates.find_self_intersections(state.positions * MM_PER_M, zones.facets)
+    return state, len(crossing) > 0
+
+
+def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
+    state, crosses = closed_sulcus("none")
+    assert crosses
+    state, crosses = closed_sulcus("global")
+    assert not crosses
+    row = state.rows[-1]
+    assert row["contact_pairs"] > 0
+    assert 0 < row["min_distance_mm"] < 0.2
+    assert min(row["min_J"] for row in state.rows) > 0
+    assert (COMM.bcast(state.positions) == state.positions).all()
+
+
+def test_hemispheres_that_press_on_each_other_stay_mirror_images():
+    changes = {"contact": {"kind": "global", "gap_mm": 1.9, "distance_mm": 0.4}}
+    # growth as it is there: pressed harder, vertices that meet exactly would rather slide aside
+    state, found = folded(hemisphere(6), 5, COMM, core_growth_rate_per_s=2e-7, **changes)
+    assert state.rows[-1]["contact_pairs"] > 0
+    assert found.relative <= 1e-8
