@@ -1,0 +1,81 @@
+"""A web server on this machine for tests of downloads: it can break off, ignore ranges, and remembers what it sent."""
+
+import gzip
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
+
+
+@dataclass
+class Server:
+    """What is served, and how."""
+
+    files: dict[str, bytes]
+    broken_after: dict[str, list[int]] = field(default_factory=dict)
+    """By path, the bytes after which one answer each breaks off, in order; further answers are whole."""
+    ranges: bool = True
+    versions: bool = True
+    asked: list[tuple[str, str | None]] = field(default_factory=list)
+    """Path and asked range of each request."""
+    url: str = ""
+
+    def version(self, path: str) -> str:
+        return f'"{hashlib.sha256(self.files[path]).hexdigest()[:16]}"'
+
+
+@contextmanager
+def serving(server: Server) -> Iterator[Server]:
+    """Serves until the block ends, at `server.url`."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+        def do_GET(self) -> None:
+            path = self.path.lstrip("/")
+            asked = self.headers.get("Range")
+            server.asked.append((path, asked))
+            if path not in server.files:
+                self.send_error(404)
+                return
+            content = server.files[path]
+            start = 0
+            if asked and server.ranges and self.headers.get("If-Range") == server.version(path):
+                start = int(asked.removeprefix("bytes=").removesuffix("-"))
+                self.send_response(206)
+                self.send_header("Content-Range", f"bytes {start}-{len(content) - 1}/{len(content)}")
+            else:
+                self.send_response(200)
+            if server.versions:
+                self.send_header("ETag", server.version(path))
+            self.send_header("Content-Length", str(len(content) - start))
+            self.end_headers()
+            breaks = server.broken_after.get(path)
+            end = start + breaks.pop(0) if breaks else len(content)
+            self.wfile.write(content[start:end])
+            self.close_connection = True
+
+    web = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.url = f"http://127.0.0.1:{web.server_address[1]}"
+    thread = Thread(target=web.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
+    thread.start()
+    try:
+        yield server
+    finally:
+        web.shutdown()
+        web.server_close()
+        thread.join()
+
+
+def packed(size: int, seed: int = 0) -> bytes:
+    """Returns a gzip file of about so many bytes that do not shrink."""
+    block = b"".join(hashlib.sha256(f"{seed} {number}".encode()).digest() for number in range(size // 32))
+    return gzip.compress(block, mtime=0)
+
+
+def gifti(text: str = "") -> bytes:
+    """Returns what passes for a whole GIFTI file."""
+    return f'<?xml version="1.0"?>\n<GIFTI Version="1.0">{text}</GIFTI>\n'.encode()
