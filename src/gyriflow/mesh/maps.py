@@ -123,6 +123,25 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     return values
 
 
+def volume_pose(report: Mapping, path: str) -> Floats:
+    """Returns the (4, 4) motion from a brain's volumes to its surface, from the report of the surface.
+
+    Raises
+    ------
+    InputError
+        Where its hemispheres were posed separately: a volume cannot follow two motions.
+    """
+    if "posing" in report and not report["posing"]["together"]:
+        raise InputError(
+            "a volume cannot be the map of a brain whose hemispheres were posed separately",
+            path=path,
+            found="one motion for the left and another for the right hemisphere (posing in surface.json)",
+            expected="hemispheres that lie in the coordinates of one brain",
+            remedy="Give the map per vertex (GIFTI), on the surfaces in results/, or hemispheres posed as one brain.",
+        )
+    return np.array(report["pose"])
+
+
 def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:
     """Raises InputError where values of a map are not within the bounds (gt, ge, le) of its parameter.
 

@@ -1,26 +1,35 @@
-"""Edge lengths that grow with depth below the surface, on a background mesh for the mesher."""
+"""Edge lengths: at the surface from a number of faces, below it growing with depth, on a background mesh."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.tetrahedra import TetrahedralMesh, grid
-from ..geometry.triangles import TriangleMesh
+from ..geometry.triangles import TriangleMesh, area
 
-FINE_DEPTH = 2.5
-"""Depth of the layer of fine elements, in surface edge lengths: just more than the cortex that they must resolve."""
-GROWTH = 0.5
-"""Increase of edge length per depth below the fine layer."""
+FACE_AREA = np.sqrt(3) / 4
+"""Area of an equilateral triangle, in edges squared."""
 
 
-def edge_length_at(depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float) -> NDArray[np.float64]:
-    """Returns the wanted edge length in mm at depths in mm below the surface."""
-    below = np.maximum(depth - FINE_DEPTH * surface_edge_mm, 0.0)
-    return np.minimum(surface_edge_mm + GROWTH * below, core_edge_mm)
+def edge_length_for(surface: TriangleMesh, faces: int) -> float:
+    """Returns the edge length in mm with which equilateral triangles on a surface are so many."""
+    return float(np.sqrt(area(surface) / (FACE_AREA * faces)))
+
+
+def edge_length_at(
+    depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, fine_depth_edges: float, growth: float
+) -> NDArray[np.float64]:
+    """Returns the wanted edge length in mm at depths in mm below the surface.
+
+    It is that of the surface down to `fine_depth_edges` of them, grows by `growth` per mm from there on, and ends at
+    that of the core.
+    """
+    below = np.maximum(depth - fine_depth_edges * surface_edge_mm, 0.0)
+    return np.minimum(surface_edge_mm + growth * below, core_edge_mm)
 
 
 def background_mesh(
-    surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float
+    surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, fine_depth_edges: float, growth: float
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
     """Returns a regular tetrahedral grid around the surface and the wanted edge length in mm at its vertices."""
     spacing = max(2 * surface_edge_mm, 1.0)
@@ -28,4 +37,4 @@ def background_mesh(
     counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
     background = grid([start + spacing * np.arange(count) for start, count in zip(low, counts, strict=True)])
     depth = cKDTree(surface.vertices).query(background.vertices)[0]
-    return background, edge_length_at(depth, surface_edge_mm, core_edge_mm)
+    return background, edge_length_at(depth, surface_edge_mm, core_edge_mm, fine_depth_edges, growth)

@@ -1,21 +1,27 @@
-"""Filling a closed surface with tetrahedra by fTetWild (pytetwild), in a process of its own with a time limit.
+"""Filling a closed surface with tetrahedra, and refusing a mesh that is not the inside of it."""
 
-`python -m gyriflow.mesh.tetrahedralisation` is that process: arrays come in on standard input and leave on standard
-output.
-"""
-
-import io
-import os
-import subprocess
-import sys
-import tempfile
+import logging
+from typing import Any, Literal
 
 import numpy as np
 
 from ..errors import MeshError
+from ..geometry.crossings import crossing_faces
+from ..geometry.remeshing import remeshed, untangled
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
-from .sizing import background_mesh
+from .improvement import improved
+from .meshers import run_mesher
+from .sizing import background_mesh, edge_length_for
+
+log = logging.getLogger(__name__)
+
+Mesher = Literal["pytetwild", "tetgen"]
+NEAR = 0.02
+"""A remeshed surface has the number of faces that was asked for when it differs by this part."""
+ATTEMPTS = 4
+REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
+"""Volume of the regular tetrahedron, in edges cubed."""
 
 
 def tetrahedralise(
@@ -25,6 +31,10 @@ def tetrahedralise(
     core_edge_mm: float,
     envelope_mm: float,
     time_limit_s: float,
+    mesher: Mesher = "pytetwild",
+    pial_faces: int | None = None,
+    fine_depth_edges: float = 2.5,
+    edge_growth: float = 0.5,
 ) -> TetrahedralMesh:
     """Returns a tetrahedral mesh of the inside of a closed surface.
 
@@ -35,9 +45,18 @@ def tetrahedralise(
     surface_edge_mm, core_edge_mm
         Edge length at the surface, and deep inside.
     envelope_mm
-        How far the mesh's surface may be from the given one.
+        How far pytetwild may leave the given surface.
     time_limit_s
         The mesher is stopped after this time.
+    mesher
+        "pytetwild" (fTetWild) makes a surface of its own within the envelope, and sizes elements by their depth.
+        "tetgen" keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as
+        their quality allows, and the poor ones are improved.
+    pial_faces
+        About how many faces the mesh's surface is to have; `surface_edge_mm` then follows from it.
+    fine_depth_edges, edge_growth
+        For pytetwild: down to this depth in surface edges elements are as fine as at the surface; below, edges grow
+        by this part of each mm.
 
     Raises
     ------
@@ -48,52 +67,55 @@ def tetrahedralise(
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
         raise MeshError("the surface to be filled must be closed and face outwards", remedy="Repair it first.")
-    background, lengths = background_mesh(surface, surface_edge_mm, core_edge_mm)
-    diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
-    arrays = {
-        "vertices": surface.vertices,
-        "faces": surface.faces,
-        "bg_vertices": background.vertices,
-        "bg_tets": background.tets,
-        "bg_values": lengths,
-        "edge": core_edge_mm,
-        "epsilon": envelope_mm / diagonal,
-    }
-    mesh = _in_own_process(arrays, time_limit_s)
+    edge = edge_length_for(surface, pial_faces) if pial_faces else surface_edge_mm
+    core = max(core_edge_mm, edge)
+    if mesher == "tetgen":
+        even = even_surface(surface, edge, pial_faces)
+        arrays: dict[str, Any] = {
+            "vertices": even.vertices,
+            "faces": even.faces,
+            "volume": REGULAR_VOLUME * core**3,
+        }
+    else:
+        background, lengths = background_mesh(surface, edge, core, fine_depth_edges, edge_growth)
+        arrays = {
+            "vertices": surface.vertices,
+            "faces": surface.faces,
+            "bg_vertices": background.vertices,
+            "bg_tets": background.tets,
+            "bg_values": lengths,
+            "edge": core,
+            "epsilon": envelope_mm / float(np.linalg.norm(np.ptp(surface.vertices, axis=0))),
+        }
+    mesh = run_mesher(mesher, arrays, time_limit_s)
     _refuse_other_shape(mesh, surface)
-    return mesh
+    # fTetWild has optimised its elements itself
+    return improved(mesh) if mesher == "tetgen" else mesh
 
 
-def _in_own_process(arrays: dict, time_limit_s: float) -> TetrahedralMesh:
-    sent = io.BytesIO()
-    np.savez(sent, **arrays)
-    try:
-        # the mesher leaves a file in its working folder
-        with tempfile.TemporaryDirectory() as folder:
-            process = subprocess.run(
-                [sys.executable, "-m", __name__],
-                input=sent.getvalue(),
-                capture_output=True,
-                timeout=time_limit_s,
-                check=False,
-                cwd=folder,
-                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            )
-    except subprocess.TimeoutExpired as expired:
-        log = (expired.stderr or b"").decode(errors="replace")[-1000:]
+def even_surface(surface: TriangleMesh, edge_mm: float, faces: int | None) -> TriangleMesh:
+    """Returns a surface remeshed with even triangles, fit to be the boundary of a mesh as it is.
+
+    Its edges are `edge_mm` long, or such that it has about so many faces. MeshError where it cuts itself.
+    """
+    even = remeshed(surface, edge_mm)
+    for _ in range(ATTEMPTS if faces else 0):
+        if abs(len(even.faces) - faces) <= NEAR * faces:  # type: ignore[operator]
+            break
+        edge_mm *= float(np.sqrt(len(even.faces) / faces))  # type: ignore[operator]
+        even = remeshed(surface, edge_mm)
+    if crossing_faces(even):
+        even = untangled(even)
+    crossing = crossing_faces(even)
+    log.info("surface remeshed to %d faces, edges of %.3f mm, %d faces cross", len(even.faces), edge_mm, crossing)
+    if crossing:
         raise MeshError(
-            f"the mesher was stopped after {time_limit_s:g} s",
-            found=f"its last words: {log or 'none'}",
-            remedy="Raise mesh.time_limit_s, or mesh with longer edges.",
-        ) from None
-    if process.returncode != 0:
-        raise MeshError(
-            f"the mesher failed with exit code {process.returncode}",
-            found=process.stderr.decode(errors="replace")[-1000:] or "no message",
-            remedy="A negative code is a signal: -9 means that memory ran out.",
+            "the surface cuts itself and cannot be kept as it is",
+            found=f"{crossing} faces that cross others after remeshing to edges of {edge_mm:.2f} mm",
+            expected="none",
+            remedy="Use mesh.mesher: pytetwild, or shorter edges, or repair or smooth the surface.",
         )
-    with np.load(io.BytesIO(process.stdout)) as received:
-        return TetrahedralMesh(received["vertices"], received["tets"])
+    return even
 
 
 def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
@@ -117,31 +139,3 @@ def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
             found="; ".join(found),
             remedy="Mesh with a smaller mesh.envelope_mm, or smooth the surface more.",
         )
-
-
-def _mesh_from_standard_input() -> None:
-    import pytetwild
-
-    output = os.dup(1)
-    os.dup2(2, 1)  # what the mesher prints must not mix with the arrays
-    with np.load(io.BytesIO(sys.stdin.buffer.read())) as arrays:
-        vertices, tets = pytetwild.tetrahedralize(
-            arrays["vertices"],
-            arrays["faces"].astype(np.uint32),
-            edge_length_abs=float(arrays["edge"]),
-            epsilon=float(arrays["epsilon"]),
-            simplify=False,
-            vtk_ordering=True,
-            bg_vertices=arrays["bg_vertices"],
-            bg_tets=arrays["bg_tets"].astype(np.int32),
-            bg_values=arrays["bg_values"],
-        )
-    used, local = np.unique(tets, return_inverse=True)
-    sent = io.BytesIO()
-    np.savez(sent, vertices=vertices[used], tets=local.reshape(-1, 4))
-    with os.fdopen(output, "wb") as stream:
-        stream.write(sent.getvalue())
-
-
-if __name__ == "__main__":
-    _mesh_from_standard_input()

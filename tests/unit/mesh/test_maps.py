@@ -9,7 +9,7 @@ from shapes import box_mesh, ellipsoid_mesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
-from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh
+from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
 
 RADIUS = 20.0
 SLOPE = np.array([0.3, -0.7, 0.2])
@@ -194,3 +194,15 @@ def test_values_that_a_parameter_cannot_have_are_refused_with_their_count():
     ) as caught:
         require_within(np.array([0.0, 1.5, 1500.0]), bounds, "thickness.shape.gii")
     assert all(words in str(caught.value) for words in ("thickness.shape.gii", "medial wall"))
+
+
+def test_a_volume_follows_the_one_motion_of_a_brain():
+    motion = pose(10, 20, 30)
+    for posing in ({}, {"posing": {"together": True}}):
+        assert volume_pose({"pose": motion.tolist()} | posing, "a.nii") == pytest.approx(motion)
+
+
+def test_a_volume_cannot_follow_hemispheres_that_were_posed_separately():
+    report = {"pose": np.eye(4).tolist(), "posing": {"together": False}}
+    with pytest.raises(InputError, match=r"a\.nii: a volume cannot be the map.*posed separately.*per vertex \(GIFTI\)"):
+        volume_pose(report, "a.nii")

@@ -1,9 +1,5 @@
 """Sizing, quality and tetrahedralisation."""
 
-import runpy
-from pathlib import Path
-from types import SimpleNamespace
-
 import igl
 import numpy as np
 import pytest
@@ -13,14 +9,17 @@ from shapes import box_mesh
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, transformed
-from gyriflow.io.surfaces import write_surface
-from gyriflow.mesh.quality import dihedral_angles, quality_summary, radius_ratios, refuse_bad_elements
-from gyriflow.mesh.sizing import background_mesh, edge_length_at
+from gyriflow.mesh.quality import dihedral_angles, elements_through, quality_summary, radius_ratios, refuse_bad_mesh
+from gyriflow.mesh.sizing import background_mesh, edge_length_at, edge_length_for
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 
-REGULAR = TetrahedralMesh([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 2, 1, 3]])
-SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "tetrahedralise.py"
-OUTPUTS = {"mesh": "brain.xdmf", "data": "brain.h5", "surface": "pial.stl", "quality": "quality.json"}
+REGULAR = TetrahedralMesh([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 1, 2, 3]])
+GATES = {
+    "min_radius_ratio": 0.02,
+    "min_dihedral_deg": 1.0,
+    "max_dihedral_deg": 178.0,
+    "max_surface_distance_mm": 0.1,
+}
 SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
 
 
@@ -42,27 +41,71 @@ def test_the_corner_element_has_its_known_quality():
     np.testing.assert_allclose(angles, [np.degrees(np.arccos(1 / np.sqrt(3)))] * 3 + [90] * 3, rtol=1e-12)
 
 
-def test_flat_elements_are_refused_with_their_place():
+def summary_of(mesh):
+    return quality_summary(mesh, boundary_surface(mesh)[0])
+
+
+def test_a_good_mesh_passes_every_gate():
+    refuse_bad_mesh(REGULAR, summary_of(REGULAR), **(GATES | {"min_radius_ratio": 0.99, "min_dihedral_deg": 70.0}))
+
+
+def test_flat_elements_are_refused_with_their_place_and_all_gates_they_fail():
     flat = TetrahedralMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1e-3]], [[0, 1, 2, 3]])
-    with pytest.raises(MeshError, match=r"1 of 1 elements.*radius ratio 0\.00"):
-        refuse_bad_elements(flat, 0.02)
-    refuse_bad_elements(REGULAR, 0.99)
+    with pytest.raises(
+        MeshError, match=r"1 of 1 elements with radius ratio to 7\.1\d*e-06 at \[0\.3, 0\.3, 0\.0\].* to 179"
+    ) as error:
+        refuse_bad_mesh(flat, summary_of(flat), **GATES)
+    assert "dihedral angle in degrees at least 1" in str(error.value)
+
+
+def test_a_surface_that_left_the_given_one_is_refused():
+    box = box_mesh((2, 2, 2), (4.0, 4.0, 4.0))
+    larger = box_mesh((2, 2, 2), (5.0, 5.0, 5.0))
+    summary = quality_summary(box, boundary_surface(larger)[0])
+    # the corner of the larger box is √3/2 from the smaller one, its faces 0.5
+    assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.5 * np.sqrt(3))
+    with pytest.raises(MeshError, match=r"surface 0\.\d+ mm from the one that was filled.*max_surface_distance_mm"):
+        refuse_bad_mesh(box, summary, **GATES)
+    refuse_bad_mesh(box, summary, **(GATES | {"max_surface_distance_mm": 1.0}))
+
+
+def test_faces_that_cross_are_refused():
+    box = box_mesh((2, 2, 2), (4.0, 4.0, 4.0))
+    with pytest.raises(MeshError, match="7 faces of its surface that cross others"):
+        refuse_bad_mesh(box, summary_of(box) | {"crossing_faces": 7}, **GATES)
+
+
+def test_elements_through_a_layer_are_its_thickness_over_the_edge_length():
+    # each of a cube's six tetrahedra has three edges of the cube, two diagonals of faces and that of the cube
+    box = box_mesh((10, 10, 10), (10.0, 10.0, 10.0))
+    mean = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
+    assert elements_through(box, 3.0) == pytest.approx(3.0 / mean)
 
 
 def test_the_summary_counts_every_element_once():
-    summary = quality_summary(box_mesh((3, 3, 3), (3.0, 3.0, 3.0)))
+    summary = summary_of(box_mesh((3, 3, 3), (3.0, 3.0, 3.0)))
     assert summary["tets"] == 162
     assert summary["volume_mm3"] == pytest.approx(27.0)
     assert all(sum(h["counts"]) == 162 for h in summary["histogram"].values())
+    assert summary["crossing_faces"] == 0
+    assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_edge_lengths_grow_with_depth_and_end_at_that_of_the_core():
-    lengths = edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 0.8, 2.5)
+    lengths = edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 0.8, 2.5, 2.5, 0.5)
     np.testing.assert_allclose(lengths, [0.8, 0.8, 1.8, 2.5])
+    np.testing.assert_allclose(edge_length_at(np.array([0.0, 1.0]), 0.4, 2.5, 0.0, 0.6), [0.4, 1.0])
+
+
+def test_the_edge_length_for_a_number_of_faces_is_that_of_equilateral_triangles():
+    icosahedron = trimesh.creation.icosphere(subdivisions=0, radius=1.0)
+    surface = TriangleMesh(icosahedron.vertices, icosahedron.faces)
+    assert edge_length_for(surface, 20) == pytest.approx(mean_edge_length(surface))
+    assert edge_length_for(surface, 80) == pytest.approx(mean_edge_length(surface) / 2)
 
 
 def test_the_background_covers_the_surface_with_positive_elements():
-    grid, lengths = background_mesh(ball(), 1.5, 3.0)
+    grid, lengths = background_mesh(ball(), 1.5, 3.0, 2.5, 0.5)
     assert (signed_volumes(grid) > 0).all()
     assert (grid.vertices.min(axis=0) < -8).all()
     assert (grid.vertices.max(axis=0) > 8).all()
@@ -103,45 +146,3 @@ def test_an_open_or_inverted_surface_is_refused():
         tetrahedralise(TriangleMesh(shape.vertices, shape.faces[1:]), **SIZES)
     with pytest.raises(MeshError, match="closed and face outwards"):
         tetrahedralise(flipped(shape), **SIZES)
-
-
-@pytest.fixture
-def dying_mesher(tmp_path, monkeypatch):
-    """A mesher that dies with a few last words."""
-    (tmp_path / "pytetwild.py").write_text(
-        "import os, signal\n"
-        "def tetrahedralize(*arrays, **settings):\n"
-        "    os.write(1, b'99 % of the elements are inverted')\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    # the mesher's process is given this path
-    monkeypatch.syspath_prepend(tmp_path)
-
-
-@pytest.mark.usefixtures("dying_mesher")
-def test_a_mesher_that_dies_leaves_its_last_words():
-    with pytest.raises(MeshError, match=r"exit code -9; found 99 % of the elements are inverted\. .*memory ran out"):
-        tetrahedralise(ball(), **SIZES)
-
-
-@pytest.mark.usefixtures("dying_mesher")
-def test_the_step_of_a_mesher_that_dies_ends_in_three(tmp_path, capsys):
-    write_surface(tmp_path / "pial.surf.gii", ball())
-    outputs = {name: str(tmp_path / file) for name, file in OUTPUTS.items()}
-    job = SimpleNamespace(
-        input=[str(tmp_path / "pial.surf.gii")],
-        output=SimpleNamespace(**outputs),
-        params=SimpleNamespace(settings=SIZES | {"min_radius_ratio": 0.02}),
-        log=[str(tmp_path / "log")],
-    )
-    with pytest.raises(SystemExit) as end:
-        runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
-    assert end.value.code == 3
-    assert "inverted" in capsys.readouterr().err
-    assert "inverted" in (tmp_path / "log").read_text()
-    assert not [path for path in outputs.values() if Path(path).exists()]
-
-
-def test_the_mesher_is_stopped_at_its_time_limit():
-    with pytest.raises(MeshError, match=r"stopped after 0\.2 s"):
-        tetrahedralise(ball(), **(SIZES | {"time_limit_s": 0.2}))

@@ -1,0 +1,58 @@
+"""Surfaces remeshed with even triangles and freed of self-intersections, by MeshLab's filters."""
+
+import numpy as np
+import pymeshlab
+from numpy.typing import NDArray
+
+from .triangles import TriangleMesh
+
+REMESHING_ROUNDS = 5
+UNTANGLING_ROUNDS = 10
+
+
+def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
+    """Returns the (m,) mask of the faces that cut other faces."""
+    document = in_meshlab(mesh)
+    document.compute_selection_by_self_intersections_per_face()
+    return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
+
+
+def remeshed(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
+    """Returns the surface with triangles close to equilateral, edges of about `edge_length_mm`."""
+    document = in_meshlab(mesh)
+    document.meshing_isotropic_explicit_remeshing(
+        iterations=REMESHING_ROUNDS, targetlen=pymeshlab.PureValue(edge_length_mm), checksurfdist=False
+    )
+    return from_meshlab(document)
+
+
+def untangled(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns the surface with places that cut each other relaxed (Laplacian smoothing of these places alone).
+
+    The number of vertices and the topology stay; each round takes in a wider neighbourhood.
+    """
+    for round_ in range(UNTANGLING_ROUNDS):
+        cutting = self_intersecting_faces(mesh)
+        if not cutting.any():
+            break
+        document = in_meshlab(mesh)
+        document.compute_selection_by_self_intersections_per_face()
+        for _ in range(1 + round_ // 2):
+            document.apply_selection_dilatation()
+        document.compute_selection_transfer_face_to_vertex()
+        document.apply_coord_laplacian_smoothing(stepsmoothnum=2, cotangentweight=False, selected=True)
+        mesh = from_meshlab(document)
+    return mesh
+
+
+def in_meshlab(mesh: TriangleMesh) -> pymeshlab.MeshSet:
+    """Returns a MeshLab document that holds the surface alone."""
+    document = pymeshlab.MeshSet(verbose=False)
+    document.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces))
+    return document
+
+
+def from_meshlab(document: pymeshlab.MeshSet) -> TriangleMesh:
+    """Returns the current surface of a MeshLab document."""
+    mesh = document.current_mesh()
+    return TriangleMesh(mesh.vertex_matrix(), mesh.face_matrix())

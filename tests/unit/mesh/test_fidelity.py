@@ -1,0 +1,76 @@
+"""Distances between surfaces, faces that cross, and widths of gaps, where they are known."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from gyriflow.geometry.crossings import crossing_faces
+from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, transformed
+from gyriflow.mesh.fidelity import gaps, surface_distance
+
+
+def box(size, centre=(0.0, 0.0, 0.0), subdivisions=3):
+    shape = trimesh.creation.box(size)
+    for _ in range(subdivisions):
+        shape = shape.subdivide()
+    return TriangleMesh(shape.vertices + np.asarray(centre), shape.faces)
+
+
+def moved(mesh, x, y=0.0, z=0.0):
+    return transformed(mesh, [[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
+
+
+def test_concentric_spheres_are_as_far_apart_as_their_radii():
+    inner, outer = (trimesh.creation.icosphere(subdivisions=4, radius=radius) for radius in (10.0, 10.5))
+    distance = surface_distance(TriangleMesh(inner.vertices, inner.faces), TriangleMesh(outer.vertices, outer.faces))
+    assert distance["hausdorff99"] == pytest.approx(0.5, abs=0.01)
+    assert distance["hausdorff"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_both_directions_count():
+    small = box((4.0, 4.0, 4.0))
+    both = merged(small, box((4.0, 4.0, 4.0), (7.0, 0.0, 0.0)))
+    # all of the small one lies on the other surface, whose second box is up to 7 mm from it
+    forth, back = surface_distance(small, both), surface_distance(both, small)
+    assert forth == back
+    assert forth["hausdorff"] == pytest.approx(7.0)
+
+
+def test_a_small_bump_counts_in_the_largest_distance_only():
+    flat = box((10.0, 10.0, 10.0), subdivisions=4)
+    vertices = np.array(flat.vertices)
+    top = np.argmin(np.linalg.norm(vertices - [0, 0, 5], axis=1))
+    vertices[top, 2] += 1.0
+    distance = surface_distance(TriangleMesh(vertices, flat.faces), flat)
+    assert distance["hausdorff99"] < 1e-3
+    assert distance["hausdorff"] == pytest.approx(1.0)
+
+
+def test_faces_that_cross_are_counted_once_each():
+    tetrahedron = TriangleMesh(
+        [[0.0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    )
+    assert crossing_faces(tetrahedron) == 0
+    assert crossing_faces(merged(tetrahedron, moved(tetrahedron, 10.0))) == 0
+    # the tip of the second one, at (1, 1, 1.9), goes in through the slanted face of the first: that face and three more
+    pointed = TriangleMesh(
+        [[1.0, 1, 1.9], [5, 5, 6], [6, 5, 5], [5, 6, 5]], [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+    )
+    assert crossing_faces(merged(tetrahedron, pointed)) == 4
+
+
+def test_the_gap_between_two_boxes_has_its_width_and_area():
+    boxes = merged(box((4.0, 6.0, 6.0), (-2.25, 0, 0)), box((4.0, 6.0, 6.0), (2.25, 0, 0)))
+    found = gaps(boxes)
+    assert found["percentile1"] == pytest.approx(0.5, abs=1e-3)
+    assert found["median"] == pytest.approx(0.5, abs=1e-3)
+    assert found["area_mm2"] == pytest.approx(2 * 36.0)
+
+
+def test_walls_far_apart_or_thin_tissue_are_no_gap():
+    far = merged(box((4.0, 6.0, 6.0), (-4.0, 0, 0)), box((4.0, 6.0, 6.0), (4.0, 0, 0)))
+    assert gaps(far) == {"percentile1": None, "median": None, "area_mm2": 0.0}
+    plate = box((0.5, 6.0, 6.0))
+    assert gaps(plate)["area_mm2"] == 0.0
+    # inside out, the same plate is a gap
+    assert gaps(flipped(plate))["median"] == pytest.approx(0.5, abs=1e-3)

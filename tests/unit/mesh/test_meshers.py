@@ -1,0 +1,169 @@
+"""The meshers' own processes: what comes back, and what a user is told when they die, hang or are missing."""
+
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from gyriflow.errors import MeshError
+from gyriflow.geometry.tetrahedra import boundary_surface, signed_volumes
+from gyriflow.geometry.triangles import TriangleMesh, merged, signed_volume, transformed
+from gyriflow.io.surfaces import write_surface
+from gyriflow.mesh.quality import quality_summary, radius_ratios, refuse_bad_mesh
+from gyriflow.mesh.tetrahedralisation import even_surface, tetrahedralise
+
+SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "tetrahedralise.py"
+OUTPUTS = {"mesh": "brain.xdmf", "data": "brain.h5", "surface": "pial.stl", "quality": "quality.json"}
+GATES = {
+    "min_radius_ratio": 0.02,
+    "min_dihedral_deg": 1.0,
+    "max_dihedral_deg": 178.0,
+    "max_surface_distance_mm": 0.1,
+}
+SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
+STAND_INS = {
+    "pytetwild": ("pytetwild.py", "tetrahedralize"),
+    "tetgen": ("igl/copyleft/tetgen.py", "tetrahedralize"),
+}
+MESHERS = list(STAND_INS)
+
+
+def egg():
+    """A surface whose edges have no single length, so that remeshing can make any number of faces of it."""
+    shape = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
+    return TriangleMesh(shape.vertices * [9.0, 8.0, 6.0], shape.faces)
+
+
+def ball(radius=8.0, subdivisions=3):
+    shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    return TriangleMesh(shape.vertices, shape.faces)
+
+
+@pytest.fixture
+def stand_in(tmp_path, monkeypatch):
+    """Puts code in the place of a mesher's function, in the mesher's process."""
+
+    def put(mesher, *code):
+        file, function = STAND_INS[mesher]
+        path = tmp_path / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for folder in path.relative_to(tmp_path).parents[:-1]:
+            (tmp_path / folder / "__init__.py").touch()
+        body = "\n".join(f"    {line}" for line in code)
+        path.write_text(f"import os, signal, time\ndef {function}(*arrays, **settings):\n{body}\n")
+        # the mesher's process is given this path
+        monkeypatch.syspath_prepend(tmp_path)
+
+    return put
+
+
+DYING = ("os.write(1, b'99 % of the elements are inverted')", "os.kill(os.getpid(), signal.SIGKILL)")
+HANGING = ("os.write(2, b'thinking')", "time.sleep(60)")
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_a_mesher_that_dies_leaves_its_last_words(stand_in, mesher):
+    stand_in(mesher, *DYING)
+    with pytest.raises(
+        MeshError,
+        match=rf"{mesher} failed with exit code -9; found 99 % of the elements are inverted\. .*memory ran out",
+    ):
+        tetrahedralise(ball(), mesher=mesher, **SIZES)
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesher):
+    stand_in(mesher, *HANGING)
+    # a process starts in less, on a busy machine too
+    with pytest.raises(MeshError, match=rf"{mesher} was stopped after 4 s; found its last words: thinking"):
+        tetrahedralise(ball(), mesher=mesher, **(SIZES | {"time_limit_s": 4}))
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_a_mesher_that_is_not_installed_is_said_so(stand_in, mesher):
+    stand_in(mesher, "raise ImportError('cannot find its library')")
+    with pytest.raises(MeshError, match=rf"{mesher} is not installed; found cannot find its library\. Install"):
+        tetrahedralise(ball(), mesher=mesher, **SIZES)
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_the_step_of_a_mesher_that_dies_ends_in_three(stand_in, tmp_path, capsys, mesher):
+    stand_in(mesher, *DYING)
+    write_surface(tmp_path / "pial.surf.gii", ball())
+    outputs = {name: str(tmp_path / file) for name, file in OUTPUTS.items()}
+    job = SimpleNamespace(
+        input=[str(tmp_path / "pial.surf.gii")],
+        output=SimpleNamespace(**outputs),
+        params=SimpleNamespace(settings=SIZES | {"mesher": mesher}, gates=GATES),
+        log=[str(tmp_path / "log")],
+    )
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
+    assert end.value.code == 3
+    assert "inverted" in capsys.readouterr().err
+    assert "inverted" in (tmp_path / "log").read_text()
+    assert not [path for path in outputs.values() if Path(path).exists()]
+
+
+@pytest.fixture(scope="module")
+def even():
+    return even_surface(ball(), 1.2, None)
+
+
+@pytest.fixture(scope="module")
+def filled():
+    return tetrahedralise(ball(), mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2}))
+
+
+def test_tetgen_keeps_the_remeshed_surface_exactly(even, filled):
+    own, _ = boundary_surface(filled)
+    assert len(own.faces) == len(even.faces)
+    np.testing.assert_array_equal(*(np.unique(surface.vertices, axis=0) for surface in (own, even)))
+    assert signed_volumes(filled).sum() == pytest.approx(signed_volume(even), rel=1e-12)
+    assert (signed_volumes(filled) > 0).all()
+
+
+def test_a_mesh_of_tetgen_passes_the_gates(filled):
+    summary = quality_summary(filled, ball())
+    refuse_bad_mesh(filled, summary, **GATES)
+    assert summary["median_radius_ratio"] > 0.6
+
+
+def test_elements_of_tetgen_grow_inwards_up_to_the_core(filled):
+    depth = 8 - np.linalg.norm(filled.vertices[filled.tets].mean(axis=1), axis=1)
+    volumes = signed_volumes(filled)
+    assert np.median(volumes[depth > 4]) > 1.5 * np.median(volumes[depth < 1])
+    # the regular element with edges of core_edge_mm; a few that touch the surface can't be divided
+    largest = 1.5**3 / (6 * np.sqrt(2))
+    fine = tetrahedralise(ball(), mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2, "core_edge_mm": 1.5}))
+    assert np.quantile(signed_volumes(fine), 0.99) <= largest < np.quantile(volumes, 0.7)
+
+
+@pytest.mark.parametrize("wanted", [1500, 4000])
+def test_tetgen_has_about_the_number_of_faces_asked_for(wanted):
+    mesh = tetrahedralise(egg(), mesher="tetgen", pial_faces=wanted, **SIZES)
+    assert len(boundary_surface(mesh)[0].faces) == pytest.approx(wanted, rel=0.03)
+
+
+def test_pytetwild_has_about_the_number_of_faces_asked_for():
+    mesh = tetrahedralise(egg(), mesher="pytetwild", pial_faces=2000, **(SIZES | {"envelope_mm": 0.3}))
+    assert len(boundary_surface(mesh)[0].faces) == pytest.approx(2000, rel=0.25)
+
+
+def test_a_narrow_gap_between_two_parts_stays_open():
+    half = ball(4.0, 3)
+    apart = transformed(half, [[1, 0, 0, 8.2], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    mesh = tetrahedralise(merged(half, apart), mesher="tetgen", **(SIZES | {"surface_edge_mm": 0.6}))
+    left, right = (mesh.vertices[side] for side in (mesh.vertices[:, 0] < 4.1, mesh.vertices[:, 0] > 4.1))
+    assert right[:, 0].min() - left[:, 0].max() == pytest.approx(0.2, abs=0.03)
+    assert radius_ratios(mesh).min() > 0.02
+
+
+def test_a_surface_that_cuts_itself_is_refused():
+    half = ball(4.0, 2)
+    into = transformed(half, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    with pytest.raises(MeshError, match=r"cuts itself and cannot be kept.*cross others|is not the inside of"):
+        tetrahedralise(merged(half, into), mesher="tetgen", **SIZES)
