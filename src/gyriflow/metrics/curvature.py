@@ -1,15 +1,26 @@
 """Curvature of triangle surfaces; outward normals, so that gyri are positive and sulci negative."""
 
+import logging
 from dataclasses import dataclass
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, TriangleMesh, edges
+from ..geometry.triangles import Floats, TriangleMesh, edges, mean_edge_length
+from .quadrics import fit_quadrics
+
+log = logging.getLogger(__name__)
+
+RADIUS_MM = 3.0
+"""At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
+
+EDGES_PER_RADIUS = 2.0
+"""Radius of the smallest ball in edges: with fewer neighbours a quadric follows the noise."""
+
+MAX_FAILED_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,12 +32,15 @@ class Curvature:
     maximum, minimum : (n,) float
         Principal curvatures κ1 ≥ κ2 in 1/mm; both are 1/R on a sphere of radius R.
     reliable : (n,) bool
-        False near the boundary of an open surface, where the neighbourhood of a vertex is one-sided.
+        False where the ball round a vertex reaches the boundary of an open surface, or no quadric could be fitted.
+    radius_mm : (n,) float
+        Radius of the ball that each vertex's curvature is fitted in.
     """
 
     maximum: Floats
     minimum: Floats
     reliable: NDArray[np.bool_]
+    radius_mm: Floats
 
     @property
     def mean(self) -> Floats:
@@ -52,36 +66,51 @@ class Curvature:
         return np.sqrt(0.5 * (self.maximum**2 + self.minimum**2))
 
 
-def curvature(mesh: TriangleMesh, *, rings: int = 3) -> Curvature:
-    """Returns the curvature from quadrics fitted to the `rings` rings of neighbours of each vertex (libigl).
+def curvature(mesh: TriangleMesh, *, radius_mm: float = RADIUS_MM) -> Curvature:
+    """Returns the curvature from quadrics fitted to the surface within `radius_mm` of each vertex.
 
-    The method is that of Panozzo, Puppo and Rocca 2010. Vertices closer than `rings` edges to a boundary are marked
-    as unreliable. MeshError where a vertex has no usable neighbourhood.
+    The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
+    curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
+    local edges are longer than half of `radius_mm`, the ball grows to two of them, and a warning names the finest
+    scale of the mesh. Weights: see `quadrics.fit_quadrics`. MeshError where a vertex in a hundred has no usable
+    neighbourhood.
     """
-    _, _, first, second, bad = igl.principal_curvature(mesh.vertices, mesh.faces, rings, True)
-    values = np.stack([first, second])
-    failed = ~np.isfinite(values).all(axis=0)
-    failed[np.asarray(bad, dtype=int)] = True
-    reliable = ~near_boundary(mesh, rings - 1)
-    if (failed & reliable).any():
+    finest = EDGES_PER_RADIUS * mean_edge_length(mesh)
+    if finest > radius_mm:
+        log.warning(
+            "curvature at a radius of %.3g mm is finer than the mesh: %.3g mm is the finest it supports",
+            radius_mm,
+            finest,
+        )
+    radii = np.maximum(radius_mm, EDGES_PER_RADIUS * _edge_lengths(mesh))
+    quadrics = fit_quadrics(mesh, radii)
+    failed = int(np.count_nonzero(~quadrics.fitted))
+    if failed > MAX_FAILED_SHARE * len(mesh.vertices):
         raise MeshError(
             "no curvature can be fitted",
-            found=f"{np.count_nonzero(failed & reliable)} vertices without a regular neighbourhood",
+            found=f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood",
             remedy="Repair or remesh the surface",
         )
-    values[:, failed] = 0.0
-    return Curvature(maximum=values.max(axis=0), minimum=values.min(axis=0), reliable=reliable)
+    a, b, c, d, e, _ = quadrics.coefficients.T
+    # first and second fundamental form of the height function; outward normals make a cap negative
+    stretch = 1.0 + d**2 + e**2
+    mean = -((1.0 + e**2) * a - d * e * b + (1.0 + d**2) * c) / stretch**1.5
+    gaussian = (4.0 * a * c - b**2) / stretch**2
+    half_difference = np.sqrt(np.maximum(mean**2 - gaussian, 0.0))
+    return Curvature(
+        maximum=mean + half_difference,
+        minimum=mean - half_difference,
+        reliable=quadrics.fitted & ~quadrics.one_sided,
+        radius_mm=radii,
+    )
 
 
-def near_boundary(mesh: TriangleMesh, rings: int) -> NDArray[np.bool_]:
-    """Returns the (n,) mask of vertices at most `rings` edges away from a boundary; none on a closed surface."""
-    pairs, counts = edges(mesh)
-    near = np.zeros(len(mesh.vertices), dtype=bool)
-    near[pairs[counts == 1]] = True
-    for _ in range(rings):
-        touched = near[pairs].any(axis=1)
-        near[pairs[touched]] = True
-    return near
+def _edge_lengths(mesh: TriangleMesh) -> Floats:
+    """Returns the (n,) mean length in mm of the edges at each vertex, 0 without edges."""
+    pairs, _ = edges(mesh)
+    lengths = np.repeat(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2)
+    size = len(mesh.vertices)
+    return np.bincount(pairs.ravel(), lengths, size) / np.maximum(np.bincount(pairs.ravel(), minlength=size), 1)
 
 
 def continued(values: Floats, known: NDArray[np.bool_], stiffness: sparse.csc_matrix) -> Floats:

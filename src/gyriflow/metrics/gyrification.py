@@ -1,4 +1,4 @@
-"""Gyrification indices: pial area over the area of a smooth surface around it."""
+"""Hulls and envelopes of pial surfaces: gyrification indices and sulcal depth."""
 
 import igl
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import MeshError
-from ..geometry.triangles import TriangleMesh, area, corners, face_areas, vertex_normals
+from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, vertex_normals
 
 ENVELOPE_RADIUS_MM = 5.0
 """The envelope bridges sulci narrower than twice this radius."""
@@ -91,3 +91,11 @@ def area_over(surface: TriangleMesh, mesh: TriangleMesh) -> float:
 def gyrification_index(mesh: TriangleMesh, around: TriangleMesh) -> float:
     """Returns the area of the surface over that of the hull or envelope around it, cuts left out of both."""
     return area(mesh) / area_over(around, mesh)
+
+
+def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
+    """Returns the (n,) straight distance in mm from each vertex outwards to the envelope; 0 on it and outside it."""
+    signed, *_ = igl.signed_distance(
+        mesh.vertices, around.vertices, around.faces, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+    )
+    return np.maximum(-signed, 0.0)

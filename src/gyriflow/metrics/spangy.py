@@ -77,9 +77,9 @@ def weyl_number(area_mm2: float, first: float, formula: WeylFormula) -> int:
     return round(area_mm2 * largest / (4.0 * np.pi))
 
 
-def number_of_modes(area_mm2: float, vertices: int, first: float, formula: WeylFormula) -> int:
-    """Returns Weyl's number, or a tenth of the number of vertices where that is less."""
-    return max(2, min(weyl_number(area_mm2, first, formula), int(MODES_PER_VERTEX * vertices)))
+def number_of_modes(wanted: int, vertices: int) -> int:
+    """Returns the number of modes wanted, or a tenth of the number of vertices where that is less."""
+    return max(2, min(wanted, int(MODES_PER_VERTEX * vertices)))
 
 
 def band_limits(first: float) -> Floats:
@@ -99,8 +99,8 @@ def bands_of_modes(eigenvalues: Floats) -> Ints:
 def spectrum(proxy: Floats, modes: Modes, mass: sparse.csc_matrix, *, edge_length_mm: float) -> Spectrum:
     """Returns the band spectrum of a folding proxy, (n,) values per vertex.
 
-    The dominant band is Germanaud's: the proxy is recomposed band by band, and a vertex where it is positive belongs
-    to the band that adds most, one where it is not to the band that takes most away, with a minus sign.
+    The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by itself: a vertex where the
+    proxy is positive belongs to the band that adds most, another to the band that takes most away, with a minus sign.
     """
     coefficients = modes.functions.T @ (mass @ proxy)
     band = bands_of_modes(modes.eigenvalues)

@@ -7,7 +7,7 @@ import trimesh
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, area, is_closed, merged, signed_volume, submesh, transformed
-from gyriflow.metrics.gyrification import area_over, capped, convex_hull, envelope, gyrification_index
+from gyriflow.metrics.gyrification import area_over, capped, convex_hull, envelope, gyrification_index, sulcal_depth
 
 
 def sphere(radius: float = 25.0) -> TriangleMesh:
@@ -25,9 +25,9 @@ def half_sphere(radius: float = 25.0) -> TriangleMesh:
     return TriangleMesh(radius * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None], shape.faces)
 
 
-def dented(depth: float, width: float) -> TriangleMesh:
+def dented(depth: float, width: float, subdivisions: int = 5) -> TriangleMesh:
     """Returns a sphere of 25 mm with a round dent of that depth and width (mm) at the top."""
-    shape = trimesh.creation.icosphere(subdivisions=5, radius=25.0)
+    shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=25.0)
     across = np.linalg.norm(shape.vertices[:, :2], axis=1)
     dent = np.where(shape.vertices[:, 2] > 0, depth * np.exp(-((across / (0.5 * width)) ** 2) * 2), 0.0)
     return TriangleMesh(shape.vertices * (1 - dent / 25.0)[:, None], shape.faces)
@@ -56,6 +56,25 @@ def test_envelope_bridges_a_sulcus_and_follows_a_wide_dent() -> None:
     assert depth(wide, convex_hull(wide)) > 2.5
     assert gyrification_index(narrow, envelope(narrow)) > gyrification_index(narrow, convex_hull(narrow)) > 1.003
     assert is_closed(envelope(narrow))
+
+
+@pytest.mark.parametrize("subdivisions", [5, 6])
+def test_sulcal_depth_of_a_dent(subdivisions: int) -> None:
+    mesh = dented(8.0, 5.0, subdivisions)
+    depth = sulcal_depth(mesh, envelope(mesh))
+    bottom = np.linalg.norm(mesh.vertices, axis=1).argmin()
+    assert depth.argmax() == bottom
+    # the mouth is bridged by a flat piece, at most 1 mm below the sphere's top
+    true = 25.0 - np.linalg.norm(mesh.vertices[bottom])
+    assert true - 1.0 < depth[bottom] <= true
+    assert depth.min() == 0.0
+    away = np.linalg.norm(mesh.vertices - mesh.vertices[bottom], axis=1) > 15.0
+    assert depth[away].max() < 0.05
+
+
+def test_sulcal_depth_is_zero_outside_the_envelope() -> None:
+    np.testing.assert_array_equal(sulcal_depth(sphere(25.0), sphere(24.0)), 0.0)
+    np.testing.assert_allclose(sulcal_depth(sphere(24.0), sphere(25.0)), 1.0, atol=0.05)
 
 
 def test_cap_of_half_a_sphere() -> None:

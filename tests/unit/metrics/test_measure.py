@@ -6,6 +6,7 @@ from pathlib import Path
 
 import nibabel as nib
 import numpy as np
+import pandas as pd
 import pytest
 import trimesh
 
@@ -59,6 +60,9 @@ def test_two_spheres(apart: BrainMetrics) -> None:
         assert value(apart, name, "mean_shape_index") == pytest.approx(1.0, abs=0.01)
         assert value(apart, name, "mean_curvedness") == pytest.approx(1 / radius, rel=0.02)
         assert value(apart, name, "sulcal_area_share") == 0.0
+        assert value(apart, name, "curvature_radius") >= 3.0
+        assert value(apart, name, "mean_sulcal_depth") == pytest.approx(0.0, abs=0.05)
+        assert value(apart, name, "crossing_faces") == 0
         # Weyl's number by the paper's formula is 8192/2π, whatever the radius
         assert value(apart, name, "weyl_number") == pytest.approx(8192 / (2 * np.pi), rel=0.01)
         assert value(apart, name, "spangy_modes") == 60
@@ -70,7 +74,11 @@ def test_two_spheres(apart: BrainMetrics) -> None:
 def test_maps_and_spectra(apart: BrainMetrics) -> None:
     assert set(apart.maps) == {"left", "right"}
     assert {name: len(values) for name, values in apart.maps["left"].items()} == dict.fromkeys(
-        ["shape_index", "curvedness", "mean_curvature", "gaussian_curvature", "spangy_dominant_band"], 2562
+        [
+            *("shape_index", "curvedness", "mean_curvature", "gaussian_curvature"),
+            *("sulcal_depth_mm", "spangy_dominant_band"),
+        ],
+        2562,
     )
     assert apart.spectra["hemisphere"].tolist() == ["left"] * 7 + ["right"] * 7
     assert apart.spectra["band"].tolist() == [*range(7), *range(7)]
@@ -100,6 +108,25 @@ def test_table_is_tidy(apart: BrainMetrics) -> None:
     assert units[["volume", "area", "mean_curvedness", "spangy_B4_power"]].tolist() == ["mL", "cm2", "1/mm", "mm2"]
 
 
+def test_surfaces_that_cut_each_other_are_counted() -> None:
+    shape = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
+    mesh = TriangleMesh(shape.vertices, shape.faces)
+    left, right = shifted(mesh, -18.0), shifted(mesh, 18.0)
+    metrics = measure_brain(merged(left, right), left, right, curvature_radius_mm=6.0, spangy_modes=10)
+    # the two spheres meet in a circle of radius √(20² − 18²), which at most a face or two per edge length cross
+    circle = 2 * np.pi * np.sqrt(20.0**2 - 18.0**2)
+    assert circle / 3.0 < value(metrics, "whole", "crossing_faces") < 8 * circle / 3.0
+    assert value(metrics, "left", "crossing_faces") == value(metrics, "right", "crossing_faces") == 0
+
+
+def test_a_radius_that_reaches_the_cut_everywhere_is_refused() -> None:
+    shape = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
+    whole = TriangleMesh(shape.vertices, shape.faces)
+    on_right = whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0
+    with pytest.raises(MeshError, match=r"Lower metrics\.curvature_radius_mm"):
+        measure_brain(whole, submesh(whole, ~on_right)[0], submesh(whole, on_right)[0], curvature_radius_mm=18.0)
+
+
 def test_inside_out_is_refused() -> None:
     shape = trimesh.creation.icosphere(subdivisions=2, radius=20.0)
     mesh = TriangleMesh(shape.vertices, shape.faces)
@@ -125,3 +152,11 @@ def test_real_hemispheres() -> None:
         assert 0.9 < value(metrics, side, "gyrification_index") < 1.3
         assert 0 < value(metrics, side, "mean_shape_index") < 0.6  # gyri prevail on a young brain
         assert all(np.isfinite(values).all() for values in metrics.maps[side].values())
+
+
+def test_coefficients_make_up_the_bands(apart) -> None:
+    squares = apart.coefficients.assign(power=apart.coefficients["coefficient"] ** 2)
+    power = squares[squares["band"] >= 0].groupby(["hemisphere", "band"])["power"].sum()
+    bands = apart.spectra.set_index(["hemisphere", "band"])["power"].dropna()
+    pd.testing.assert_series_equal(power, bands, rtol=1e-9)
+    assert apart.coefficients.groupby("hemisphere")["mode"].max().tolist() == [59, 59]

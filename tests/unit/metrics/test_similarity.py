@@ -6,7 +6,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.metrics.similarity import distances, rigid_alignment, surface_distance
+from gyriflow.metrics.alignment import rigid_alignment
+from gyriflow.metrics.similarity import brain_distances, distances, surface_distance
 
 
 def brain_like(subdivisions: int = 4) -> TriangleMesh:
@@ -33,7 +34,7 @@ def test_alignment_takes_a_motion_back() -> None:
     mesh = brain_like()
     matrix = motion(12.0, [8.0, -5.0, 3.0])
     found = rigid_alignment(transformed(mesh, matrix), mesh)
-    np.testing.assert_allclose(found @ matrix, np.eye(4), atol=0.03)
+    np.testing.assert_allclose(found.matrix @ matrix, np.eye(4), atol=0.03)
     result = surface_distance(transformed(mesh, matrix), mesh)
     assert result["symmetric_mean_mm"] < 0.02
     assert result["hausdorff95_mm"] < 0.05
@@ -70,3 +71,39 @@ def test_same_in_both_orders() -> None:
     there, back = surface_distance(a, b), surface_distance(b, a)
     assert there["symmetric_mean_mm"] == pytest.approx(back["symmetric_mean_mm"], rel=0.02)
     assert there["hausdorff95_mm"] == pytest.approx(back["hausdorff95_mm"], rel=0.02)
+
+
+@pytest.mark.parametrize("degrees", [75.0, 120.0, 180.0])
+def test_a_wrong_pose_is_put_right_and_said(degrees: float, caplog: pytest.LogCaptureFixture) -> None:
+    mesh = brain_like()
+    turned = transformed(mesh, motion(degrees, [8.0, -5.0, 3.0]))
+    result = surface_distance(turned, mesh, name="left")
+    assert result["symmetric_mean_mm"] < 0.02
+    assert result["rotation_deg"] == pytest.approx(degrees, abs=0.5)
+    assert f"left: fits best when turned by {degrees:.0f} degrees" in caplog.text
+
+
+def test_the_given_pose_is_kept_where_another_fits_as_well(caplog: pytest.LogCaptureFixture) -> None:
+    shape = trimesh.creation.icosphere(subdivisions=4)
+    # the same after half a turn about any axis
+    longish = TriangleMesh(shape.vertices * [20.0, 28.0, 16.0], shape.faces)
+    result = surface_distance(transformed(longish, motion(10.0, [1.0, 2.0, 3.0])), longish)
+    assert result["rotation_deg"] == pytest.approx(10.0, abs=0.5)
+    assert result["pose_margin_1"] == pytest.approx(1.0, abs=0.15)
+    assert "the pose is doubtful" in caplog.text
+    assert rigid_alignment(brain_like(), brain_like()).margin > 5.0
+
+
+def test_parts_of_a_brain_are_aligned_by_themselves() -> None:
+    left, right = sphere(20.0), transformed(sphere(21.0), motion(0.0, [50.0, 0.0, 0.0]))
+    other = {"left": transformed(left, motion(0.0, [0.0, 4.0, 0.0])), "right": sphere(23.0)}
+    table = brain_distances({"left": left, "right": right}, other)
+    assert table.columns.tolist() == ["hemisphere", "metric", "value", "unit"]
+    value = table.set_index(["hemisphere", "metric"])["value"]
+    assert value["left", "symmetric_mean"] < 0.02
+    assert value["left", "shift"] == pytest.approx(4.0, abs=0.01)
+    assert value["right", "symmetric_mean"] == pytest.approx(2.0, abs=0.05)
+    assert value["right", "shift"] == pytest.approx(50.0, abs=0.1)
+    assert dict(zip(table["metric"], table["unit"], strict=True)) == {
+        "symmetric_mean": "mm", "hausdorff95": "mm", "rotation": "deg", "shift": "mm", "pose_margin": "1",
+    }  # fmt: skip

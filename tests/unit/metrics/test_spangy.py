@@ -38,7 +38,11 @@ def test_weyl_numbers_of_a_sphere() -> None:
     # A = 4πR², λ1 = 2/R²: N = A·4⁶·λ1/4π = 8192, and 2π times fewer by the paper's λmax
     assert weyl_number(4 * np.pi * 30.0**2, 2 / 30.0**2, "textbook") == 8192
     assert weyl_number(4 * np.pi * 30.0**2, 2 / 30.0**2, "paper") == round(8192 / (2 * np.pi))
-    assert number_of_modes(4 * np.pi * 30.0**2, 5000, 2 / 30.0**2, "paper") == 500
+
+
+def test_modes_are_at_most_a_tenth_of_the_vertices() -> None:
+    assert number_of_modes(1304, 5000) == 500
+    assert number_of_modes(1304, 50000) == 1304
 
 
 def test_power_of_one_mode_is_in_its_band(solved) -> None:
@@ -115,19 +119,48 @@ def test_wavelengths_and_flags(solved) -> None:
     assert np.isnan(bands["power"][6])
 
 
-def test_agrees_with_slam_once_its_slip_is_undone(shape, solved) -> None:
+@pytest.mark.parametrize("count", [200, 130, 61])
+def test_agrees_with_slam_once_its_slip_is_undone(shape, solved, count: int) -> None:
     modes, mass = solved
-    proxy = np.sin(shape.vertices[:, 0] / 4.0) + np.cos(shape.vertices[:, 1] / 3.0)
+    modes = Modes(modes.eigenvalues[:count], modes.functions[:, :count])
+    proxy = np.random.default_rng(5).standard_normal(len(shape.vertices))  # no coefficient is 0
     found = spectrum(proxy, modes, mass, edge_length_mm=1.0)
-    values, squares = modes.eigenvalues, found.coefficients**2
-    # slam's formula: bands up to the last complete one, then the rest of the modes without the very last
-    complete = int(np.log2(values[-1] / values[1]) / 2)
-    for k in range(complete):
-        inside = (values >= values[1] * 4**k) & (values <= values[1] * 4 ** (k + 1))
-        assert found.bands["power"][k + 1] == pytest.approx(squares[inside].sum())
-    rest = squares[values > values[1] * 4**complete][:-1].sum()
-    assert found.bands["power"][complete + 1] == pytest.approx(rest + squares[-1])
-    assert squares[-1] > 0
+    values, squares = modes.eigenvalues, (modes.functions.T @ (mass @ proxy)) ** 2
+    # slam's formula: its number of bands from the last eigenvalue; between them λ1·4^(k−1) and λ1·4^k, both included;
+    # the last band is what is left, but for the very last coefficient
+    bands = int(np.log2(values[-1] / values[1]) / 2) + 2
+    slam = np.zeros(bands)
+    slam[0] = squares[0]
+    for k in range(1, bands - 1):
+        first, last = np.flatnonzero((values >= values[1] * 4 ** (k - 1)) & (values <= values[1] * 4**k))[[0, -1]]
+        slam[k] = squares[first : last + 1].sum()
+    slam[-1] = squares[last + 1 : -1].sum()
+    undone = slam.copy()
+    undone[-1] += squares[-1]
+    np.testing.assert_allclose(found.bands["power"][:bands], undone, rtol=1e-12)
+    assert found.bands["power"][bands:].isna().all()
+    assert slam[-1] < found.bands["power"][bands - 1]
+
+
+def test_a_sphere_has_its_degrees_in_the_bands() -> None:
+    # λ = l(l + 1)/R² and λ1 = 2/R²: B1 holds l = 1 and 2, B2 l = 3 to 5, B3 l = 6 to 10, of 2l + 1 modes each
+    sphere = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
+    stiffness, mass = laplacian(TriangleMesh(sphere.vertices, sphere.faces))
+    x, y, z = (sphere.vertices / 20.0).T
+    modes = lowest_modes(stiffness, mass, 130)
+    harmonics = {
+        1: (z, x * y),
+        2: (5 * z**3 - 3 * z, x**4 - 6 * x**2 * y**2 + y**4),
+        3: (z**6 * 231 - z**4 * 315 + z**2 * 105 - 5,),
+    }
+    for band, proxies in harmonics.items():
+        for proxy in proxies:
+            found = spectrum(proxy, modes, mass, edge_length_mm=1.0)
+            assert found.bands["relative_power"][band] > 0.99
+    assert found.bands["modes"][:4].tolist() == [1, 3 + 5, 7 + 9 + 11, 13 + 15 + 17 + 19 + 21]
+    wavelengths = 2 * np.pi * 20.0 / np.sqrt(2.0) / 2.0 ** np.arange(7)
+    np.testing.assert_allclose(found.bands["wavelength_min_mm"][1:], wavelengths[1:], rtol=5e-3)
+    assert found.bands["complete"].tolist() == [True, True, True, True, False, False, False]
 
 
 def test_no_band_is_lost_when_the_proxy_is_zero(solved) -> None:

@@ -1,0 +1,149 @@
+"""Age from one metric: a monotone curve over gestational weeks, and the week at which it takes a value."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.optimize import nnls
+
+from ..geometry.triangles import Floats
+
+GRID_GW = 0.01
+"""Spacing of the weeks at which a curve is kept."""
+
+WEEKS_PER_KNOT = 5
+"""A curve bends once more for every so many weeks with brains."""
+
+ROUNDING = 1e-9
+"""Values that differ by less, relative to their size, are equal."""
+
+LEAST_ERROR_GW = 0.1
+"""No metric counts as if it told the age better than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class AgeCurve:
+    """A metric over gestational weeks, monotone.
+
+    Attributes
+    ----------
+    weeks : (g,) float
+        Ascending, from the youngest to the oldest brain, in GW.
+    values : (g,) float
+        The metric times `sign`, never falling.
+    sign : float
+        −1 where the metric falls with age, else 1.
+    """
+
+    weeks: Floats
+    values: Floats
+    sign: float
+
+
+@dataclass(frozen=True)
+class AgeEstimate:
+    """A gestational age in GW, its range, and "younger" or "older" where it lies outside the curve's weeks."""
+
+    week: float
+    low: float
+    high: float
+    outside: str
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """What a metric says of the age of brains whose week was left out of its curve.
+
+    Attributes
+    ----------
+    error_gw : float
+        Mean absolute error over brains with younger and older ones beside them.
+    guess_gw : float
+        The same for the middle of the other brains' weeks, a guess that knows no metric.
+    noise : float
+        Root mean square difference between these brains' values and the curves without them.
+    """
+
+    error_gw: float
+    guess_gw: float
+    noise: float
+
+    @property
+    def weight(self) -> float:
+        """The precision beyond guessing in GW⁻²; 0 for a metric that says nothing about age."""
+        return max(0.0, max(self.error_gw, LEAST_ERROR_GW) ** -2 - self.guess_gw**-2)
+
+
+def age_curve(weeks: Floats, values: Floats) -> AgeCurve:
+    """Returns the monotone curve through (n,) values of brains of two or more weeks, by least squares.
+
+    It is a quadratic spline with coefficients that never fall, which makes it monotone (Ramsay 1988, "Monotone
+    regression splines in action"), straight for fewer than four weeks; one knot inside for every five weeks beyond
+    five. Values that differ by rounding only are level.
+    """
+    distinct = np.unique(weeks)
+    degree = 2 if len(distinct) > 3 else 1
+    inner = np.quantile(distinct, np.linspace(0, 1, (len(distinct) - 1) // WEEKS_PER_KNOT + 1)[1:-1])
+    knots = np.concatenate([[distinct[0]] * (degree + 1), inner, [distinct[-1]] * (degree + 1)])
+    centred = values - values.mean()
+    scale = float(np.abs(centred).max())
+    if scale <= ROUNDING * np.abs(values).max():
+        centred, scale = np.zeros_like(values), 1.0
+    sign = -1.0 if float(centred @ (weeks - weeks.mean())) < 0 else 1.0
+    rises, _ = nnls(_rising(weeks, knots, degree), sign * centred / scale)
+    number = max(2, round((distinct[-1] - distinct[0]) / GRID_GW) + 1)
+    grid = np.linspace(distinct[0], distinct[-1], number)
+    fitted = _rising(grid, knots, degree) @ rises * scale + sign * values.mean()
+    return AgeCurve(grid, np.maximum.accumulate(fitted), sign)
+
+
+def _rising(weeks: Floats, knots: Floats, degree: int) -> Floats:
+    """Returns functions whose sums with non-negative factors never fall: ± a constant, and sums of B-splines."""
+    splines = BSpline.design_matrix(weeks, knots, degree).toarray()
+    steps = np.cumsum(splines[:, :0:-1], axis=1)
+    return np.column_stack([np.ones(len(weeks)), -np.ones(len(weeks)), steps])
+
+
+def estimated_age(curve: AgeCurve, value: float, noise: float) -> AgeEstimate:
+    """Returns the week at which the curve has the value, between those at which it has value ∓ noise.
+
+    Where the curve is level the middle of that part is taken. A value beyond an end by more than the noise is outside;
+    its week is that of the end. All is NaN for a value that is NaN.
+    """
+    if np.isnan(value):
+        return AgeEstimate(np.nan, np.nan, np.nan, "")
+    risen = curve.sign * value
+    low, _ = _level_part(curve, risen - noise)
+    first, last = _level_part(curve, risen)
+    _, high = _level_part(curve, risen + noise)
+    below, above = risen < curve.values[0] - noise, risen > curve.values[-1] + noise
+    return AgeEstimate(0.5 * (first + last), low, high, "younger" if below else "older" if above else "")
+
+
+def _level_part(curve: AgeCurve, risen: float) -> tuple[float, float]:
+    """Returns the first and the last week at which the curve has a value (times its sign), or the nearest end twice."""
+    slack = ROUNDING * float(np.abs(curve.values).max())
+    end = len(curve.weeks) - 1
+    first = min(int(np.searchsorted(curve.values, risen - slack, side="left")), end)
+    last = max(int(np.searchsorted(curve.values, risen + slack, side="right")) - 1, 0)
+    # between two points of the grid `last` is the one before `first`
+    a, b = sorted((float(curve.weeks[first]), float(curve.weeks[last])))
+    return a, b
+
+
+def leave_one_week_out(weeks: Floats, values: Floats) -> LeftOut:
+    """Returns how well a metric tells the age of brains of three weeks or more, each week left out in turn."""
+    errors, guesses, differences = [], [], []
+    for week in np.unique(weeks)[1:-1]:
+        out = weeks == week
+        curve = age_curve(weeks[~out], values[~out])
+        expected = curve.sign * np.interp(week, curve.weeks, curve.values)
+        for value in values[out]:
+            errors.append(estimated_age(curve, value, 0.0).week - week)
+            guesses.append(0.5 * (curve.weeks[0] + curve.weeks[-1]) - week)
+            differences.append(value - expected)
+    return LeftOut(
+        error_gw=float(np.mean(np.abs(errors))),
+        guess_gw=max(float(np.mean(np.abs(guesses))), LEAST_ERROR_GW),
+        noise=float(np.sqrt(np.mean(np.square(differences)))),
+    )

@@ -1,0 +1,82 @@
+"""Curves of metrics over age that are known, and the ages read from them."""
+
+import numpy as np
+import pytest
+
+from gyriflow.metrics.age_curve import LEAST_ERROR_GW, age_curve, estimated_age, leave_one_week_out
+
+WEEKS = np.arange(21.0, 30.0)
+
+
+@pytest.mark.parametrize(
+    "metric",
+    [lambda w: 10 * w, lambda w: 1e-6 * (w - 20) ** 2, lambda w: 500 - 3 * w, lambda w: -((w - 20.0) ** 2)],
+    ids=["line", "bent", "falling", "falling, bent"],
+)
+def test_age_is_read_back_from_a_smooth_metric(metric) -> None:
+    curve = age_curve(WEEKS, metric(WEEKS))
+    for week in (21.0, 23.4, 28.9):
+        found = estimated_age(curve, metric(week), 0.0)
+        assert (found.week, found.outside) == (pytest.approx(week, abs=0.02), "")
+
+
+def test_noise_gives_the_range() -> None:
+    found = estimated_age(age_curve(WEEKS, 500 - 10 * WEEKS), 500 - 10 * 25.0, noise=5.0)
+    assert (found.low, found.week, found.high) == pytest.approx((24.5, 25.0, 25.5), abs=0.02)
+
+
+@pytest.mark.parametrize(("sign", "first"), [(1.0, "younger"), (-1.0, "older")])
+def test_values_beyond_the_ends(sign: float, first: str) -> None:
+    curve = age_curve(WEEKS, sign * 10 * WEEKS)
+    below, above = estimated_age(curve, 200.0 * sign, 5.0), estimated_age(curve, 300.0 * sign, 5.0)
+    assert (below.week, below.outside) == (21.0, "younger")
+    assert (above.week, above.outside) == (29.0, "older")
+    # by less than the noise
+    assert estimated_age(curve, sign * 294.0, 5.0).outside == ""
+
+
+def test_curve_never_turns_back() -> None:
+    noisy = np.array([1.0, 3.0, 2.0, 4.0, 3.5, 6.0, 9.0, 7.0, 10.0])
+    curve = age_curve(WEEKS, noisy)
+    assert (np.diff(curve.values) >= 0).all()
+    assert np.abs(np.interp(WEEKS, curve.weeks, curve.values) - noisy).max() < 2.0
+    assert (np.diff(age_curve(WEEKS, -noisy).values) >= 0).all()
+
+
+def test_constant_metric_says_nothing() -> None:
+    found = estimated_age(age_curve(WEEKS, np.full(9, 3.0)), 3.0, 0.0)
+    assert (found.low, found.week, found.high) == pytest.approx((21.0, 25.0, 29.0))
+    assert leave_one_week_out(WEEKS, np.full(9, 3.0)).weight == 0.0
+    # rounding is no signal
+    assert leave_one_week_out(WEEKS, 3.0 + 1e-15 * WEEKS).weight == 0.0
+
+
+def test_no_value_no_age() -> None:
+    assert np.isnan(estimated_age(age_curve(WEEKS, WEEKS), np.nan, 1.0).week)
+
+
+def test_weight_of_a_perfect_metric_and_of_noise() -> None:
+    perfect = leave_one_week_out(WEEKS, 3 * WEEKS)
+    assert perfect.error_gw < 0.01
+    assert perfect.noise == pytest.approx(0.0, abs=0.01)
+    # from week 25: 3, 2, 1, 0, 1, 2 and 3 weeks
+    assert perfect.guess_gw == pytest.approx(12 / 7)
+    assert perfect.weight == pytest.approx(LEAST_ERROR_GW**-2 - perfect.guess_gw**-2)
+    assert leave_one_week_out(WEEKS, np.array([1.0, -1, 1, -1, 1, -1, 1, -1, 1])).weight == 0.0
+
+
+def test_one_deviant_week_is_seen_as_error_and_noise() -> None:
+    values = 10 * WEEKS
+    values[4] += 20.0
+    found = leave_one_week_out(WEEKS, values)
+    # left out, week 25 is taken for 27 by a curve that is right
+    assert found.error_gw * 7 > 2.0
+    assert found.noise * np.sqrt(7) > 20.0
+
+
+def test_several_brains_of_a_week_are_left_out_together() -> None:
+    # the second brains are alike, and unlike the first ones: were one left in, it would give the other's age away
+    weeks, values = np.repeat(np.arange(21.0, 27.0), 2), np.repeat([1.0, 2.0, 9.0, 4.0, 5.0, 6.0], 2)
+    found = leave_one_week_out(weeks, values)
+    single = leave_one_week_out(weeks[::2], values[::2])
+    assert found.error_gw == pytest.approx(single.error_gw, abs=0.02)

@@ -1,0 +1,63 @@
+"""Numbers of modes: Weyl's, the common one, and what completes B6."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import trimesh
+
+from gyriflow.geometry.triangles import TriangleMesh, area
+from gyriflow.metrics.laplace_beltrami import laplacian, lowest_modes
+from gyriflow.metrics.mode_numbers import common_modes, complete_number, modes_wanted, weyl_numbers
+from gyriflow.metrics.spangy import bands_of_modes, first_eigenvalue, spectrum, weyl_number
+
+
+def ball(radius_mm: float, stretch: float = 1.0, subdivisions: int = 4) -> TriangleMesh:
+    shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius_mm)
+    return TriangleMesh(shape.vertices * [1.0, stretch, 1.0], shape.faces)
+
+
+def test_weyl_numbers_of_spheres() -> None:
+    found = weyl_numbers(ball(20.0), ball(30.0), "textbook").set_index("hemisphere")
+    np.testing.assert_allclose(found["area_mm2"], 4 * np.pi * np.array([20.0, 30.0]) ** 2, rtol=5e-3)
+    np.testing.assert_allclose(found["first_eigenvalue_per_mm2"], 2 / np.array([20.0, 30.0]) ** 2, rtol=5e-3)
+    # the number does not know the size
+    np.testing.assert_allclose(found["weyl_number"], 8192, rtol=5e-3)
+    assert found["vertices"].tolist() == [2562, 2562]
+
+
+def test_the_common_number_is_the_largest_of_each_side() -> None:
+    numbers = pd.DataFrame({"hemisphere": ["left", "right"] * 2, "weyl_number": [700, 810, 790, 640]})
+    assert common_modes(numbers) == {"left": 790, "right": 810}
+
+
+def wanted(choice, mesh: TriangleMesh) -> int:
+    stiffness, mass = laplacian(mesh)
+    return modes_wanted(choice, "left", mesh, stiffness, mass, first_eigenvalue(stiffness, mass), "paper")
+
+
+def test_which_number_is_taken() -> None:
+    mesh = ball(20.0)  # of 2562 vertices; Weyl's number of a sphere is 1304
+    assert wanted("own", mesh) == 256
+    assert wanted({"left": 200, "right": 3}, mesh) == 200
+    assert wanted({"left": 700, "right": 3}, mesh) == 256
+    assert wanted(700, mesh) == 700
+    elongated = ball(4.0, stretch=30.0)
+    first = first_eigenvalue(*laplacian(elongated))
+    assert wanted("own", elongated) == weyl_number(area(elongated), first, "paper") < 256
+
+
+def test_complete_holds_all_of_b6_and_no_more_than_needed() -> None:
+    # elongated, so that few modes lie below 4⁶ λ1
+    mesh = ball(4.0, stretch=9.0)
+    stiffness, mass = laplacian(mesh)
+    number = complete_number(stiffness, mass, first_eigenvalue(stiffness, mass))
+    modes = lowest_modes(stiffness, mass, number)
+    bands = spectrum(mesh.vertices[:, 1], modes, mass, edge_length_mm=1.0).bands
+    assert bands["complete"].all()
+    assert np.count_nonzero(bands_of_modes(modes.eigenvalues) == -1) == 1
+
+
+@pytest.mark.parametrize("subdivisions", [2, 3])
+def test_a_coarse_surface_has_no_complete_b6(subdivisions: int) -> None:
+    mesh = ball(20.0, subdivisions=subdivisions)
+    assert wanted("complete", mesh) == len(mesh.vertices) // 2
