@@ -20,6 +20,7 @@ report: "workflow/report/workflow.rst"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/download.smk"
 include: "workflow/rules/input.smk"
 include: "workflow/rules/surface.smk"
 include: "workflow/rules/mesh.smk"
@@ -34,6 +35,7 @@ include: "workflow/rules/report.smk"
 
 localrules:
     all,
+    download,
     surface,
     mesh,
     growth,

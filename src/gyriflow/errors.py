@@ -38,6 +38,7 @@ class GyriflowError(Exception):
         if remedy is not None:
             message = f"{message}. {remedy}"
         super().__init__(message)
+        self.names_file = path is not None
 
     def __reduce__(self) -> tuple:
         # keyword-only arguments are already part of the message

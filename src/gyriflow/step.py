@@ -37,11 +37,11 @@ def recorded_exit_code(path: Path) -> int | None:
 
 
 @contextmanager
-def step(log: str) -> Iterator[None]:
+def step(log: str, *inputs: str) -> Iterator[None]:
     """Runs a step with its messages in the file `log`.
 
     A GyriflowError ends the program with its exit code and one message on the terminal and in the log; another error
-    ends it with a traceback there.
+    ends it with a traceback there. Where an error names no file, the message begins with the step's `inputs`.
     """
     logging.basicConfig(
         level=logging.INFO,
@@ -54,8 +54,9 @@ def step(log: str) -> Iterator[None]:
     try:
         yield
     except GyriflowError as error:
-        logging.error("%s", error)
-        print(f"gyriflow: {error}", file=sys.stderr)
+        message = str(error) if error.names_file or not inputs else f"{', '.join(inputs)}: {error}"
+        logging.error("%s", message)
+        print(f"gyriflow: {message}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
     except KeyboardInterrupt:

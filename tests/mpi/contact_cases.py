@@ -156,6 +156,24 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_clo
     assert brentq(lambda stretch: stress_at(stretch, growth), 0.9, 1.4) == pytest.approx(1 + growth)
 
 
+def test_the_energy_falls_in_every_step_of_newtons_method(monkeypatch):
+    mesh = two_blocks(other=(4, 3, 3))
+    problem, _ = problem_with_contact(mesh, in_a_tube(mesh), 0.1, growth_along_z=0.1)
+    solver = NewtonSolver(problem, NewtonSettings(1e-8, 1e-6, max_newton=60), residual_floor=0.0)
+    advance, energies = solver._advance, []
+
+    def recorded(norm):
+        energies.append(problem.energy())
+        reached = advance(norm)
+        energies.append(problem.energy())
+        return reached
+
+    monkeypatch.setattr(solver, "_advance", recorded)
+    solver.solve(np.zeros_like(problem.displacement))
+    assert len(energies) > 8
+    assert (np.diff(energies) <= 1e-12 * max(energies)).all()
+
+
 def two_balls():
     ball = ellipsoid_mesh(2, (4.0, 4.0, 4.0))
     vertices = np.concatenate([ball.vertices - [4.1, 0.0, 0.0], ball.vertices + [4.1, 0.0, 0.0]])

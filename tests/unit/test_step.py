@@ -47,6 +47,14 @@ def test_a_known_error_is_one_message_and_its_code(exit_file, tmp_path, capsys):
     assert "Traceback" not in text
 
 
+@pytest.mark.parametrize(("path", "named"), [(None, "a.gii, b.gii: has a hole"), ("x.gii", "x.gii: has a hole")])
+def test_an_error_that_names_no_file_is_given_the_inputs(exit_file, tmp_path, capsys, path, named):
+    with pytest.raises(SystemExit), step(str(tmp_path / "log"), "a.gii", "b.gii"):
+        raise MeshError("has a hole", path=path)
+    assert capsys.readouterr().err == f"gyriflow: {named}\n"
+    assert named in (tmp_path / "log").read_text()
+
+
 def test_an_unknown_error_keeps_its_traceback(exit_file, tmp_path):
     log = tmp_path / "log"
     with pytest.raises(SystemExit) as end, step(str(log)):

@@ -25,10 +25,11 @@ SMALL_STUDY = {
 
 @dataclass(frozen=True)
 class Workflow:
-    """A copy of the checkout and a working directory for its results."""
+    """A copy of the checkout, a working directory for its results, and a folder of packages in place of others."""
 
     checkout: Path
     directory: Path
+    packages: Path | None = None
 
     def command(self, *arguments: str) -> list[str]:
         """Returns the command that `./run snakemake` runs."""
@@ -36,7 +37,8 @@ class Workflow:
 
     @property
     def environment(self) -> dict[str, str]:
-        return os.environ | {"PYTHONPATH": str(self.checkout / "src")}
+        paths = [self.packages, self.checkout / "src"]
+        return os.environ | {"PYTHONPATH": os.pathsep.join(str(path) for path in paths if path)}
 
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Runs the launcher in the working directory."""
@@ -46,7 +48,7 @@ class Workflow:
             env=self.environment,
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=300,
             check=False,
         )
 

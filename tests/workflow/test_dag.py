@@ -53,6 +53,15 @@ def test_one_brain_alone_is_folded_without_growth_rates(workflow):
     assert not {"growth_rates", "similarity"} & set(jobs)
 
 
+def test_ages_are_told_where_brains_of_five_weeks_are_the_reference(workflow):
+    five = [{"id": f"p{week}", "week": week, "phantom": {}} for week in range(21, 26)]
+    study = {"brains": five, "start": "p21", "folding": {"end_week": 22}}
+    jobs = workflow.jobs("--configfile", workflow.write("five.yaml", study))
+    assert (jobs["age_profile"], jobs["age_profile_figure"]) == (1, 1)
+    fewer = workflow.write("four.yaml", study | {"brains": five[:4]})
+    assert not {"age_profile", "age_profile_figure"} & set(workflow.jobs("--configfile", fewer))
+
+
 def test_maps_are_planned_for_the_runs_that_have_any(workflow):
     for name in ("left.gii", "right.gii", "soft.nii.gz"):
         (workflow.directory / name).touch()
@@ -104,19 +113,19 @@ def test_nothing_is_to_be_done_after_all_was_made(finished):
 
 REPORT = {"html_report": 1, "all": 1}
 NEW_RESULTS = REPORT | {"study_resources": 1}
-SHAPE = NEW_RESULTS | {"metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1}
+SHAPE = NEW_RESULTS | {"metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1}
 ONE_RUN = SHAPE | {
     "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure_simulated": 2, "run_metrics": 2,
     "displacement": 1,
     "similarity": 1, "study_table": 4, "study_runs": 1, "zones_figure": 1, "steps_figure": 1, "weekly_figure": 1,
-    "displacement_maps": 1, "shape_maps": 2, "displacement_figure": 1, "runs_figure": 1, "regions_figure": 1,
+    "displacement_maps": 1, "shape_maps": 3, "displacement_figure": 1, "runs_figure": 1, "regions_figure": 1,
 }  # fmt: skip
 OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "runs_figure"}
 BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count in ONE_RUN.items()}
 MESH = {"tetrahedralise": 1, "quality_figure": 1}
 FIGURES = {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "displacement_figure": 1, "quality_figure": 1,
-    "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 4,
+    "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 6,
     "zones_figure": 2, "regions_figure": 2, "steps_figure": 2,
 }  # fmt: skip
 
@@ -126,8 +135,8 @@ FIGURES = {
     [
         (
             "metrics",
-            {"curvature_radius": 4},
-            SHAPE | {"measure_real": 2, "measure_simulated": 4, "run_metrics": 4, "study_table": 2, "shape_maps": 4},
+            {"curvature_radius_mm": 4.0},
+            SHAPE | {"measure_real": 2, "measure_simulated": 4, "run_metrics": 4, "study_table": 2, "shape_maps": 6},
         ),
         ("runs", {"thick": {"thickness_mm": 3.5}}, ONE_RUN),
         ("folding", {"growth_rate_per_s": 1e-7}, BOTH_RUNS | {"growth_figure": 1}),
@@ -135,7 +144,9 @@ FIGURES = {
         (
             "surface",
             {"edge_length_mm": 1.5},
-            BOTH_RUNS | MESH | {"pial_surface": 2, "measure_real": 2, "growth_rates": 1, "growth_figure": 1},
+            BOTH_RUNS
+            | MESH
+            | {"pial_surface": 2, "weyl_numbers": 1, "measure_real": 2, "growth_rates": 1, "growth_figure": 1},
         ),
         ("report", {"dpi": 100}, NEW_RESULTS | FIGURES),
         ("report", {"energy": {"pue": 1.67}}, NEW_RESULTS),

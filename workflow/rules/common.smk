@@ -15,6 +15,10 @@ shell.prefix(
 )
 
 
+# Snakemake tells a Snakefile nothing of its targets; jobs of their own are asked for as NAME:
+DOWNLOADING = not {"download", "download:"}.isdisjoint(sys.argv)
+
+
 def validated_config():
     """Returns the configuration as models; ends with a message and exit code 2 where it is not valid."""
     from gyriflow.config import load
@@ -26,9 +30,9 @@ def validated_config():
             # Snakemake's own reading keeps the last of two equal keys
             file = Path(workflow.workdir_init, path)
             content = read_yaml(file)
-            if isinstance(content, dict) and "brains" in content:
+            if isinstance(content, dict) and {"brains", "atlas"} & set(content):
                 base = file.resolve().parent
-        return load(config, base)
+        return load(config, base, downloading=DOWNLOADING)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)

@@ -98,6 +98,35 @@ rule bands_figure:
         "../scripts/bands_figure.py"
 
 
+rule age_profile_figure:
+    input:
+        profile=rules.age_profile.output.profile,
+        check=rules.age_profile.output.check,
+    output:
+        png=report(
+            f"{FIGURES}/age_profile.png",
+            caption="../report/age_profile.rst",
+            category="Metrics",
+            labels={"figure": "weeks that simulated brains look like"},
+        ),
+        pdf=f"{FIGURES}/age_profile.pdf",
+    log:
+        "results/study/logs/age_profile_figure.log",
+    benchmark:
+        "results/study/benchmarks/age_profile_figure.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        **DRAWING,
+        measured=CONFIG.measured_name(CONFIG.age_reference),
+        code=code("report"),
+    script:
+        "../scripts/age_profile_figure.py"
+
+
 rule displacement_figure:
     input:
         "results/study/displacement.csv",
@@ -153,7 +182,7 @@ rule quality_figure:
         runtime=10,
     params:
         **DRAWING,
-        min_radius_ratio=CONFIG.mesh.min_radius_ratio,
+        gates=MESH_GATES,
         code=code("report"),
     script:
         "../scripts/quality_figure.py"
@@ -235,7 +264,7 @@ SINGLE_RUN_FIGURES = [
     rules.regions_figure,
     rules.steps_figure,
 ]
-SHAPE_MEASURES = ["shape_index", "curvedness"]
+SHAPE_MEASURES = ["shape_index", "curvedness", "sulcal_depth_mm"]
 
 
 rule figures:
@@ -244,6 +273,7 @@ rule figures:
         rules.spectra_figure.output,
         rules.bands_figure.output,
         rules.displacement_figure.output,
+        rules.age_profile_figure.output if CONFIG.age_reference else [],
         rules.quality_figure.output,
         expand(rules.overlay_figure.output, brain=OVERLAID),
         [

@@ -31,6 +31,9 @@ rule parameters:
     params:
         settings=lambda wildcards: CONFIG.parameters(wildcards.run),
         weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
+        estimated_from=lambda wildcards: (
+            CONFIG.estimated_from if rates_of_run(wildcards) else None
+        ),
         code=lambda wildcards: code("growth") if rates_of_run(wildcards) else None,
     script:
         "../scripts/parameters.py"

@@ -1,5 +1,11 @@
 # Growth rates of the cortex, from the areas of the brains' pial surfaces over the weeks.
-GROWTH_BRAINS = CONFIG.growth_brains
+# by series, the earliest first
+GROWTH_SERIES = [
+    (series, brain)
+    for series, brains in CONFIG.growth_series.items()
+    for brain in sorted(brains, key=lambda name: CONFIG.brain(name).week)
+]
+GROWTH_BRAINS = [brain for _, brain in GROWTH_SERIES]
 
 
 def folding_rate():
@@ -18,6 +24,7 @@ rule growth_rates:
     output:
         areas=f"results/{START}/growth/areas.csv",
         rates=f"results/{START}/growth/rates.csv",
+        agreement=f"results/{START}/growth/agreement.csv",
     log:
         f"results/{START}/logs/growth_rates.log",
     benchmark:
@@ -28,6 +35,7 @@ rule growth_rates:
         mem_mb=1000,
         runtime=10,
     params:
+        series=[series for series, _ in GROWTH_SERIES],
         brains=GROWTH_BRAINS,
         weeks=[CONFIG.brain(brain).week for brain in GROWTH_BRAINS],
         code=code("growth"),
@@ -39,6 +47,7 @@ rule growth_figure:
     input:
         areas=rules.growth_rates.output.areas,
         rates=rules.growth_rates.output.rates,
+        agreement=rules.growth_rates.output.agreement,
     output:
         png=report(
             f"results/{START}/growth/growth.png",
@@ -64,6 +73,8 @@ rule growth_figure:
         runtime=10,
     params:
         folding_rate_per_s=folding_rate(),
+        estimated_from=CONFIG.estimated_from,
+        series_names=list(CONFIG.growth_series),
         measured=CONFIG.measured_name(GROWTH_BRAINS),
         dpi=CONFIG.report.dpi,
         code=code("report"),

@@ -1,4 +1,11 @@
 # The start brain as a tetrahedral mesh.
+MESH_GATES = {
+    key: value
+    for key, value in CONFIG.mesh.model_dump().items()
+    if key.startswith(("min_", "max_"))
+}
+
+
 rule tetrahedralise:
     input:
         f"results/{START}/surface/pial.surf.gii",
@@ -17,7 +24,8 @@ rule tetrahedralise:
         mem_mb=6000,
         runtime=60,
     params:
-        settings=CONFIG.mesh.model_dump(),
+        settings=CONFIG.mesh.model_dump(exclude=set(MESH_GATES)),
+        gates=MESH_GATES,
         code=code("mesh"),
     script:
         "../scripts/tetrahedralise.py"

@@ -1,12 +1,43 @@
 # Metrics of measured and simulated brains, by the same code with the same settings.
+# The number of modes comes from the measured brains alone: their metrics need no simulation, and no run changes them.
+rule weyl_numbers:
+    input:
+        left=expand("results/{brain}/surface/left.pial.surf.gii", brain=BRAINS),
+        right=expand("results/{brain}/surface/right.pial.surf.gii", brain=BRAINS),
+    output:
+        "results/study/weyl_numbers.csv",
+    log:
+        "results/study/logs/weyl_numbers.log",
+    benchmark:
+        "results/study/benchmarks/weyl_numbers.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    params:
+        brains=BRAINS,
+        formula=CONFIG.metrics.spangy_wavelength,
+        code=code("metrics"),
+    script:
+        "../scripts/weyl_numbers.py"
+
+
+MODE_NUMBERS = (
+    rules.weyl_numbers.output[0] if CONFIG.metrics.spangy_modes == "common" else []
+)
+
+
 rule measure_real:
     input:
         whole="results/{brain}/surface/pial.surf.gii",
         left="results/{brain}/surface/left.pial.surf.gii",
         right="results/{brain}/surface/right.pial.surf.gii",
+        mode_numbers=MODE_NUMBERS,
     output:
         metrics="results/{brain}/metrics/real/metrics.csv",
         spectra="results/{brain}/metrics/real/spectra.csv",
+        coefficients="results/{brain}/metrics/real/coefficients.csv",
         left="results/{brain}/metrics/real/left.shape.gii",
         right="results/{brain}/metrics/real/right.shape.gii",
     log:
@@ -24,7 +55,7 @@ rule measure_real:
             "run": "real",
             "week": CONFIG.brain(wildcards.brain).week,
         },
-        settings=CONFIG.metrics.model_dump(),
+        settings=CONFIG.metrics.model_dump(exclude={"age_reference"}),
         code=code("metrics"),
     script:
         "../scripts/measure.py"
@@ -35,9 +66,11 @@ rule measure_simulated:
         whole=rules.folded_surface.output.whole,
         left=rules.folded_surface.output.left,
         right=rules.folded_surface.output.right,
+        mode_numbers=MODE_NUMBERS,
     output:
         metrics=f"results/{START}/metrics/{{run}}/week-{{week}}/metrics.csv",
         spectra=f"results/{START}/metrics/{{run}}/week-{{week}}/spectra.csv",
+        coefficients=f"results/{START}/metrics/{{run}}/week-{{week}}/coefficients.csv",
         left=f"results/{START}/metrics/{{run}}/week-{{week}}/left.shape.gii",
         right=f"results/{START}/metrics/{{run}}/week-{{week}}/right.shape.gii",
     log:
@@ -55,7 +88,7 @@ rule measure_simulated:
             "run": wildcards.run,
             "week": float(wildcards.week),
         },
-        settings=CONFIG.metrics.model_dump(),
+        settings=CONFIG.metrics.model_dump(exclude={"age_reference"}),
         code=code("metrics"),
     script:
         "../scripts/measure.py"

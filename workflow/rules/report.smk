@@ -57,7 +57,8 @@ rule html_report:
         runtime=20,
     params:
         snakefile=f"{workflow.basedir}/Snakefile",
-        config=CONFIG.model_dump(mode="json", exclude_defaults=True),
+        # the brains of the atlas are among the brains by now
+        config=CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}),
     script:
         "../scripts/html_report.py"
 

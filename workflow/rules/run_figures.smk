@@ -107,7 +107,7 @@ rule shape_maps:
             caption="../report/shape_maps.rst",
             category="Metrics",
             labels=lambda wildcards: {
-                "figure": f"{wildcards.measure.replace('_', ' ')} maps",
+                "figure": f"{wildcards.measure.removesuffix('_mm').replace('_', ' ')} maps",
                 "run": wildcards.run,
             },
         ),
@@ -117,7 +117,7 @@ rule shape_maps:
     benchmark:
         "results/study/benchmarks/shape_maps.{measure}.{run}.tsv"
     wildcard_constraints:
-        measure="shape_index|curvedness",
+        measure="shape_index|curvedness|sulcal_depth_mm",
     conda:
         ENVIRONMENT
     resources:
@@ -183,9 +183,16 @@ rule regions_figure:
             f"{FIGURES}/layers.{{run}}.png",
             caption="../report/layers.rst",
             category="Folding",
-            labels={"figure": "growth and stiffness in a section", "run": "{run}"},
+            labels={"figure": "regions and growth in sections", "run": "{run}"},
         ),
         section_pdf=f"{FIGURES}/layers.{{run}}.pdf",
+        normals_png=report(
+            f"{FIGURES}/normals.{{run}}.png",
+            caption="../report/normals.rst",
+            category="Folding",
+            labels={"figure": "pial normals in sections", "run": "{run}"},
+        ),
+        normals_pdf=f"{FIGURES}/normals.{{run}}.pdf",
     log:
         "results/study/logs/regions_figure.{run}.log",
     benchmark:
@@ -197,7 +204,7 @@ rule regions_figure:
         runtime=10,
     params:
         **DRAWING,
-        code=code("report"),
+        code=code("report", "folding"),
     script:
         "../scripts/regions_figure.py"
 

@@ -1,8 +1,19 @@
 # What compares the runs of a study with each other and with the measured brains.
+
+# the surfaces of a brain, by what stands before "pial" in their names
+SURFACE_PARTS = {"whole": "", "left": "left.", "right": "right."}
+
+
 rule similarity:
     input:
-        simulated=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.pial.surf.gii",
-        real="results/{brain}/surface/pial.surf.gii",
+        simulated=[
+            f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.{side}pial.surf.gii"
+            for side in SURFACE_PARTS.values()
+        ],
+        real=[
+            f"results/{{brain}}/surface/{side}pial.surf.gii"
+            for side in SURFACE_PARTS.values()
+        ],
     output:
         f"results/{START}/metrics/{{run}}/week-{{week}}/similarity.{{brain}}.csv",
     log:
@@ -21,6 +32,7 @@ rule similarity:
             "week": float(wildcards.week),
             "real": wildcards.brain,
         },
+        parts=list(SURFACE_PARTS),
         code=code("metrics"),
     script:
         "../scripts/similarity.py"
@@ -65,6 +77,49 @@ rule study_table:
         code=code(),
     script:
         "../scripts/join_tables.py"
+
+
+rule spectral_distance:
+    input:
+        "results/study/spectra.csv",
+    output:
+        "results/study/spectral_distance.csv",
+    log:
+        "results/study/logs/spectral_distance.log",
+    benchmark:
+        "results/study/benchmarks/spectral_distance.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        code=code("metrics"),
+    script:
+        "../scripts/spectral_distance.py"
+
+
+rule age_profile:
+    input:
+        metrics="results/study/metrics.csv",
+        spectra="results/study/spectra.csv",
+    output:
+        profile="results/study/age_profile.csv",
+        check="results/study/age_profile_check.csv",
+    log:
+        "results/study/logs/age_profile.log",
+    benchmark:
+        "results/study/benchmarks/age_profile.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=10,
+    params:
+        reference=CONFIG.age_reference,
+        code=code("metrics"),
+    script:
+        "../scripts/age_profile.py"
 
 
 rule study_runs:
@@ -114,3 +169,6 @@ rule metrics:
         expand(rules.displacement.output, run=RUNS),
         rules.study_runs.output,
         STUDY_TABLES,
+        rules.spectral_distance.output,
+        # with brains of too few weeks there is nothing to tell ages from
+        rules.age_profile.output if CONFIG.age_reference else [],

@@ -93,6 +93,8 @@ rule poses:
         mem_mb=2000,
         runtime=30,
     params:
+        # exchanged files are the same inputs to Snakemake
+        order=[path for brain in TO_POSE for path in brain.files],
         max_hole_mm=CONFIG.surface.max_hole_mm,
         code=code("surface"),
     script:
@@ -122,6 +124,7 @@ rule pial_surface:
         mem_mb=4000,
         runtime=30,
     params:
+        order=surface_files,
         source=surface_source,
         week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
         reading=surface_reading,

@@ -6,16 +6,16 @@ from gyriflow.geometry.tetrahedra import boundary_faces
 from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh
+from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
 from gyriflow.step import step
 from gyriflow.surface.pial import LPS_TO_RAS
 
 files, reading, maps = snakemake.input, snakemake.params.reading, {}
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
-    facets, pose = boundary_faces(mesh)[0], np.array(read_json(files.surface)["pose"])
+    facets, report = boundary_faces(mesh)[0], read_json(files.surface)
     # surfaces of the input are turned as the brain was; those that gyriflow made are turned already
-    poses = [pose @ LPS_TO_RAS if reading["coordinates"] == "lps" else pose, np.eye(4)]
+    poses = [np.array(report["pose"]) @ (LPS_TO_RAS if reading["coordinates"] == "lps" else np.eye(4)), np.eye(4)]
     for name, source in snakemake.params.maps.items():
         path = ", ".join(source["map"])
         if source["surface"]:
@@ -23,7 +23,7 @@ with step(snakemake.log[0]):
             surface = placed(mesh.vertices[np.unique(facets)], surface, poses)
             maps[name] = vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
         else:
-            volume = read_volume_map(path, reading["affine_from"])
-            maps[name] = volume_map_on_mesh(mesh.vertices, volume.values, pose @ volume.affine, path)
+            volume, motion = read_volume_map(path, reading["affine_from"]), volume_pose(report, path)
+            maps[name] = volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
         require_within(maps[name], snakemake.params.bounds[name], path)
     write_maps(snakemake.output[0], maps)

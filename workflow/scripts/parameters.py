@@ -10,7 +10,9 @@ with step(snakemake.log[0]):
     for name, column in FOLDING_RATES.items():
         if settings[name] == "estimated":
             allowed = settings["allow_negative_growth"]
-            curve = rate_curve(read_table(files.rates), column, allow_negative=allowed)
+            rates = read_table(files.rates)
+            rates = rates[rates["series"] == snakemake.params.estimated_from]
+            curve = rate_curve(rates, column, allow_negative=allowed)
             settings[name] = {"weeks": dict(zip(*(numbers.tolist() for numbers in curve), strict=True))}
     known = {
         "start_week": weeks[0],

@@ -8,7 +8,7 @@ from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial, from_shape
 
 files, output, params = list(snakemake.input), snakemake.output, snakemake.params
-with step(snakemake.log[0]):
+with step(snakemake.log[0], *files[:2]):
     match params.source:
         case "labels":
             scheme, volume = label_scheme(**params.scheme), read_label_volume(files[0], **params.reading)

@@ -7,6 +7,10 @@ from gyriflow.step import step
 
 params = snakemake.params
 with step(snakemake.log[0]):
-    histogram = read_json(snakemake.input[0])["histogram"]
-    figure = quality_histogram(histogram, min_radius_ratio=params.min_radius_ratio, synthetic=params.synthetic)
+    quality = read_json(snakemake.input[0])
+    surface = (
+        f"surface: 99 % within {quality['surface_distance_mm']['hausdorff99']:.3f} mm of the given one, "
+        f"{quality['crossing_faces']} faces cross"
+    )
+    figure = quality_histogram(quality["histogram"], gates=params.gates, surface=surface, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -1,16 +1,14 @@
-"""How far a simulated brain's surface is from a measured one of the same week."""
-
-import pandas as pd
+"""How far a simulated brain's surface is from a measured one of the same week, whole and by hemisphere."""
 
 from gyriflow.io.files import write_table
 from gyriflow.io.surfaces import read_surface
-from gyriflow.metrics.similarity import surface_distance
+from gyriflow.metrics.similarity import brain_distances
 from gyriflow.step import step
 
-labels = snakemake.params.labels
+files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    distances = surface_distance(read_surface(snakemake.input.simulated), read_surface(snakemake.input.real))
-    # the names end in their unit
-    parts = [(*name.rsplit("_", 1), value) for name, value in distances.items()]
-    rows = [{**labels, "metric": name, "value": value, "unit": unit} for name, unit, value in parts]
-    write_table(snakemake.output[0], pd.DataFrame(rows))
+    simulated, real = (
+        dict(zip(params.parts, map(read_surface, paths), strict=True)) for paths in (files.simulated, files.real)
+    )
+    table = brain_distances(simulated, real)
+    write_table(snakemake.output[0], table.assign(**params.labels)[[*params.labels, *table.columns]])

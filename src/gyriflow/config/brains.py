@@ -9,6 +9,16 @@ from .base import Settings, setting
 SOURCES = ("labels", "segmentation", "hemispheres", "pial", "phantom", "shape")
 """The keys of a brain of which exactly one is given."""
 
+KINDS = {
+    "labels": "volume",
+    "segmentation": "volume",
+    "phantom": "volume",
+    "hemispheres": "surface",
+    "pial": "surface",
+    "shape": "surface",
+}
+"""The kind of data behind each source: a label volume, or surfaces as they are given."""
+
 SIDES = ("left", "right")
 
 SINGLE_FILES = ("labels", "image", "pial")

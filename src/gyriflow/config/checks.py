@@ -4,8 +4,9 @@ from collections import Counter
 from collections.abc import Collection
 from typing import Any
 
-from .brains import SHAPE_SIZES, SOURCES, ShapeSettings
+from .brains import KINDS, SHAPE_SIZES, SOURCES, ShapeSettings
 from .folding import GROWTH_RATES, FoldingSettings
+from .growth import estimated_from, growth_series
 from .schemes import BUILT_IN_SCHEMES
 
 VOLUMES = ("labels", "segmentation")
@@ -123,26 +124,51 @@ def study_problems(brains: Any, start: Any, runs: dict[str, dict[str, Any]]) -> 
     return problems
 
 
-def growth_problems(brains: Any, growth: Any, runs: dict[str, dict[str, Any]]) -> list[str]:
-    """Returns what is wrong between the brains, those that growth rates are estimated from, and the runs (all raw)."""
+def growth_problems(brains: Any, growth: Any, start: Any, runs: dict[str, dict[str, Any]]) -> list[str]:
+    """Returns what is wrong between the brains, the series that growth rates are estimated from, and the runs (raw)."""
     entries = [entry for entry in brains if isinstance(entry, dict)] if isinstance(brains, list) else []
-    weeks = {entry["id"]: _number(entry.get("week")) for entry in entries if isinstance(entry.get("id"), str)}
-    given = growth.get("brains") if isinstance(growth, dict) else None
-    named = isinstance(given, list) and all(isinstance(name, str) for name in given)
-    chosen: list[str] = given if isinstance(given, list) and named else list(weeks)
-    unknown = [name for name in chosen if name not in weeks]
-    if unknown:
-        return [f"growth.brains: found {', '.join(unknown)}; expected ids of brains: {', '.join(weeks)}"]
-    found = {weeks[name] for name in chosen} - {None}
-    if len(found) > 1:
+    entries = [entry for entry in entries if isinstance(entry.get("id"), str)]
+    weeks = {entry["id"]: week for entry in entries if (week := _number(entry.get("week"))) is not None}
+    kinds = {
+        entry["id"]: next((kind for key, kind in KINDS.items() if entry.get(key) is not None), "volume")
+        for entry in entries
+        if entry["id"] in weeks
+    }
+    growth = growth if isinstance(growth, dict) else {}
+    given = growth.get("brains")
+    lists = given if isinstance(given, dict) else {"": given} if given is not None else {}
+    if not all(isinstance(ids, list) and all(isinstance(name, str) for name in ids) for ids in lists.values()):
         return []
-    least = f"found brains of {len(found)} week{'' if len(found) == 1 else 's'}; a growth rate needs two or more"
-    problems = {f"growth.brains: {least}": None} if named else {}
-    for name, settings in runs.items():
-        for key in GROWTH_RATES:
-            if settings.get(key) == "estimated":
-                problems[f"{_where(name, key, runs)}: can't be estimated: {least}"] = None
-    return list(problems)
+    known = [entry["id"] for entry in entries]
+    paths = {name: f"growth.brains.{name}".rstrip(".") for name in lists}
+    unknown = {name: [brain for brain in ids if brain not in known] for name, ids in lists.items()}
+    if any(unknown.values()):
+        return [
+            f"{paths[name]}: found {', '.join(ids)}; expected ids of brains: {', '.join(known)}"
+            for name, ids in unknown.items()
+            if ids
+        ]
+    reasons = {name: _too_few_weeks(ids, weeks) for name, ids in lists.items()}
+    problems = [f"{paths[name]}: {reason}" for name, reason in reasons.items() if reason is not None]
+    series = growth_series(kinds, weeks, given)
+    wanted = growth.get("estimated_from")
+    if isinstance(wanted, str) and series and wanted not in series:
+        problems.append(f"growth.estimated_from: found {wanted!r}; the series are {', '.join(series)}")
+    reason = _too_few_weeks([brain for ids in lists.values() for brain in ids] if lists else list(weeks), weeks)
+    if reason is None and wanted is None and estimated_from(series, None, str(start)) is None:
+        reason = f"the start brain is in none of the series {', '.join(series)}; name one under growth.estimated_from"
+    if reason is not None:
+        estimated = [(name, key) for name in runs for key in GROWTH_RATES if runs[name].get(key) == "estimated"]
+        problems += dict.fromkeys(f"{_where(name, key, runs)}: can't be estimated: {reason}" for name, key in estimated)
+    return problems
+
+
+def _too_few_weeks(brains: list[str], weeks: dict[str, float]) -> str | None:
+    """Returns what is wrong with the weeks of brains that are to give growth rates, None where nothing is."""
+    found = len({weeks[brain] for brain in brains if brain in weeks})
+    if found > 1:
+        return None
+    return f"found brains of {found} week{'' if found == 1 else 's'}; a growth rate needs two or more"
 
 
 def _name_problems(name: str) -> list[str]:

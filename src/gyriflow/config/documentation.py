@@ -119,7 +119,7 @@ def _type_name(annotation: Any) -> str:
     if origin is tuple:
         return "list of " + _type_name(parts[0])
     if origin is dict:
-        return "names with settings"
+        return "names with lists" if parts[1] == tuple[str, ...] else "names with settings"
     if annotation is VaryingSettings:
         return "varying"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):

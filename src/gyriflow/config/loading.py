@@ -11,9 +11,11 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from ..errors import InputError
+from .atlas import AtlasSettings, atlas_brains, atlas_files, atlas_problems
 from .brains import SIDES, SINGLE_FILES, Brain
 from .checks import brain_problems, growth_problems, study_problems
 from .folding import VARYING, FoldingSettings
+from .metrics import age_reference_problems
 from .root import Config
 from .schemes import scheme_problems
 from .varying import TAGS
@@ -21,7 +23,7 @@ from .varying import TAGS
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
 
 
-def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
+def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: bool = False) -> Config:
     """Returns the validated configuration, with input files as absolute paths.
 
     Parameters
@@ -30,6 +32,8 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
         The configuration as read from YAML.
     base_dir
         Folder of the configuration file, for relative paths.
+    downloading
+        Whether the files of the atlas are about to be fetched, so that they need not be there yet.
 
     Raises
     ------
@@ -49,12 +53,22 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
     schemes = plain.get("schemes")
     schemes = schemes if isinstance(schemes, dict) else {}
     problems += [problem for name, scheme in schemes.items() for problem in scheme_problems(name, scheme)]
-    valid["brains"] = _brains(plain.get("brains", _ABSENT), list(schemes), Path(base_dir), problems)
+    with_atlas = plain.get("atlas") is not None
+    given = plain.get("brains", [] if with_atlas else _ABSENT)
+    valid["brains"] = _brains(given, list(schemes), Path(base_dir), problems, alone=not with_atlas)
+    valid["atlas"], of_atlas = _atlas(valid.get("atlas"), Path(base_dir), problems, downloading=downloading)
+    valid["brains"] += tuple(Brain(**entry) for entry in of_atlas)
     folding = _with_map_files(plain.get("folding", {}), Path(base_dir), "folding", problems)
     valid["folding"] = _validated(FoldingSettings, folding, ("folding",), problems)
     runs = _runs(plain.get("runs"), folding if isinstance(folding, dict) else {}, Path(base_dir), problems)
-    problems += study_problems(plain.get("brains"), plain.get("start"), runs)
-    problems += growth_problems(plain.get("brains"), plain.get("growth"), runs)
+    entries = [*(given if isinstance(given, list) else []), *of_atlas]
+    if with_atlas and not of_atlas:
+        # the ids of an atlas section that is wrong are not known
+        problems += study_problems(entries, None, runs)
+    else:
+        problems += study_problems(entries, plain.get("start"), runs)
+        problems += growth_problems(entries, plain.get("growth"), plain.get("start"), runs)
+        problems += age_reference_problems(entries, plain.get("metrics"))
     if problems:
         raise InputError(
             f"the configuration has {len(problems)} problem{'s' if len(problems) > 1 else ''}:\n  "
@@ -88,8 +102,11 @@ def _validated(kind: Any, value: Any, path: tuple, problems: list[str]) -> Any:
         return None
 
 
-def _brains(raw: Any, schemes: list[str], base_dir: Path, problems: list[str]) -> tuple[Brain, ...]:
-    if raw is _ABSENT or not isinstance(raw, list) or not raw:
+def _brains(
+    raw: Any, schemes: list[str], base_dir: Path, problems: list[str], *, alone: bool = True
+) -> tuple[Brain, ...]:
+    """Returns the brains of `brains`; with `alone` there are no others, so that it may not be empty."""
+    if raw is _ABSENT or not isinstance(raw, list) or (alone and not raw):
         found = "nothing" if raw is _ABSENT else repr(raw)
         problems.append(f"brains: found {found}; expected a list of brains, each with id, week and a source")
         return ()
@@ -99,6 +116,20 @@ def _brains(raw: Any, schemes: list[str], base_dir: Path, problems: list[str]) -
         problems += brain_problems(entry, where, schemes)
         brains.append(_validated(Brain, _with_files(entry, base_dir, where, problems), ("brains", number), problems))
     return tuple(brains)
+
+
+def _atlas(
+    atlas: AtlasSettings | None, base_dir: Path, problems: list[str], *, downloading: bool
+) -> tuple[AtlasSettings | None, list[dict[str, Any]]]:
+    """Returns the atlas section with its folder as an absolute path, and the entries of `brains` that it stands for."""
+    if atlas is None:
+        return None, []
+    places = [base_dir / Path(atlas.folder).expanduser(), Path.cwd() / atlas.folder]
+    folder = next((place for place in places if place.exists()), places[0])
+    atlas = atlas.model_copy(update={"folder": str(folder.resolve())})
+    files = atlas_files(atlas)
+    problems += atlas_problems(atlas, files, downloading=downloading)
+    return atlas, atlas_brains(files)
 
 
 def _with_files(entry: Any, base_dir: Path, where: str, problems: list[str]) -> Any:

@@ -1,16 +1,41 @@
 """Settings of the tetrahedral mesh."""
 
+from typing import Literal
+
 from .base import Settings, setting
 
 
 class MeshSettings(Settings):
     """How the start brain's pial surface is filled with tetrahedra."""
 
+    mesher: Literal["pytetwild", "tetgen"] = setting(
+        "pytetwild",
+        "",
+        "`pytetwild` (fTetWild): the best elements, on a surface of its own within `envelope_mm`; `tetgen`: a finer "
+        "surface with few elements below it, in a few seconds.",
+    )
     surface_edge_mm: float = setting(
         0.72, "mm", "Edge length in the cortex: at most half the cortical thickness.", gt=0.1, le=10
     )
+    pial_faces: int | None = setting(
+        None,
+        "",
+        "About how many faces the mesh's surface has; `surface_edge_mm` then does not count.",
+        ge=100,
+        le=2_000_000,
+    )
     core_edge_mm: float = setting(2.5, "mm", "Edge length deep inside.", gt=0.1, le=20)
-    envelope_mm: float = setting(0.1, "mm", "How far the mesh's surface may be from the pial surface.", gt=0.001, le=2)
+    fine_depth_edges: float = setting(
+        2.5,
+        "surface edges",
+        "Depth down to which elements are as fine as at the surface; `pytetwild` only.",
+        ge=0,
+        le=20,
+    )
+    edge_growth: float = setting(0.5, "mm/mm", "Growth of edges with depth below that; `pytetwild` only.", gt=0, le=2)
+    envelope_mm: float = setting(
+        0.1, "mm", "How far the mesh's surface may leave the pial surface; `pytetwild` only.", gt=0.001, le=2
+    )
     time_limit_s: float = setting(1800.0, "s", "The mesher is stopped after this time.", gt=0)
     min_radius_ratio: float = setting(
         0.02,
@@ -18,4 +43,13 @@ class MeshSettings(Settings):
         "Least accepted quality of an element: 3 × inscribed / circumscribed radius, 1 is regular.",
         ge=0,
         lt=1,
+    )
+    min_dihedral_deg: float = setting(1.0, "deg", "Least accepted dihedral angle of an element.", ge=0, lt=70)
+    max_dihedral_deg: float = setting(178.0, "deg", "Largest accepted dihedral angle of an element.", gt=71, le=180)
+    max_surface_distance_mm: float = setting(
+        0.1,
+        "mm",
+        "Largest accepted distance between the mesh's surface and the pial surface, within which 99 % of either lies.",
+        gt=0,
+        le=5,
     )

@@ -3,12 +3,13 @@
 from collections.abc import Iterable
 from typing import Any
 
+from .atlas import AtlasSettings, atlas_files
 from .base import Settings, setting
-from .brains import Brain
+from .brains import KINDS, Brain
 from .folding import VARYING, FoldingSettings, output_weeks
-from .growth import GrowthSettings
+from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
-from .metrics import MetricsSettings
+from .metrics import MetricsSettings, age_reference
 from .report import ReportSettings
 from .schemes import SchemeSettings
 from .surface import SurfaceSettings
@@ -19,8 +20,10 @@ class Config(Settings):
     """A validated configuration. `folding` is the base of every run, `runs` holds the runs' complete settings."""
 
     brains: tuple[Brain, ...] = setting(
-        ..., "", "The brains: one the folding starts from, others to compare with and to estimate growth from."
-    )
+        ..., "", "The brains: one the folding starts from, others to compare with and to estimate growth from. "
+        "May be left out with `atlas`.",
+    )  # fmt: skip
+    atlas: AtlasSettings | None = setting(None, "", "The dHCP atlases as further brains.")
     schemes: dict[str, SchemeSettings] = setting(
         {}, "", "Label schemes by name, beside those that gyriflow has; for the brains' `scheme`."
     )
@@ -65,6 +68,14 @@ class Config(Settings):
         return {"name": name} | (self.schemes[name].model_dump() if name in self.schemes else {})
 
     @property
+    def downloads(self) -> dict[str, str]:
+        """The URL of each file of the atlas, by its path in the atlas folder."""
+        if self.atlas is None:
+            return {}
+        folder = self.atlas.folder
+        return {str(file.path.relative_to(folder)): file.url for file in atlas_files(self.atlas)}
+
+    @property
     def start_week(self) -> float:
         """The gestational age at which the folding starts."""
         return self.brain(self.start).week
@@ -75,10 +86,20 @@ class Config(Settings):
         return output_weeks(self.start_week, settings.end_week, settings.output_every_gw)
 
     @property
-    def growth_brains(self) -> list[str]:
-        """The ids of the brains that growth rates are estimated from; none where they are all of one week."""
-        chosen = [brain for brain in self.brains if self.growth.brains is None or brain.id in self.growth.brains]
-        return [brain.id for brain in chosen] if len({brain.week for brain in chosen}) > 1 else []
+    def growth_series(self) -> dict[str, list[str]]:
+        """The ids of the brains of each series of growth rates, by its name; none where they are all of one week."""
+        kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
+        return growth_series(kinds, {brain.id: brain.week for brain in self.brains}, self.growth.brains)
+
+    @property
+    def estimated_from(self) -> str | None:
+        """The series that `estimated` rates are taken from; None where there is no such series."""
+        return estimated_from(self.growth_series, self.growth.estimated_from, self.start)
+
+    @property
+    def age_reference(self) -> list[str]:
+        """The ids of the brains that ages are told from; none where they are of too few weeks."""
+        return age_reference(self.brains, self.metrics.age_reference)
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its folding program, where a map goes by the name of its parameter.

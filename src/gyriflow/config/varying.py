@@ -7,7 +7,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from .base import Settings, setting
 
 Week = Annotated[float, Field(ge=15, le=45)]
-TAGS = ("number", "table", "word")
+TAGS = ("number", "table", "word", "list")
 """Names of the kinds of value, which stand in the place of an error but are no keys."""
 
 

@@ -91,6 +91,7 @@ class NewtonSolver:
         self._fallbacks: dict[int, PETSc.KSP] = {}
         self._level = 0  # of the shift that the last tangent needed
         self._convex = True  # whether the last tangent was positive definite as it was
+        self._energy: float | None = None  # at the present iterate, where it is known
         self._exhausted = False  # whether nothing is left to gain but round-off
         self.inverting: NDArray[np.float64] | None = None
 
@@ -177,7 +178,7 @@ class NewtonSolver:
                     self._convex = True
                     return
             # folds pressed together would rather slide aside: without that, the tangent is hardly ever indefinite
-            tangent = self.problem.tangent(convex=True)
+            self.problem.convexify(tangent)
         # where the tangent was not positive definite before, it may still not be
         for level in range(max(self._level - 1, 0), len(SHIFTS)):
             with tangent.raised(SHIFTS[level]):
@@ -211,7 +212,9 @@ class NewtonSolver:
         problem, start = self.problem, self.problem.displacement.copy()
         slope = self._direction.dot(self._residual)
         # what contributions add is not convex, and their state at the start is still known here
-        before = problem.energy() if problem.contributions else None
+        before = None
+        if problem.contributions:
+            before = problem.energy() if self._energy is None else self._energy
         self._direction.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
         with self._direction.localForm() as local:
             direction = local.array_r.reshape(-1, 3).copy()
@@ -229,11 +232,10 @@ class NewtonSolver:
                     before = problem.energy()
                     problem.set_displacement(start + length * direction)
                 energy = problem.energy()
-                if np.isfinite(trial) and energy <= before + 1e-4 * length * slope:
-                    return self._accept(trial)
+                lower = np.isfinite(trial) and energy <= before + 1e-4 * length * slope
                 # what is left to gain is below the energy's round-off: the residual decides
-                if trial < norm and abs(energy - before) <= ROUND_OFF * abs(before):
-                    return self._accept(trial)
+                if lower or (trial < norm and abs(energy - before) <= ROUND_OFF * abs(before)):
+                    return self._accept(trial, energy)
             else:
                 self.inverting = problem.volume_ratios()
             length /= 2
@@ -243,8 +245,9 @@ class NewtonSolver:
             return norm
         raise NotConvergedError("the line search found no step that lowers the energy")
 
-    def _accept(self, norm: float) -> float:
+    def _accept(self, norm: float, energy: float | None = None) -> float:
         self._residual, self._trial = self._trial, self._residual
+        self._energy = energy
         return norm
 
     def solve(self, start: NDArray[np.float64]) -> StepCount:
@@ -268,7 +271,7 @@ class NewtonSolver:
             if not norm < at_rest:  # also where it is not a number
                 problem.set_displacement(np.zeros_like(start))
                 norm = problem.residual(self._residual)
-        tangent, before, self._exhausted = None, np.inf, False
+            tangent, before, self._energy, self._exhausted = None, np.inf, None, False
         while not (norm <= tolerance or self._exhausted):
             if count.newton >= self.settings.max_newton:
                 raise NotConvergedError(

@@ -203,11 +203,8 @@ class Problem:
             self._motions.remove(out.array_w)
         return out.norm()
 
-    def tangent(self, *, convex: bool = False) -> Tangent:
-        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
-
-        With `convex`, contributions leave out what is negative of theirs.
-        """
+    def tangent(self) -> Tangent:
+        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed."""
         blocks = self._blocks.blocks
         blocks.set_value(0.0)
         dolfinx.fem.assemble_matrix(blocks, self._tangent)
@@ -218,11 +215,20 @@ class Problem:
             # one object for all iterates, since multigrid keeps the first it is given
             self._sum = SumOperator(products)
             self._sum_matrix = self._sum.as_matrix()
+        return Tangent(matrix, self._sum_matrix, self._further_parts(convex=False))
+
+    def convexify(self, tangent: Tangent) -> None:
+        """Takes from the present tangent what is negative of the contributions' terms."""
+        tangent.set_parts(self._further_parts(convex=True))
+
+    def _further_parts(self, *, convex: bool) -> list[PETSc.Mat]:
+        """Returns the contributions' tangents, without entries of fixed components, and has the products know them."""
+        assert self._sum is not None
         parts = [part for part in (part.stiffness(convex=convex) for part in self.contributions) if part is not None]
         for part in parts:
             part.zeroRowsColumns(self._fixed_global, diag=0.0)
         self._sum.parts = parts
-        return Tangent(matrix, self._sum_matrix, parts)
+        return parts
 
     def hold(self, direction: PETSc.Vec) -> None:
         """Sets the fixed components of a direction to exactly 0, which preconditioners miss by their tolerance."""

@@ -59,11 +59,18 @@ class Tangent:
     def __init__(self, matrix: PETSc.Mat, products: PETSc.Mat, parts: Sequence[PETSc.Mat]) -> None:
         self.products = products
         self.smoothing = matrix
+        self._raised: list[tuple[np.ndarray, np.ndarray]] = []
+        self.set_parts(parts)
+
+    def set_parts(self, parts: Sequence[PETSc.Mat]) -> None:
+        """Takes other parts in the place of those there are; what acts like the whole must know of them already."""
+        for nodes, blocks in self._raised:
+            add_block_diagonal(self.smoothing, nodes, -blocks)
         self._parts = parts
         self._raised = [raising(part) for part in parts]
-        self._whole = None if parts else matrix
+        self._whole = None if parts else self.smoothing
         for nodes, blocks in self._raised:
-            add_block_diagonal(matrix, nodes, blocks)
+            add_block_diagonal(self.smoothing, nodes, blocks)
 
     def whole(self) -> PETSc.Mat:
         """Returns the matrix with all entries, stored by rows."""

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..units import SECONDS_PER_GW
+from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 
 FOLDING_RATES = {
     "growth_rate_per_s": "compound_rate_per_s",
@@ -81,6 +81,62 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
             "core_compound_rate_per_s": np.log(volume_ratio) / (3 * seconds),
         }
     )
+
+
+def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
+    """Returns the growth rates of each series of brains: the table of `growth_rates` under its name, in `series`.
+
+    Parameters
+    ----------
+    areas
+        Columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean.
+    """
+    tables = []
+    for name, brains in areas.groupby("series", sort=False):
+        weekly = brains.groupby("week", as_index=False)[["area_cm2", "volume_ml"]].mean()
+        weeks, area_cm2, volume_ml = (weekly[column].tolist() for column in weekly)
+        areas_mm2, volumes_mm3 = [a / CM2_PER_MM2 for a in area_cm2], [v / ML_PER_MM3 for v in volume_ml]
+        rates = growth_rates(weeks, areas_mm2, volumes_mm3)
+        rates.insert(0, "series", name)
+        tables.append(rates)
+    return pd.concat(tables, ignore_index=True)
+
+
+def agreement(areas: pd.DataFrame) -> pd.DataFrame:
+    """Returns how far series of brains agree with the first one: differences of their rates between common weeks.
+
+    Rates are taken between the successive weeks that both series have, so that the intervals are the same.
+
+    Parameters
+    ----------
+    areas
+        As for `rates_of_series`.
+
+    Returns
+    -------
+    DataFrame
+        series, reference (the first series), from_week, to_week, rate_per_s, reference_rate_per_s, difference_per_s
+        (the series' rate less the reference's), and the same three with core_ in front. No row where series have no two
+        common weeks.
+    """
+    names = list(dict.fromkeys(areas["series"]))
+    compared = [f"{kind}{column}" for kind in ("", "core_") for column in _COMPARED]
+    tables = [pd.DataFrame(columns=["series", "reference", "from_week", "to_week", *compared])]
+    for name in names[1:]:
+        pair = [areas[areas["series"] == series] for series in (name, names[0])]
+        weeks = set(pair[0]["week"]) & set(pair[1]["week"])
+        if len(weeks) > 1:
+            rates, others = (rates_of_series(brains[brains["week"].isin(weeks)]) for brains in pair)
+            table = rates[["series", "from_week", "to_week"]].assign(reference=names[0])
+            for kind in ("", "core_"):
+                rate, other = rates[f"{kind}rate_per_s"], others[f"{kind}rate_per_s"]
+                for column, values in zip(_COMPARED, (rate, other, rate - other), strict=True):
+                    table[f"{kind}{column}"] = values
+            tables.append(table)
+    return pd.concat(tables[1:] or tables, ignore_index=True)[tables[0].columns]
+
+
+_COMPARED = ("rate_per_s", "reference_rate_per_s", "difference_per_s")
 
 
 def rate_curve(

@@ -16,7 +16,7 @@ from nibabel.nifti1 import xform_codes
 from numpy.typing import NDArray
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.geometry.triangles import TriangleMesh, is_closed
 from gyriflow.io.files import AnyPath, replaced
 
 log = logging.getLogger(__name__)
@@ -108,7 +108,9 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
         meta=GiftiMetaData(meta),
     )
     triangles = GiftiDataArray(
-        mesh.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE", meta=GiftiMetaData({"TopologicalType": "Closed"})
+        mesh.faces.astype(np.int32),
+        intent="NIFTI_INTENT_TRIANGLE",
+        meta=GiftiMetaData({"TopologicalType": "Closed" if is_closed(mesh) else "Open"}),
     )
     with replaced(path) as temporary:
         nib.save(GiftiImage(darrays=[points, triangles]), temporary)

@@ -15,6 +15,7 @@ from .hdf5 import new_hdf5
 
 XDMF_NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
 XDMF_ATTRIBUTE = {1: "Scalar", 3: "Vector", 9: "Tensor"}
+XDMF_TOPOLOGY = {3: "Triangle", 4: "Tetrahedron"}
 
 
 def data_item(values: NDArray, where: str) -> str:
@@ -31,10 +32,10 @@ def attribute(name: str, centre: str, values: NDArray, where: str) -> str:
     return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{item}</Attribute>'
 
 
-def topology(tets: NDArray, where: str) -> str:
-    """Returns the XDMF element of the tetrahedra stored at `where`."""
-    item = data_item(tets, where)
-    return f'<Topology TopologyType="Tetrahedron" NumberOfElements="{len(tets)}">{item}</Topology>'
+def topology(cells: NDArray, where: str) -> str:
+    """Returns the XDMF element of the tetrahedra or triangles stored at `where`."""
+    item = data_item(cells, where)
+    return f'<Topology TopologyType="{XDMF_TOPOLOGY[cells.shape[1]]}" NumberOfElements="{len(cells)}">{item}</Topology>'
 
 
 def geometry(points: NDArray, where: str) -> str:
@@ -42,9 +43,10 @@ def geometry(points: NDArray, where: str) -> str:
     return f'<Geometry GeometryType="XYZ">{data_item(points, where)}</Geometry>'
 
 
-def document(grids: str) -> str:
-    """Returns a whole XDMF document around its grids."""
-    return f'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>{grids}</Domain></Xdmf>\n'
+def document(*domains: str) -> str:
+    """Returns a whole XDMF document around the grids of its domains."""
+    inside = "".join(f"<Domain>{grids}</Domain>" for grids in domains)
+    return f'<?xml version="1.0"?>\n<Xdmf Version="3.0">{inside}</Xdmf>\n'
 
 
 def write_tetrahedral_mesh(
@@ -100,20 +102,6 @@ def read_tetrahedral_mesh(path: str | PathLike[str]) -> TetrahedralMesh:
         raise InputError("has elements without volume", path=path, found=f"{int((volumes == 0).sum())}")
     turned = np.where((volumes < 0)[:, None], mesh.tets[:, [0, 2, 1, 3]], mesh.tets)
     return TetrahedralMesh(mesh.vertices, turned)
-
-
-def read_vertex_field(path: str | PathLike[str], name: str) -> NDArray:
-    """Returns a field of an XDMF file, (n,) or (n, 3), at the vertices of `read_tetrahedral_mesh`.
-
-    Raises
-    ------
-    InputError
-        Where the file cannot be read or has no such field.
-    """
-    read, tets = _content(Path(path))
-    if name not in read.point_data:
-        raise InputError("lacks a field at its vertices", path=path, found=sorted(read.point_data), expected=name)
-    return np.asarray(read.point_data[name])[np.unique(tets)]
 
 
 def _content(path: Path) -> tuple[meshio.Mesh, NDArray]:

@@ -1,4 +1,4 @@
-"""Charts of growth, metrics, solver steps and mesh quality."""
+"""Charts of metrics, solver steps and mesh quality."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -19,7 +19,6 @@ from .style import (
     REAL_COLOUR,
     RUN_COLOURS,
     SINGLE_COLUMN_IN,
-    column_label,
     from_zero,
     light_grid,
     new_figure,
@@ -45,84 +44,13 @@ QUALITY_TITLES = {
     "radius_ratio": "radius ratio (1 = regular)",
     "min_dihedral_deg": "smallest dihedral angle (°)",
     "max_dihedral_deg": "largest dihedral angle (°)",
+    "volume_mm3": "volume (mm³)",
 }
-
-
-@styled
-def growth_chart(
-    areas: pd.DataFrame,
-    rates: pd.DataFrame,
-    *,
-    folding_rate_per_s: float | Mapping[float, float] | None = None,
-    measured: str = REAL_BRAIN,
-    title: str = "",
-    synthetic: bool = False,
-) -> Figure:
-    """Returns cortical area and volume over weeks, and the tangential growth rate of each interval as bars.
-
-    Parameters
-    ----------
-    areas : columns subject, week, area_cm2, volume_ml
-    rates : columns from_week, to_week, rate_per_s (1/s)
-    folding_rate_per_s
-        Growth rate of the folding in 1/s, drawn as a line over the bars: a number, or values by week that are linear
-        in between and constant beyond.
-    """
-    figure = new_figure(FULL_WIDTH_IN, 2.6, title=title, synthetic=synthetic)
-    area_axes, rate_axes = figure.subplots(1, 2)
-    known = areas.sort_values("week")
-    area_axes.plot(known["week"], known["area_cm2"], "o-", color=RUN_COLOURS[0])
-    area_axes.set_ylabel("pial area (cm²)", color=RUN_COLOURS[0])
-    from_zero(area_axes)
-    week_axis(area_axes, known["week"])
-    light_grid(area_axes)
-    volume_axes = area_axes.twinx()
-    volume_axes.spines["right"].set_visible(True)
-    volume_axes.plot(known["week"], known["volume_ml"], "s--", color=RUN_COLOURS[1])
-    volume_axes.set_ylabel("volume (mL)", color=RUN_COLOURS[1])
-    from_zero(volume_axes)
-    area_axes.set_title(f"{measured}: area and volume")
-
-    scaled = rates["rate_per_s"] * 1e7
-    labels = [
-        column_label((a, b)).removesuffix(" GW") for a, b in zip(rates["from_week"], rates["to_week"], strict=True)
-    ]
-    bars = rate_axes.bar(labels, scaled, width=0.7, color=RUN_COLOURS[0])
-    # in front of the folding's line, where they meet
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-    size = 6.5 if len(rates) <= 10 else 5
-    texts = rate_axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=size, padding=2)
-    for text in texts:
-        text.set(bbox=box, zorder=3)
-    rate_axes.axhline(0, color="black", linewidth=0.6)
-    if folding_rate_per_s is not None:
-        _folding_line(rate_axes, rates, folding_rate_per_s)
-        # above the axes, where no bar can be
-        rate_axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.06), borderaxespad=0)
-    rate_axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
-    rate_axes.set_xlabel("gestational interval (GW)")
-    rate_axes.set_title("tangential growth rate", loc="left")
-    if len(labels) > 6:
-        rate_axes.tick_params(axis="x", rotation=45)
-    rate_axes.margins(y=0.12)
-    # room for three bars at least, else a single one fills the panel
-    spare = max(0.0, 3 - len(labels)) / 2
-    rate_axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
-    return figure
-
-
-def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]) -> None:
-    """Draws the folding's growth rate over bars of equal width, one per interval of the rates."""
-    look: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
-    if not isinstance(rate_per_s, Mapping):
-        axes.axhline(rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **look)
-        return
-    weeks = np.array(sorted(rate_per_s))
-    values = 1e7 * np.array([rate_per_s[week] for week in weeks])
-    ends = np.array([*rates["from_week"], rates["to_week"].iloc[-1]])
-    shown = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
-    places = np.interp(shown, ends, np.arange(len(ends)) - 0.5)
-    axes.plot(places, np.interp(shown, weeks, values), label="folding", **look)
+QUALITY_GATES = {
+    "radius_ratio": "min_radius_ratio",
+    "min_dihedral_deg": "min_dihedral_deg",
+    "max_dihedral_deg": "max_dihedral_deg",
+}
 
 
 def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> set[str]:
@@ -254,20 +182,23 @@ def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False
 def quality_histogram(
     quality: pd.DataFrame | Mapping[str, Mapping[str, ArrayLike]],
     *,
-    min_radius_ratio: float | None = None,
+    gates: Mapping[str, float] | None = None,
+    surface: str = "",
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
-    """Returns histograms of the tetrahedra's radius ratio and dihedral angles.
+    """Returns histograms of the tetrahedra's radius ratio, dihedral angles and volumes.
 
     Parameters
     ----------
     quality : DataFrame with one row per element, or {column: {"edges": (k + 1,), "counts": (k,)}}
-        Columns radius_ratio, min_dihedral_deg, max_dihedral_deg; others are left out.
-    min_radius_ratio
-        The gate of the configuration, drawn as a line.
+        Columns radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3; others are left out.
+    gates : {min_radius_ratio, min_dihedral_deg, max_dihedral_deg: limit}
+        The gates of the configuration, drawn as lines; others are left out.
+    surface
+        What is to be said of the mesh's surface, under the histograms.
     """
-    figure = new_figure(FULL_WIDTH_IN, 2.3, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 2.5, title=title, synthetic=synthetic)
     panels = figure.subplots(1, len(QUALITY_TITLES), sharey=False)
     for axes, (column, label) in zip(panels, QUALITY_TITLES.items(), strict=True):
         if isinstance(quality, pd.DataFrame):
@@ -280,12 +211,16 @@ def quality_histogram(
         axes.set_ylim(bottom=0.7)
         axes.set_xlabel(label)
         filled = np.flatnonzero(counts)
-        low, high = edges[filled[0]], edges[filled[-1] + 1]
-        count = f"{int(counts.sum()):,}".replace(",", "\u2009")
-        axes.set_title(f"{count} elements, {low:.3g} to {high:.3g}", fontsize=7)
+        said = f"{edges[filled[0]]:.3g} to {edges[filled[-1] + 1]:.3g}"
+        limit = (gates or {}).get(QUALITY_GATES.get(column, ""))
+        if limit is not None:
+            axes.axvline(limit, color=RUN_COLOURS[1], linestyle="--")
+            said += f", gate {limit:g}"
+        axes.set_title(said, fontsize=7)
         light_grid(axes)
-    panels[0].set_ylabel("elements")
-    if min_radius_ratio is not None:
-        panels[0].axvline(min_radius_ratio, color=RUN_COLOURS[1], linestyle="--", label=f"gate {min_radius_ratio:g}")
-        panels[0].legend(loc="upper left")
+    panels[-1].set_xscale("log")
+    count = f"{int(counts.sum()):,}".replace(",", "\u2009")
+    panels[0].set_ylabel(f"of {count} elements")
+    if surface:
+        figure.supxlabel(surface, fontsize=7)
     return figure

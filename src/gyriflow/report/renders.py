@@ -163,8 +163,8 @@ def scalar_maps(
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
     quantity
-        "shape_index" (−1 to 1, gyri red, sulci blue), or "curvedness" (1/mm; from 0 to the 98th percentile of all
-        surfaces).
+        "shape_index" (−1 to 1, gyri red, sulci blue), "curvedness" (1/mm) or "sulcal_depth_mm"; the latter two from 0
+        to the 98th percentile of all surfaces.
     measured
         What the measured brains are called, where there are any.
 
@@ -181,8 +181,12 @@ def scalar_maps(
             # a few sharp vertices would take the whole scale
             high = float(np.nanpercentile(values, 98))
             scale, label = colour_scale("viridis", 0.0, high, cut=True), "curvedness (mm⁻¹)"
+        case "sulcal_depth_mm":
+            high = float(np.nanpercentile(values, 98))
+            scale, label = colour_scale("YlGnBu", 0.0, high, cut=True), "sulcal depth (mm)"
         case _:
-            raise InputError("unknown quantity", found=quantity, expected=["shape_index", "curvedness"])
+            known = ["shape_index", "curvedness", "sulcal_depth_mm"]
+            raise InputError("unknown quantity", found=quantity, expected=known)
     keys = _ordered(*maps.values())
     rows = [
         Row(

@@ -56,6 +56,7 @@ VIEWS = {
 }
 """The views by name. In the top view the brain's left is on the picture's left."""
 
+_INSIDE_COLOUR = "#D9D9D9"
 _UNKNOWN_COLOUR = (0.72, 0.72, 0.72, 1.0)
 
 # three lamps fixed to the camera: a raking one that lets folds cast shade, two weak ones that fill the dark side
@@ -161,7 +162,10 @@ def render(
             diffuse=0.75,
             specular=0.10,
             specular_power=15,
+            culling="back",
         )
+        # the inside of a surface that is open where a connected brain is parted
+        plotter.add_mesh(surface, color=_INSIDE_COLOUR, ambient=0.6, diffuse=0.4, culling="front")
         for position, intensity in _LAMPS:
             plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2

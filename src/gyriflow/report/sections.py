@@ -1,16 +1,23 @@
-"""Plane sections through tetrahedral meshes."""
+"""Plane sections through tetrahedral meshes: fields, tags, and vectors as arrows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
 import pyvista as pv
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import Collection
+from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse, Patch
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
-from .style import FULL_WIDTH_IN, new_figure, styled
+from .style import FULL_WIDTH_IN, RUN_COLOURS, new_figure, styled
 
 PLANES = {
     # name: (axis across the plane, axes to the right and up)
@@ -19,6 +26,39 @@ PLANES = {
     "sagittal": (0, 1, 2),
 }
 AXIS_NAMES = ("x: left − to right + (mm)", "y: posterior − to anterior + (mm)", "z: inferior − to superior + (mm)")
+SHOWN = ("coronal", "axial")
+HEMISPHERES = {1: ("left", "#0072B2"), 2: ("right", "#F0E442"), 3: ("between the planes", "#CC79A7")}
+GROWING = {1: ("growing", "#D55E00"), 0: ("no growth", "#56B4E9")}
+"""Codes of the elements' tags, their names and colours, those of the boundary's zones, near the paper's."""
+GROWTH, STIFFNESS = "tangential growth per step (10⁻³)", "shear modulus (Pa)"
+_FOOT_IN, _LABEL_IN = 0.66, 1.3
+_ARROWS_ACROSS = 26
+
+Tag = tuple[NDArray[np.integer], Mapping[int, tuple[str, str]]]
+Ellipsoid = tuple[Floats, Floats]
+
+
+def region_sections(
+    mesh: TetrahedralMesh,
+    fields: Mapping[str, Floats],
+    tags: Mapping[str, NDArray[np.integer]],
+    ellipsoid: Ellipsoid | None,
+    *,
+    title: str = "",
+    synthetic: bool = False,
+) -> Figure:
+    """Returns coronal and axial sections with the hemispheres, what grows, growth of a step, and stiffness.
+
+    Fields at vertices, tags of elements, and the ellipsoid are those of the folding's regions.
+    """
+    return cross_sections(
+        mesh,
+        {GROWTH: 1e3 * fields["tangential_growth_per_step"], STIFFNESS: fields["shear_modulus_pa"]},
+        tags={"hemispheres": (tags["hemisphere"], HEMISPHERES), "growing": (tags["growing"], GROWING)},
+        ellipsoid=ellipsoid,
+        title=title,
+        synthetic=synthetic,
+    )
 
 
 @styled
@@ -26,62 +66,232 @@ def cross_sections(
     mesh: TetrahedralMesh,
     fields: Mapping[str, Floats],
     *,
-    plane: str = "coronal",
+    tags: Mapping[str, Tag] | None = None,
+    planes: Sequence[str] = SHOWN,
+    ellipsoid: Ellipsoid | None = None,
     title: str = "",
     synthetic: bool = False,
 ) -> Figure:
-    """Returns a plane section through the middle of a mesh in RAS+ mm for each of some fields, side by side.
+    """Returns plane sections through the middle of a mesh in RAS+ mm, a row per plane, a column per tag and field.
 
     Parameters
     ----------
     fields : {name and unit: (n,) values at the vertices}
-    plane
-        "coronal", "axial" or "sagittal"; the brain's left is on the picture's left.
+    tags : {name: ((m,) codes of the elements, {code: (name, colour)})}
+    planes
+        Among "coronal", "axial" and "sagittal"; the brain's left is on the picture's left. All panels have one scale.
+    ellipsoid
+        Centre and semi-axes, (3,) in mm, of an ellipsoid of which the outline is drawn.
 
     Raises
     ------
     InputError
-        For another plane, or values that do not fit the mesh.
+        For another plane, values that do not fit the mesh, or a code without a name.
     """
-    if plane not in PLANES:
-        raise InputError("unknown plane", found=plane, expected=list(PLANES))
+    tags = tags or {}
+    _require_fitting(mesh, fields, tags)
+    grid = _grid(mesh, fields, {name: codes for name, (codes, _) in tags.items()})
+    figure, panels, foot = _rows(mesh, planes, len(tags) + len(fields), title, synthetic)
+    for column, name in enumerate((*tags, *fields)):
+        panels[0, column].set_title(name.partition(" (")[0], fontsize=7)
+        for axes, plane in zip(panels[:, column], planes, strict=True):
+            points, triangles, section = _section(grid, plane)
+            scale: Colormap = mpl.colormaps["viridis"]
+            if name in tags:
+                colours = [colour for _, colour in tags[name][1].values()]
+                values, limits = _ranks(section.cell_data[name], tags[name][1]), (-0.5, len(colours) - 0.5)
+                scale = ListedColormap(colours)
+            else:
+                values = section.point_data[name][triangles].mean(axis=1)
+                limits = float(np.min(fields[name])), float(np.max(fields[name]))
+            drawn = _draw(axes, points, triangles, values, scale, limits)
+            if ellipsoid:
+                _outline(axes, ellipsoid, plane, _middle(mesh)[PLANES[plane][0]])
+        if name in fields:
+            bar = figure.colorbar(drawn, cax=foot[column].inset_axes((0.05, 0.8, 0.9, 0.1)), orientation="horizontal")
+            bar.set_label(name, fontsize=7)
+        else:
+            keys: list[Artist] = [Patch(color=colour, label=label) for label, colour in tags[name][1].values()]
+            if ellipsoid and name == list(tags)[-1]:
+                keys.append(Line2D([], [], color="black", linestyle="--", linewidth=0.9, label="ellipsoid"))
+            foot[column].legend(handles=keys, loc="upper center", borderaxespad=0, labelspacing=0.3, handlelength=1.6)
+    return figure
+
+
+@styled
+def normal_arrows(
+    mesh: TetrahedralMesh,
+    normals: Floats,
+    weight: Floats,
+    facets: NDArray[np.integer],
+    *,
+    planes: Sequence[str] = SHOWN,
+    title: str = "",
+    synthetic: bool = False,
+) -> Figure:
+    """Returns sections with the normals of a sample of vertices near them as arrows, over the cortical weight.
+
+    Parameters
+    ----------
+    normals : (n, 3) unit vectors at the vertices
+    weight : (n,) cortical weight at the vertices
+    facets : (f, 3) pial facets, whose vertices have arrows of another colour
+    """
+    label = "cortical weight"
+    _require_fitting(mesh, {label: weight, "normals": normals}, {})
+    grid, middle = _grid(mesh, {label: weight}, {}), _middle(mesh)
+    pial = np.zeros(len(mesh.vertices), dtype=bool)
+    pial[np.unique(facets)] = True
+    step = float(np.ptp(mesh.vertices, axis=0).max()) / _ARROWS_ACROSS
+    length = 1.3 * step
+    half = np.ptp(mesh.vertices, axis=0) / 2 + 1.1 * length
+    wide = [half[PLANES[plane][1]] for plane in known(planes)]
+    tall = max(half[PLANES[plane][2]] for plane in planes)
+    height = (FULL_WIDTH_IN - 0.55 * len(planes)) * tall / sum(wide) + 0.95 + 0.17 * synthetic
+    figure = new_figure(FULL_WIDTH_IN, height, title=title, synthetic=synthetic)
+    panels = figure.subplots(1, len(planes), squeeze=False, gridspec_kw={"width_ratios": wide})[0]
+    groups = {"pial vertices": (pial, RUN_COLOURS[0]), "vertices inside": (~pial, RUN_COLOURS[1])}
+    for axes, plane, width in zip(panels, planes, wide, strict=True):
+        across, right, up = PLANES[plane]
+        axes.set_xlim(middle[right] - width, middle[right] + width)
+        axes.set_ylim(middle[up] - tall, middle[up] + tall)
+        points, triangles, section = _section(grid, plane)
+        cortex = section.point_data[label][triangles].mean(axis=1)
+        # half of the scale, so that arrows stand out
+        _draw(axes, points, triangles, cortex, mpl.colormaps["Greys"], (0.0, 2.0))
+        for among, colour in groups.values():
+            shown = _sample(mesh.vertices, among, plane, middle[across], step)
+            axes.quiver(
+                *mesh.vertices[shown][:, (right, up)].T, *(length * normals[shown][:, (right, up)]).T, color=colour,
+                angles="xy", scale_units="xy", scale=1.0, width=0.005, headwidth=3.5, headlength=4, headaxislength=3.5,
+            )  # fmt: skip
+        axes.set_title(f"{plane}, {'xyz'[across]} = {middle[across]:.1f} mm")
+        axes.set(xlabel=AXIS_NAMES[right], ylabel=AXIS_NAMES[up])
+    keys = [Patch(color=colour, label=f"normals, {name}") for name, (_, colour) in groups.items()]
+    keys.append(Patch(color=mpl.colormaps["Greys"](0.5), label="cortex (weight 1; white: core, 0)"))
+    figure.legend(handles=keys, loc="outside lower center", ncols=3)
+    return figure
+
+
+def known(planes: Sequence[str]) -> Sequence[str]:
+    """Returns the names of planes as they are; InputError for an unknown one."""
+    unknown = [plane for plane in planes if plane not in PLANES]
+    if unknown:
+        raise InputError("unknown plane", found=unknown, expected=list(PLANES))
+    return planes
+
+
+def _require_fitting(mesh: TetrahedralMesh, fields: Mapping[str, Floats], tags: Mapping[str, Tag]) -> None:
     for label, values in fields.items():
         if len(values) != len(mesh.vertices):
             expected = f"{len(mesh.vertices)}, one per vertex"
             raise InputError(f"{label}: values do not fit the mesh", found=len(values), expected=expected)
-    across, right, up = PLANES[plane]
-    section = _cut(mesh, fields, across)
-    points, triangles = np.asarray(section.points), section.regular_faces
-    span = np.ptp(points, axis=0)
-    height = 1.35 + 0.17 * synthetic + (FULL_WIDTH_IN / len(fields) - 0.7) * span[up] / span[right]
-    figure = new_figure(FULL_WIDTH_IN, height, title=title, synthetic=synthetic)
-    panels = figure.subplots(1, len(fields), sharey=True, squeeze=False)[0]
-    for axes, (label, values) in zip(panels, fields.items(), strict=True):
-        low, high = float(np.min(values)), float(np.max(values))
-        drawn = axes.tripcolor(
-            points[:, right],
-            points[:, up],
-            triangles,
-            facecolors=section.point_data[label][triangles].mean(axis=1),
-            cmap="viridis",
-            vmin=low,
-            vmax=high if high > low else low + 1.0,
-            antialiased=False,
-            rasterized=True,
-        )
-        axes.set_aspect("equal")
-        axes.set_xlabel(AXIS_NAMES[right])
-        axes.set_title(f"{plane} section at {'xyz'[across]} = {points[0, across]:.1f} mm")
-        axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(6))
-        figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.8, aspect=30).set_label(label)
-    panels[0].set_ylabel(AXIS_NAMES[up])
-    return figure
+    for label, (codes, names) in tags.items():
+        if len(codes) != len(mesh.tets):
+            expected = f"{len(mesh.tets)}, one per element"
+            raise InputError(f"{label}: tags do not fit the mesh", found=len(codes), expected=expected)
+        if unknown := sorted({int(code) for code in np.unique(codes)} - set(names)):
+            raise InputError(f"{label}: unknown tag", found=unknown, expected=sorted(names))
 
 
-def _cut(mesh: TetrahedralMesh, fields: Mapping[str, Floats], axis: int) -> pv.PolyData:
-    """Returns the triangles of the section across the middle of an axis, with the fields at their points."""
+def _rows(
+    mesh: TetrahedralMesh, planes: Sequence[str], columns: int, title: str, synthetic: bool
+) -> tuple[Figure, NDArray, NDArray]:
+    """Returns a figure with its panels, a row for each plane, all at one scale, and a place for a key per column."""
+    middle, half = _middle(mesh), 0.515 * np.ptp(mesh.vertices, axis=0)
+    width = max(half[PLANES[plane][1]] for plane in known(planes))
+    inches_per_mm = (FULL_WIDTH_IN - 0.5 - 0.1 * columns) / columns / width
+    tall = [max(half[PLANES[plane][2]], _LABEL_IN / inches_per_mm) for plane in planes]
+    heights = [inches_per_mm * height for height in tall] + [_FOOT_IN]
+    total = sum(heights) + 0.5 + 0.12 * len(planes) + 0.17 * synthetic
+    figure = new_figure(FULL_WIDTH_IN, total, title=title, synthetic=synthetic)
+    panels = figure.subplots(len(heights), columns, squeeze=False, gridspec_kw={"height_ratios": heights})
+    for (row, column), axes in np.ndenumerate(panels[:-1]):
+        across, right, up = PLANES[planes[row]]
+        axes.set_xlim(middle[right] - width, middle[right] + width)
+        axes.set_ylim(middle[up] - tall[row], middle[up] + tall[row])
+        last = row == len(planes) - 1 or PLANES[planes[row + 1]][1] != right
+        axes.tick_params(labelbottom=last, labelleft=not column)
+        if last:
+            axes.set_xlabel(AXIS_NAMES[right] if columns < 3 else f"{'xyz'[right]} (mm)")
+        if not column:
+            axes.set_ylabel(f"{planes[row]}, {'xyz'[across]} = {middle[across]:.1f} mm\n{'xyz'[up]} (mm)")
+    for axes in panels[-1]:
+        axes.set_axis_off()
+    return figure, panels[:-1], panels[-1]
+
+
+def _middle(mesh: TetrahedralMesh) -> Floats:
+    return np.asarray((mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2)
+
+
+def _grid(
+    mesh: TetrahedralMesh, fields: Mapping[str, Floats], tags: Mapping[str, NDArray[np.integer]]
+) -> pv.UnstructuredGrid:
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: np.array(mesh.tets)}, np.array(mesh.vertices))
-    for label, values in fields.items():
-        grid.point_data[label] = np.asarray(values, dtype=float)
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    return grid.slice(normal=np.eye(3)[axis], origin=middle, generate_triangles=True)
+    for name, values in fields.items():
+        grid.point_data[name] = np.asarray(values, dtype=float)
+    for name, codes in tags.items():
+        grid.cell_data[name] = np.asarray(codes)
+    return grid
+
+
+def _section(grid: pv.UnstructuredGrid, plane: str) -> tuple[Floats, NDArray, pv.PolyData]:
+    """Returns (k, 2) points and triangles of the section across the middle of an axis, and it with its data."""
+    across, right, up = PLANES[plane]
+    section = grid.slice(normal=np.eye(3)[across], origin=grid.center, generate_triangles=True)
+    return np.asarray(section.points)[:, (right, up)], section.regular_faces, section
+
+
+def _ranks(codes: NDArray[np.integer], names: Mapping[int, object]) -> Floats:
+    """Returns the place of each code among the names."""
+    order = np.array(list(names))
+    return (codes[:, None] == order).argmax(axis=1).astype(float)
+
+
+def _draw(
+    axes: Axes, points: Floats, triangles: NDArray, values: Floats, colours: Colormap, limits: tuple[float, float]
+) -> Collection:
+    """Returns the section drawn into the panel, whose limits stay."""
+    low, high = limits
+    keep = {"xlim": axes.get_xlim(), "ylim": axes.get_ylim()}
+    drawn = axes.tripcolor(
+        points[:, 0],
+        points[:, 1],
+        triangles=triangles,
+        facecolors=values,
+        cmap=colours,
+        vmin=low,
+        vmax=high if high > low else low + 1.0,
+        antialiased=False,
+        rasterized=True,
+    )
+    axes.set(**keep)
+    axes.set_aspect("equal")
+    axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(5))
+    axes.yaxis.set_major_locator(mpl.ticker.MaxNLocator(5))
+    return drawn
+
+
+def _outline(axes: Axes, ellipsoid: Ellipsoid, plane: str, position: float) -> None:
+    """Draws the ellipse in which the plane at a position cuts the ellipsoid, if it does."""
+    centre, semi_axes = ellipsoid
+    across, right, up = PLANES[plane]
+    rest = 1 - ((position - centre[across]) / semi_axes[across]) ** 2
+    if rest > 0:
+        size = 2 * np.sqrt(rest) * semi_axes
+        for colour, line, thickness in (("white", "-", 1.6), ("black", "--", 0.9)):
+            ellipse = Ellipse((centre[right], centre[up]), size[right], size[up], fill=False)
+            ellipse.set(edgecolor=colour, linestyle=line, linewidth=thickness)
+            axes.add_patch(ellipse)
+
+
+def _sample(points: Floats, among: NDArray[np.bool_], plane: str, position: float, step: float) -> NDArray[np.int64]:
+    """Returns some of the vertices near a plane: in each square of `step` mm the one nearest to it."""
+    across, right, up = PLANES[plane]
+    away = np.abs(points[:, across] - position)
+    near = np.flatnonzero(among & (away < step / 2))
+    near = near[np.argsort(away[near], kind="stable")]
+    squares = np.floor(points[near][:, (right, up)] / step).astype(int)
+    _, first = np.unique(squares, axis=0, return_index=True)
+    return near[first]

@@ -15,10 +15,13 @@ def growth_table(rates: pd.DataFrame) -> pd.DataFrame:
 
     Parameters
     ----------
-    rates : columns from_week, to_week, area_ratio, rate_per_s, volume_ratio, core_rate_per_s
+    rates : columns series, from_week, to_week, area_ratio, rate_per_s, volume_ratio, core_rate_per_s
+        The series is shown where there are several.
     """
+    several = len(set(rates["series"])) > 1
     return pd.DataFrame(
-        {
+        ({"series": rates["series"]} if several else {})
+        | {
             "from (GW)": rates["from_week"],
             "to (GW)": rates["to_week"],
             "area ratio": rates["area_ratio"].round(4),
@@ -27,6 +30,47 @@ def growth_table(rates: pd.DataFrame) -> pd.DataFrame:
             "core rate (10⁻⁷ s⁻¹)": (1e7 * rates["core_rate_per_s"]).round(3),
         }
     )
+
+
+def sizes_table(areas: pd.DataFrame) -> pd.DataFrame:
+    """Returns areas and volumes per week of each series of brains, and how far each is from the first one in %.
+
+    Parameters
+    ----------
+    areas : columns series, week, area_cm2, volume_ml
+        Brains of one week and series count as their mean.
+    """
+    names = list(dict.fromkeys(areas["series"]))
+    columns: dict[str, pd.Series] = {}
+    for column, heading, unit in (("area_cm2", "pial area", "cm²"), ("volume_ml", "volume", "mL")):
+        wide = areas.pivot_table(index="week", columns="series", values=column, aggfunc="mean")
+        columns |= {f"{heading} ({unit}): {name}": wide[name] for name in names}
+        for name in names[1:]:
+            columns[f"{heading}: {name} − {names[0]} (%)"] = (100 * (wide[name] / wide[names[0]] - 1)).round(1)
+    return pd.DataFrame(columns).rename_axis("week (GW)")
+
+
+def agreement_table(agreement: pd.DataFrame) -> pd.DataFrame:
+    """Returns how far the growth rates of series agree, in 10⁻⁷ s⁻¹: a row per interval, their mean, the mean size.
+
+    Parameters
+    ----------
+    agreement : columns series, reference, from_week, to_week, difference_per_s, core_difference_per_s
+    """
+    differences = {"difference_per_s": "tangential rate", "core_difference_per_s": "core rate"}
+    parts = []
+    for series, rows in agreement.groupby("series", sort=False):
+        weeks = [f"{a:g}–{b:g}" for a, b in zip(rows["from_week"], rows["to_week"], strict=True)]
+        part = pd.DataFrame({"compared": f"{series} − {rows['reference'].iloc[0]}", "interval (GW)": weeks})
+        values = (1e7 * rows[list(differences)]).reset_index(drop=True)
+        part = part.join(values)
+        for label, summary in (("mean", values.mean()), ("mean size", values.abs().mean())):
+            part.loc[len(part)] = [part["compared"].iloc[0], label, *summary]
+        parts.append(part)
+    table = pd.concat(parts, ignore_index=True)
+    # a sum with 0 takes the sign from a rounded −0
+    table[list(differences)] = table[list(differences)].round(3) + 0.0
+    return table.rename(columns={name: f"{text}, difference (10⁻⁷ s⁻¹)" for name, text in differences.items()})
 
 
 def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.DataFrame:

@@ -27,6 +27,8 @@ ZONES: Mapping[int, tuple[str, str]] = {
     7: ("side y", "#E69F00"),
 }
 """Codes of the boundary's zones, their names and colours (near the paper's red, green, blue, yellow and purple)."""
+FLAT_CUTS = (5, 6, 7)
+"""Codes of zones that only simple shapes have."""
 
 
 @styled
@@ -63,7 +65,11 @@ def zones_picture(
     for code, (_, colour) in names.items():
         table[code] = to_rgb(colour)
     areas = np.bincount(zones, weights=face_areas(mesh), minlength=max(names) + 1) * CM2_PER_MM2
-    legend = [Patch(color=colour, label=f"{name} {areas[code]:.1f} cm²") for code, (name, colour) in names.items()]
+    legend = [
+        Patch(color=colour, label=f"{name} {areas[code]:.1f} cm²")
+        for code, (name, colour) in names.items()
+        if areas[code] or code not in FLAT_CUTS
+    ]
     columns, rows = _one_row(mesh, table[zones], views, fissure_x_mm)
     return panel_grid(columns, rows, title=title, synthetic=synthetic, legend=legend)
 

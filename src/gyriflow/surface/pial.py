@@ -252,7 +252,7 @@ def _even(
     even, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
     if faults(even):
         _warn(report, f"the surface was made anew through voxels, since it had {faults(even)}")
-        mesh, report["topology"] = remade(mesh, 0.5 * edge_length_mm)
+        mesh, report[name.replace("mesh", "remade")] = remade(mesh, 0.5 * edge_length_mm)
         even, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
     require_sound(even)
     return even

@@ -34,8 +34,10 @@ def cleaned(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[
     `max_hole_mm` across closed, faces turned outward, small pieces and pieces inside others dropped.
     MeshError for larger holes and for surfaces that stay open.
     """
-    report: dict[str, Any] = {"faces_that_cut_others": int(self_intersecting_faces(mesh).sum())}
+    report: dict[str, Any] = {}
     mesh = _without_doubles(mesh, report)
+    # not before: faces that meet in several copies of a vertex would count
+    report["faces_that_cut_others"] = int(self_intersecting_faces(mesh).sum())
     mesh = _manifold(mesh, report)
     mesh = _main_pieces(mesh, report)
     mesh = _filled(mesh, max_hole_mm, report)

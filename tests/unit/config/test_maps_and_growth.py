@@ -4,6 +4,7 @@ import pytest
 
 from gyriflow.config import load
 from gyriflow.config.checks import growth_problems
+from gyriflow.errors import InputError
 
 BRAINS = [
     {"id": "a", "week": 21, "phantom": {}},
@@ -71,11 +72,73 @@ def test_the_folding_program_reads_curves_and_maps(tmp_path):
     [({}, ["a", "b", "c"]), ({"brains": ["c", "a"]}, ["a", "c"]), ({"brains": None}, ["a", "b", "c"])],
 )
 def test_growth_is_estimated_from_all_brains_or_those_named(growth, brains):
-    assert load(study({}, growth=growth)).growth_brains == brains
+    assert load(study({}, growth=growth)).growth_series == {"volume": brains}
+
+
+def both_kinds(tmp_path, weeks):
+    """Returns a study with a phantom and a closed surface of each of some weeks, the phantoms first."""
+    (tmp_path / "pial.surf.gii").touch()
+    made = [{"id": f"v{week}", "week": week, "phantom": {}} for week in weeks]
+    given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
+    return {"brains": [*made, *given], "start": "s21", "folding": {"end_week": 24}}
+
+
+def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_estimated_from(tmp_path):
+    raw = both_kinds(tmp_path, (21, 22))
+    config = load(raw, tmp_path)
+    assert config.growth_series == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
+    assert config.estimated_from == "surface"
+    assert load(raw | {"start": "v21"}, tmp_path).estimated_from == "volume"
+    assert load(raw | {"growth": {"estimated_from": "volume"}}, tmp_path).estimated_from == "volume"
+    assert load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path).growth_series == {"volume": ["v21", "v22"]}
+
+
+def test_kinds_of_which_one_has_a_single_week_are_one_series(tmp_path):
+    raw = both_kinds(tmp_path, (21, 22))
+    assert load(raw | {"growth": {"brains": ["s21", "v22"]}}, tmp_path).growth_series == {"all": ["v22", "s21"]}
+    chosen = {"brains": ["s21", "v21", "v22"]}
+    assert load(raw | {"growth": chosen}, tmp_path).growth_series == {"all": ["v21", "v22", "s21"]}
+
+
+def test_series_may_be_named(tmp_path):
+    raw = both_kinds(tmp_path, (21, 22, 23))
+    named = {"early": ["s21", "s22"], "late": ["v22", "s23"]}
+    config = load(raw | {"growth": {"brains": named, "estimated_from": "late"}}, tmp_path)
+    assert config.growth_series == {"early": ["s21", "s22"], "late": ["v22", "s23"]}
+    assert config.estimated_from == "late"
+
+
+@pytest.mark.parametrize(
+    ("growth", "found"),
+    [
+        (
+            {"brains": {"one": ["v21", "x"], "two": ["v21", "v22"]}},
+            ["growth.brains.one: found x; expected ids of brains: v21, v22, s21, s22"],
+        ),
+        (
+            {"brains": {"one": ["v21", "s21"], "two": ["v21", "v22"]}},
+            ["growth.brains.one: found brains of 1 week; a growth rate needs two or more"],
+        ),
+        (
+            {"brains": {"one": ["v21", "v22"], "two": ["v21", "v22"]}},
+            [
+                "folding.growth_rate_per_s: can't be estimated: the start brain is in none of the series one, two; "
+                "name one under growth.estimated_from"
+            ],
+        ),
+        ({"estimated_from": "volumes"}, ["growth.estimated_from: found 'volumes'; the series are surface, volume"]),
+        ({"brains": {"one": "v21"}}, ["growth.brains.one: found 'v21'; it should be a valid tuple"]),
+    ],
+)
+def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
+    raw = both_kinds(tmp_path, (21, 22)) | {"growth": growth, "folding": ESTIMATED}
+    with pytest.raises(InputError) as caught:
+        load(raw, tmp_path)
+    assert [line.strip() for line in str(caught.value).splitlines()[1:-1]] == found
 
 
 def test_brains_of_one_week_give_no_growth():
-    assert load({"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 22}}).growth_brains == []
+    assert load({"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 22}}).growth_series == {}
 
 
 @pytest.mark.parametrize(
@@ -94,12 +157,12 @@ def test_brains_of_one_week_give_no_growth():
     ],
 )
 def test_brains_that_give_no_growth_rate_are_refused(growth, settings, found):
-    assert growth_problems(BRAINS, growth, {"reference": settings}) == found
+    assert growth_problems(BRAINS, growth, "a", {"reference": settings}) == found
 
 
 def test_an_estimate_without_two_weeks_is_refused_where_it_stands():
     reason = "can't be estimated: found brains of 1 week; a growth rate needs two or more"
-    assert growth_problems(BRAINS[:1], None, {"x": ESTIMATED, "y": ESTIMATED}) == [
+    assert growth_problems(BRAINS[:1], None, "a", {"x": ESTIMATED, "y": ESTIMATED}) == [
         f"folding.growth_rate_per_s: {reason}"
     ]
-    assert growth_problems(BRAINS[:1], {}, {"x": ESTIMATED, "y": {}}) == [f"runs.x.growth_rate_per_s: {reason}"]
+    assert growth_problems(BRAINS[:1], {}, "a", {"x": ESTIMATED, "y": {}}) == [f"runs.x.growth_rate_per_s: {reason}"]

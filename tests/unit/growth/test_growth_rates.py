@@ -1,10 +1,11 @@
 """Growth rates of areas and volumes made with known rates."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.growth.rates import FOLDING_RATES, growth_rates, rate_curve
+from gyriflow.growth.rates import FOLDING_RATES, agreement, growth_rates, rate_curve, rates_of_series
 
 WEEK_S = 604_800.0
 
@@ -93,3 +94,45 @@ def test_negative_rates_are_refused_with_their_intervals_unless_allowed() -> Non
 def test_refused(weeks: list[float], areas: list[float], volumes: list[float], match: str) -> None:
     with pytest.raises(InputError, match=match):
         growth_rates(weeks, areas, volumes)
+
+
+def brains(series: str, areas_cm2: dict[float, float], volumes_ml: dict[float, float]) -> pd.DataFrame:
+    """Returns areas and volumes by week as the workflow's table has them."""
+    columns = {"week": list(areas_cm2), "area_cm2": list(areas_cm2.values()), "volume_ml": list(volumes_ml.values())}
+    return pd.DataFrame({"series": series, "subject": "brain", **columns})
+
+
+def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean() -> None:
+    surface = brains("surface", {21: 100.0, 22: 121.0}, {21: 1000.0, 22: 1331.0})
+    volume = pd.concat(
+        [
+            brains("volume", {21: 90.0, 23: 144.0}, {21: 1000.0, 23: 1728.0}),
+            brains("volume", {21: 110.0}, {21: 1000.0}),
+        ]
+    )
+    table = rates_of_series(pd.concat([surface, volume]))
+    assert table["series"].tolist() == ["surface", "volume"]
+    np.testing.assert_allclose(table["rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
+    np.testing.assert_allclose(table["core_rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
+    assert table["to_week"].tolist() == [22, 23]
+
+
+def test_agreement_is_between_the_weeks_that_both_series_have() -> None:
+    first = brains("surface", {21: 100.0, 22: 121.0, 23: 144.0}, {21: 1000.0, 22: 1331.0, 23: 1728.0})
+    second = brains("volume", {20: 1.0, 21: 100.0, 23: 169.0}, {20: 1.0, 21: 1000.0, 23: 1000.0})
+    row = agreement(pd.concat([first, second]))
+    assert len(row) == 1
+    assert row[["series", "reference", "from_week", "to_week"]].iloc[0].tolist() == ["volume", "surface", 21, 23]
+    assert row["rate_per_s"][0] == pytest.approx(0.3 / (2 * WEEK_S))
+    assert row["reference_rate_per_s"][0] == pytest.approx(0.2 / (2 * WEEK_S))
+    assert row["difference_per_s"][0] == pytest.approx(0.1 / (2 * WEEK_S))
+    assert row["core_difference_per_s"][0] == pytest.approx(-0.2 / (2 * WEEK_S))
+
+
+def test_one_series_or_one_common_week_has_no_agreement_but_its_columns() -> None:
+    first = brains("surface", {21: 100.0, 22: 121.0}, {21: 1.0, 22: 1.0})
+    second = brains("volume", {22: 100.0, 23: 121.0}, {22: 1.0, 23: 1.0})
+    for areas in (first, pd.concat([first, second])):
+        table = agreement(areas)
+        assert len(table) == 0
+        assert {"series", "difference_per_s", "core_difference_per_s"} <= set(table.columns)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
+from nibabel.nifti1 import data_type_codes, intent_codes
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, is_closed, signed_volume
@@ -92,3 +93,21 @@ def test_named_maps_come_back(tmp_path):
     assert list(back) == list(maps)
     for name, values in maps.items():
         assert back[name] == pytest.approx(values, abs=1e-6)
+
+
+def test_maps_are_what_workbench_calls_metric_files(tmp_path):
+    write_vertex_maps(tmp_path / "a.shape.gii", {"sulcal_depth_mm": np.arange(5)}, "CortexLeft")
+    image = nib.load(tmp_path / "a.shape.gii")
+    (array,) = image.darrays
+    assert image.meta["AnatomicalStructurePrimary"] == "CortexLeft"
+    assert intent_codes.niistring[array.intent] == "NIFTI_INTENT_SHAPE"
+    assert data_type_codes.niistring[array.datatype] == "NIFTI_TYPE_FLOAT32"
+    assert array.data.shape == (5,)
+    assert array.meta["Name"] == "sulcal_depth_mm"
+
+
+def test_open_surfaces_are_declared_open(tmp_path, ball):
+    for faces, expected in ((ball.faces, "Closed"), (ball.faces[1:], "Open")):
+        write_surface(tmp_path / "a.surf.gii", TriangleMesh(ball.vertices, faces), "CortexLeft")
+        (triangles,) = nib.load(tmp_path / "a.surf.gii").get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
+        assert triangles.meta["TopologicalType"] == expected

@@ -17,7 +17,7 @@ from gyriflow.io.frames import (
     read_weeks,
     write_frame,
 )
-from gyriflow.io.tetmeshes import read_tetrahedral_mesh, read_vertex_field, write_tetrahedral_mesh
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 
 
 def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path):
@@ -30,18 +30,6 @@ def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path):
     other = meshio.read(path)
     np.testing.assert_array_equal(other.point_data["p"], mesh.vertices)
     np.testing.assert_allclose(other.cell_data["v"][0], signed_volumes(mesh))
-
-
-def test_a_field_is_read_at_the_vertices_of_the_mesh(tmp_path):
-    mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
-    # a point of no element is no vertex of the mesh
-    points = np.vstack([[[9.0, 9.0, 9.0]], mesh.vertices])
-    path = tmp_path / "fields.xdmf"
-    meshio.Mesh(points, [("tetra", mesh.tets + 1)], {"x": points[:, 0], "p": points}).write(path)
-    np.testing.assert_array_equal(read_vertex_field(path, "x"), mesh.vertices[:, 0])
-    np.testing.assert_array_equal(read_vertex_field(path, "p"), read_tetrahedral_mesh(path).vertices)
-    with pytest.raises(InputError, match=r"fields\.xdmf: lacks a field.*found \['p', 'x'\]; expected growth"):
-        read_vertex_field(path, "growth")
 
 
 def test_any_xdmf_of_tetrahedra_is_read_and_turned_positive(tmp_path):

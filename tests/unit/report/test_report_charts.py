@@ -7,13 +7,16 @@ import pytest
 from matplotlib.figure import Figure
 
 from gyriflow.errors import InputError
-from gyriflow.report.charts import growth_chart, metrics_chart, quality_histogram, steps_chart
+from gyriflow.report.charts import metrics_chart, quality_histogram, steps_chart
+from gyriflow.report.growth import growth_chart
 from gyriflow.report.spectra import spectra_chart, spectra_weeks_chart
 
 AREAS = pd.DataFrame(
     {"subject": ["a", "c", "b"], "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
+).assign(series="volume")
+RATES = pd.DataFrame({"from_week": [21.0, 22.0], "to_week": [22.0, 23.0], "rate_per_s": [1.2e-7, -0.3e-7]}).assign(
+    series="volume"
 )
-RATES = pd.DataFrame({"from_week": [21.0, 22.0], "to_week": [22.0, 23.0], "rate_per_s": [1.2e-7, -0.3e-7]})
 
 
 def words(figure: Figure) -> list[str]:
@@ -57,6 +60,32 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     assert line_of(rate_axes, "#D55E00")[:, 1] == pytest.approx([2.0, 2.0])
     assert area_axes.lines[0].get_xydata().tolist() == [[21, 100], [22, 115], [23, 130]]
     assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
+
+
+def test_series_have_bars_on_one_scale_and_their_differences_a_panel():
+    areas = pd.concat([AREAS.assign(series="surface"), AREAS.assign(area_cm2=2 * AREAS["area_cm2"])])
+    rates = pd.concat([RATES.assign(series="surface", rate_per_s=[3e-7, 1e-7]), RATES])
+    agreement = RATES.assign(reference="surface", difference_per_s=[-1.8e-7, 0.4e-7])
+    figure = growth_chart(areas, rates, agreement, folding_rate_per_s=2e-7)
+    area_axes, difference_axes, surface_axes, volume_axes, _ = figure.axes
+    assert [line.get_ydata().tolist() for line in area_axes.lines] == [[100, 115, 130], [200, 230, 260]]
+    assert [bar.get_height() for bar in difference_axes.patches] == pytest.approx([-1.8, 0.4])
+    assert "volume − surface: mean −0.70, mean size 1.10" in words(figure)
+    assert [bar.get_height() for bar in surface_axes.patches] == pytest.approx([3.0, 1.0])
+    assert [bar.get_height() for bar in volume_axes.patches] == pytest.approx([1.2, -0.3])
+    assert surface_axes.get_ylim() == volume_axes.get_ylim()
+    assert {"tangential growth rate: surface", "tangential growth rate: volume", "volume: area"} <= set(words(figure))
+    # a series is of one colour in all panels, and not that of the folding
+    for axes, colour in ((surface_axes, "#0072B2"), (volume_axes, "#009E73"), (difference_axes, "#009E73")):
+        assert all(mpl.colors.same_color(bar.get_facecolor(), colour) for bar in axes.patches)
+
+
+def test_series_without_common_weeks_have_no_panel_of_differences():
+    other = RATES.assign(series="surface", from_week=[30.0, 31.0], to_week=[31.0, 32.0])
+    areas = pd.concat([AREAS, AREAS.assign(series="surface", week=AREAS["week"] + 9)])
+    figure = growth_chart(areas, pd.concat([RATES, other]), RATES.iloc[:0])
+    assert not any("difference" in text for text in words(figure))
+    assert len([axes for axes in figure.axes if axes.patches]) == 2
 
 
 def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
@@ -182,19 +211,29 @@ def test_steps_are_drawn_and_unusual_rungs_marked():
 
 def test_quality_histogram_counts_every_element_once():
     quality = pd.DataFrame(
-        {"radius_ratio": [0.05, 0.5, 0.9], "min_dihedral_deg": [3, 40, 60], "max_dihedral_deg": [90, 100, 170]}
+        {
+            "radius_ratio": [0.05, 0.5, 0.9],
+            "min_dihedral_deg": [3, 40, 60],
+            "max_dihedral_deg": [90, 100, 170],
+            "volume_mm3": [1e-3, 0.2, 1.0],
+        }
     )
-    figure = quality_histogram(quality, min_radius_ratio=0.1)
+    gates = {"min_radius_ratio": 0.1, "min_dihedral_deg": 2.0, "max_dihedral_deg": 175.0, "max_surface_distance_mm": 1}
+    figure = quality_histogram(quality, gates=gates, surface="0 faces cross")
     for axes in figure.axes:
         assert axes.patches[0].get_data().values.sum() == 3
-    assert figure.axes[0].lines[0].get_xdata() == pytest.approx([0.1, 0.1])
+    lines = [[line.get_xdata()[0] for line in axes.lines] for axes in figure.axes]
+    assert lines == [[0.1], [2.0], [175.0], []]
+    assert "0 faces cross" in words(figure)
 
 
 def test_quality_histogram_takes_ready_classes():
-    classes = {"edges": [0.0, 0.5, 1.0], "counts": [1, 7]}
-    figure = quality_histogram(dict.fromkeys(("radius_ratio", "min_dihedral_deg", "max_dihedral_deg"), classes))
+    classes = {"edges": [0.1, 0.5, 1.0], "counts": [1, 7]}
+    columns = ("radius_ratio", "min_dihedral_deg", "max_dihedral_deg", "volume_mm3")
+    figure = quality_histogram(dict.fromkeys(columns, classes))
     assert figure.axes[1].patches[0].get_data().values.tolist() == [1, 7]
-    assert "8 elements" in figure.axes[0].get_title()
+    assert figure.axes[0].get_title() == "0.1 to 1"
+    assert "8 elements" in figure.axes[0].get_ylabel()
 
 
 def test_spectra_bars_are_the_relative_powers_of_each_side():

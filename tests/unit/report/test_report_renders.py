@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from shapes import ellipsoid_mesh
 
 from gyriflow.errors import InputError
 from gyriflow.folding.zones import ZONE_NAMES
-from gyriflow.geometry.tetrahedra import TetrahedralMesh
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.report.panels import round_length
 from gyriflow.report.renders import displacement_maps, runs_comparison, scalar_maps, weekly_comparison
 from gyriflow.report.scene import VIEWS, render, uniform_colours
-from gyriflow.report.sections import cross_sections
+from gyriflow.report.sections import cross_sections, normal_arrows
 from gyriflow.report.zones import ZONES, field_picture, zones_picture
 
 
@@ -168,6 +169,16 @@ def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
     assert right[0] > 2 * right[2]
 
 
+def test_the_inside_of_a_parted_brain_has_no_zone():
+    mesh = box((10, 30, 20))
+    # without the side towards the camera
+    open_ = TriangleMesh(mesh.vertices, mesh.faces[~(mesh.vertices[mesh.faces, 0] == 5.0).all(axis=1)])
+    figure = zones_picture(open_, np.full(10, 1), fissure_x_mm=20.0, views=("left medial", "left"))
+    medial, lateral = (image[covered(image)].astype(float) for image in (picture(figure, 0), picture(figure, 1)))
+    assert np.ptp(medial.mean(axis=0)) < 10
+    assert lateral.mean(axis=0)[1] > lateral.mean(axis=0)[0] + 50
+
+
 def test_zones_that_do_not_fit_are_refused():
     mesh = box((20, 30, 20))
     with pytest.raises(InputError, match="found 3 codes; expected 12"):
@@ -182,36 +193,77 @@ def test_field_picture_names_the_field():
     assert bar.get_xlim() == (0.0, 2.0)
 
 
-def test_a_section_has_the_area_and_the_values_of_the_middle_plane():
-    corner = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10], [10, 10, 10]], dtype=float)
-    mesh = TetrahedralMesh(corner, np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
-    figure = cross_sections(mesh, {"height (mm)": corner[:, 2], "x (mm)": corner[:, 0]}, plane="axial")
-    height, x = (axes.collections[0] for axes in figure.axes[:2])
-    paths = [path.vertices[:3] for path in x.get_paths()]
+CORNER = TetrahedralMesh(
+    [[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10], [10, 10, 10]], np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+)
+
+
+def areas(collection) -> np.ndarray:
+    """Returns the areas of drawn triangles."""
+    paths = [path.vertices[:3] for path in collection.get_paths()]
     (u, v) = (np.array([path[k] - path[0] for path in paths]) for k in (1, 2))
-    areas = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    return np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+
+
+def test_a_section_has_the_area_and_the_values_of_the_middle_plane():
+    points = CORNER.vertices
+    figure = cross_sections(CORNER, {"height (mm)": points[:, 2], "x (mm)": points[:, 0]}, planes=("axial",))
+    height, x = (axes.collections[0] for axes in figure.axes[:2])
     # at half its height the corner tetrahedron is a triangle with legs of 5 mm, the other a square of 50 mm2
-    assert areas.sum() == pytest.approx(12.5 + 50.0)
+    assert areas(x).sum() == pytest.approx(12.5 + 50.0)
     np.testing.assert_allclose(np.asarray(height.get_array()), 5.0)
-    np.testing.assert_allclose(np.asarray(x.get_array()), [path[:, 0].mean() for path in paths])
-    assert {"axial section at z = 5.0 mm", "height (mm)", "x (mm)"} <= words(figure)
+    np.testing.assert_allclose(np.asarray(x.get_array()), [path.vertices[:3, 0].mean() for path in x.get_paths()])
+    assert {"axial, z = 5.0 mm\ny (mm)", "height (mm)", "x (mm)"} <= words(figure)
+
+
+def test_a_section_has_a_row_per_plane_the_tags_colours_and_the_ellipses_of_the_planes():
+    tags = {"part": (np.array([4, 2]), {2: ("second", "#00ff00"), 4: ("first", "#ff0000")})}
+    ball = (np.array([5.0, 5.0, 1.0]), np.array([5.0, 5.0, 5.0]))
+    figure = cross_sections(CORNER, {}, tags=tags, planes=("coronal", "axial"), ellipsoid=ball)
+    coronal, axial = figure.axes[:2]
+    drawn = axial.collections[0]
+    colours = drawn.to_rgba(drawn.get_array())
+    assert areas(drawn)[colours[:, 0] == 1].sum() == pytest.approx(12.5)
+    assert areas(drawn)[colours[:, 1] == 1].sum() == pytest.approx(50.0)
+    # the ball's middle lies in the coronal plane, and 4 mm below the axial one
+    assert [axes.patches[0].get_width() for axes in (coronal, axial)] == pytest.approx([10.0, 6.0])
+    assert {"first", "second", "part", "ellipsoid"} <= words(figure)
+
+
+def test_normals_are_arrows_at_vertices_near_the_plane():
+    brain = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
+    facets = boundary_faces(brain)[0]
+    normals = brain.vertices / np.maximum(np.linalg.norm(brain.vertices, axis=1, keepdims=True), 1e-9)
+    figure = normal_arrows(brain, normals, np.ones(len(normals)), facets, planes=("axial",))
+    (axes,) = figure.axes
+    pial, inside = (drawn for drawn in axes.collections if hasattr(drawn, "XY"))
+    for arrows in (pial, inside):
+        assert len(arrows.XY) > 10
+        direction = np.stack([arrows.U, arrows.V], axis=1)
+        # away from the middle
+        outward = np.einsum("ij,ij->i", direction, arrows.XY)
+        lengths = np.linalg.norm(direction, axis=1) * np.linalg.norm(arrows.XY, axis=1)
+        np.testing.assert_allclose(outward, lengths, atol=1e-6)
+    radius = [np.linalg.norm(arrows.XY / [20.0, 26.0], axis=1) for arrows in (pial, inside)]
+    assert radius[0].min() > radius[1].max()
 
 
 def test_a_section_of_wrong_values_or_in_an_unknown_plane_is_refused():
-    mesh = TetrahedralMesh(np.eye(4, 3), np.array([[3, 0, 1, 2]]))
-    with pytest.raises(InputError, match="growth: values do not fit the mesh; found 9; expected 4, one per vertex"):
-        cross_sections(mesh, {"growth": np.zeros(9)})
-    with pytest.raises(InputError, match="unknown plane; found oblique"):
-        cross_sections(mesh, {"growth": np.zeros(4)}, plane="oblique")
+    with pytest.raises(InputError, match="growth: values do not fit the mesh; found 9; expected 5, one per vertex"):
+        cross_sections(CORNER, {"growth": np.zeros(9)})
+    with pytest.raises(InputError, match=r"unknown plane; found \['oblique'\]"):
+        cross_sections(CORNER, {"growth": np.zeros(5)}, planes=("oblique",))
+    with pytest.raises(InputError, match=r"part: unknown tag; found \[7\]"):
+        cross_sections(CORNER, {}, tags={"part": (np.array([7, 1]), {1: ("one", "red")})})
 
 
-def test_curvedness_goes_from_zero_to_where_few_vertices_are_above():
+@pytest.mark.parametrize(("quantity", "label"), [("curvedness", "(mm⁻¹)"), ("sulcal_depth_mm", "sulcal depth (mm)")])
+def test_curvedness_and_depth_go_from_zero_to_where_few_vertices_are_above(quantity, label):
     mesh = box((20, 30, 20))
     values = np.array([0.1] * 7 + [9.0])
-    figure = scalar_maps({"simulated": {28.0: (mesh, values)}}, quantity="curvedness", views=("left",))
-    (bar,) = [axes for axes in figure.axes if "curvedness" in axes.get_xlabel()]
+    figure = scalar_maps({"simulated": {28.0: (mesh, values)}}, quantity=quantity, views=("left",))
+    (bar,) = [axes for axes in figure.axes if label in axes.get_xlabel()]
     assert bar.get_xlim() == pytest.approx((0.0, np.percentile(values, 98)))
-    assert "(mm⁻¹)" in bar.get_xlabel()
 
 
 def test_zones_have_the_codes_and_names_of_the_folding():

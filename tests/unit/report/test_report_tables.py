@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from gyriflow.report.displacement import displacement_chart, displacement_summary, displacement_table
-from gyriflow.report.tables import growth_table, html_table, metrics_table, runs_table
+from gyriflow.report.tables import agreement_table, growth_table, html_table, metrics_table, runs_table, sizes_table
 
 NORMS = pd.DataFrame(
     {
@@ -48,6 +48,7 @@ def test_displacement_chart_draws_the_chosen_nodes_at_the_middle_of_the_interval
 def test_growth_table_is_in_units_of_1e_7():
     rates = pd.DataFrame(
         {
+            "series": "volume",
             "from_week": [21.0],
             "to_week": [22.0],
             "area_ratio": [1.1],
@@ -57,6 +58,39 @@ def test_growth_table_is_in_units_of_1e_7():
         }
     )
     assert growth_table(rates)["tangential rate (10⁻⁷ s⁻¹)"].tolist() == [1.234]
+    assert "series" not in growth_table(rates)
+    both = growth_table(pd.concat([rates, rates.assign(series="surface")]))
+    assert both["series"].tolist() == ["volume", "surface"]
+
+
+def test_agreement_table_has_each_interval_the_mean_and_the_mean_size():
+    agreement = pd.DataFrame(
+        {
+            "series": "volume",
+            "reference": "surface",
+            "from_week": [21.0, 22.0],
+            "to_week": [22.0, 23.5],
+            "difference_per_s": [0.3e-7, -0.1e-7],
+            "core_difference_per_s": [0.2e-7, 0.4e-7],
+        }
+    )
+    table = agreement_table(agreement)
+    assert set(table["compared"]) == {"volume − surface"}
+    assert table["interval (GW)"].tolist() == ["21–22", "22–23.5", "mean", "mean size"]
+    assert table["tangential rate, difference (10⁻⁷ s⁻¹)"].tolist() == pytest.approx([0.3, -0.1, 0.1, 0.2])
+    assert table["core rate, difference (10⁻⁷ s⁻¹)"].tolist() == pytest.approx([0.2, 0.4, 0.3, 0.3])
+
+
+def test_sizes_table_compares_series_week_by_week():
+    areas = pd.DataFrame(
+        [("surface", 21.0, 100.0, 50.0), ("surface", 22.0, 120.0, 60.0), ("volume", 22.0, 126.0, 57.0)],
+        columns=["series", "week", "area_cm2", "volume_ml"],
+    )
+    table = sizes_table(areas)
+    assert table["pial area (cm²): surface"].tolist() == [100.0, 120.0]
+    assert table.loc[22.0, "pial area: volume − surface (%)"] == pytest.approx(5.0)
+    assert table.loc[22.0, "volume: volume − surface (%)"] == pytest.approx(-5.0)
+    assert np.isnan(table.loc[21.0, "pial area: volume − surface (%)"])
 
 
 def test_metrics_table_gives_the_difference_from_the_measured_brain():

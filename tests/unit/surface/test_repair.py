@@ -63,6 +63,7 @@ def test_soup_of_separate_triangles_is_joined():
     mesh, report = cleaned(soup, 3.0)
     assert len(mesh.vertices) == len(whole.vertices)
     assert report["duplicate_vertices_joined"] == 3 * len(whole.faces) - len(whole.vertices)
+    assert report["faces_that_cut_others"] == 0
 
 
 def test_degenerate_and_double_faces_are_removed():

@@ -1,0 +1,54 @@
+"""Regions of a brain as tags of its elements and facets, and its ellipsoid of no growth: for a look before the solve.
+
+Plain NumPy; the solver itself goes by `zones` and `layers`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.tetrahedra import TetrahedralMesh
+from .parameters import FoldingParameters
+from .zones import Zones
+
+Floats = NDArray[np.float64]
+Tags = dict[str, NDArray[np.int32]]
+
+LEFT, RIGHT, BRIDGE = 1, 2, 3
+CORTEX, CORE = 1, 2
+
+
+def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
+    """Returns the (m,) tags of the elements.
+
+    `hemisphere` is LEFT or RIGHT by the element's centroid, BRIDGE between the two contact planes. `growing` is 0
+    where the model lets none of an element's vertices grow, else 1. `layer` is CORTEX or CORE.
+
+    Parameters
+    ----------
+    weight : (n,) float
+        Cortical weight at the vertices; an element is cortex where its mean is above a half.
+    """
+    x = mesh.vertices[mesh.tets, 0].mean(axis=1)
+    left, right = zones.planes_mm
+    return {
+        "hemisphere": np.select([x <= left, x >= right], [LEFT, RIGHT], BRIDGE).astype(np.int32),
+        "growing": (zones.growth[mesh.tets].max(axis=1) > 0).astype(np.int32),
+        "layer": np.where(weight[mesh.tets].mean(axis=1) > 0.5, CORTEX, CORE).astype(np.int32),
+    }
+
+
+def facet_tags(mesh: TetrahedralMesh, zones: Zones) -> Tags:
+    """Returns the (f,) tags of `zones.facets`: `zone` as in `zones`, `hemisphere` LEFT or RIGHT of the fissure."""
+    x = mesh.vertices[zones.facets, 0].mean(axis=1)
+    side = np.where(x < zones.fissure_x_mm, LEFT, RIGHT)
+    return {"zone": zones.facet_zone.astype(np.int32), "hemisphere": side.astype(np.int32)}
+
+
+def no_growth_ellipsoid(vertices: Floats, parameters: FoldingParameters) -> tuple[Floats, Floats] | None:
+    """Returns centre and semi-axes, (3,) in mm, of the ellipsoid in which nothing grows; None where there is none."""
+    p = parameters.no_growth
+    if p.kind == "none":
+        return None
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    shift = np.array([0.0, p.shift_y, p.shift_z])
+    return (low + high) / 2 + shift * (high - low), np.array(p.semi_axes) * (high - low)

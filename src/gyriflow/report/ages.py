@@ -1,0 +1,172 @@
+"""The chart of the age profile: which week of the reference brains the simulated ones look like."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..errors import InputError
+from .style import (
+    FULL_WIDTH_IN,
+    MEASURED,
+    MUTED_COLOUR,
+    REAL_BRAIN,
+    REAL_COLOUR,
+    light_grid,
+    new_figure,
+    run_colours,
+    run_legend,
+    simulated_runs,
+    styled,
+    week_axis,
+    week_label,
+)
+
+ALL, FREE_OF_SIZE = "all", "all without size"
+MOST_METRICS = 14
+"""Metrics in the lower panel: those with most weight."""
+LEAST_WEIGHT = 0.005
+"""Metrics with a smaller share of the weight are left out there."""
+_GAP_GW = 0.1
+"""How far points of one week stand from each other."""
+
+
+@styled
+def age_profile_chart(
+    profile: pd.DataFrame, check: pd.DataFrame, *, title: str = "", measured: str = REAL_BRAIN, synthetic: bool = False
+) -> Figure:
+    """Returns the ages that whole brains look like over their own, and each metric's age at the last simulated week.
+
+    The upper left panel has the simulated brains, the upper right one the reference brains, each left out of its own
+    reference. Large marks are all metrics together, filled, and without those of size, open, with their spread; dots
+    are single metrics; triangles are ages outside the reference.
+
+    Parameters
+    ----------
+    profile, check : columns run, week, hemisphere, metric, kind, estimated_week, low, high, weight, flag
+        `check` has mean_absolute_error, too.
+
+    Raises
+    ------
+    InputError
+        If there is no simulated brain in the profile.
+    """
+    brains = profile[profile["hemisphere"] == "whole"]
+    left_out = check[check["hemisphere"] == "whole"]
+    runs = simulated_runs(brains["run"])
+    if not runs:
+        raise InputError("no simulated brain in the age profile", found=sorted(set(brains["run"])))
+    colours = run_colours(runs) | {MEASURED: REAL_COLOUR}
+    last = max(set.intersection(*(set(brains.loc[brains["run"] == run, "week"]) for run in runs)))
+    rows = _of_last_week(brains, last)
+    figure = new_figure(
+        FULL_WIDTH_IN, 3.6 + 0.17 * rows["metric"].nunique(), title=title, synthetic=synthetic, measured=measured
+    )
+    grid = figure.add_gridspec(2, 2, height_ratios=[2.9, 0.5 + 0.17 * rows["metric"].nunique()])
+    panels = [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])]
+    for axes, table in zip(panels, (brains, left_out), strict=True):
+        _age_panel(axes, table, colours)
+        _frame(axes, [brains, left_out])
+    panels[0].set_ylabel("looks like (GW)")
+    panels[0].set_title("simulated")
+    panels[1].set_title(_errors(left_out, measured))
+    _metric_panel(figure.add_subplot(grid[1, :]), rows, colours, last)
+    dots: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
+    extra = [
+        Line2D([], [], markersize=5, label="all metrics", **dots),
+        Line2D([], [], markersize=5, markerfacecolor="white", label="without those of size", **dots),
+        Line2D([], [], markersize=2, label="single metrics", **dots),
+        Line2D([], [], markersize=4, label="outside the reference", **dots | {"marker": "^"}),
+    ]
+    run_legend(figure, runs, measured=f"{measured}, left out", extra=extra)
+    return figure
+
+
+def _of_last_week(brains: pd.DataFrame, week: float) -> pd.DataFrame:
+    """Returns the rows of simulated brains of a week: the metrics with most weight, those first."""
+    rows = brains[(brains["run"] != MEASURED) & (brains["week"] == week) & (brains["kind"] != "together")]
+    rows = rows[(rows["weight"] > LEAST_WEIGHT) & rows["estimated_week"].notna()]
+    order = rows.groupby("metric")["weight"].max().sort_values(ascending=False).index[:MOST_METRICS]
+    return rows[rows["metric"].isin(order)].sort_values("weight", ascending=False, kind="stable")
+
+
+def _errors(left_out: pd.DataFrame, measured: str) -> str:
+    means = left_out.groupby("metric")["mean_absolute_error"].first()
+    return (
+        f"{measured}, left out: mean error {means[ALL]:.2f} GW,\nwithout metrics of size {means[FREE_OF_SIZE]:.2f} GW"
+    )
+
+
+def _marker(flag: str, inside: str) -> str:
+    return "v" if flag.startswith("younger") else "^" if flag.startswith("older") else inside
+
+
+def _age_panel(axes: Axes, table: pd.DataFrame, colours: Mapping[str, Any]) -> None:
+    """Draws estimated over own weeks, the brains of each run beside each other."""
+    runs = list(dict.fromkeys(table["run"]))
+    for index, run in enumerate(runs):
+        own, colour = table[table["run"] == run], colours[run]
+        shift = _GAP_GW * (index - (len(runs) - 1) / 2)
+        single = own[(own["kind"] != "together") & (own["weight"] > 0)]
+        for flag, rows in single.groupby("flag"):
+            axes.plot(
+                rows["week"] + 2 * shift,
+                rows["estimated_week"],
+                _marker(str(flag), "o"),
+                color=colour,
+                markersize=2.2,
+                markeredgewidth=0,
+                alpha=0.35,
+            )
+        for metric, face, line, aside in ((FREE_OF_SIZE, "white", "--", 0.4), (ALL, colour, "-", -0.4)):
+            rows = own[own["metric"] == metric].sort_values("week")
+            place = rows["week"] + 2 * shift + aside * _GAP_GW
+            week = rows["estimated_week"]
+            spread = np.abs([week - rows["low"], rows["high"] - week])
+            axes.errorbar(place, week, yerr=spread, fmt="none", ecolor=colour, elinewidth=0.8, alpha=0.7)
+            if run != MEASURED:
+                axes.plot(place, week, line, color=colour, linewidth=0.9)
+            for x, y, flag in zip(place, week, rows["flag"], strict=True):
+                marker = _marker(flag, "*" if run == MEASURED else "o")
+                size = 7 if marker == "*" else 4.5
+                axes.plot(x, y, marker, color=colour, markerfacecolor=face, markersize=size, zorder=3)
+
+
+def _frame(axes: Axes, tables: Sequence[pd.DataFrame]) -> None:
+    """Gives both panels the same weeks on both axes, and the line on which a brain looks as old as it is."""
+    weeks = pd.concat([pd.concat([table["week"], table["low"], table["high"]]) for table in tables]).dropna()
+    week_axis(axes, weeks)
+    axes.set_ylim(axes.get_xlim())
+    axes.set_box_aspect(0.8)
+    axes.yaxis.set_major_locator(axes.xaxis.get_major_locator())
+    axes.plot([weeks.min(), weeks.max()], [weeks.min(), weeks.max()], ":", color=MUTED_COLOUR, linewidth=0.9, zorder=1)
+    light_grid(axes)
+
+
+def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any], week: float) -> None:
+    """Draws the age by each metric with its range, most weight on top."""
+    metrics = list(dict.fromkeys(rows["metric"]))
+    runs = simulated_runs(rows["run"])
+    for index, run in enumerate(runs):
+        own = rows[rows["run"] == run]
+        columns = (own[name] for name in ("metric", "kind", "flag", "estimated_week", "low", "high"))
+        for metric, kind, flag, age, low, high in zip(*columns, strict=True):
+            place = metrics.index(metric) + 0.6 * ((index + 0.5) / len(runs) - 0.5)
+            axes.plot([low, high], [place, place], color=colours[run], linewidth=0.8, alpha=0.7)
+            face = colours[run] if kind == "size" else "white"
+            axes.plot(age, place, _marker(flag, "o"), color=colours[run], markerfacecolor=face, markersize=3.5)
+    weights = rows.groupby("metric")["weight"].max()
+    names = [
+        f"{metric.replace('spangy', 'SpAnGy').replace('_', ' ')}  {100 * weights[metric]:.0f} %" for metric in metrics
+    ]
+    axes.set_yticks(range(len(metrics)), names)
+    axes.set_ylim(len(metrics) - 0.4, -0.6)
+    axes.axvline(week, color=MUTED_COLOUR, linestyle=":", linewidth=0.9, zorder=1)
+    axes.set_title(f"by single metrics at {week_label(week)}, with their weight: of size filled, free of size open")
+    week_axis(axes)
+    axes.set_xlabel("looks like (GW)")
+    light_grid(axes, "x")

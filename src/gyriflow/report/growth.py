@@ -1,0 +1,171 @@
+"""The chart of areas, volumes and growth rates, and how far series of brains agree."""
+
+from collections.abc import Mapping
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .style import (
+    FULL_WIDTH_IN,
+    REAL_BRAIN,
+    RUN_COLOURS,
+    column_label,
+    from_zero,
+    light_grid,
+    new_figure,
+    styled,
+    week_axis,
+)
+
+PANEL_HEIGHT_IN = 2.6
+SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
+"""Colours of the series; the one left out is the folding's."""
+
+
+@styled
+def growth_chart(
+    areas: pd.DataFrame,
+    rates: pd.DataFrame,
+    agreement: pd.DataFrame | None = None,
+    *,
+    folding_rate_per_s: float | Mapping[float, float] | None = None,
+    measured: str = REAL_BRAIN,
+    title: str = "",
+    synthetic: bool = False,
+) -> Figure:
+    """Returns cortical area and volume over weeks, and the tangential growth rate of each interval as bars.
+
+    Several series of brains share the panel of areas and volumes; each has a panel of bars, on one scale, and a further
+    panel shows how their rates differ between common weeks.
+
+    Parameters
+    ----------
+    areas : columns series, subject, week, area_cm2, volume_ml
+    rates : columns series, from_week, to_week, rate_per_s (1/s)
+    agreement : columns series, reference, from_week, to_week, difference_per_s (1/s)
+    folding_rate_per_s
+        Growth rate of the folding in 1/s, drawn as a line over the bars: a number, or values by week that are linear
+        in between and constant beyond.
+    """
+    names = list(dict.fromkeys(rates["series"]))
+    colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
+    compared = agreement is not None and len(agreement) > 0
+    lines = -(-(1 + compared + len(names)) // 2)
+    figure = new_figure(FULL_WIDTH_IN, PANEL_HEIGHT_IN * lines, title=title, synthetic=synthetic)
+    panels = iter(figure.subplots(lines, 2).flat)
+    _sizes_panel(next(panels), areas, colours, measured)
+    if agreement is not None and compared:
+        _differences_panel(next(panels), agreement, colours)
+    drawn: list[Axes] = []
+    for name, colour in colours.items():
+        axes = next(panels)
+        heading = "tangential growth rate" if len(names) == 1 else f"tangential growth rate: {name}"
+        _rates_panel(axes, rates[rates["series"] == name], colour, heading, folding_rate_per_s)
+        drawn.append(axes)
+    limits = np.array([axes.get_ylim() for axes in drawn])
+    for axes in drawn:
+        axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
+    for axes in panels:
+        axes.remove()
+    return figure
+
+
+def _sizes_panel(axes: Axes, areas: pd.DataFrame, colours: Mapping[str, str], measured: str) -> None:
+    """Draws areas (left axis) and volumes (right axis) over weeks, a colour per series, or per axis for one series."""
+    alone = len(colours) == 1
+    volume_axes = axes.twinx()
+    volume_axes.spines["right"].set_visible(True)
+    for name, colour in colours.items():
+        known = areas[areas["series"] == name].sort_values("week")
+        axes.plot(known["week"], known["area_cm2"], "o-", color=colour, label=f"{name}: area")
+        other = RUN_COLOURS[1] if alone else colour
+        volume_axes.plot(known["week"], known["volume_ml"], "s--", color=other, label=f"{name}: volume", markersize=3)
+    axes.set_ylabel("pial area (cm²)", color=RUN_COLOURS[0] if alone else "black")
+    volume_axes.set_ylabel("volume (mL)", color=RUN_COLOURS[1] if alone else "black")
+    for each in (axes, volume_axes):
+        from_zero(each)
+    week_axis(axes, areas["week"])
+    light_grid(axes)
+    axes.set_title(f"{measured}: area and volume")
+    if not alone:
+        handles = axes.get_lines() + volume_axes.get_lines()
+        axes.legend(handles=handles, loc="lower right", ncols=2, columnspacing=1.0)
+
+
+def _rates_panel(
+    axes: Axes, rates: pd.DataFrame, colour: str, title: str, folding_rate_per_s: float | Mapping[float, float] | None
+) -> None:
+    """Draws the growth rate of each interval of one series as a bar, and the folding's rate as a line."""
+    labels = _interval_labels(rates)
+    bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
+    # in front of the folding's line, where they meet
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+    size = 6.5 if len(rates) <= 10 else 5
+    texts = axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=size, padding=2)
+    for text in texts:
+        text.set(bbox=box, zorder=3)
+    axes.axhline(0, color="black", linewidth=0.6)
+    if folding_rate_per_s is not None:
+        _folding_line(axes, rates, folding_rate_per_s)
+        # above the axes, where no bar can be
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.06), borderaxespad=0)
+    axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
+    axes.set_title(title, loc="left")
+    axes.margins(y=0.12)
+    _interval_axis(axes, labels)
+
+
+def _differences_panel(axes: Axes, agreement: pd.DataFrame, colours: Mapping[str, str]) -> None:
+    """Draws for each interval how far the rates of the series are from the reference's, and their mean as a line."""
+    intervals = agreement[["from_week", "to_week"]].drop_duplicates().sort_values(["from_week", "to_week"])
+    places = {pair: place for place, pair in enumerate(intervals.itertuples(index=False, name=None))}
+    series = list(dict.fromkeys(agreement["series"]))
+    width = 0.7 / len(series)
+    for number, name in enumerate(series):
+        rows = agreement[agreement["series"] == name]
+        difference = rows["difference_per_s"] * 1e7
+        offset = (number - (len(series) - 1) / 2) * width
+        pairs = rows[["from_week", "to_week"]].itertuples(index=False, name=None)
+        axes.bar([places[pair] + offset for pair in pairs], difference, width=width, color=colours[name])
+        mean, spread = (f"{value:.2f}".replace("-", "−") for value in (difference.mean(), difference.abs().mean()))
+        label = f"{name} − {rows['reference'].iloc[0]}: mean {mean}, mean size {spread}"
+        axes.axhline(float(difference.mean()), color=colours[name], linestyle=":", label=label)
+    axes.axhline(0, color="black", linewidth=0.6)
+    axes.set_ylabel("difference (10⁻⁷ s⁻¹)")
+    axes.set_title("difference of the growth rates")
+    labels = _interval_labels(intervals)
+    axes.set_xticks(range(len(labels)), labels)
+    axes.margins(y=0.25)
+    axes.legend(loc="upper left")
+    _interval_axis(axes, labels)
+
+
+def _interval_labels(rates: pd.DataFrame) -> list[str]:
+    return [column_label((a, b)).removesuffix(" GW") for a, b in zip(rates["from_week"], rates["to_week"], strict=True)]
+
+
+def _interval_axis(axes: Axes, labels: list[str]) -> None:
+    axes.set_xlabel("gestational interval (GW)")
+    if len(labels) > 6:
+        axes.tick_params(axis="x", rotation=45)
+    # room for three bars at least, else a single one fills the panel
+    spare = max(0.0, 3 - len(labels)) / 2
+    axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
+
+
+def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]) -> None:
+    """Draws the folding's growth rate over bars of equal width, one per interval of the rates."""
+    look: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
+    if not isinstance(rate_per_s, Mapping):
+        axes.axhline(rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **look)
+        return
+    weeks = np.array(sorted(rate_per_s))
+    values = 1e7 * np.array([rate_per_s[week] for week in weeks])
+    ends = np.array([*rates["from_week"], rates["to_week"].iloc[-1]])
+    shown = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
+    places = np.interp(shown, ends, np.arange(len(ends)) - 0.5)
+    axes.plot(places, np.interp(shown, weeks, values), label="folding", **look)

@@ -1,0 +1,11 @@
+"""Which week of the reference brains each other brain looks like, and how well that is told of reference brains."""
+
+from gyriflow.io.files import read_table, write_table
+from gyriflow.metrics.age_profile import age_profile, age_profile_check
+from gyriflow.step import step
+
+files, output, reference = snakemake.input, snakemake.output, snakemake.params.reference
+with step(snakemake.log[0]):
+    tables = read_table(files.metrics), read_table(files.spectra)
+    write_table(output.profile, age_profile(*tables, reference))
+    write_table(output.check, age_profile_check(*tables, reference))
