@@ -29,6 +29,7 @@ include: "workflow/rules/folding.smk"
 include: "workflow/rules/metrics.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/run_figures.smk"
+include: "workflow/rules/metric_figures.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 

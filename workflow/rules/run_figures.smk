@@ -17,6 +17,13 @@ def folded(run, side="", weeks=None):
     ]
 
 
+# the last week of which every run has a surface
+LAST_WEEK = max(set.intersection(*(set(week_tags(run)) for run in RUNS)))
+LAST_BRAINS = [
+    brain for week, brain in shown_beside(RUNS[0]).items() if week == LAST_WEEK
+]
+
+
 rule weekly_figure:
     input:
         simulated=lambda wildcards: folded(wildcards.run),
