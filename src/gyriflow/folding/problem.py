@@ -211,6 +211,8 @@ class Problem:
         matrix, products = self._blocks.assembled(), self._blocks.for_products()
         if not self.contributions:
             return Tangent(matrix, products, ())
+        # petsc4py keeps what several ranks share until all of them agree to let go of it
+        PETSc.garbage_cleanup(self.domain.comm)
         if self._sum is None:
             # one object for all iterates, since multigrid keeps the first it is given
             self._sum = SumOperator(products)
