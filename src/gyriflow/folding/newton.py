@@ -18,6 +18,8 @@ RUNGS = ("cg", "cg, preconditioner rebuilt", "cg, tangent shifted", "gmres", "mu
 KEPT, REBUILT, SHIFTED, GMRES, DIRECT = range(5)
 ROUND_OFF = 1e-12
 """Relative error of an energy, a sum over elements."""
+UNRESOLVED = 1e-6
+"""Relative change of an energy that strains of a ten-thousandth leave uncertain."""
 NEAR = 100.0
 """Multiple of the tolerance below which the tangent of the iteration before is as good as a new one."""
 LOOSE = 0.03
@@ -211,10 +213,11 @@ class NewtonSolver:
         """Moves along the direction as far as energy and elements allow; returns the new residual norm."""
         problem, start = self.problem, self.problem.displacement.copy()
         slope = self._direction.dot(self._residual)
-        # what contributions add is not convex, and their state at the start is still known here
-        before = None
+        before, convex = None, self._convex
         if problem.contributions:
+            # what they add is not convex, so that the energy is asked where its sum can tell
             before = problem.energy() if self._energy is None else self._energy
+            convex = convex and abs(slope) <= UNRESOLVED * abs(before)
         self._direction.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
         with self._direction.localForm() as local:
             direction = local.array_r.reshape(-1, 3).copy()
@@ -225,7 +228,7 @@ class NewtonSolver:
                 trial = problem.residual(self._trial)
                 # where a convex energy's slope has all but vanished, it fell by about half of it: no need to ask for it
                 flat = abs(self._direction.dot(self._trial)) <= 0.1 * abs(slope)
-                if self._convex and before is None and np.isfinite(trial) and trial < norm and flat:
+                if convex and np.isfinite(trial) and trial < norm and flat:
                     return self._accept(trial)
                 if before is None:
                     problem.set_displacement(start)
