@@ -22,6 +22,8 @@ UNRESOLVED = 1e-6
 """Relative change of an energy that strains of a ten-thousandth leave uncertain."""
 NEAR = 100.0
 """Multiple of the tolerance below which the tangent of the iteration before is as good as a new one."""
+SLOW = 1e3
+"""Multiple of the tolerance below which an iteration that gains less than half calls for the true tangent."""
 LOOSE = 0.03
 """Relative tolerance of a linear solve that need not be good."""
 INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
@@ -93,6 +95,7 @@ class NewtonSolver:
         self._fallbacks: dict[int, PETSc.KSP] = {}
         self._level = 0  # of the shift that the last tangent needed
         self._convex = True  # whether the last tangent was positive definite as it was
+        self._slow = False  # whether the last iteration has gained little, close to the solution
         self._energy: float | None = None  # at the present iterate, where it is known
         self._exhausted = False  # whether nothing is left to gain but round-off
         self.inverting: NDArray[np.float64] | None = None
@@ -146,11 +149,7 @@ class NewtonSolver:
 
     def _too_many(self) -> float:
         """Returns the number of iterations above which the kept preconditioner counts as stale."""
-        return 1.5 * self._fresh_iterations * self._decades() + 2
-
-    def _decades(self) -> float:
-        """Returns by how many powers of ten a linear solve is to reduce its residual."""
-        return -np.log10(self._wanted_reduction)
+        return 1.5 * self._fresh_iterations * -np.log10(self._wanted_reduction) + 2
 
     def _run_cg(self, tangent: Tangent, count: StepCount, *, shifted: bool) -> int:
         """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
@@ -167,7 +166,7 @@ class NewtonSolver:
         tangent.whole().setNearNullSpace(self.problem.near_null_space())
         reason, iterations = self._run(self._cg, tangent, reuse=False, fast=not shifted)
         count.krylov += iterations
-        self._fresh_iterations, self._stale = iterations / self._decades(), reason <= 0
+        self._fresh_iterations, self._stale = iterations / -np.log10(self._wanted_reduction), reason <= 0
         return reason
 
     def _solve_linear(self, tangent: Tangent, count: StepCount) -> None:
@@ -179,8 +178,9 @@ class NewtonSolver:
                 if reason > 0 and iterations <= self._too_many() and self._direction.dot(self._residual) < 0:
                     self._convex = True
                     return
-            # folds pressed together would rather slide aside: without that, the tangent is hardly ever indefinite
-            self.problem.convexify(tangent)
+            # folds pressed together would rather slide aside: without that the tangent is hardly ever indefinite, but wrong
+            if not self._slow:
+                self.problem.convexify(tangent)
         # where the tangent was not positive definite before, it may still not be
         for level in range(max(self._level - 1, 0), len(SHIFTS)):
             with tangent.raised(SHIFTS[level]):
@@ -291,6 +291,7 @@ class NewtonSolver:
             self._wanted_reduction = enough if enough >= 0.1 * floor else floor
             if tangent is None or norm > NEAR * tolerance or norm > before / 4:
                 tangent = problem.tangent()
+            self._slow = before / 2 < norm <= SLOW * tolerance
             before = norm
             self._solve_linear(tangent, count)
             norm = self._advance(norm)
