@@ -178,7 +178,7 @@ class NewtonSolver:
                 if reason > 0 and iterations <= self._too_many() and self._direction.dot(self._residual) < 0:
                     self._convex = True
                     return
-            # folds pressed together would rather slide aside: without that the tangent is hardly ever indefinite, but wrong
+            # folds pressed together would rather slide aside: without that the tangent is rarely indefinite, but wrong
             if not self._slow:
                 self.problem.convexify(tangent)
         # where the tangent was not positive definite before, it may still not be
