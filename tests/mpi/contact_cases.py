@@ -148,6 +148,8 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_clo
         pressure = forces[on_top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
         stretch = 1 + (GAP_MM - gaps[-1]) / 2 / HEIGHT_MM
         assert pressure == pytest.approx(-stress_at(stretch, growth), rel=0.01)
+        inside = on_top & (np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
+        assert contact.pressure()[inside].mean() == pytest.approx(pressure, rel=0.1)
     assert 0 < gaps[2] < gaps[1] < gaps[0] < 0.2
     # to each pressure belongs a part of the distance
     assert gaps[2] / gaps[1] == pytest.approx(0.5, abs=0.1)

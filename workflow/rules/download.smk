@@ -11,5 +11,6 @@ rule download:
     params:
         folder=CONFIG.atlas.folder if CONFIG.atlas else None,
         urls=CONFIG.downloads,
+        optional=CONFIG.optional_downloads,
     script:
         "../scripts/download.py"

@@ -16,5 +16,5 @@ params = snakemake.params
 with step(snakemake.log[0]):
     if not params.urls:
         raise InputError("nothing to download", expected="a section `atlas` in the configuration, with its folder")
-    fetched = fetch(params.folder, params.urls, say)
-    say(f"{len(fetched)} files fetched; all {len(params.urls)} are in {params.folder}")
+    fetched = fetch(params.folder, params.urls, say, params.optional)
+    say(f"{len(fetched)} files fetched into {params.folder}")

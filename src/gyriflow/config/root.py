@@ -76,6 +76,14 @@ class Config(Settings):
         return {str(file.path.relative_to(folder)): file.url for file in atlas_files(self.atlas)}
 
     @property
+    def optional_downloads(self) -> list[str]:
+        """The files among `downloads` that no brain needs."""
+        if self.atlas is None:
+            return []
+        folder = self.atlas.folder
+        return [str(file.path.relative_to(folder)) for file in atlas_files(self.atlas) if not file.needed]
+
+    @property
     def start_week(self) -> float:
         """The gestational age at which the folding starts."""
         return self.brain(self.start).week

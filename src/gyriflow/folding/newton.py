@@ -175,8 +175,8 @@ class NewtonSolver:
             if not self._stale:
                 reason, iterations = self._run(self._cg, tangent, reuse=True, fast=True)
                 count.krylov += iterations
-                if reason > 0 and iterations <= self._too_many() and self._direction.dot(self._residual) < 0:
-                    self._convex = True
+                if reason > 0 and self._direction.dot(self._residual) < 0:
+                    self._convex, self._stale = True, iterations > self._too_many()
                     return
             # folds pressed together would rather slide aside: without that the tangent is rarely indefinite, but wrong
             if not self._slow:

@@ -9,7 +9,7 @@ import os
 import shlex
 import time
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -36,7 +36,7 @@ BYTES_PER_MB = 1e6
 Say = Callable[[str], None]
 
 
-def fetch(folder: AnyPath, urls: Mapping[str, str], say: Say) -> list[str]:
+def fetch(folder: AnyPath, urls: Mapping[str, str], say: Say, optional: Collection[str] = ()) -> list[str]:
     """Fetches the files that a folder lacks and checks those that it has; returns the names of those fetched.
 
     Parameters
@@ -47,6 +47,8 @@ def fetch(folder: AnyPath, urls: Mapping[str, str], say: Say) -> list[str]:
         Where each file is to be had, by its path in the folder.
     say
         Is called with a line of progress.
+    optional
+        Files among them that the server may lack.
 
     Raises
     ------
@@ -80,13 +82,18 @@ def fetch(folder: AnyPath, urls: Mapping[str, str], say: Say) -> list[str]:
                 try:
                     store.fetch(name, downloader=partial(_download, part=part, say=say))
                 except FileNotFoundError:
-                    absent.append(urls[name])
+                    absent.append(name)
                     continue
             sums[name] = pooch.file_hash(str(folder / name))
             _record(folder, sums)
+    lacking = [name for name in absent if name in optional]
+    if lacking:
+        say(f"the server has no {', '.join(lacking)}: not needed")
+        missing = [name for name in missing if name not in lacking]
+        absent = [name for name in absent if name not in lacking]
     if absent:
         raise StorageError(
-            f"the server has no such file: {', '.join(absent)}",
+            f"the server has no such file: {', '.join(urls[name] for name in absent)}",
             path=folder,
             remedy="All others are there. Take those out of the configuration, or give the address of another server.",
         )
@@ -104,6 +111,8 @@ def _alone_in(folder: Path) -> Iterator[None]:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise StorageError("another download into this folder is running", path=folder) from None
+        except OSError:  # a file system without locks, as some networks have
+            pass
         yield
     finally:
         os.close(handle)

@@ -175,6 +175,14 @@ def test_files_that_the_server_lacks_are_named_after_the_others_came(tmp_path, s
     assert whole_files(tmp_path) == {LONG: LABELS}
 
 
+def test_a_file_that_nothing_needs_may_be_lacking(tmp_path, server):
+    urls = {name: f"{server.url}/{name}" for name in (LONG, "t2.nii.gz")}
+    said = []
+    assert fetch(tmp_path, urls, said.append, ["t2.nii.gz"]) == [LONG]
+    assert any("no t2.nii.gz" in line for line in said)
+    assert whole_files(tmp_path) == {LONG: LABELS}
+
+
 def test_no_server_is_said_once_and_leaves_nothing(tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
