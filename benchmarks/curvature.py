@@ -7,22 +7,17 @@ surface remeshed at several densities. The last line is one JSON object.
 """
 
 import argparse
-import contextlib
 import json
-import os
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import igl
 import numpy as np
-import pymeshlab
-import pyvista as pv
+from curvature_estimators import ESTIMATORS, gyriflow
 from curved_surfaces import Ellipsoid, Folded, Torus, meshed, noisy
-from numpy.typing import NDArray
 
-from gyriflow.geometry.remeshing import in_meshlab, remeshed
-from gyriflow.geometry.triangles import TriangleMesh, mean_edge_length, vertex_areas
+from gyriflow.geometry.remeshing import remeshed
+from gyriflow.geometry.triangles import Floats, TriangleMesh, mean_edge_length, vertex_areas
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import RADIUS_MM, Curvature, curvature
 from gyriflow.metrics.gyrification import envelope, gyrification_index, sulcal_depth
@@ -37,73 +32,7 @@ EDGES_MM = (0.5, 0.8, 1.2)
 NOISE_MM = 0.05
 REAL_EDGES_MM = (0.6, 1.0, 1.5)
 RADII_MM = (2.0, 2.5, 3.0, 4.0)
-HARD_BALL_MM = 2.5
-"""Radius of a ball with constant weights whose error on clean surfaces is that of gyriflow's default."""
 MARKERS = ("<!-- benchmarks/curvature.py: begin -->", "<!-- benchmarks/curvature.py: end -->")
-
-Floats = NDArray[np.float64]
-Pair = tuple[Floats, Floats]
-Estimator = Callable[[TriangleMesh], Pair]
-
-
-def gyriflow(mesh: TriangleMesh) -> Pair:
-    found = curvature(mesh)
-    return found.maximum, found.minimum
-
-
-def libigl(mesh: TriangleMesh, size: int, rings: bool) -> Pair:
-    _, _, first, second, _ = igl.principal_curvature(mesh.vertices, mesh.faces, size, rings)
-    return np.maximum(first, second), np.minimum(first, second)
-
-
-def as_many_edges(mesh: TriangleMesh) -> int:
-    """Returns the whole number of mean edges nearest to the radius of a hard ball, at least two."""
-    return max(2, round(HARD_BALL_MM / mean_edge_length(mesh)))
-
-
-def principal(mean: Floats, gaussian: Floats) -> Pair:
-    half_difference = np.sqrt(np.maximum(mean**2 - gaussian, 0.0))
-    return mean + half_difference, mean - half_difference
-
-
-def meshlab_fit(mesh: TriangleMesh, method: str) -> Pair:
-    values = []
-    for kind in ("Mean Curvature", "Gaussian Curvature"):
-        document = in_meshlab(mesh)
-        document.compute_curvature_principal_directions_per_vertex(
-            method=method, curvcolormethod=kind, scale=pymeshlab.PureValue(HARD_BALL_MM), autoclean=False
-        )
-        values.append(document.current_mesh().vertex_scalar_array())
-    return principal(*values)
-
-
-def meshlab_discrete(mesh: TriangleMesh) -> Pair:
-    values = []
-    for kind in ("Mean Curvature", "Gaussian Curvature"):
-        document = in_meshlab(mesh)
-        document.compute_scalar_by_discrete_curvature_per_vertex(curvaturetype=kind)
-        values.append(document.current_mesh().vertex_scalar_array())
-    return principal(*values)
-
-
-def vtk_discrete(mesh: TriangleMesh) -> Pair:
-    surface = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
-    return principal(surface.curvature("mean"), surface.curvature("gaussian"))
-
-
-ESTIMATORS: dict[str, Estimator] = {
-    f"**gyriflow, {RADIUS_MM:g} mm**": gyriflow,
-    "libigl, 3 rings": lambda mesh: libigl(mesh, 3, True),
-    f"libigl, rings nearest to {HARD_BALL_MM:g} mm": lambda mesh: libigl(mesh, as_many_edges(mesh), True),
-    f"libigl, ball nearest to {HARD_BALL_MM:g} mm": lambda mesh: libigl(mesh, as_many_edges(mesh), False),
-    f"MeshLab, scale-dependent quadric, {HARD_BALL_MM:g} mm": lambda mesh: meshlab_fit(
-        mesh, "Scale Dependent Quadric Fitting"
-    ),
-    "MeshLab, quadric of one ring": lambda mesh: meshlab_fit(mesh, "Quadric Fitting"),
-    "MeshLab, Taubin": lambda mesh: meshlab_fit(mesh, "Taubin approximation"),
-    "MeshLab, cotangents and angle defects": meshlab_discrete,
-    "VTK, dihedral angles and angle defects": vtk_discrete,
-}
 
 
 def relative_rms(found: Floats, expected: Floats) -> float:
@@ -190,9 +119,7 @@ def error_tables(meshes: dict, exact: dict) -> tuple[dict, list[str]]:
             for deviation in (0.0, NOISE_MM):
                 for edge, mesh in of_name.items():
                     shown = noisy(mesh, deviation, seed=1) if deviation else mesh
-                    with muted():
-                        found = np.stack(function(shown))
-                    values.append(relative_rms(found, exact[name][edge]))
+                    values.append(relative_rms(np.stack(function(shown)), exact[name][edge]))
             lines.append(row(estimator, values))
             if function is gyriflow:
                 errors["clean"][name] = [round(value, 2) for value in values[: len(EDGES_MM)]]
@@ -212,8 +139,7 @@ def density_table(meshes: dict) -> tuple[dict, list[str]]:
     for estimator, function in list(ESTIMATORS.items())[:5]:
         values = []
         for of_name in meshes.values():
-            with muted():
-                found = {edge: np.stack(function(mesh)) for edge, mesh in of_name.items()}
+            found = {edge: np.stack(function(mesh)) for edge, mesh in of_name.items()}
             dense = of_name[EDGES_MM[0]]
             for edge in EDGES_MM[1:]:
                 values.append(relative_rms(found[edge], moved(dense, found[EDGES_MM[0]], of_name[edge])))
@@ -291,19 +217,6 @@ def real_table(surface: TriangleMesh) -> list[str]:
         cells = " | ".join(f"{value:.4g}" for value in values)
         lines.append(f"| {mean_edge_length(mesh):.2f} mm | {len(mesh.vertices)} | {cells} |")
     return lines
-
-
-@contextlib.contextmanager
-def muted():
-    """Keeps out what MeshLab prints from its own C++."""
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(nowhere)
-        os.close(kept)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,16 @@ from gyriflow.mesh.tetrahedralisation import tetrahedralise
 DEFAULTS = MeshSettings()
 SETTINGS = ("surface_edge_mm", "core_edge_mm", "fine_depth_edges", "edge_growth", "envelope_mm", "time_limit_s")
 COPIED = ("pial_faces", "tets", "vertices", "pial_edge_mm", "min_radius_ratio", "median_radius_ratio")
-ANGLES = ("min_dihedral_deg", "max_dihedral_deg", "min_volume_mm3", "volume_mm3", "crossing_faces", "gap_mm")
+ANGLES = (
+    "min_dihedral_deg",
+    "max_dihedral_deg",
+    "min_volume_mm3",
+    "volume_mm3",
+    "volume_change",
+    "crossing_faces",
+    "gap_mm",
+    "gap_kept",
+)
 
 
 def main() -> None:

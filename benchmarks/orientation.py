@@ -1,7 +1,7 @@
 """How well hemispheres are posed: surfaces in known wrong poses against the truth, as one line of JSON.
 
 FOLDER holds pairs of surfaces whose names differ by `left` and `right` only, and `truth.json`: for each file the rigid
-motion `to_ras` (4, 4) back to RAS+ mm and whether it is `inside_out`.
+motion `to_ras` (4, 4) back to RAS+ mm and whether it is `inside_out`. `repose.py` makes more such folders.
 """
 
 import argparse
@@ -42,7 +42,9 @@ def main() -> None:
     began = time.perf_counter()
     found, refused = posed(pairs_of_files(folder))
     seconds = time.perf_counter() - began
-    result = {"n": 2 * len(found)} | errors(found, truth) | surfaces(found, truth)
+    result = {"n": 2 * len(found)} | errors(found, truth)
+    counts, failed = surfaces(found, truth)
+    result, refused = result | counts, refused + failed
     print(json.dumps(result | {"seconds": round(seconds, 1), "refused": refused}))
 
 
@@ -74,7 +76,8 @@ def posed(files: list[Files]) -> tuple[dict[Files, Poses], list[str]]:
 def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:
     """Returns the worst errors once one rotation, the same for all, has been taken off.
 
-    Offset and gap are the places of left and right relative to each other: within the sagittal plane, and along x.
+    Pitch, about x, and tilt, about the other axes, are the parts of the angles. Offset and gap are the places of left
+    and right relative to each other: within the sagittal plane, and along x.
     `worst_place_mm` is the place of a brain in the sagittal plane relative to the mean of all.
     """
     motions, centres = [], []
@@ -89,9 +92,12 @@ def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:
         common.inv().apply(motion[:3, :3] @ centre + motion[:3, 3]) - centre
         for motion, centre in zip(motions, centres, strict=True)
     ])  # fmt: skip
+    vectors = np.degrees([turn.as_rotvec() for turn in off])
     apart, places = away[1::2] - away[::2], 0.5 * (away[::2] + away[1::2])
     return {
         "worst_angle_deg": _worst(np.degrees([turn.magnitude() for turn in off])),
+        "worst_pitch_deg": _worst(np.abs(vectors[:, 0])),
+        "worst_tilt_deg": _worst(np.linalg.norm(vectors[:, 1:], axis=1)),
         "common_angle_deg": _worst(np.degrees([common.magnitude()])),
         "worst_offset_mm": _worst(np.linalg.norm(apart[:, 1:], axis=1)),
         "worst_gap_mm": _worst(np.abs(apart[:, 0])),
@@ -99,27 +105,27 @@ def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:
     }
 
 
-def surfaces(found: dict[Files, Poses], truth: dict) -> dict[str, int]:
-    """Returns how many files were recognised as inside out or not, and how many brains became closed surfaces."""
-    right, closed = 0, 0
+def surfaces(found: dict[Files, Poses], truth: dict) -> tuple[dict[str, int], list[str]]:
+    """Returns how many files were recognised as inside out or not, how many brains closed, and what failed."""
+    right, closed, failed = 0, 0, []
     for brain, pose in found.items():
         left, other = map(read_surface, brain)
         size = (abs(signed_volume(left))) ** (1 / 3)
-        surface = from_hemispheres(
-            left,
-            other,
-            pose.report,
-            week=_week(brain[0], left),
-            coordinates="auto",
-            edge_length_mm=max(1.2, size / 25),
-        )
+        edge = max(1.2, size / 25)
+        try:
+            surface = from_hemispheres(
+                left, other, pose.report, week=_week(left), coordinates="auto", edge_length_mm=edge
+            )
+        except GyriflowError as error:
+            failed.append(f"{brain[0].name}: {error}")
+            continue
         sound = [is_closed(piece) and euler_number(piece) == 2 for piece in pieces(surface.whole)]
         closed += sound == [True, True]
         for side, path in zip(SIDES, brain, strict=True):
             turned = surface.report[f"repair_{side}"]["pieces_turned_outward"] > 0
             outward = signed_volume(getattr(surface, side)) > 0
             right += outward and turned == truth[path.name]["inside_out"]
-    return {"inside_out_right": right, "merged_closed": closed}
+    return {"inside_out_right": right, "merged_closed": closed}, failed
 
 
 def _common(rotations: list[Floats]) -> Rotation:
@@ -136,10 +142,8 @@ def _common(rotations: list[Floats]) -> Rotation:
     return best
 
 
-def _week(path: Path, left: TriangleMesh) -> float:
-    """Returns the week in a file's name, or the one whose brains are nearest in size."""
-    if named := re.search(r"week(\d+(?:\.\d+)?)", path.name):
-        return float(named[1])
+def _week(left: TriangleMesh) -> float:
+    """Returns the week whose brains are nearest in size."""
     volume = 2e-3 * abs(signed_volume(left))
     return float(min(WEEKS, key=lambda week: abs(np.log(expected_volume_ml(week) / volume))))
 

@@ -170,34 +170,6 @@ def test_no_vague_names():
     assert [(path, name) for path, name in names if vague.search(name)] == []
 
 
-def rules() -> dict[str, str]:
-    """Returns the text of every rule by name."""
-    text = "\n".join(path.read_text() for path in RULE_FILES)
-    return dict(re.findall(r"^rule (\w+):\n((?:(?:[ \t].*)?\n)*)", text + "\n", flags=re.MULTILINE))
-
-
-def test_every_rule_has_a_log_a_benchmark_an_environment_and_resources():
-    working = {name: body for name, body in rules().items() if re.search(r"^    output:", body, flags=re.MULTILINE)}
-    assert len(working) > 5
-    missing = [
-        f"{name}: {keyword}"
-        for name, body in working.items()
-        for keyword in ("log", "benchmark", "conda", "resources")
-        if not re.search(rf"^    {keyword}:", body, flags=re.MULTILINE)
-    ]
-    assert missing == []
-
-
-def test_every_script_is_used_and_there():
-    named = {name for body in rules().values() for name in re.findall(r"\.\./scripts/(\w+\.py)", body)}
-    assert named == {path.name for path in SCRIPTS}
-
-
-def test_every_caption_is_used_and_there():
-    named = {name for body in rules().values() for name in re.findall(r"\.\./report/(\w+\.rst)", body)}
-    assert named | {"workflow.rst"} == {path.name for path in (ROOT / "workflow" / "report").glob("*.rst")}
-
-
 def listed(path: Path) -> list[str]:
     """Returns the entries of a list of packages."""
     return [entry for line in path.read_text().splitlines() if (entry := line.split("#")[0].strip())]

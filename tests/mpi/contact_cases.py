@@ -55,7 +55,7 @@ def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z
     nodes, cells = len(domain.vertex_of_node), len(domain.cells)
     normal = np.tile([0.0, 0.0, 1.0], (cells, 1))
     problem.set_layers(np.full(nodes, MU), np.zeros(nodes), np.full(nodes, growth_along_z), normal)
-    contact = SelfContact(domain, problem.displacement, zones.facets, ContactSettings(distance, stiffness))
+    contact = SelfContact(domain, problem.displacement, zones.facets, ContactSettings(stiffness, distance))
     problem.contributions.append(contact)
     return problem, contact
 
@@ -187,7 +187,7 @@ def test_ten_thousand_large_random_steps_cross_nothing():
     facets, _ = boundary_faces(mesh)
     domain = Domain(COMM, mesh)
     displacement = np.zeros((len(domain.vertex_of_node), 3))
-    contact = SelfContact(domain, displacement, facets, ContactSettings(0.2, 1000.0))
+    contact = SelfContact(domain, displacement, facets, ContactSettings(1000.0, 0.2))
     random = np.random.default_rng(5)
     surface = ipctk.CollisionMesh(mesh.vertices, ipctk.edges(facets.astype(np.int32)), facets.astype(np.int32))
     cut = 0
@@ -211,7 +211,7 @@ def test_a_surface_that_crosses_itself_is_refused():
     mesh = TetrahedralMesh(mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets)
     facets, _ = boundary_faces(mesh)
     with pytest.raises(MeshError, match="crosses itself"):
-        SelfContact(Domain(COMM, mesh), np.zeros((1, 3)), facets, ContactSettings(0.2, 1000.0))
+        SelfContact(Domain(COMM, mesh), np.zeros((1, 3)), facets, ContactSettings(1000.0, 0.2))
 
 
 def slab_with_a_sulcus():

@@ -202,7 +202,7 @@ def test_a_rebuilt_preconditioner_is_as_good_as_a_new_one():
     solver.solve(np.zeros_like(problem.displacement))
     stretched = problem.domain.positions * [12.0, 1.0, 0.3]
     problem.domain.place(stretched)
-    solver._stale = True
+    solver._wear.wear_out()
     count = solver.solve(np.zeros_like(problem.displacement))
     new = NewtonSolver(problem, settings, residual_floor=0.0)
     fresh = new.solve(np.zeros_like(problem.displacement))

@@ -101,6 +101,16 @@ def test_growth_comes_from_the_brains_that_are_named(workflow):
     assert (jobs["pial_surface"], jobs["growth_rates"]) == (2, 1)
 
 
+def test_only_a_common_number_of_modes_ties_measured_brains_to_simulated_ones(workflow):
+    target = "results/b/metrics/real/metrics.csv"
+    alone = {"phantom": 1, "pial_surface": 1, "measure_real": 1}
+    assert workflow.jobs(target, "--configfile", workflow.write("plain.yaml", SMALL_STUDY)) == alone
+    common = workflow.write("common.yaml", SMALL_STUDY | {"metrics": {"spangy_modes": "common"}})
+    jobs = workflow.jobs(target, "--configfile", common)
+    # two output weeks of each of two runs
+    assert (jobs["weyl_numbers"], jobs["simulate"], jobs["folded_surface"]) == (1, 2, 4)
+
+
 def changed(section, **values):
     study = copy.deepcopy(SMALL_STUDY)
     study[section] = study.get(section, {}) | values
@@ -144,9 +154,7 @@ FIGURES = {
         (
             "surface",
             {"edge_length_mm": 1.5},
-            BOTH_RUNS
-            | MESH
-            | {"pial_surface": 2, "weyl_numbers": 1, "measure_real": 2, "growth_rates": 1, "growth_figure": 1},
+            BOTH_RUNS | MESH | {"pial_surface": 2, "measure_real": 2, "growth_rates": 1, "growth_figure": 1},
         ),
         ("report", {"dpi": 100}, NEW_RESULTS | FIGURES),
         ("report", {"energy": {"pue": 1.67}}, NEW_RESULTS),

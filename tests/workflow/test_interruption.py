@@ -8,9 +8,10 @@ from contextlib import suppress
 
 import psutil
 import pytest
-from shapes import ellipsoid_mesh
+from shapes import ellipsoid_mesh, hemisphere
 
 from gyriflow.io.files import read_json, write_json
+from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
 from .conftest import SMALL_STUDY
@@ -36,6 +37,8 @@ def meshed(workflow):
         path.touch()
     results = workflow.directory / "results" / "a"
     write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
+    for side, sign in (("left", -1), ("right", 1)):
+        write_surface(results / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
     write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", ellipsoid_mesh(10, (20.0, 26.0, 18.0)))
     touched = workflow.run("--touch", "--cores", "1", "mesh", "--configfile", "study.yaml")
     assert touched.returncode == 0, touched.stderr

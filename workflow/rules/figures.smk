@@ -60,6 +60,19 @@ rule quality_figure:
         "../scripts/quality_figure.py"
 
 
+# of a mesh that did not pass the gates; made when asked for
+use rule quality_figure as refused_quality_figure with:
+    input:
+        f"results/{START}/mesh/refused/quality.json",
+    output:
+        png=f"results/{START}/mesh/refused/quality.png",
+        pdf=f"results/{START}/mesh/refused/quality.pdf",
+    log:
+        f"results/{START}/logs/refused_quality_figure.log",
+    benchmark:
+        f"results/{START}/benchmarks/refused_quality_figure.tsv"
+
+
 # brains with an image that their surface can be compared with
 OVERLAID = [brain.id for brain in CONFIG.brains if brain.image]
 

@@ -69,7 +69,7 @@ rule parameter_maps:
         },
         # files of maps are understood as those of the brain
         reading=CONFIG.brain(START).model_dump(include={"coordinates", "affine_from"}),
-        code=code("mesh"),
+        code=code("mesh", "surface"),
     script:
         "../scripts/parameter_maps.py"
 
@@ -80,6 +80,9 @@ rule regions:
         data=f"results/{START}/mesh/brain.h5",
         params=f"results/{START}/folding/{{run}}/params.yaml",
         maps=maps_of_run,
+        # the hemispheres of the folded brain are those of the measured one
+        left=f"results/{START}/surface/left.pial.surf.gii",
+        right=f"results/{START}/surface/right.pial.surf.gii",
     output:
         mesh=f"results/{START}/folding/{{run}}/regions.xdmf",
         data=f"results/{START}/folding/{{run}}/regions.h5",
@@ -93,7 +96,7 @@ rule regions:
         mem_mb=4000,
         runtime=15,
     params:
-        code=code("folding"),
+        code=code("folding", "surface"),
     script:
         "../scripts/regions.py"
 
@@ -140,7 +143,8 @@ rule simulate:
 rule folded_surface:
     input:
         frames=rules.simulate.output.frames,
-        params=rules.parameters.output[0],
+        regions=rules.regions.output.mesh,
+        data=rules.regions.output.data,
     output:
         whole=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.pial.surf.gii",
         left=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.left.pial.surf.gii",
@@ -155,7 +159,7 @@ rule folded_surface:
         mem_mb=2000,
         runtime=10,
     params:
-        code=code(),
+        code=code("folding"),
     script:
         "../scripts/folded_surface.py"
 

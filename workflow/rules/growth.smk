@@ -77,7 +77,7 @@ rule growth_figure:
         series_names=list(CONFIG.growth_series),
         measured=CONFIG.measured_name(GROWTH_BRAINS),
         dpi=CONFIG.report.dpi,
-        code=code("report"),
+        code=code("growth", "report"),
     script:
         "../scripts/growth_figure.py"
 

@@ -54,7 +54,7 @@ rule segmentation:
         container=lambda wildcards: CONFIG.brain(wildcards.brain).segmentation.container,
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
         scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
-        code=code(),
+        code=code("surface"),
     script:
         "../scripts/segmentation.py"
 

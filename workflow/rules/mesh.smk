@@ -26,6 +26,8 @@ rule tetrahedralise:
     params:
         settings=CONFIG.mesh.model_dump(exclude=set(MESH_GATES)),
         gates=MESH_GATES,
+        # no output: it stays where the rule fails
+        refused=f"results/{START}/mesh/refused",
         code=code("mesh"),
     script:
         "../scripts/tetrahedralise.py"

@@ -1,9 +1,24 @@
 # Metrics of measured and simulated brains, by the same code with the same settings.
-# The number of modes comes from the measured brains alone: their metrics need no simulation, and no run changes them.
+
+
+def folded_surfaces(side):
+    """Returns the surfaces of a hemisphere of all runs at all output weeks."""
+    return [
+        file
+        for run in RUNS
+        for file in expand(
+            rules.folded_surface.output[side], run=run, week=week_tags(run)
+        )
+    ]
+
+
+# Only a common number of modes ties brains to each other: measured ones then wait for all simulations.
 rule weyl_numbers:
     input:
-        left=expand("results/{brain}/surface/left.pial.surf.gii", brain=BRAINS),
-        right=expand("results/{brain}/surface/right.pial.surf.gii", brain=BRAINS),
+        left=expand("results/{brain}/surface/left.pial.surf.gii", brain=BRAINS)
+        + folded_surfaces("left"),
+        right=expand("results/{brain}/surface/right.pial.surf.gii", brain=BRAINS)
+        + folded_surfaces("right"),
     output:
         "results/study/weyl_numbers.csv",
     log:
@@ -16,7 +31,15 @@ rule weyl_numbers:
         mem_mb=2000,
         runtime=20,
     params:
-        brains=BRAINS,
+        labels=[
+            {"subject": brain.id, "run": "real", "week": brain.week}
+            for brain in CONFIG.brains
+        ]
+        + [
+            {"subject": START, "run": run, "week": week}
+            for run in RUNS
+            for week in CONFIG.weeks(run)
+        ],
         formula=CONFIG.metrics.spangy_wavelength,
         code=code("metrics"),
     script:

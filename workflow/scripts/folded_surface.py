@@ -1,18 +1,20 @@
-"""The pial surface of a folding run at a week, and its hemispheres: the material sides of the fissure at the start."""
+"""The pial surface of a folding run at a week, and its hemispheres: the facets that were theirs at the start."""
 
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh, corners, submesh
-from gyriflow.io.frames import read_positions, read_tets, read_weeks
+from gyriflow.folding.regions import LEFT
+from gyriflow.geometry.triangles import TriangleMesh, submesh
+from gyriflow.io.frames import read_positions
+from gyriflow.io.regions import read_regions
 from gyriflow.io.surfaces import write_surface
-from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
 
-frames, output = snakemake.input.frames, snakemake.output
+output = snakemake.output
 with step(snakemake.log[0]):
-    start = TetrahedralMesh(read_positions(frames, read_weeks(frames)[0]), read_tets(frames))
-    initial, vertices = boundary_surface(start)
-    surface = TriangleMesh(read_positions(frames, float(snakemake.wildcards.week))[vertices], initial.faces)
-    on_left = corners(initial).mean(axis=1)[:, 0] < read_yaml(snakemake.input.params)["fissure_x_mm"]
-    write_surface(output.whole, surface)
-    write_surface(output.left, submesh(surface, on_left)[0], "CortexLeft")
-    write_surface(output.right, submesh(surface, ~on_left)[0], "CortexRight")
+    regions = read_regions(snakemake.input.regions)
+    positions = read_positions(snakemake.input.frames, float(snakemake.wildcards.week))
+    surface, on_left = TriangleMesh(positions, regions.facets), regions.facet_tags["hemisphere"] == LEFT
+    for name, part, structure in (
+        ("whole", on_left | ~on_left, None),
+        ("left", on_left, "CortexLeft"),
+        ("right", ~on_left, "CortexRight"),
+    ):
+        write_surface(output[name], submesh(surface, part)[0], structure)

@@ -17,7 +17,6 @@ with step(snakemake.log[0]):
         for left, right in zip(files.left, files.right, strict=True)
     ]
     areas["volume_ml"] = [signed_volume(read_surface(whole)) * ML_PER_MM3 for whole in files.whole]
-    areas = areas.sort_values(["series", "week"], kind="stable")
     write_table(output.areas, areas)
     write_table(output.rates, rates_of_series(areas))
     write_table(output.agreement, agreement(areas))

@@ -1,19 +1,27 @@
-"""The start brain's pial surface filled with tetrahedra."""
+"""The start brain's pial surface filled with tetrahedra; a mesh that is refused is kept aside, to be looked at."""
 
+from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.io.files import write_json
+from gyriflow.io.files import emptied, write_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
-from gyriflow.mesh.quality import quality_summary, radius_ratios, refuse_bad_mesh
+from gyriflow.mesh.gates import refuse_bad_mesh
+from gyriflow.mesh.quality import quality_summary, radius_ratios
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
+    refused = emptied(params.refused)
     surface = read_surface(snakemake.input[0])
     mesh = tetrahedralise(surface, **params.settings)
-    summary = quality_summary(mesh, surface)
-    refuse_bad_mesh(mesh, summary, **params.gates)
-    write_tetrahedral_mesh(output.mesh, mesh, cell_fields={"radius_ratio": radius_ratios(mesh)})
+    summary, fields = quality_summary(mesh, surface), {"radius_ratio": radius_ratios(mesh)}
+    try:
+        refuse_bad_mesh(mesh, summary, refused / "brain.xdmf", **params.gates)
+    except MeshError:
+        write_tetrahedral_mesh(refused / "brain.xdmf", mesh, cell_fields=fields)
+        write_json(refused / "quality.json", summary)
+        raise
+    write_tetrahedral_mesh(output.mesh, mesh, cell_fields=fields)
     write_surface(output.surface, boundary_surface(mesh)[0])
     write_json(output.quality, summary)

@@ -1,4 +1,4 @@
-"""How many modes each measured hemisphere needs by Weyl's law."""
+"""How many modes each hemisphere needs by Weyl's law, of measured and simulated brains."""
 
 import pandas as pd
 
@@ -10,7 +10,7 @@ from gyriflow.step import step
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     tables = []
-    for brain, left, right in zip(params.brains, files.left, files.right, strict=True):
-        tables.append(weyl_numbers(read_surface(left), read_surface(right), params.formula))
-        tables[-1].insert(0, "subject", brain)
+    for labels, left, right in zip(params.labels, files.left, files.right, strict=True):
+        table = weyl_numbers(read_surface(left), read_surface(right), params.formula)
+        tables.append(table.assign(**labels)[[*labels, *table.columns]])
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

@@ -46,10 +46,26 @@ class MeshSettings(Settings):
     )
     min_dihedral_deg: float = setting(1.0, "deg", "Least accepted dihedral angle of an element.", ge=0, lt=70)
     max_dihedral_deg: float = setting(178.0, "deg", "Largest accepted dihedral angle of an element.", gt=71, le=180)
+    min_volume_mm3: float = setting(1e-6, "mm³", "Least accepted volume of an element.", ge=0, lt=1)
+    max_volume_change: float = setting(
+        0.01,
+        "",
+        "Largest accepted difference of the mesh's volume from that inside the pial surface, relative.",
+        gt=0,
+        lt=1,
+    )
     max_surface_distance_mm: float = setting(
         0.1,
         "mm",
         "Largest accepted distance between the mesh's surface and the pial surface, within which 99 % of either lies.",
         gt=0,
         le=5,
+    )
+    min_gap_kept: float = setting(
+        0.95,
+        "",
+        "Least accepted share of the fissure and of other gaps narrower than 3 mm, by the area of their walls, that "
+        "stays open in the mesh, with half of its width at least.",
+        ge=0,
+        le=1,
     )

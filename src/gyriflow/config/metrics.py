@@ -24,11 +24,12 @@ class MetricsSettings(Settings):
     spangy_proxy: Literal["shape_index", "mean_curvature"] = setting(
         "shape_index", "", "The map whose spectrum is analysed."
     )
-    spangy_modes: Annotated[int, Field(ge=2, le=20000)] | Literal["common", "own", "complete"] = setting(
-        "common", "",
-        "Number of eigenmodes, from 2 to 20000, or `common`: per hemisphere the largest Weyl number (modes that the "
-        "shortest wavelength needs) of the measured brains; `own`: that of the surface itself, either at most a tenth "
-        "of its vertices; `complete`: all up to the end of band B6.",
+    spangy_modes: Annotated[int, Field(ge=2, le=20000)] | Literal["B4", "B5", "B6", "common", "own"] = setting(
+        "B5", "",
+        "Number of eigenmodes, from 2 to 20000, or the last band, all modes up to whose end are computed: `B4`, `B5` "
+        "or `B6`, each four times as many as before; `common`: per hemisphere the largest Weyl number (modes that the "
+        "shortest wavelength needs) of all measured and simulated brains of the study; `own`: that of the surface "
+        "itself.",
     )  # fmt: skip
     spangy_wavelength: Literal["paper", "textbook"] = setting(
         "paper", "", "Relation of the shortest wavelength to λ: `paper` 2π/WL², `textbook` (2π/WL)²."

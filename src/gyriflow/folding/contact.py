@@ -15,7 +15,6 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from ..errors import MeshError
-from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import TriangleMesh, edges
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
@@ -24,7 +23,8 @@ from .varying import Maps
 
 Floats = NDArray[np.float64]
 DISTANCE_PER_EDGE = 0.2
-"""Distance at which contact begins, in mean edge lengths of the surface: well below what the mesh resolves."""
+"""Distance at which contact begins, in mean edge lengths of the surface as it is: well below what the mesh resolves.
+As the surface grows, its edges do; a distance that stayed behind would only make contact harder to solve."""
 STIFFNESS_PER_MODULUS = 0.1
 """The barrier's stiffness in shear moduli of the cortex. The pressure between folds, some tenths of the modulus, holds
 them at about half of the distance then; a stiffer barrier takes more iterations and changes nothing else."""
@@ -39,23 +39,20 @@ N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """Distance d̂ in mm below which parts of the surface repel each other, and the barrier's stiffness in Pa."""
+    """The barrier's stiffness in Pa, and the distance d̂ in mm below which parts of the surface repel each other.
 
-    distance_mm: float
+    None takes `DISTANCE_PER_EDGE` of the mean edge length at each step's start.
+    """
+
     stiffness_pa: float
+    distance_mm: float | None = None
 
 
-def contact_settings(
-    parameters: FoldingParameters, mesh: TetrahedralMesh, facets: NDArray[np.int64], maps: Maps
-) -> ContactSettings:
-    """Returns the settings of a run: as given, or from the mesh at the start (mm) and the stiffest cortex."""
+def contact_settings(parameters: FoldingParameters, maps: Maps) -> ContactSettings:
+    """Returns the settings of a run: as given, or from the stiffest cortex."""
     p = parameters
-    pairs, _ = edges(TriangleMesh(mesh.vertices, facets))
-    edge = float(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1), axis=-1).mean())
     stiffest = p.shear_modulus_cortex_pa.range(maps, p.start_week, p.end_week)[1]
-    return ContactSettings(
-        p.contact.distance_mm or DISTANCE_PER_EDGE * edge, p.contact.stiffness_pa or STIFFNESS_PER_MODULUS * stiffest
-    )
+    return ContactSettings(p.contact.stiffness_pa or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm)
 
 
 class SelfContact:
@@ -71,6 +68,11 @@ class SelfContact:
         The surface, as vertex indices of the file.
     settings
         Distance and stiffness.
+
+    Attributes
+    ----------
+    distance_mm : float
+        The present distance d̂.
 
     Raises
     ------
@@ -90,9 +92,6 @@ class SelfContact:
         self._faces = np.asfortranarray(faces.reshape(-1, 3), dtype=np.int32)
         surface = TriangleMesh(domain.positions[self._vertices], faces.reshape(-1, 3))
         self._edges = np.asfortranarray(edges(surface)[0], dtype=np.int32)
-        self._barrier = ipctk.BarrierPotential(
-            BARRIER, settings.distance_mm, settings.stiffness_pa, use_physical_barrier=True
-        )
         owned = domain.vertex_of_node[: domain.owned]
         place = np.searchsorted(self._vertices, owned).clip(max=len(self._vertices) - 1)
         self._owned_nodes = np.flatnonzero(self._vertices[place] == owned)
@@ -101,6 +100,7 @@ class SelfContact:
         self._search = ipctk.LBVH()
         self._candidates = ipctk.Candidates()
         self._centre: Floats | None = None  # where the candidates hold
+        self._reach = 0.0
         self.mesh_moved()
         if ipctk.has_intersections(self._surface, self._start):
             raise MeshError(
@@ -114,6 +114,11 @@ class SelfContact:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
         self._start = np.asfortranarray(self.domain.positions[self._vertices] * MM_PER_M)
         self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
+        mean_edge = float(np.linalg.norm(np.diff(self._start[self._edges], axis=1), axis=-1).mean())
+        self.distance_mm = self.settings.distance_mm or DISTANCE_PER_EDGE * mean_edge
+        self._barrier = ipctk.BarrierPotential(
+            BARRIER, self.distance_mm, self.settings.stiffness_pa, use_physical_barrier=True
+        )
         self._known: Floats | None = None
 
     def _on_surface(self, local: Floats) -> Floats:
@@ -122,7 +127,8 @@ class SelfContact:
 
     def _within_reach(self, positions: Floats) -> bool:
         """Returns whether the known candidates hold all pairs that can be near at (s, 3) positions in mm."""
-        return self._centre is not None and bool(np.abs(positions - self._centre).max() <= MARGIN_MM)
+        margin = self._reach - self.distance_mm / 2
+        return self._centre is not None and bool(np.abs(positions - self._centre).max() <= margin)
 
     def _state(self) -> tuple[Floats, ipctk.NormalCollisions]:
         """Returns the (s, 3) positions in mm at the present displacement, and the pairs within the distance."""
@@ -130,13 +136,12 @@ class SelfContact:
         if self._known is None or not np.array_equal(u, self._known):
             self._known = u
             self._positions = np.asfortranarray(self._start + u * MM_PER_M)
-            distance = self.settings.distance_mm
             if not self._within_reach(self._positions):
-                self._centre = self._positions
-                self._candidates.build(self._surface, self._positions, distance / 2 + MARGIN_MM, self._search)
+                self._centre, self._reach = self._positions, self.distance_mm / 2 + MARGIN_MM
+                self._candidates.build(self._surface, self._positions, self._reach, self._search)
             self._pairs = ipctk.NormalCollisions()
             self._pairs.use_area_weighting = True
-            self._pairs.build(self._candidates, self._surface, self._positions, distance)
+            self._pairs.build(self._candidates, self._surface, self._positions, self.distance_mm)
         return self._positions, self._pairs
 
     def energy(self) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..errors import SolverError
+from .krylov import Wear, new_krylov, smooth_with
 from .problem import Problem
 from .tangent import Tangent
 
@@ -88,8 +89,7 @@ class NewtonSolver:
         self._residual = problem.new_vector()
         self._trial = problem.new_vector()
         self._direction = problem.new_vector()
-        self._fresh_iterations = 0.0  # Krylov iterations with a new preconditioner, per power of ten
-        self._stale = True
+        self._wear = Wear()
         self._wanted_reduction = settings.krylov_tolerance
         self._cg = self._new_krylov("cg", "gamg")
         self._fallbacks: dict[int, PETSc.KSP] = {}
@@ -97,32 +97,12 @@ class NewtonSolver:
         self._convex = True  # whether the last tangent was positive definite as it was
         self._slow = False  # whether the last iteration has gained little, close to the solution
         self._energy: float | None = None  # at the present iterate, where it is known
+        self._first_gain = 0.0  # what the first iteration of the step before left of the residual
         self._exhausted = False  # whether nothing is left to gain but round-off
         self.inverting: NDArray[np.float64] | None = None
 
     def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
-        krylov = PETSc.KSP().create(self.problem.domain.comm)
-        prefix = f"gyriflow_{method}_"
-        options = PETSc.Options(prefix)
-        if preconditioner == "gamg":
-            options["pc_gamg_threshold"] = 0.01
-            # else a rebuilt preconditioner would keep the coarse spaces of the first shape
-            options["pc_gamg_reuse_interpolation"] = False
-            options["pc_gamg_aggressive_coarsening"] = 1
-            options["mg_levels_ksp_type"] = "chebyshev"
-            options["mg_levels_ksp_max_it"] = 2
-            options["mg_levels_pc_type"] = "pbjacobi"
-        krylov.setOptionsPrefix(prefix)
-        krylov.setType(method)
-        krylov.getPC().setType(preconditioner)
-        if method == "cg":
-            # the norm that Newton's method is judged by
-            krylov.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-        if preconditioner == "lu":
-            krylov.getPC().setFactorSolverType("mumps")
-        krylov.setTolerances(atol=0.0, max_it=self.settings.max_krylov)
-        krylov.setFromOptions()
-        return krylov
+        return new_krylov(self.problem.domain.comm, method, preconditioner, self.settings.max_krylov)
 
     def _run(self, krylov: PETSc.KSP, tangent: Tangent, *, reuse: bool, fast: bool = False) -> tuple[int, int]:
         """Solves into the direction; returns PETSc's reason for the end, 0 for one without, and the iterations.
@@ -137,8 +117,7 @@ class NewtonSolver:
         try:
             if fast:
                 krylov.setUp()
-                smoother = multigrid.getMGSmoother(multigrid.getMGLevels() - 1)
-                smoother.setOperators(tangent.products, tangent.smoothing)
+                smooth_with(krylov, tangent.products, tangent.smoothing)
             krylov.solve(self._residual, self._direction)
         except PETSc.Error:  # a factorisation that broke down
             return 0, 0
@@ -147,36 +126,37 @@ class NewtonSolver:
         finite = bool(np.isfinite(self._direction.norm()))
         return krylov.getConvergedReason() if finite else 0, krylov.getIterationNumber()
 
-    def _too_many(self) -> float:
-        """Returns the number of iterations above which the kept preconditioner counts as stale."""
-        return 1.5 * self._fresh_iterations * -np.log10(self._wanted_reduction) + 2
-
     def _run_cg(self, tangent: Tangent, count: StepCount, *, shifted: bool) -> int:
         """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
-        if not self._stale:
+        if not self._wear.stale:
             reason, iterations = self._run(self._cg, tangent, reuse=True, fast=not shifted)
             count.krylov += iterations
             # a matrix that is not positive definite is no fault of the preconditioner
             if reason == INDEFINITE[0]:
                 return reason
-            self._stale = reason <= 0 or iterations > self._too_many()
             if reason > 0:
+                self._wear.add(iterations, self._wanted_reduction)
                 return reason
             count.rung = max(count.rung, REBUILT)
         tangent.whole().setNearNullSpace(self.problem.near_null_space())
         reason, iterations = self._run(self._cg, tangent, reuse=False, fast=not shifted)
         count.krylov += iterations
-        self._fresh_iterations, self._stale = iterations / -np.log10(self._wanted_reduction), reason <= 0
+        self._wear.renew()
+        if reason > 0:
+            self._wear.add(iterations, self._wanted_reduction)
+        elif reason != INDEFINITE[0]:
+            self._wear.wear_out()
         return reason
 
     def _solve_linear(self, tangent: Tangent, count: StepCount) -> None:
         """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
         if self.problem.contributions:
-            if not self._stale:
+            if not self._wear.stale:
                 reason, iterations = self._run(self._cg, tangent, reuse=True, fast=True)
                 count.krylov += iterations
                 if reason > 0 and self._direction.dot(self._residual) < 0:
-                    self._convex, self._stale = True, iterations > self._too_many()
+                    self._convex = True
+                    self._wear.add(iterations, self._wanted_reduction)
                     return
             # folds pressed together would rather slide aside: without that the tangent is rarely indefinite, but wrong
             if not self._slow:
@@ -285,9 +265,10 @@ class NewtonSolver:
             count.newton += 1
             enough = 0.4 * tolerance / norm
             floor = self.settings.krylov_tolerance
-            if problem.contributions and np.isfinite(before):
+            if problem.contributions:
                 # while contact changes from one iterate to the next, a direction need not be better than the last was
-                floor = max(floor, min(LOOSE, (norm / before) ** 2))
+                gain = norm / before if np.isfinite(before) else self._first_gain
+                floor = max(floor, min(LOOSE, gain**2))
             self._wanted_reduction = enough if enough >= 0.1 * floor else floor
             if tangent is None or norm > NEAR * tolerance or norm > before / 4:
                 tangent = problem.tangent()
@@ -295,5 +276,7 @@ class NewtonSolver:
             before = norm
             self._solve_linear(tangent, count)
             norm = self._advance(norm)
+            if count.newton == 1:
+                self._first_gain = norm / before
         count.residual = norm / at_rest if at_rest > 0 else 0.0
         return count

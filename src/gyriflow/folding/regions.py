@@ -15,6 +15,8 @@ Tags = dict[str, NDArray[np.int32]]
 
 LEFT, RIGHT, BRIDGE = 1, 2, 3
 CORTEX, CORE = 1, 2
+SHOWN_FIELDS = ("zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal")
+"""The fields that are shown with the regions."""
 
 
 def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
@@ -37,10 +39,15 @@ def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
     }
 
 
-def facet_tags(mesh: TetrahedralMesh, zones: Zones) -> Tags:
-    """Returns the (f,) tags of `zones.facets`: `zone` as in `zones`, `hemisphere` LEFT or RIGHT of the fissure."""
-    x = mesh.vertices[zones.facets, 0].mean(axis=1)
-    side = np.where(x < zones.fissure_x_mm, LEFT, RIGHT)
+def facet_tags(zones: Zones, on_left: NDArray[np.bool_]) -> Tags:
+    """Returns the (f,) tags of `zones.facets`: `zone` as in `zones`, `hemisphere` LEFT or RIGHT.
+
+    Parameters
+    ----------
+    on_left : (f,) bool
+        Which facets belong to the left hemisphere. The fissure may be curved, so that no plane tells.
+    """
+    side = np.where(on_left, LEFT, RIGHT)
     return {"zone": zones.facet_zone.astype(np.int32), "hemisphere": side.astype(np.int32)}
 
 

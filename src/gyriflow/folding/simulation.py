@@ -71,7 +71,7 @@ class Folding:
         )
         self.contact: SelfContact | None = None
         if parameters.contact.kind == "global":
-            settings = contact_settings(parameters, mesh, zones.facets, self.maps)
+            settings = contact_settings(parameters, self.maps)
             self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, settings)
             self.problem.contributions.append(self.contact)
         self._pial = np.unique(zones.cortex_facets)

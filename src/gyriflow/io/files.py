@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -39,6 +40,12 @@ def replaced(path: AnyPath) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def emptied(folder: AnyPath) -> Path:
+    """Returns the path of a folder that is removed with all in it, so that nothing of an earlier run is left there."""
+    shutil.rmtree(folder, ignore_errors=True)
+    return Path(folder)
 
 
 def _plain(value: Any) -> Any:

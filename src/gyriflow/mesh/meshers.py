@@ -4,11 +4,13 @@
 """
 
 import io
+import logging
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -16,10 +18,14 @@ import numpy as np
 from ..errors import MeshError
 from ..geometry.tetrahedra import TetrahedralMesh
 
+log = logging.getLogger(__name__)
+
 PACKAGES = {"pytetwild": "pytetwild", "tetgen": "libigl"}
 """The package that each mesher comes with."""
 MISSING = 77
 """Exit code of a process whose mesher is not installed."""
+LAST_WORDS = 1000
+"""So many of the last characters that a mesher prints stand in the message of its failure; all of them are logged."""
 
 RADIUS_EDGE_RATIO = 1.3
 """TetGen's bound on circumradius over shortest edge: from here on edges grow as fast as elements stay good."""
@@ -28,7 +34,7 @@ OPTIMISED_DEG = 140
 
 
 def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> TetrahedralMesh:
-    """Returns the mesh that a mesher makes in a process of its own.
+    """Returns the mesh that a mesher makes in a process of its own; what that prints is logged line by line.
 
     Parameters
     ----------
@@ -46,40 +52,64 @@ def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> Tet
     """
     sent = io.BytesIO()
     np.savez(sent, **arrays)
-    try:
-        # a mesher may leave files in its working folder
-        with tempfile.TemporaryDirectory() as folder:
-            process = subprocess.run(
-                [sys.executable, "-m", __name__, name],
-                input=sent.getvalue(),
-                capture_output=True,
-                timeout=time_limit_s,
-                check=False,
-                cwd=folder,
-                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            )
-    except subprocess.TimeoutExpired as expired:
-        log = (expired.stderr or b"").decode(errors="replace")[-1000:]
+    # a mesher may leave files in its working folder
+    with tempfile.TemporaryDirectory() as folder:
+        code, output, words = _run(name, sent.getvalue(), folder, time_limit_s)
+    last = "\n".join(words)[-LAST_WORDS:]
+    if code is None:
         raise MeshError(
             f"the mesher {name} was stopped after {time_limit_s:g} s",
-            found=f"its last words: {log or 'none'}",
+            found=f"its last words: {last or 'none'}",
             remedy="Raise mesh.time_limit_s, or mesh with longer edges.",
-        ) from None
-    log = process.stderr.decode(errors="replace")[-1000:]
-    if process.returncode == MISSING:
+        )
+    if code == MISSING:
         raise MeshError(
             f"the mesher {name} is not installed",
-            found=log.strip().splitlines()[-1],
+            found=words[-1],
             remedy=f"Install {PACKAGES[name]} as envs/requirements.txt names it, or choose another mesh.mesher.",
         )
-    if process.returncode != 0:
+    if code != 0:
         raise MeshError(
-            f"the mesher {name} failed with exit code {process.returncode}",
-            found=log or "no message",
+            f"the mesher {name} failed with exit code {code}",
+            found=last or "no message",
             remedy="A negative code is a signal: -9 means that memory ran out.",
         )
-    with np.load(io.BytesIO(process.stdout)) as received:
+    with np.load(io.BytesIO(output)) as received:
         return TetrahedralMesh(received["vertices"], received["tets"])
+
+
+def _run(name: str, sent: bytes, folder: str, time_limit_s: float) -> tuple[int | None, bytes, list[str]]:
+    """Returns a mesher's exit code (None where it was stopped), what it sent back, and the lines that it printed."""
+    words: list[str] = []
+    reading, printing = os.pipe()
+
+    def listen() -> None:
+        # lines go to the log as they come, so that one can see how far the mesher is
+        with os.fdopen(reading, errors="replace") as stream:
+            for line in filter(str.strip, stream):
+                words.append(line.rstrip())
+                log.info("%s: %s", name, words[-1])
+
+    listener = Thread(target=listen)
+    with subprocess.Popen(
+        [sys.executable, "-m", __name__, name],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=printing,
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    ) as process:
+        os.close(printing)
+        listener.start()
+        try:
+            output, _ = process.communicate(sent, timeout=time_limit_s)
+            code: int | None = process.returncode
+        except subprocess.TimeoutExpired:
+            output, code = b"", None
+        finally:
+            process.kill()
+    listener.join()
+    return code, output, words
 
 
 def _pytetwild(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

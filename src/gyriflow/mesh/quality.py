@@ -1,6 +1,5 @@
 """Quality of a mesh: radius ratio, dihedral angles and volumes of its elements, and how its surface was kept."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,11 +7,10 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..errors import MeshError
 from ..geometry.crossings import crossing_faces
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
-from ..geometry.triangles import TriangleMesh, area, face_areas, mean_edge_length
-from .fidelity import gaps, surface_distance
+from ..geometry.triangles import TriangleMesh, area, face_areas, mean_edge_length, signed_volume
+from .fidelity import gap_kept, gap_summary, gap_walls, surface_distance
 
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
@@ -72,13 +70,15 @@ def elements_through(mesh: TetrahedralMesh, thickness_mm: float) -> float:
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
     """Returns counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
-    `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, and `gap_mm`
-    holds the gaps of both (see `fidelity`). `histogram` holds for radius ratio, dihedral angles and volume the edges
-    of the classes and the number of elements in each.
+    `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
+    that of the volume, relative to the one inside it; `gap_mm` holds the gaps of both, and `gap_kept` the share of the
+    given one's gaps that the mesh leaves open, None where it has none (see `fidelity`). `histogram` holds for radius
+    ratio, dihedral angles and volume the edges of the classes and the number of elements in each.
     """
     quality = element_quality(mesh)
     own, _ = boundary_surface(mesh)
     volume = quality["volume_mm3"]
+    walls = gap_walls(surface)
     classes = {
         "radius_ratio": np.linspace(0, 1, 41),
         "min_dihedral_deg": np.linspace(0, 90, 46),
@@ -94,8 +94,10 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "smallest_pial_face_mm2": float(face_areas(own).min()),
         "crossing_faces": crossing_faces(own),
         "surface_distance_mm": surface_distance(own, surface),
-        "gap_mm": {"input": gaps(surface), "mesh": gaps(own)},
+        "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(own))},
+        "gap_kept": gap_kept(walls, own),
         "volume_mm3": float(volume.sum()),
+        "volume_change": float(volume.sum() / signed_volume(surface) - 1),
         "min_radius_ratio": float(quality["radius_ratio"].min()),
         "mean_radius_ratio": float(quality["radius_ratio"].mean()),
         "median_radius_ratio": float(quality["radius_ratio"].median()),
@@ -113,53 +115,3 @@ def _tenths_of_decades(values: pd.Series) -> tuple[int, int]:
     """Returns the range of n for which 10^(n/10) are the edges of classes that hold all of some positive values."""
     logarithms = 10 * np.log10(values)
     return int(np.floor(logarithms.min())) - 1, int(np.ceil(logarithms.max())) + 2
-
-
-def refuse_bad_mesh(
-    mesh: TetrahedralMesh,
-    summary: Mapping[str, Any],
-    *,
-    min_radius_ratio: float,
-    min_dihedral_deg: float,
-    max_dihedral_deg: float,
-    max_surface_distance_mm: float,
-) -> None:
-    """Raises MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
-
-    For elements the message has the number of bad ones and the worst place. Faces of the mesh's surface that cross
-    each other are always refused.
-    """
-    ratio, angles = radius_ratios(mesh), dihedral_angles(mesh)
-    sharp, blunt = angles.min(axis=1), angles.max(axis=1)
-    elements = [
-        ("radius ratio", ratio, ratio < min_radius_ratio, ratio.argmin(), f"at least {min_radius_ratio:g}"),
-        (
-            "dihedral angle in degrees",
-            sharp,
-            sharp < min_dihedral_deg,
-            sharp.argmin(),
-            f"at least {min_dihedral_deg:g}",
-        ),
-        ("dihedral angle in degrees", blunt, blunt > max_dihedral_deg, blunt.argmax(), f"at most {max_dihedral_deg:g}"),
-    ]
-    found, expected = [], []
-    for name, values, bad, worst, limit in elements:
-        if bad.any():
-            place = np.round(mesh.vertices[mesh.tets[worst]].mean(axis=0), 1).tolist()
-            found.append(f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at {place} mm")
-            expected.append(f"{name} {limit}")
-    distance = summary["surface_distance_mm"]["hausdorff99"]
-    if distance > max_surface_distance_mm:
-        found.append(f"a surface {distance:.3f} mm from the one that was filled (99 % of it is nearer)")
-        expected.append(f"at most {max_surface_distance_mm:g} mm (mesh.max_surface_distance_mm)")
-    if summary["crossing_faces"]:
-        found.append(f"{summary['crossing_faces']} faces of its surface that cross others")
-        expected.append("none that cross")
-    if found:
-        raise MeshError(
-            "the mesh is not good enough",
-            found="; ".join(found),
-            expected="; ".join(expected),
-            remedy="Mesh with another mesh.envelope_mm, other edge lengths or another mesh.mesher, or lower the gates "
-            "of mesh.",
-        )

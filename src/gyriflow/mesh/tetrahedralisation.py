@@ -20,6 +20,8 @@ Mesher = Literal["pytetwild", "tetgen"]
 NEAR = 0.02
 """A remeshed surface has the number of faces that was asked for when it differs by this part."""
 ATTEMPTS = 4
+OTHER_VOLUME = 0.05
+"""A mesh whose volume differs by more than this part is that of another shape; nearer ones are left to the gates."""
 REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 """Volume of the regular tetrahedron, in edges cubed."""
 
@@ -62,7 +64,7 @@ def tetrahedralise(
     ------
     MeshError
         Where the surface is open or inside out, the mesher fails or takes too long, or its mesh is not the inside of
-        the surface: other components or handles, inverted elements, more than 2 % of the volume lost.
+        the surface: other components or handles, inverted elements, a volume that differs by more than 5 %.
     """
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
@@ -123,12 +125,13 @@ def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
     boundary, _ = boundary_surface(mesh)
     open_edges = int((edges(boundary)[1] != 2).sum())
     wanted = signed_volume(surface)
+    changed = abs(volumes.sum() - wanted) > OTHER_VOLUME * wanted
     parts = [face_components(s).max() + 1 for s in (boundary, surface)]
     euler = [euler_number(s) for s in (boundary, surface)]
     problems = {
         f"{int((volumes <= 0).sum())} inverted elements": (volumes <= 0).any(),
         f"{open_edges} edges of its surface without two faces": open_edges > 0,
-        f"volume {volumes.sum():.0f} mm3 instead of {wanted:.0f}": abs(volumes.sum() - wanted) > 0.02 * wanted,
+        f"volume {volumes.sum():.0f} mm3 instead of {wanted:.0f}": changed,
         f"{parts[0]} parts instead of {parts[1]}": parts[0] != parts[1],
         f"Euler number {euler[0]} instead of {euler[1]}": euler[0] != euler[1],
     }

@@ -8,17 +8,20 @@ from scipy.spatial.transform import Rotation
 
 from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, face_normals
 
-POINTS = 2000
-"""Points per surface that the alignment is found with."""
-
-MAX_ITERATIONS = 60
 CONVERGED_MM = 0.01
-"""The alignment ends when no point moves further in an iteration."""
 
-ROUGH_POINTS = 150
-ROUGH_ITERATIONS = 10
-ROUGHLY_CONVERGED_MM = 0.5
-"""The same for poses that are only compared with each other."""
+FULL = 2000, 60, CONVERGED_MM
+"""Points per surface that the alignment is found with, its most iterations, and when it ends before: no point moves by
+more."""
+
+FAIR = 500, 30, 0.05
+"""The same for the few poses that are compared with each other."""
+
+ROUGH = 150, 10, 0.5
+"""The same for all poses, to find those few."""
+
+CANDIDATES = 5
+"""How many poses that differ from each other are compared."""
 
 TURNS = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
 """The 24 rotations of a cube, none first: no rotation is more than 63 degrees from all of them."""
@@ -39,8 +42,8 @@ class Alignment:
     matrix : (4, 4) float
         Rotation and shift in mm.
     margin : float
-        Mean distance between the surfaces in the best pose that is turned away from this one, over that in this one.
-        Near 1 the surfaces fit as well in another pose; infinity where there is no other one.
+        Mean distance between the surfaces in the best pose that is turned away from this one, over that in this one,
+        both aligned in the same way. Near 1 the surfaces fit as well in another pose; infinity where there is no other.
     """
 
     matrix: Floats
@@ -78,25 +81,30 @@ def rigid_alignment(a: TriangleMesh, b: TriangleMesh) -> Alignment:
     """Returns the motion of `a` onto `b` with the least distance among those found from 24 poses.
 
     Iterative closest points find the nearest pose that fits, which need not be the best. They are therefore begun
-    roughly from each rotation of a cube, the centroids together, and ended in full from the best. The pose from the
-    surfaces as given is kept unless another one is clearly better.
+    roughly from each rotation of a cube, the centroids together. The best few of these poses, and that from the
+    surfaces as given, are aligned better and all alike, and compared. The last is kept unless another one is clearly
+    better. The pose that is kept is aligned in full.
     """
     surfaces = _surface(a), _surface(b)
-    rough = [
-        _closest_points(*surfaces, _together(*surfaces, turn), ROUGH_POINTS, ROUGH_ITERATIONS, ROUGHLY_CONVERGED_MM)
-        for turn in TURNS
-    ]
-    far = np.array([_mean_distance(*surfaces, matrix, ROUGH_POINTS) for matrix in rough])
-    # the first is the one from the surfaces as given
-    ends = dict.fromkeys((0, int(far.argmin())))
-    chosen = [_closest_points(*surfaces, rough[end], POINTS, MAX_ITERATIONS, CONVERGED_MM) for end in ends]
-    given, best = chosen[0], chosen[-1]
-    left = [_mean_distance(*surfaces, matrix, POINTS) for matrix in (given, best)]
-    better = left[1] < CLEARLY_BETTER * left[0] - CONVERGED_MM
-    matrix, distance = (best, left[1]) if better else (given, left[0])
-    elsewhere = [_angle_deg(other @ np.linalg.inv(matrix)) > SAME_POSE_DEG for other in rough]
-    margin = max(far[elsewhere].min(initial=np.inf), CONVERGED_MM) / max(distance, CONVERGED_MM)
-    return Alignment(matrix, float(margin))
+    rough = [_closest_points(*surfaces, _together(*surfaces, turn), ROUGH) for turn in TURNS]
+    poses = [_closest_points(*surfaces, end, FAIR) for end in _apart(surfaces, rough)]
+    # of less than they are aligned to, distances say nothing
+    far = np.array([max(_mean_distance(*surfaces, pose, FULL[0]), CONVERGED_MM) for pose in poses])
+    best = int(far.argmin())
+    chosen = best if far[best] < CLEARLY_BETTER * far[0] else 0
+    elsewhere = [_angle_deg(pose @ np.linalg.inv(poses[chosen])) > SAME_POSE_DEG for pose in poses]
+    margin = far[elsewhere].min(initial=np.inf) / far[chosen]
+    return Alignment(_closest_points(*surfaces, poses[chosen], FULL), float(margin))
+
+
+def _apart(surfaces: tuple[_Surface, _Surface], rough: list[Floats]) -> list[Floats]:
+    """Returns the first of the motions, and after it the best of all that differ from each other."""
+    far = [_mean_distance(*surfaces, matrix, ROUGH[0]) for matrix in rough]
+    apart: list[int] = []
+    for end in map(int, np.argsort(far)):
+        if all(_angle_deg(rough[end] @ np.linalg.inv(rough[other])) > SAME_POSE_DEG for other in apart):
+            apart.append(end)
+    return [rough[end] for end in dict.fromkeys([0, *apart[:CANDIDATES]])]
 
 
 def _surface(mesh: TriangleMesh) -> _Surface:
@@ -113,14 +121,13 @@ def _together(a: _Surface, b: _Surface, turn: Floats) -> Floats:
     return matrix
 
 
-def _closest_points(
-    a: _Surface, b: _Surface, matrix: Floats, count: int, max_iterations: int, converged_mm: float
-) -> Floats:
+def _closest_points(a: _Surface, b: _Surface, matrix: Floats, effort: tuple[int, int, float]) -> Floats:
     """Returns the (4, 4) motion of `a` onto `b` that closest points lead to from the motion `matrix`.
 
     In both directions, each iteration the least-squares motion of points towards the planes of their nearest faces
     (Chen and Medioni 1992).
     """
+    count, max_iterations, converged_mm = effort
     of_a, of_b = a.spread(count), b.spread(count)
     for _ in range(max_iterations):
         rotation, shift = matrix[:3, :3], matrix[:3, 3]

@@ -52,7 +52,7 @@ def measure_brain(
     *,
     curvature_radius_mm: float = RADIUS_MM,
     spangy_proxy: SpangyProxy = "shape_index",
-    spangy_modes: SpangyModes = "own",
+    spangy_modes: SpangyModes = "B5",
     spangy_wavelength: WeylFormula = "paper",
     threads: int = 1,
 ) -> BrainMetrics:

@@ -8,9 +8,10 @@ from scipy import sparse
 
 from ..geometry.triangles import TriangleMesh, area
 from .laplace_beltrami import count_below, laplacian
-from .spangy import WeylFormula, band_limits, first_eigenvalue, number_of_modes, weyl_number
+from .spangy import WeylFormula, band_limits, first_eigenvalue, weyl_number
 
-SpangyModes = int | Literal["own", "complete"] | Mapping[str, int]
+LastBand = Literal["B4", "B5", "B6"]
+SpangyModes = int | LastBand | Literal["own"] | Mapping[str, int]
 
 
 def weyl_numbers(left: TriangleMesh, right: TriangleMesh, formula: WeylFormula) -> pd.DataFrame:
@@ -27,14 +28,6 @@ def common_modes(numbers: pd.DataFrame) -> dict[str, int]:
     return {str(name): int(number) for name, number in numbers.groupby("hemisphere")["weyl_number"].max().items()}
 
 
-def complete_number(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, first: float) -> int:
-    """Returns the number of modes that holds all of B6: those below 4⁶·λ1, by inertia, and the next.
-
-    At most half as many as there are vertices; B6 is then flagged as incomplete.
-    """
-    return min(count_below(stiffness, mass, float(band_limits(first)[-1])) + 1, stiffness.shape[0] // 2)
-
-
 def modes_wanted(
     choice: SpangyModes,
     hemisphere: str,
@@ -46,12 +39,17 @@ def modes_wanted(
 ) -> int:
     """Returns the number of modes for a hemisphere.
 
-    A number is taken as it is. "own" is Weyl's number, "complete" what holds all of B6, and a mapping gives the number
-    per hemisphere. "own" and a mapping give at most a tenth of the number of vertices: higher modes show the mesh.
+    The name of a band stands for all modes up to its end, counted by inertia, and the next one. "own" is Weyl's number,
+    a mapping gives the number per hemisphere. All these are at most half as many as there are vertices. A number is
+    taken as it is.
     """
     if isinstance(choice, int):
         return choice
-    if choice == "complete":
-        return complete_number(stiffness, mass, first)
-    number = weyl_number(area(mesh), first, formula) if choice == "own" else choice[hemisphere]
-    return number_of_modes(number, len(mesh.vertices))
+    if isinstance(choice, Mapping):
+        number = choice[hemisphere]
+    elif choice == "own":
+        number = weyl_number(area(mesh), first, formula)
+    else:
+        end = band_limits(first)[int(choice.removeprefix("B"))]
+        number = count_below(stiffness, mass, float(end)) + 1
+    return max(2, min(number, len(mesh.vertices) // 2))

@@ -21,9 +21,6 @@ BANDS = 6
 EDGES_PER_WAVELENGTH = 6
 """A band whose shortest wavelength spans fewer edges is not resolved by the mesh."""
 
-MODES_PER_VERTEX = 0.1
-"""More modes than this share of the vertices have wavelengths of less than about 5 edges: they show the mesh."""
-
 WeylFormula = Literal["paper", "textbook"]
 
 
@@ -75,11 +72,6 @@ def weyl_number(area_mm2: float, first: float, formula: WeylFormula) -> int:
     shortest = 2.0 * np.pi / np.sqrt(first) / 2.0**BANDS
     largest = 2.0 * np.pi / shortest**2 if formula == "paper" else (2.0 * np.pi / shortest) ** 2
     return round(area_mm2 * largest / (4.0 * np.pi))
-
-
-def number_of_modes(wanted: int, vertices: int) -> int:
-    """Returns the number of modes wanted, or a tenth of the number of vertices where that is less."""
-    return max(2, min(wanted, int(MODES_PER_VERTEX * vertices)))
 
 
 def band_limits(first: float) -> Floats:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats
 from .spangy import BANDS
@@ -15,10 +16,9 @@ _HEMISPHERE = ["subject", "run", "week", "hemisphere"]
 def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     """Returns how far the spectrum of each hemisphere is from those of the same side of all measured brains.
 
-    The distance is √Σ(s − s′)² over the fold bands, where s is the share that a band has of the power of the bands
-    from B1 on. Only bands that are complete and resolved in both spectra count, in the shares too: 0 for equal shares,
-    at most √2. Neither the size of the brain nor the number of modes enters it. With fewer fold bands it is smaller;
-    compare distances of the same bands.
+    The distance up to band Bk is √Σ(s − s′)² over the fold bands B4 to Bk, where s is the share that a band has of the
+    power of B1 to Bk: 0 for equal shares, at most √2. Neither the size of the brain nor the number of modes enters it.
+    There is one up to B4, up to B5 and up to B6, each between all pairs whose bands are complete in both.
 
     Parameters
     ----------
@@ -28,44 +28,42 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        subject, run, week, hemisphere, real (the measured brain), real_week, metric (spectral_distance), value, unit,
-        bands (such as "B4 B5", or "none"), flag ("ok" for B4 to B6; "not B6", "not B5 B6" for what is left out; "no
-        fold band", then without a value). A measured brain is not compared with itself.
+        subject, run, week, hemisphere, real (the measured brain), real_week, metric (spectral_distance_B4,
+        spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok"; "B5 B6 not resolved": in one
+        of the two these bands are finer than its edges resolve; "B6 cut off": not complete in one of the two, then
+        without a value). A measured brain is not compared with itself.
     """
-    powers = _powers(spectra)
+    complete, resolved, powers = (
+        spectra.pivot_table(name, _HEMISPHERE, "band", aggfunc="first").reindex(columns=range(1, BANDS + 1))
+        for name in ("complete", "resolved", "power")
+    )
+    hemispheres = list(complete.index)
+    fine = resolved.eq(True).to_numpy()
+    whole = powers.reindex(complete.index).where(complete.eq(True)).to_numpy(dtype=float)
     rows = [
-        (*brain, other[0], other[2], *_distance(own, theirs))
-        for brain, own in powers.items()
-        for other, theirs in powers.items()
-        if other[1] == "real" and other[3] == brain[3] and other != brain
+        (*own, other[0], other[2], *row)
+        for i, own in enumerate(hemispheres)
+        for j, other in enumerate(hemispheres)
+        if other[1] == "real" and other[3] == own[3] and i != j
+        for row in _distances(whole[i], whole[j], fine[i] & fine[j])
     ]
-    columns = [*_HEMISPHERE, "real", "real_week", "value", "bands", "flag"]
-    table = pd.DataFrame(rows, columns=columns).assign(metric="spectral_distance", unit="1")
-    return table[[*columns[:6], "metric", "value", "unit", "bands", "flag"]]
+    table = pd.DataFrame(rows, columns=[*_HEMISPHERE, "real", "real_week", "metric", "value", "flag"])
+    return table.assign(unit="1")[[*table.columns[:-1], "unit", "flag"]]
 
 
-def _powers(spectra: pd.DataFrame) -> dict[tuple, Floats]:
-    """Returns for each hemisphere the powers of the bands B1 to B6, NaN where a band is cut off or not resolved."""
-    powers: dict[tuple, Floats] = {}
-    for *hemisphere, band, power, complete, resolved in spectra[
-        [*_HEMISPHERE, "band", "power", "complete", "resolved"]
-    ].itertuples(index=False, name=None):
-        own = powers.setdefault(tuple(hemisphere), np.full(BANDS, np.nan))
-        if band > 0 and complete and resolved:
-            own[band - 1] = power
-    return powers
+def _distances(a: Floats, b: Floats, resolved: NDArray[np.bool_]) -> list[tuple[str, float, str]]:
+    """Returns metric, value and flag for the powers of B1 to B6, NaN where a band is not complete."""
+    rows = []
+    for last in FOLD_BANDS:
+        fold = slice(FOLD_BANDS[0] - 1, last)
+        shares = a[:last] / a[:last].sum(), b[:last] / b[:last].sum()
+        cut = _names(np.isnan(a[:last] + b[:last]))
+        coarse = _names(~resolved[:last])
+        flag = f"{cut} cut off" if cut else f"{coarse} not resolved" if coarse else "ok"
+        name = "spectral_distance_B4" + (f"_to_B{last}" if last > FOLD_BANDS[0] else "")
+        rows.append((name, float(np.linalg.norm(shares[0][fold] - shares[1][fold])), flag))
+    return rows
 
 
-def _distance(a: Floats, b: Floats) -> tuple[float, str, str]:
-    """Returns the distance of the powers of the bands B1 to B6, the bands that it is over, and its flag."""
-    common = np.isfinite(a) & np.isfinite(b)
-    # bands end at the first that one of them lacks
-    last = int(np.argmin(common)) if not common.all() else BANDS
-    over = [band for band in FOLD_BANDS if band <= last]
-    if not over:
-        return np.nan, "none", "no fold band"
-    shares = a[:last] / a[:last].sum(), b[:last] / b[:last].sum()
-    fold = np.array(over) - 1
-    lacking = [f"B{band}" for band in FOLD_BANDS if band > last]
-    flag = " ".join(["not", *lacking]) if lacking else "ok"
-    return float(np.linalg.norm(shares[0][fold] - shares[1][fold])), " ".join(f"B{band}" for band in over), flag
+def _names(bands: NDArray[np.bool_]) -> str:
+    return " ".join(f"B{k + 1}" for k in np.flatnonzero(bands))

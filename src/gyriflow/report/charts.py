@@ -50,6 +50,7 @@ QUALITY_GATES = {
     "radius_ratio": "min_radius_ratio",
     "min_dihedral_deg": "min_dihedral_deg",
     "max_dihedral_deg": "max_dihedral_deg",
+    "volume_mm3": "min_volume_mm3",
 }
 
 
@@ -193,7 +194,7 @@ def quality_histogram(
     ----------
     quality : DataFrame with one row per element, or {column: {"edges": (k + 1,), "counts": (k,)}}
         Columns radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3; others are left out.
-    gates : {min_radius_ratio, min_dihedral_deg, max_dihedral_deg: limit}
+    gates : {min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3: limit}
         The gates of the configuration, drawn as lines; others are left out.
     surface
         What is to be said of the mesh's surface, under the histograms.
@@ -214,7 +215,9 @@ def quality_histogram(
         said = f"{edges[filled[0]]:.3g} to {edges[filled[-1] + 1]:.3g}"
         limit = (gates or {}).get(QUALITY_GATES.get(column, ""))
         if limit is not None:
-            axes.axvline(limit, color=RUN_COLOURS[1], linestyle="--")
+            # a least volume far below all others would stretch their axis: it is only told
+            if column != "volume_mm3" or limit >= edges[0]:
+                axes.axvline(limit, color=RUN_COLOURS[1], linestyle="--")
             said += f", gate {limit:g}"
         axes.set_title(said, fontsize=7)
         light_grid(axes)

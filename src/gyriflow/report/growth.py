@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from .style import (
     FULL_WIDTH_IN,
@@ -79,11 +80,13 @@ def _sizes_panel(axes: Axes, areas: pd.DataFrame, colours: Mapping[str, str], me
     alone = len(colours) == 1
     volume_axes = axes.twinx()
     volume_axes.spines["right"].set_visible(True)
-    for name, colour in colours.items():
+    for number, (name, colour) in enumerate(reversed(list(colours.items()))):
         known = areas[areas["series"] == name].sort_values("week")
-        axes.plot(known["week"], known["area_cm2"], "o-", color=colour, label=f"{name}: area")
+        axes.plot(known["week"], known["area_cm2"], "o-", color=colour)
         other = RUN_COLOURS[1] if alone else colour
-        volume_axes.plot(known["week"], known["volume_ml"], "s--", color=other, label=f"{name}: volume", markersize=3)
+        # volumes of series often agree: the later ones then are seen within the earlier ones
+        look: dict[str, Any] = {"markersize": 3 + 2.5 * number, "markerfacecolor": "white"}
+        volume_axes.plot(known["week"], known["volume_ml"], "s--", color=other, zorder=2 - 0.1 * number, **look)
     axes.set_ylabel("pial area (cm²)", color=RUN_COLOURS[0] if alone else "black")
     volume_axes.set_ylabel("volume (mL)", color=RUN_COLOURS[1] if alone else "black")
     for each in (axes, volume_axes):
@@ -92,7 +95,11 @@ def _sizes_panel(axes: Axes, areas: pd.DataFrame, colours: Mapping[str, str], me
     light_grid(axes)
     axes.set_title(f"{measured}: area and volume")
     if not alone:
-        handles = axes.get_lines() + volume_axes.get_lines()
+        handles = [Line2D([], [], color=colour, linewidth=4, label=name) for name, colour in colours.items()]
+        handles.append(Line2D([], [], color="black", linestyle="-", marker="o", label="area"))
+        handles.append(
+            Line2D([], [], color="black", linestyle="--", marker="s", markerfacecolor="white", label="volume")
+        )
         axes.legend(handles=handles, loc="lower right", ncols=2, columnspacing=1.0)
 
 
@@ -111,10 +118,10 @@ def _rates_panel(
     axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
         _folding_line(axes, rates, folding_rate_per_s)
-        # above the axes, where no bar can be
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.06), borderaxespad=0)
+        # above the axes, where no bar can be, and below the title
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
-    axes.set_title(title, loc="left")
+    axes.set_title(title, loc="left", pad=6.0 if folding_rate_per_s is None else 16.0)
     axes.margins(y=0.12)
     _interval_axis(axes, labels)
 
@@ -136,11 +143,12 @@ def _differences_panel(axes: Axes, agreement: pd.DataFrame, colours: Mapping[str
         axes.axhline(float(difference.mean()), color=colours[name], linestyle=":", label=label)
     axes.axhline(0, color="black", linewidth=0.6)
     axes.set_ylabel("difference (10⁻⁷ s⁻¹)")
-    axes.set_title("difference of the growth rates")
+    # the legend is above the axes, where no bar can be, and below the title
+    axes.set_title("difference of the growth rates", loc="left", pad=6.0 + 10.0 * len(series))
     labels = _interval_labels(intervals)
     axes.set_xticks(range(len(labels)), labels)
-    axes.margins(y=0.25)
-    axes.legend(loc="upper left")
+    axes.margins(y=0.12)
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.01), borderaxespad=0)
     _interval_axis(axes, labels)
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.transforms import Transform
 
 from ..errors import InputError
 from .style import (
@@ -45,6 +47,25 @@ def _untrusted_bars(axes: Axes, bars: Sequence, trusted: Sequence[bool]) -> None
             bar.set(hatch=_INCOMPLETE_HATCH, edgecolor="white", linewidth=0)
 
 
+def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0) -> None:
+    text = axes.text(x, 0.5, "beyond the\nmodes computed", transform=transform, ha="center", va="center")
+    text.set_rotation(rotation)
+
+
+def _untrusted_legend(*, bars: bool = False, points: bool = False, stars: bool = False) -> list[Artist]:
+    """Returns the entries of the legend for what is drawn of bands that are cut off or not resolved."""
+    entries: list[Artist] = []
+    label = "band cut off or not resolved"
+    if bars:
+        entries.append(Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label=label))
+    for marker, size, drawn, colour in (("o", 5, points, MUTED_COLOUR), ("*", 8, stars, REAL_COLOUR)):
+        if drawn:
+            hollow = Line2D([], [], color=colour, marker=marker, markersize=size, markerfacecolor="white", label=label)
+            hollow.set_linestyle("none")
+            entries.append(hollow)
+    return entries
+
+
 @styled
 def spectra_chart(
     spectra: pd.DataFrame,
@@ -57,7 +78,8 @@ def spectra_chart(
 ) -> Figure:
     """Returns the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
 
-    Bars of bands that are cut off or not resolved by the surface are hatched, such stars open.
+    Bars of bands that are cut off or not resolved by the surface are hatched, such stars open. A band without any
+    power is said to be beyond the modes.
 
     Parameters
     ----------
@@ -91,6 +113,9 @@ def spectra_chart(
             axes.hlines(real["relative_power"], centre - 0.42, centre + 0.42, color=REAL_COLOUR, linewidth=0.9)
             face = REAL_COLOUR if real["trusted"] else "white"
             axes.plot(centre, real["relative_power"], "*", color=REAL_COLOUR, markerfacecolor=face, markersize=8)
+        for place, band in enumerate(bands):
+            if not side.loc[side["band"] == band, "relative_power"].notna().any():
+                _beyond_the_modes(axes, place, axes.get_xaxis_transform(), rotation=90.0)
         axes.set_xticks(range(len(bands)), [f"B{band}\n{_FOLDS.get(band, '')}" for band in bands])
         axes.set_xlabel("SpAnGy band, and the folds that go with it")
         axes.set_xlim(-0.5, len(bands) - 0.5)
@@ -98,13 +123,9 @@ def spectra_chart(
         light_grid(axes)
     panels[0].set_ylabel("relative power")
     from_zero(panels[0])
-    extra = []
-    if not rows["trusted"].all():
-        extra = [
-            Patch(
-                facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label="band cut off or not resolved"
-            )
-        ]
+    untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
+    marks = set((untrusted["run"] == MEASURED).to_list())
+    extra = _untrusted_legend(bars=False in marks, stars=True in marks)
     run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
     return figure
 
@@ -152,7 +173,7 @@ def spectra_weeks_chart(
             week_axis(axes, rows["week"])
             light_grid(axes)
             if not here["relative_power"].notna().any():
-                axes.text(0.5, 0.5, "beyond the\nmodes computed", transform=axes.transAxes, ha="center", va="center")
+                _beyond_the_modes(axes, 0.5, axes.transAxes)
                 axes.set_yticks([])
             if hemisphere == "left":
                 axes.set_title(f"B{band}, {_FOLDS[band]} folds" if band in _FOLDS else f"B{band}")
@@ -160,9 +181,8 @@ def spectra_weeks_chart(
         line[0].set_ylabel(f"{hemisphere} hemisphere\nrelative power")
     for axes in panels[0]:
         from_zero(axes)
-    extra = []
-    if not rows["trusted"].all():
-        hollow = {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}
-        extra = [Line2D([], [], color=MUTED_COLOUR, label="band cut off or not resolved", **hollow)]  # type: ignore[arg-type]
+    untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
+    marks = set((untrusted["run"] == MEASURED).to_list())
+    extra = _untrusted_legend(points=False in marks, stars=True in marks)
     run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
     return figure

@@ -11,9 +11,10 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, transformed, unit, vertex_areas, vertex_normals
+from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
+from gyriflow.surface.medial_wall import medial_wall
 from gyriflow.surface.outlines import Outline, outline, reference
-from gyriflow.surface.registration import Fit, Target, found, registered
+from gyriflow.surface.registration import Fit, Target, found, matched
 
 Floats = NDArray[np.float64]
 
@@ -22,12 +23,8 @@ MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 LEAST_CONFIDENCE, WORST_RESIDUAL = 1.1, 0.085
 # two sides of one brain are mirror images as well as this
 WORST_PAIR_RESIDUAL = 0.07
-# how narrowly the medial wall is a plane, in sizes of the hemisphere, while it is looked for
-WALL_WIDTHS = (0.10, 0.05, 0.03, 0.02, 0.012, 0.012)
-WALL_COSINE = 0.85
-# a wall that was cut along a plane: its normals are looked for ever more narrowly, and this part of the area has them
-CUT_WIDTHS_DEG, CUT_SHARE = (40.0, 25.0, 15.0, 10.0, 7.0), 0.04
-CUT_DEG, CUT_DEPTH = 5.0, 0.01
+# a fit of one side on the other is off by about so many degrees per residual, about each axis
+ERROR_DEG_PER_RESIDUAL = 50.0
 # the Sylvian dent is in front of the middle by so much of the hemisphere's size where it is to be told from the back
 SYLVIAN_AHEAD = 0.05
 
@@ -44,6 +41,8 @@ class Half:
         To RAS+: the medial wall faces −x, the pitch is the reference's.
     wall_mm : float
         Where the medial wall is then, along x from the centre of volume.
+    wall_error_deg : float
+        By how much its normal may be off.
     residual, confidence : float
         Distance to the reference relative to the size, and how many times worse the next best pose is.
     sylvian : float
@@ -53,6 +52,7 @@ class Half:
     outline: Outline
     rotation: Floats
     wall_mm: float
+    wall_error_deg: float
     residual: float
     confidence: float
     sylvian: float
@@ -72,19 +72,18 @@ class Pair:
         return np.asarray(self.right.rotation @ self.fit.shift * self.right.outline.size_mm)
 
 
-def pair_by_shape(left: TriangleMesh, right: TriangleMesh, path: str | None = None) -> Pair:
-    """Returns the poses that the shapes of two closed, outward surfaces say; `path` is for messages.
+def pair_by_shape(left: TriangleMesh, right: TriangleMesh) -> Pair:
+    """Returns the poses that the shapes of two closed, outward surfaces say.
 
     InputError where a hemisphere fits the reference badly or in more than one way, where the two are no mirror images
     of each other, and where they seem to be swapped.
     """
-    halves = [_half(transformed(left, MIRROR), "left", path), _half(right, "right", path)]
+    halves = [_half(transformed(left, MIRROR), "left"), _half(right, "right")]
     one, other = halves
-    fit = registered(one.outline, Target(other.outline), other.rotation.T @ one.rotation)
+    fit = matched(Target(one.outline), Target(other.outline), other.rotation.T @ one.rotation)
     if fit.residual > WORST_PAIR_RESIDUAL:
         raise InputError(
             "the hemispheres are no mirror images of each other",
-            path=path,
             found=f"a mean distance of {fit.residual:.3f} of their size between one and the other's mirror image",
             expected=f"at most {WORST_PAIR_RESIDUAL}",
             remedy="Give both hemispheres of one subject and week. Are both files of the same side?",
@@ -93,7 +92,6 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh, path: str | None = No
     if min(ahead) < -SYLVIAN_AHEAD and max(ahead) > SYLVIAN_AHEAD:
         raise InputError(
             "both hemispheres seem to be of one side",
-            path=path,
             found=f"the Sylvian fissure {ahead[0]:+.2f} (left) and {ahead[1]:+.2f} (right) of the size off the middle",
             expected="in front of the middle in both, mirrored",
             remedy="Give one left and one right hemisphere.",
@@ -101,16 +99,29 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh, path: str | None = No
     if np.mean(ahead) < -SYLVIAN_AHEAD:
         raise InputError(
             "the hemispheres seem to be swapped",
-            path=path,
             found=f"the Sylvian fissure {-np.mean(ahead):.2f} of the size behind the middle",
             expected="in front of the middle",
             remedy="Swap `left` and `right`; or, if they are right, pose the files yourself and set coordinates: ras.",
         )
-    # both sides get the same pitch, half-way between what each says
-    apart = pitch_deg(other.rotation @ fit.rotation @ one.rotation.T)
-    turns = (0.5 * apart, -0.5 * apart)
-    one, other = (replace(half, rotation=about_x(by) @ half.rotation) for half, by in zip(halves, turns, strict=True))
+    one, other = (
+        replace(half, rotation=turn.as_matrix() @ half.rotation)
+        for half, turn in zip(halves, _reconciled(one, other, fit), strict=True)
+    )
     return Pair(one, other, fit)
+
+
+def _reconciled(one: Half, other: Half, fit: Fit) -> tuple[Rotation, Rotation]:
+    """Returns by which rotations both halves are to be turned to lie as the fit and their walls say.
+
+    Least squares of three measures: each wall's tilts and the fit, by their errors. Of the pitch the walls say nothing:
+    each half gets one half-way between what the two say.
+    """
+    apart = Rotation.from_matrix(other.rotation @ fit.rotation @ one.rotation.T).as_rotvec()
+    walls = np.array([one.wall_error_deg, other.wall_error_deg]) ** 2
+    first, second = walls / (walls.sum() + (ERROR_DEG_PER_RESIDUAL * fit.residual) ** 2)
+    shares = np.array([[0.5, first, first], [-0.5, -second, -second]])
+    turn, back = Rotation.from_rotvec(apart * shares)
+    return turn, back
 
 
 def about_x(angle_deg: float) -> Floats:
@@ -124,67 +135,26 @@ def pitch_deg(rotation: Floats) -> float:
     return float(np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1])))
 
 
-def _half(mesh: TriangleMesh, side: str, path: str | None) -> Half:
+def _half(mesh: TriangleMesh, side: str) -> Half:
     shape = outline(mesh)
     fit, confidence = found(shape, Target(reference()))
     if confidence < LEAST_CONFIDENCE or fit.residual > WORST_RESIDUAL:
         raise InputError(
             f"the pose of the {side} hemisphere cannot be told from its shape",
-            path=path,
             found=f"a residual of {fit.residual:.3f}, the next best pose {confidence:.2f} times worse",
             expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times",
             remedy="Is it a cerebral hemisphere's closed pial surface? If so, pose it and set coordinates: ras or lps.",
         )
     points = np.asarray((mesh.vertices - shape.centre) / shape.size_mm, dtype=np.float64)
     start = np.asarray(-fit.rotation[0], dtype=np.float64)
-    normal, offset = _medial_wall(points, vertex_normals(mesh), vertex_areas(mesh), start)
-    turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
+    wall = medial_wall(points, vertex_normals(mesh), vertex_areas(mesh), start)
+    turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ wall.normal])
     rotation = turn.as_matrix() @ fit.rotation
     rotation = about_x(pitch_deg(fit.rotation @ rotation.T)) @ rotation
-    ahead = _sylvian(points @ rotation.T, vertex_areas(mesh))
-    return Half(shape, rotation, -offset * shape.size_mm, fit.residual, confidence, ahead)
-
-
-def _medial_wall(points: Floats, normals: Floats, areas: Floats, start: Floats) -> tuple[Floats, float]:
-    """Returns the outward unit normal and the offset of the plane along the medial wall, which faces about `start`.
-
-    It is the plane of the cut where the hemispheres were cut apart, else one fitted to the most of the wall.
-    """
-    facing = normals @ start > WALL_COSINE
-    points, normals, total, areas = points[facing], normals[facing], areas.sum(), areas[facing]
-    normal: NDArray = start
-    for width in CUT_WIDTHS_DEG:
-        for _ in range(6):
-            normal = unit((normals * (areas * _bell(_degrees(normals @ normal) / width))[:, None]).sum(axis=0)[None])[0]
-    offset = _densest(points @ normal, areas)
-    cut = (_degrees(normals @ normal) < CUT_DEG) & (np.abs(points @ normal - offset) < CUT_DEPTH)
-    if areas[cut].sum() > CUT_SHARE * total:
-        return normal, float(np.median(points[cut] @ normal))
-    normal = start
-    offset = _densest(points @ normal, areas)
-    for width in WALL_WIDTHS:
-        for _ in range(5):
-            weights = areas * _bell((points @ normal - offset) / (3.0 * width))
-            centre = np.average(points, axis=0, weights=weights)
-            _, axes = np.linalg.eigh(np.cov(points.T, aweights=weights))
-            normal = axes[:, 0] * np.sign(axes[:, 0] @ normal)
-            offset = float(centre @ normal)
-    return normal, offset
-
-
-def _bell(away: NDArray) -> NDArray:
-    """Returns Tukey's biweight: 1 at 0, 0 from ±1 on."""
-    return np.where(np.abs(away) < 1.0, (1.0 - away**2) ** 2, 0.0)
-
-
-def _degrees(cosines: NDArray) -> NDArray:
-    return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))))
-
-
-def _densest(heights: Floats, areas: Floats) -> float:
-    """Returns the height around which the most area lies."""
-    counts, edges = np.histogram(heights, bins=np.arange(heights.min(), heights.max() + 0.02, 0.01), weights=areas)
-    return float(edges[counts.argmax()] + 0.005)
+    # of the surface the sulci may outweigh the Sylvian fissure, of the outline it may be shallow
+    both = (points, vertex_areas(mesh)), (shape.points, np.ones(len(shape.points)))
+    ahead = float(np.mean([_sylvian(places @ rotation.T, areas) for places, areas in both]))
+    return Half(shape, rotation, -wall.offset * shape.size_mm, wall.error_deg, fit.residual, confidence, ahead)
 
 
 def _sylvian(points: Floats, areas: Floats) -> float:

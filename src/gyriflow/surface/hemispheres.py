@@ -40,6 +40,19 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> NDArray[np.bool_]:
     return result
 
 
+def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> NDArray[np.bool_]:
+    """Returns the (m,) mask of the faces that lie on the left hemisphere, of a surface close to that of both.
+
+    A face belongs to the hemisphere whose given surface is nearer to its centroid: where a connected brain was cut
+    along a curved fissure, so is `mesh`. Stray patches are given back as in `left_faces`.
+    """
+    centres = corners(mesh).mean(axis=1)
+    away, back = (
+        np.sqrt(igl.point_mesh_squared_distance(centres, side.vertices, side.faces)[0]) for side in (left, right)
+    )
+    return left_faces(mesh, away - back)
+
+
 def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
     """Returns the left and the right hemisphere's pial surfaces; together they have every face of `mesh` once.
 

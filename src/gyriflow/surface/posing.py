@@ -9,20 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gyriflow.errors import InputError
 from gyriflow.surface.halves import MIRROR, SYLVIAN_AHEAD, Pair, about_x, pitch_deg
 from gyriflow.surface.registration import Target, angle_deg, registered
 
 Floats = NDArray[np.float64]
 
 FRAMES = {"ras": np.eye(3), "lps": np.diag([-1.0, -1.0, 1.0])}
-# how well the shape has to agree with axes for the file to be in them: tilts (of the wall), and pitch, in degrees
-EXACT_DEG, DECLARED_DEG, SAME_PITCH_DEG = 1.5, 10.0, 15.0
+# how well the shape has to agree with axes for the file to be in them: tilts (of the wall), and pitch, in degrees;
+# the first is per residual of the hemispheres' fit, as the shape of an asymmetric brain says less
+EXACT_DEG_PER_RESIDUAL, DECLARED_DEG, SAME_PITCH_DEG = 70.0, 10.0, 15.0
 # files of one brain share their coordinates where their poses differ by less; distances are relative to the size
-COMMON_DEG, COMMON_OFFSET, COMMON_DISTANCE = 4.0, 0.08, 0.15
+COMMON_DEG_PER_RESIDUAL, COMMON_OFFSET, COMMON_DISTANCE = 180.0, 0.08, 0.15
 # the medial walls' distance from the mid-sagittal plane where the files do not say it
 BESIDE_MM = 0.5
 # each brain is registered with so many that are smaller and larger
 NEIGHBOURS = 4
+# the pitch is known to a degree or two
+PITCH_STEP_DEG = 0.5
+# decimals of what is reported: a rounded rotation moves no place of a brain by a micrometre
+DIGITS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +55,9 @@ def poses(pairs: Sequence[Pair], declared: Sequence[bool]) -> list[Poses]:
 
 
 def as_poses(report: dict[str, Any]) -> Poses:
-    """Returns the poses that a report of them holds."""
+    """Returns the poses that a report of them holds; InputError where it is a refusal, for its reason."""
+    if "refused" in report:
+        raise InputError(report["refused"])
     matrices = report["matrices"]
     return Poses(np.array(matrices["left"]), np.array(matrices["right"]), report)
 
@@ -70,10 +78,10 @@ def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
         "method": "file" if frame else "shape",
         "coordinates": frame,
         "pitch_deg": pitch,
-        "residual": {side: half.residual for side, half in both.items()},
-        "confidence": {side: half.confidence for side, half in both.items()},
-        "mirror_residual": pair.fit.residual,
-        "sylvian_ahead": {side: half.sylvian for side, half in both.items()},
+        "residual": {side: round(half.residual, DIGITS) for side, half in both.items()},
+        "confidence": {side: round(half.confidence, DIGITS) for side, half in both.items()},
+        "mirror_residual": round(pair.fit.residual, DIGITS),
+        "sylvian_ahead": {side: round(half.sylvian, DIGITS) for side, half in both.items()},
         "warnings": [],
     }
     if np.mean(list(report["sylvian_ahead"].values())) < SYLVIAN_AHEAD:
@@ -89,6 +97,8 @@ def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
         if _share_coordinates(pair):
             left = right = _mean_motion(left, right, pair)
     report["together"] = left is right
+    # a pose that is the same but for round-off is the same file
+    left, right = left.round(DIGITS), right.round(DIGITS)
     report["matrices"] = {"left": left.tolist(), "right": right.tolist()}
     return Poses(left, right, report)
 
@@ -110,7 +120,7 @@ def _separate(pair: Pair, pitch: float, place: Floats) -> tuple[Floats, Floats]:
 def _share_coordinates(pair: Pair) -> bool:
     """Returns whether the files have both hemispheres where one rigid motion brings them to a brain."""
     left, right = _separate(pair, 0.0, np.zeros(2))
-    if angle_deg(right[:3, :3].T @ left[:3, :3]) > COMMON_DEG:
+    if angle_deg(right[:3, :3].T @ left[:3, :3]) > COMMON_DEG_PER_RESIDUAL * pair.fit.residual:
         return False
     centre = MIRROR[:3, :3] @ pair.left.outline.centre
     away = np.abs((right - left)[:3, :3] @ centre + (right - left)[:3, 3]) / pair.right.outline.size_mm
@@ -135,10 +145,8 @@ def _frame(pair: Pair, declared: bool) -> str | None:
         turns = [half.rotation @ axes.T for half in (pair.left, pair.right)]
         # mirrored files have the same axes up to signs, which cancel
         tilts = [np.degrees(np.arccos(np.clip(turn[0, 0], -1.0, 1.0))) for turn in turns]
-        if (
-            max(tilts) < (DECLARED_DEG if declared else EXACT_DEG)
-            and max(abs(pitch_deg(turn)) for turn in turns) < SAME_PITCH_DEG
-        ):
+        most = max(DECLARED_DEG if declared else 0.0, EXACT_DEG_PER_RESIDUAL * pair.fit.residual)
+        if np.mean(tilts) < most and max(abs(pitch_deg(turn)) for turn in turns) < SAME_PITCH_DEG:
             return name
     return None
 
@@ -148,7 +156,10 @@ def _pitches(pairs: Sequence[Pair], frames: list[str | None]) -> list[float]:
 
     Brains next to each other in size are registered, and least squares make of this one pitch for each. Where files
     say the pitch of some brains, the difference is interpolated over the logarithm of size: brains change as they grow.
+    It is rounded, so that a brain hardly ever moves where another one of the study is changed or added.
     """
+    if not pairs:
+        return []
     sizes = np.log([_size(pair) for pair in pairs])
     rank = np.argsort(np.argsort(sizes))
     rows, values = [], []
@@ -170,7 +181,7 @@ def _pitches(pairs: Sequence[Pair], frames: list[str | None]) -> list[float]:
     if known:
         at, differences = np.array(sorted(known)).T
         solution = solution + np.interp(sizes, at, differences)
-    return [float(value) for value in solution]
+    return [PITCH_STEP_DEG * round(float(value) / PITCH_STEP_DEG) for value in solution]
 
 
 def _pitch_in_file(pair: Pair, frame: str) -> float:

@@ -20,6 +20,8 @@ REFINED = 8
 # poses nearer to each other than this are one
 DISTINCT_DEG = 40.0
 FURTHEST = 0.3
+# smooth deformations: how much their mean square counts beside that of the distances left, and the rounds
+STIFFNESS, BENDS = 0.03, 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +72,58 @@ def found(source: Outline, target: Target) -> tuple[Fit, float]:
     return fits[0], min(others, default=np.inf) / fits[0].residual
 
 
+def matched(one: Target, other: Target, start: Floats) -> Fit:
+    """Returns the fit of `one` on `other`, two shapes that are alike but for a smooth deformation.
+
+    It is the rigid part of a quadratic deformation, which leaves the bends out of it where nearest places alone would
+    turn a shape to make up for them. Both directions count alike. The residual is that of the rigid fit.
+    """
+    there = registered(one.outline, other, start)
+    back = Fit(there.rotation.T, -there.rotation.T @ there.shift, there.residual)
+    ahead, behind = _unbent(one.outline, other, there), _unbent(other.outline, one, back)
+    mean = Rotation.from_matrix([ahead.rotation, behind.rotation.T]).mean().as_matrix()
+    return Fit(mean, 0.5 * (ahead.shift - behind.rotation.T @ behind.shift), there.residual)
+
+
+def _unbent(source: Outline, target: Target, fit: Fit) -> Fit:
+    """Returns the rigid part of the quadratic deformation that takes on from a fit."""
+    points = source.points[source.sample]
+    start, facing = points @ fit.rotation.T + fit.shift, source.normals[source.sample] @ fit.rotation.T
+    columns = np.hstack([np.ones((len(start), 1)), start])
+    products = [columns[:, i] * columns[:, j] for i in range(4) for j in range(i, 4)]
+    # orthonormal, so that the coefficients' squares add up to the mean square of the deformation
+    basis = np.linalg.qr(np.stack(products, axis=1))[0] * np.sqrt(len(start))
+    bends = np.zeros((basis.shape[1], 3))
+    for _ in range(BENDS):
+        at = start + basis @ bends
+        ahead, plane, weights = _met(at, facing, target, FINE)
+        rows = (basis[:, :, None] * plane[:, None, :]).reshape(len(basis), -1)
+        stiff = STIFFNESS * len(start)
+        step = np.linalg.solve(
+            (rows * weights[:, None]).T @ rows + stiff * np.eye(bends.size),
+            rows.T @ (weights * ahead) - stiff * bends.ravel(),
+        )
+        bends = bends + step.reshape(bends.shape)
+        if np.abs(step).max() < 1e-4:
+            break
+    at = start + basis @ bends
+    turn, _ = Rotation.align_vectors(at - at.mean(axis=0), points - points.mean(axis=0))
+    rotation = turn.as_matrix()
+    return Fit(rotation, at.mean(axis=0) - rotation @ points.mean(axis=0), fit.residual)
+
+
+def _met(at: Floats, facing: Floats, target: Target, scale: float) -> tuple[Floats, Floats, Floats]:
+    """Returns how far nearest places are, along which directions, and their Geman-McClure weights.
+
+    The directions are those of the symmetric point-to-plane distance, Rusinkiewicz 2019 (doi 10.1145/3306346.3323037).
+    """
+    _, nearest = target.oriented.query(np.hstack([at, NORMALS * facing]))
+    theirs = target.outline.normals[nearest]
+    plane = unit(theirs + facing)
+    ahead = np.einsum("ij,ij->i", target.outline.points[nearest] - at, plane)
+    return ahead, plane, (np.einsum("ij,ij->i", theirs, facing) > 0.5) / (1.0 + (ahead / scale) ** 2) ** 2
+
+
 def angle_deg(rotation: Floats) -> float:
     """Returns the angle of a (3, 3) rotation in degrees."""
     return float(np.degrees(Rotation.from_matrix(rotation).magnitude()))
@@ -84,19 +138,12 @@ def _descended(
     every: int,
     shift: Floats | None = None,
 ) -> tuple[Floats, Floats]:
-    """Returns rotation and shift after rounds of symmetric point-to-plane steps with Geman-McClure weights.
-
-    Rusinkiewicz 2019 (doi 10.1145/3306346.3323037) for the step.
-    """
+    """Returns rotation and shift after rounds of symmetric point-to-plane steps."""
     points, normals = (values[source.sample[::every]] for values in (source.points, source.normals))
     shift = np.zeros(3) if shift is None else shift
     for _ in range(rounds):
         at, facing = points @ rotation.T + shift, normals @ rotation.T
-        _, nearest = target.oriented.query(np.hstack([at, NORMALS * facing]))
-        theirs = target.outline.normals[nearest]
-        plane = unit(theirs + facing)
-        ahead = np.einsum("ij,ij->i", target.outline.points[nearest] - at, plane)
-        weights = (np.einsum("ij,ij->i", theirs, facing) > 0.5) / (1.0 + (ahead / scale) ** 2) ** 2
+        ahead, plane, weights = _met(at, facing, target, scale)
         rows = np.hstack([np.cross(at, plane), plane])
         step = np.linalg.solve((rows * weights[:, None]).T @ rows + 1e-9 * np.eye(6), rows.T @ (weights * ahead))
         turn = Rotation.from_rotvec(step[:3]).as_matrix()

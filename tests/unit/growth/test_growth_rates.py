@@ -1,13 +1,21 @@
 """Growth rates of areas and volumes made with known rates."""
 
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.rates import FOLDING_RATES, agreement, growth_rates, rate_curve, rates_of_series
+from gyriflow.io.surfaces import write_surface
 
 WEEK_S = 604_800.0
+SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "growth_rates.py"
 
 
 def test_rates_are_those_the_areas_were_made_with() -> None:
@@ -136,3 +144,24 @@ def test_one_series_or_one_common_week_has_no_agreement_but_its_columns() -> Non
         table = agreement(areas)
         assert len(table) == 0
         assert {"series", "difference_per_s", "core_difference_per_s"} <= set(table.columns)
+
+
+def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(tmp_path) -> None:
+    files = []
+    for number, radius_mm in enumerate((20.0, 22.0, 20.0, 21.0)):
+        ball = trimesh.creation.icosphere(subdivisions=2, radius=radius_mm)
+        files.append(tmp_path / f"{number}.gii")
+        write_surface(files[-1], TriangleMesh(ball.vertices, ball.faces))
+    job = SimpleNamespace(
+        input=SimpleNamespace(whole=files, left=files, right=files),
+        output=SimpleNamespace(**{name: tmp_path / f"{name}.csv" for name in ("areas", "rates", "agreement")}),
+        params=SimpleNamespace(series=["mine", "mine", "atlas", "atlas"], brains=[*"abcd"], weeks=[21, 22, 21, 22]),
+        log=[str(tmp_path / "log")],
+    )
+    runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
+    (row,) = pd.read_csv(tmp_path / "agreement.csv").itertuples()
+    assert (row.series, row.reference) == ("atlas", "mine")
+    # radii grow as the square root of areas
+    assert row.difference_per_s == pytest.approx((1.05 - 1.1) / WEEK_S, rel=1e-5)
+    areas = pd.read_csv(tmp_path / "areas.csv")
+    assert areas["subject"].tolist() == [*"abcd"]

@@ -6,7 +6,7 @@ import trimesh
 
 from gyriflow.geometry.crossings import crossing_faces
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, transformed
-from gyriflow.mesh.fidelity import gaps, surface_distance
+from gyriflow.mesh.fidelity import gap_kept, gap_summary, gap_walls, surface_distance
 
 
 def box(size, centre=(0.0, 0.0, 0.0), subdivisions=3):
@@ -61,7 +61,7 @@ def test_faces_that_cross_are_counted_once_each():
 
 def test_the_gap_between_two_boxes_has_its_width_and_area():
     boxes = merged(box((4.0, 6.0, 6.0), (-2.25, 0, 0)), box((4.0, 6.0, 6.0), (2.25, 0, 0)))
-    found = gaps(boxes)
+    found = gap_summary(gap_walls(boxes))
     assert found["percentile1"] == pytest.approx(0.5, abs=1e-3)
     assert found["median"] == pytest.approx(0.5, abs=1e-3)
     assert found["area_mm2"] == pytest.approx(2 * 36.0)
@@ -69,8 +69,28 @@ def test_the_gap_between_two_boxes_has_its_width_and_area():
 
 def test_walls_far_apart_or_thin_tissue_are_no_gap():
     far = merged(box((4.0, 6.0, 6.0), (-4.0, 0, 0)), box((4.0, 6.0, 6.0), (4.0, 0, 0)))
-    assert gaps(far) == {"percentile1": None, "median": None, "area_mm2": 0.0}
+    assert gap_summary(gap_walls(far)) == {"percentile1": None, "median": None, "area_mm2": 0.0}
     plate = box((0.5, 6.0, 6.0))
-    assert gaps(plate)["area_mm2"] == 0.0
+    assert gap_summary(gap_walls(plate))["area_mm2"] == 0.0
     # inside out, the same plate is a gap
-    assert gaps(flipped(plate))["median"] == pytest.approx(0.5, abs=1e-3)
+    assert gap_summary(gap_walls(flipped(plate)))["median"] == pytest.approx(0.5, abs=1e-3)
+
+
+def pair(gap):
+    return merged(box((4.0, 6.0, 6.0), (-2 - gap / 2, 0, 0)), box((4.0, 6.0, 6.0), (2 + gap / 2, 0, 0)))
+
+
+# half of the width is the limit: 0.3 of 0.5 mm is open, 0.2 is not, nor are walls that overlap
+@pytest.mark.parametrize(("left_open", "kept"), [(0.5, 1.0), (0.7, 1.0), (0.3, 1.0), (0.2, 0.0), (-0.1, 0.0)])
+def test_a_gap_is_kept_where_half_of_its_width_is(left_open, kept):
+    assert gap_kept(gap_walls(pair(0.5)), pair(left_open)) == kept
+
+
+def test_the_share_of_a_gap_that_is_bridged_is_not_kept():
+    # tissue fills the upper third of the gap
+    bridged = merged(pair(0.5), box((0.5, 6.0, 2.0), (0, 0, 2.0)))
+    assert gap_kept(gap_walls(pair(0.5)), bridged) == pytest.approx(2 / 3, abs=0.05)
+
+
+def test_without_a_gap_none_is_kept_or_lost():
+    assert gap_kept(gap_walls(pair(4.0)), pair(0.1)) is None

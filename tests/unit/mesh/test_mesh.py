@@ -9,7 +9,8 @@ from shapes import box_mesh
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, transformed
-from gyriflow.mesh.quality import dihedral_angles, elements_through, quality_summary, radius_ratios, refuse_bad_mesh
+from gyriflow.mesh.gates import refuse_bad_mesh
+from gyriflow.mesh.quality import dihedral_angles, elements_through, quality_summary, radius_ratios
 from gyriflow.mesh.sizing import background_mesh, edge_length_at, edge_length_for
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 
@@ -18,7 +19,10 @@ GATES = {
     "min_radius_ratio": 0.02,
     "min_dihedral_deg": 1.0,
     "max_dihedral_deg": 178.0,
+    "min_volume_mm3": 1e-6,
+    "max_volume_change": 0.02,
     "max_surface_distance_mm": 0.1,
+    "min_gap_kept": 0.95,
 }
 SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
 
@@ -66,7 +70,49 @@ def test_a_surface_that_left_the_given_one_is_refused():
     assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.5 * np.sqrt(3))
     with pytest.raises(MeshError, match=r"surface 0\.\d+ mm from the one that was filled.*max_surface_distance_mm"):
         refuse_bad_mesh(box, summary, **GATES)
-    refuse_bad_mesh(box, summary, **(GATES | {"max_surface_distance_mm": 1.0}))
+    refuse_bad_mesh(box, summary, **(GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.9}))
+
+
+def test_a_mesh_that_lost_or_won_volume_is_refused_with_the_share():
+    box = box_mesh((2, 2, 2), (4.0, 4.0, 4.0))
+    for size, change in ((4.1, r"-7\.1 %"), (3.9, r"\+7\.9 %")):
+        summary = quality_summary(box, boundary_surface(box_mesh((2, 2, 2), (size,) * 3))[0])
+        message = (
+            rf"a volume of 64 mm3, {change} against the surface's; expected at most 2 % \(mesh\.max_volume_change\)"
+        )
+        with pytest.raises(MeshError, match=message):
+            refuse_bad_mesh(box, summary, **GATES)
+        refuse_bad_mesh(box, summary, **(GATES | {"max_volume_change": 0.08}))
+
+
+def test_tiny_elements_are_refused():
+    small = TetrahedralMesh(1e-3 * REGULAR.vertices, REGULAR.tets)
+    # the regular element in a cube with edges of 2e-3 mm has a third of its volume
+    with pytest.raises(
+        MeshError, match=r"1 of 1 elements with volume in mm3 to 2\.667e-09 .*; expected .*at least 1e-06"
+    ):
+        refuse_bad_mesh(small, summary_of(small), **GATES)
+
+
+def test_a_mesh_that_shuts_the_fissure_is_refused():
+    def halves(gap):
+        parts = [box_mesh((4, 6, 6), (4.0, 6.0, 6.0)) for _ in range(2)]
+        shifts = ([-2 - gap / 2, 0, 0], [2 + gap / 2, 0, 0])
+        first = len(parts[0].vertices)
+        return TetrahedralMesh(
+            np.vstack([part.vertices + shift for part, shift in zip(parts, shifts, strict=True)]),
+            np.vstack([parts[0].tets, parts[1].tets + first]),
+        )
+
+    shut, surface = halves(0.1), boundary_surface(halves(0.3))[0]
+    summary = quality_summary(shut, surface)
+    assert summary["gap_kept"] == 0.0
+    assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.1)
+    with pytest.raises(
+        MeshError, match=r"open along 0 % of their walls; expected at least 95 % \(mesh\.min_gap_kept\)"
+    ):
+        refuse_bad_mesh(shut, summary, **(GATES | {"max_surface_distance_mm": 0.2}))
+    refuse_bad_mesh(halves(0.3), quality_summary(halves(0.3), surface), **GATES)
 
 
 def test_faces_that_cross_are_refused():

@@ -11,8 +11,11 @@ import trimesh
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import boundary_surface, signed_volumes
 from gyriflow.geometry.triangles import TriangleMesh, merged, signed_volume, transformed
+from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
-from gyriflow.mesh.quality import quality_summary, radius_ratios, refuse_bad_mesh
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.mesh.gates import refuse_bad_mesh
+from gyriflow.mesh.quality import quality_summary, radius_ratios
 from gyriflow.mesh.tetrahedralisation import even_surface, tetrahedralise
 
 SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "tetrahedralise.py"
@@ -21,7 +24,10 @@ GATES = {
     "min_radius_ratio": 0.02,
     "min_dihedral_deg": 1.0,
     "max_dihedral_deg": 178.0,
+    "min_volume_mm3": 1e-6,
+    "max_volume_change": 0.01,
     "max_surface_distance_mm": 0.1,
+    "min_gap_kept": 0.95,
 }
 SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
 STAND_INS = {
@@ -89,23 +95,48 @@ def test_a_mesher_that_is_not_installed_is_said_so(stand_in, mesher):
         tetrahedralise(ball(), mesher=mesher, **SIZES)
 
 
-@pytest.mark.parametrize("mesher", MESHERS)
-def test_the_step_of_a_mesher_that_dies_ends_in_three(stand_in, tmp_path, capsys, mesher):
-    stand_in(mesher, *DYING)
-    write_surface(tmp_path / "pial.surf.gii", ball())
-    outputs = {name: str(tmp_path / file) for name, file in OUTPUTS.items()}
+def mesh_in(folder, mesher, gates=GATES):
+    """Runs the workflow's script on a ball; returns the exit code and the files that it wrote for good."""
+    write_surface(folder / "pial.surf.gii", ball())
+    outputs = {name: str(folder / file) for name, file in OUTPUTS.items()}
+    settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5}
     job = SimpleNamespace(
-        input=[str(tmp_path / "pial.surf.gii")],
+        input=[str(folder / "pial.surf.gii")],
         output=SimpleNamespace(**outputs),
-        params=SimpleNamespace(settings=SIZES | {"mesher": mesher}, gates=GATES),
-        log=[str(tmp_path / "log")],
+        params=SimpleNamespace(settings=settings, gates=gates, refused=str(folder / "refused")),
+        log=[str(folder / "log")],
     )
-    with pytest.raises(SystemExit) as end:
+    code = 0
+    try:
         runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
-    assert end.value.code == 3
-    assert "inverted" in capsys.readouterr().err
-    assert "inverted" in (tmp_path / "log").read_text()
-    assert not [path for path in outputs.values() if Path(path).exists()]
+    except SystemExit as end:
+        code = end.code
+    return code, [name for name, path in outputs.items() if Path(path).exists()]
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_the_step_of_a_mesher_that_dies_ends_in_three_with_all_that_it_printed_in_the_log(
+    stand_in, tmp_path, capsys, mesher
+):
+    stand_in(mesher, "for i in range(300):", "    os.write(2, b'pass %d of the mesher\\n' % i)", *DYING)
+    assert mesh_in(tmp_path, mesher) == (3, [])
+    said, log = capsys.readouterr().err, (tmp_path / "log").read_text()
+    assert "inverted" in said
+    # the message has the last words, the log all of them
+    assert "pass 0 of the mesher" not in said
+    assert [f"{mesher}: pass {i} of the mesher\n" in log for i in range(300)] == [True] * 300
+    assert f"{mesher}: 99 % of the elements are inverted\n" in log
+
+
+def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_attempt(tmp_path, capsys):
+    refused, coarse = tmp_path / "refused", GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.1}
+    assert mesh_in(tmp_path, "tetgen", coarse | {"min_radius_ratio": 0.99}) == (3, [])
+    assert f"{refused}/brain.xdmf: the mesh is not good enough" in capsys.readouterr().err
+    quality, mesh = read_json(refused / "quality.json"), read_tetrahedral_mesh(refused / "brain.xdmf")
+    assert quality["tets"] == len(mesh.tets) == sum(quality["histogram"]["radius_ratio"]["counts"])
+    assert quality["min_radius_ratio"] == pytest.approx(radius_ratios(mesh).min())
+    assert mesh_in(tmp_path, "tetgen", coarse) == (0, list(OUTPUTS))
+    assert not refused.exists()
 
 
 @pytest.fixture(scope="module")

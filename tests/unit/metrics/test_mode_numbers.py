@@ -7,7 +7,7 @@ import trimesh
 
 from gyriflow.geometry.triangles import TriangleMesh, area
 from gyriflow.metrics.laplace_beltrami import laplacian, lowest_modes
-from gyriflow.metrics.mode_numbers import common_modes, complete_number, modes_wanted, weyl_numbers
+from gyriflow.metrics.mode_numbers import common_modes, modes_wanted, weyl_numbers
 from gyriflow.metrics.spangy import bands_of_modes, first_eigenvalue, spectrum, weyl_number
 
 
@@ -37,27 +37,34 @@ def wanted(choice, mesh: TriangleMesh) -> int:
 
 def test_which_number_is_taken() -> None:
     mesh = ball(20.0)  # of 2562 vertices; Weyl's number of a sphere is 1304
-    assert wanted("own", mesh) == 256
     assert wanted({"left": 200, "right": 3}, mesh) == 200
-    assert wanted({"left": 700, "right": 3}, mesh) == 256
+    assert wanted({"left": 9000, "right": 3}, mesh) == 2562 // 2
+    assert wanted("own", mesh) == 2562 // 2
     assert wanted(700, mesh) == 700
     elongated = ball(4.0, stretch=30.0)
     first = first_eigenvalue(*laplacian(elongated))
-    assert wanted("own", elongated) == weyl_number(area(elongated), first, "paper") < 256
+    assert wanted("own", elongated) == weyl_number(area(elongated), first, "paper") < 2562 // 2
 
 
-def test_complete_holds_all_of_b6_and_no_more_than_needed() -> None:
+def test_a_band_stands_for_all_modes_up_to_its_end_on_a_sphere() -> None:
+    # λ = l(l + 1)/R², λ1 = 2/R²: below 2·4⁴/R² lie l = 0 to 21, each 2l + 1 times, and l = 22 by so little that the
+    # finite elements lift it out
+    assert wanted("B4", ball(20.0, subdivisions=5)) == 22**2 + 1
+
+
+@pytest.mark.parametrize("last", [4, 5, 6])
+def test_bands_are_held_entirely_with_no_more_modes_than_needed(last: int) -> None:
     # elongated, so that few modes lie below 4⁶ λ1
     mesh = ball(4.0, stretch=9.0)
     stiffness, mass = laplacian(mesh)
-    number = complete_number(stiffness, mass, first_eigenvalue(stiffness, mass))
-    modes = lowest_modes(stiffness, mass, number)
-    bands = spectrum(mesh.vertices[:, 1], modes, mass, edge_length_mm=1.0).bands
-    assert bands["complete"].all()
-    assert np.count_nonzero(bands_of_modes(modes.eigenvalues) == -1) == 1
+    modes = lowest_modes(stiffness, mass, wanted(f"B{last}", mesh))
+    bands = spectrum(mesh.vertices[:, 1], modes, mass, edge_length_mm=1.0).bands.set_index("band")
+    assert bands["complete"].tolist() == [band <= last for band in range(7)]
+    beyond = np.count_nonzero(~np.isin(bands_of_modes(modes.eigenvalues), range(last + 1)))
+    assert beyond == 1
 
 
 @pytest.mark.parametrize("subdivisions", [2, 3])
 def test_a_coarse_surface_has_no_complete_b6(subdivisions: int) -> None:
     mesh = ball(20.0, subdivisions=subdivisions)
-    assert wanted("complete", mesh) == len(mesh.vertices) // 2
+    assert wanted("B6", mesh) == len(mesh.vertices) // 2

@@ -68,13 +68,17 @@ def test_series_have_bars_on_one_scale_and_their_differences_a_panel():
     agreement = RATES.assign(reference="surface", difference_per_s=[-1.8e-7, 0.4e-7])
     figure = growth_chart(areas, rates, agreement, folding_rate_per_s=2e-7)
     area_axes, difference_axes, surface_axes, volume_axes, _ = figure.axes
-    assert [line.get_ydata().tolist() for line in area_axes.lines] == [[100, 115, 130], [200, 230, 260]]
+    assert [line_of(area_axes, colour)[:, 1].tolist() for colour in ("#0072B2", "#009E73")] == [
+        [100, 115, 130],
+        [200, 230, 260],
+    ]
     assert [bar.get_height() for bar in difference_axes.patches] == pytest.approx([-1.8, 0.4])
     assert "volume − surface: mean −0.70, mean size 1.10" in words(figure)
     assert [bar.get_height() for bar in surface_axes.patches] == pytest.approx([3.0, 1.0])
     assert [bar.get_height() for bar in volume_axes.patches] == pytest.approx([1.2, -0.3])
     assert surface_axes.get_ylim() == volume_axes.get_ylim()
-    assert {"tangential growth rate: surface", "tangential growth rate: volume", "volume: area"} <= set(words(figure))
+    assert {"tangential growth rate: surface", "tangential growth rate: volume"} <= set(words(figure))
+    assert [text.get_text() for text in area_axes.get_legend().get_texts()] == ["surface", "volume", "area", "volume"]
     # a series is of one colour in all panels, and not that of the folding
     for axes, colour in ((surface_axes, "#0072B2"), (volume_axes, "#009E73"), (difference_axes, "#009E73")):
         assert all(mpl.colors.same_color(bar.get_facecolor(), colour) for bar in axes.patches)
@@ -218,12 +222,13 @@ def test_quality_histogram_counts_every_element_once():
             "volume_mm3": [1e-3, 0.2, 1.0],
         }
     )
-    gates = {"min_radius_ratio": 0.1, "min_dihedral_deg": 2.0, "max_dihedral_deg": 175.0, "max_surface_distance_mm": 1}
+    gates = {"min_radius_ratio": 0.1, "min_dihedral_deg": 2.0, "max_dihedral_deg": 175.0, "min_volume_mm3": 1e-6}
     figure = quality_histogram(quality, gates=gates, surface="0 faces cross")
     for axes in figure.axes:
         assert axes.patches[0].get_data().values.sum() == 3
     lines = [[line.get_xdata()[0] for line in axes.lines] for axes in figure.axes]
     assert lines == [[0.1], [2.0], [175.0], []]
+    assert figure.axes[3].get_title() == "0.001 to 1, gate 1e-06"
     assert "0 faces cross" in words(figure)
 
 
@@ -253,6 +258,33 @@ def test_bands_that_are_cut_off_are_hatched_and_written_as_b6_too():
     figure = spectra_chart(spectra, week=28.0)
     assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, True]
     assert any("cut off" in text for text in words(figure))
+
+
+def hatches_and_open_stars(figure: Figure) -> tuple[bool, bool]:
+    """Returns whether the legend of a figure has a hatched patch, and whether it has an open star."""
+    handles = figure.legends[0].legend_handles
+    patches = [handle for handle in handles if isinstance(handle, mpl.patches.Patch)]
+    marks = [handle for handle in handles if isinstance(handle, mpl.lines.Line2D) and handle.get_marker() == "*"]
+    hatched = any(patch.get_hatch() for patch in patches)
+    return hatched, any(mark.get_markerfacecolor() == "white" for mark in marks)
+
+
+@pytest.mark.parametrize(("run", "shown"), [("thin", (True, False)), ("real", (False, True))])
+def test_the_legend_names_only_the_marks_that_are_drawn(run, shown):
+    good = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("real", 28.0, {4: 0.2})]
+    spectra = pd.concat([*good, *spectrum_rows(run, 28.0, {5: 0.1}, complete=False)])
+    assert hatches_and_open_stars(spectra_chart(spectra, week=28.0)) == shown
+    assert hatches_and_open_stars(spectra_chart(pd.concat(good), week=28.0)) == (False, False)
+    assert hatches_and_open_stars(spectra_weeks_chart(spectra)) == (False, run == "real")
+
+
+def test_bands_without_modes_are_said_to_be_beyond_them():
+    rows = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("thin", 28.0, {6: np.nan}, complete=False)]
+    figure = spectra_chart(pd.concat(rows), week=28.0, bands=(4, 6))
+    said = [text for text in figure.axes[0].texts if "modes computed" in text.get_text()]
+    assert [text.get_position()[0] for text in said] == [1]
+    # nothing is drawn of it, so the legend has no mark for it
+    assert hatches_and_open_stars(figure) == (False, False)
 
 
 def test_spectra_chart_refuses_a_week_without_spectra():

@@ -1,0 +1,116 @@
+"""Hemispheres of a folded brain whose fissure is bent: those of the measured brain, carried along by the scripts."""
+
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from shapes import ellipsoid_mesh
+
+from gyriflow.folding.regions import LEFT, RIGHT
+from gyriflow.geometry.triangles import TriangleMesh, corners, merged, submesh
+from gyriflow.io.frames import join_frames, write_frame
+from gyriflow.io.regions import read_regions
+from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+from gyriflow.surface.hemispheres import nearer_left
+
+SCRIPTS = Path(__file__).parents[3] / "workflow" / "scripts"
+SEMI_AXES = (20.0, 26.0, 18.0)
+RUN = {
+    "start_week": 21.0,
+    "end_week": 22.0,
+    "output_weeks": [21.0, 22.0],
+    "fissure_x_mm": 0.0,
+    "thickness_mm": 4.0,
+    "contact": {"kind": "planes", "gap_mm": 8.0},
+}
+
+
+def beyond_fissure(points):
+    """Returns how far (n, 3) points are to the right of a fissure that swings by 4 mm to both sides."""
+    return points[:, 0] - 4.0 * np.sin(points[:, 1] / 8.0)
+
+
+def folded(points):
+    """Returns points where a folded brain could have them: larger, and all to the right of the start's fissure."""
+    return 1.3 * points + [40.0, 0.0, 0.01] * (1 + points[:, 1:2] ** 2 / 100)
+
+
+class Named(dict):
+    """Files of a job, which Snakemake hands over by name and as attributes."""
+
+    __getattr__ = dict.__getitem__
+
+
+def run(script, folder, inputs, outputs, **more):
+    """Runs a script of the workflow on files of a folder, as Snakemake would."""
+    inputs, outputs = (
+        Named({name: str(folder / file) if file else [] for name, file in files.items()}) for files in (inputs, outputs)
+    )
+    job = SimpleNamespace(input=inputs, output=outputs, log=[str(folder / "log")], **more)
+    runpy.run_path(str(SCRIPTS / script), init_globals={"snakemake": job})
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """The hemispheres of a measured brain, in triangles of their own."""
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    surface = TriangleMesh(ball.vertices * SEMI_AXES, ball.faces)
+    on_left = beyond_fissure(corners(surface).mean(axis=1)) < 0
+    return submesh(surface, on_left)[0], submesh(surface, ~on_left)[0]
+
+
+@pytest.fixture(scope="module")
+def made(measured, tmp_path_factory):
+    """A folder with the regions of the brain's mesh, and with the surfaces of its second frame."""
+    folder = tmp_path_factory.mktemp("folded")
+    brain = ellipsoid_mesh(16, SEMI_AXES)
+    write_tetrahedral_mesh(folder / "brain.xdmf", brain)
+    for side, surface in zip(("left", "right"), measured, strict=True):
+        write_surface(folder / f"start.{side}.gii", surface)
+    (folder / "params.yaml").write_text(yaml.safe_dump(RUN))
+    start = {"mesh": "brain.xdmf", "params": "params.yaml", "left": "start.left.gii", "right": "start.right.gii"}
+    run("regions.py", folder, start | {"maps": None}, {"mesh": "regions.xdmf"})
+    for week, positions in ((21.0, brain.vertices), (22.0, folded(brain.vertices))):
+        write_frame(folder / f"{week}.h5", week, {"positions": positions})
+    join_frames(folder / "frames.h5", brain.tets, [folder / "21.0.h5", folder / "22.0.h5"])
+    parts = {part: f"{part}.gii" for part in ("whole", "left", "right")}
+    frames = {"frames": "frames.h5", "regions": "regions.xdmf"}
+    run("folded_surface.py", folder, frames, parts, wildcards=SimpleNamespace(week="22.00"))
+    return folder
+
+
+def test_facets_have_the_hemisphere_that_they_lie_on_though_the_fissure_is_bent(made):
+    regions = read_regions(made / "regions.xdmf")
+    centres = regions.mesh.vertices[regions.facets].mean(axis=1)
+    beyond, tag = beyond_fissure(centres), regions.facet_tags["hemisphere"]
+    clear = np.abs(beyond) > 0.5
+    np.testing.assert_array_equal(tag[clear], np.where(beyond[clear] < 0, LEFT, RIGHT))
+    # a plane would give some to the other side
+    assert np.mean(tag != np.where(centres[:, 0] < 0, LEFT, RIGHT)) > 0.04
+
+
+def test_the_folded_hemispheres_are_the_facets_that_were_theirs_at_the_start(made):
+    regions = read_regions(made / "regions.xdmf")
+    whole, left, right = (read_surface(made / f"{part}.gii") for part in ("whole", "left", "right"))
+    positions = folded(regions.mesh.vertices)
+    for side, tag in ((left, LEFT), (right, RIGHT)):
+        theirs = positions[regions.facets[regions.facet_tags["hemisphere"] == tag]]
+        np.testing.assert_allclose(corners(side), theirs, atol=1e-4)
+    np.testing.assert_allclose(corners(whole), positions[regions.facets], atol=1e-4)
+
+
+def test_walls_close_to_each_other_are_told_apart():
+    # the left hemisphere bulges far over the middle, half a millimetre in front of the right one's hollow
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
+    left = TriangleMesh(ball.vertices, ball.faces)
+    shell = trimesh.creation.icosphere(subdivisions=4, radius=10.5)
+    right = TriangleMesh(
+        shell.vertices, shell.faces[:, ::-1][corners(TriangleMesh(shell.vertices, shell.faces)).mean(axis=1)[:, 0] > -5]
+    )
+    both = merged(left, right)
+    np.testing.assert_array_equal(nearer_left(both, left, right), np.arange(len(both.faces)) < len(left.faces))

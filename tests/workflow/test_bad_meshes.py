@@ -1,0 +1,139 @@
+"""Meshes that are not good enough and meshers that fail, in the real program: refused, with what is to be looked at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import HALF_AXES, hemisphere
+
+from gyriflow.geometry.triangles import merged, transformed
+from gyriflow.io.files import read_json
+from gyriflow.io.surfaces import write_surface
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+
+from .conftest import Workflow
+
+VOLUME_ML = 4 / 3 * np.pi * HALF_AXES.prod() / 1e3
+LEFT, RIGHT = hemisphere(-1), hemisphere(1)
+# mm between the hemispheres, which are 3 mm apart, once the right one was moved
+GAP_MM, OVERLAP_MM = 1.0, 3.0
+MESHING = {
+    "surface_edge_mm": 4.0,
+    "core_edge_mm": 10.0,
+    "envelope_mm": 0.3,
+    "max_surface_distance_mm": 1.0,
+    "max_volume_change": 0.04,
+}
+STUDY = {
+    "brains": [{"id": name, "week": 21, "phantom": {}} for name in ("apart", "tangled")],
+    "start": "apart",
+    "mesh": MESHING,
+    "folding": {"end_week": 22},
+}
+MESH = "results/apart/mesh/brain.xdmf"
+QUALITY = "results/study/figures/mesh_quality.png"
+REFUSED = "results/apart/mesh/refused"
+
+
+def moved(x):
+    return merged(LEFT, transformed(RIGHT, [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
+
+
+@pytest.fixture(scope="module")
+def workflow(checkout_copy, tmp_path_factory):
+    """Two brains whose surfaces count as made, and the mesh of the one whose hemispheres are apart."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshes"))
+    config = workflow.write("study.yaml", STUDY)
+    listed = workflow.run("surface", "--configfile", config, "--forceall", "--summary").stdout
+    for file in [line.split("\t")[0] for line in listed.splitlines()[1:]]:
+        (workflow.directory / file).parent.mkdir(parents=True, exist_ok=True)
+        (workflow.directory / file).touch()
+    for name, gap in (("apart", GAP_MM), ("tangled", -OVERLAP_MM)):
+        write_surface(workflow.directory / f"results/{name}/surface/pial.surf.gii", moved(gap - 3.0))
+    touched = workflow.run("--touch", "--cores", "1", "surface", "--configfile", config)
+    assert touched.returncode == 0, touched.stderr
+    outcome = workflow.run(MESH, QUALITY, "--cores", "2", "--configfile", config)
+    assert outcome.returncode == 0, outcome.stderr
+    return workflow
+
+
+def test_the_quality_of_the_mesh_is_told_and_drawn(workflow):
+    quality = read_json(workflow.directory / "results/apart/mesh/quality.json")
+    assert quality["volume_mm3"] / 1e3 == pytest.approx(2 * VOLUME_ML, rel=0.05)
+    assert {sum(kind["counts"]) for kind in quality["histogram"].values()} == {quality["tets"]}
+    assert quality["gap_mm"]["input"]["median"] == pytest.approx(1.5, abs=0.5)
+    assert quality["gap_kept"] > 0.95
+    assert (workflow.directory / QUALITY).stat().st_size > 10_000
+
+
+def remeshing(workflow, brain="apart", **settings):
+    """Runs the mesh of a brain again with other settings and returns the outcome and the log."""
+    name = workflow.write("changed.yaml", STUDY | {"start": brain, "mesh": MESHING | settings})
+    outcome = workflow.run(f"results/{brain}/mesh/brain.xdmf", "--cores", "1", "--configfile", name)
+    return outcome, (workflow.directory / f"results/{brain}/logs/tetrahedralise.log").read_text()
+
+
+def refused(workflow, outcome, log, *messages, brain="apart"):
+    """Checks that the step ended in 3 with its messages, and that nothing was left in the place of a mesh."""
+    assert outcome.returncode == 3, outcome.stderr
+    for message in messages:
+        assert message in log
+        assert message in outcome.stderr
+    assert "Traceback" not in outcome.stderr
+    folder = workflow.directory / f"results/{brain}/mesh"
+    assert not [path for path in folder.glob("*") if path.is_file()]
+
+
+@pytest.fixture(scope="module")
+def gated(workflow):
+    return remeshing(workflow, min_radius_ratio=0.9, max_volume_change=1e-6, max_surface_distance_mm=1e-3)
+
+
+def test_a_mesh_below_the_gates_is_refused_with_all_that_it_fails(workflow, gated):
+    refused(
+        workflow,
+        *gated,
+        f"{REFUSED}/brain.xdmf: the mesh is not good enough",
+        "elements with radius ratio to",
+        "radius ratio at least 0.9",
+        "% against the surface's",
+        "at most 0.001 mm (mesh.max_surface_distance_mm)",
+    )
+
+
+@pytest.mark.usefixtures("gated")
+def test_what_was_refused_can_be_looked_at(workflow):
+    quality = read_json(workflow.directory / REFUSED / "quality.json")
+    assert quality["tets"] == len(read_tetrahedral_mesh(workflow.directory / REFUSED / "brain.xdmf").tets)
+    assert quality["min_radius_ratio"] < 0.9
+    drawn = workflow.run(f"{REFUSED}/quality.png", "--cores", "1", "--configfile", "changed.yaml")
+    assert drawn.returncode == 0, drawn.stderr
+    assert (workflow.directory / REFUSED / "quality.png").stat().st_size > 10_000
+
+
+FAILURES = {
+    "hangs": ("time.sleep(60)", "the mesher pytetwild was stopped after 8 s; found its last words: "),
+    "dies": ("os.kill(os.getpid(), signal.SIGKILL)", "the mesher pytetwild failed with exit code -9; found "),
+}
+
+
+@pytest.mark.usefixtures("gated")
+@pytest.mark.parametrize("failure", FAILURES)
+def test_a_mesher_that_fails_ends_in_3_with_its_last_words_and_all_of_them_in_the_log(workflow, tmp_path, failure):
+    end, message = FAILURES[failure]
+    (tmp_path / "pytetwild.py").write_text(
+        "import os, signal, time\n"
+        "def tetrahedralize(*arrays, **settings):\n"
+        "    os.write(1, b'first words\\n' + 100 * b'so much is done\\n' + b'half of it is done')\n"
+        f"    {end}\n"
+    )
+    outcome, log = remeshing(replace(workflow, packages=tmp_path), time_limit_s=8.0)
+    refused(workflow, outcome, log, message, "half of it is done")
+    assert "pytetwild: first words\n" in log
+    assert log.count("pytetwild: so much is done\n") == 100
+
+
+def test_a_surface_that_cuts_itself_is_refused_before_it_is_filled(workflow):
+    outcome, log = remeshing(workflow, "tangled", mesher="tetgen", surface_edge_mm=2.0)
+    refused(workflow, outcome, log, "the surface cuts itself and cannot be kept as it is; found ", brain="tangled")
+    assert "faces that cross others after remeshing to edges of 2.00 mm; expected none" in log

@@ -1,0 +1,223 @@
+"""Label volumes: bad ones end with a message in the real program and exit code 2; the same brain is the same in any."""
+
+import json
+from types import SimpleNamespace
+
+import nibabel as nib
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gyriflow.io.files import read_json
+from gyriflow.io.surfaces import read_surface
+from gyriflow.phantom.brain import phantom_labels
+
+from .conftest import Workflow
+
+LABELS, AFFINE = phantom_labels(21.0, voxel_mm=2.0)
+
+
+def image(labels=LABELS, affine=AFFINE, kind=np.int16, unit="mm"):
+    made = nib.Nifti1Image(np.asarray(labels, dtype=kind), affine)
+    made.header.set_xyzt_units(unit)
+    made.set_sform(affine, code=1)
+    made.set_qform(affine, code=1)
+    return made
+
+
+def with_wrong(matrix, code, made=None):
+    """Returns an image with one of its two matrices moved and turned; `code` 0 says that this one is not set."""
+    made = made or image()
+    wrong = np.diag([2.0, 2.0, 2.0, 1.0])
+    if matrix == "sform":
+        made.set_sform(wrong, code=code)
+    else:
+        made.set_qform(wrong, code=code)
+    return made
+
+
+def with_values(*values):
+    labels = LABELS.astype(float)
+    labels[: len(values), 0, 0] = values
+    return image(labels, kind=np.float32)
+
+
+def relabelled(old, new):
+    labels = LABELS.copy()
+    np.place(labels, np.isin(labels, old), new)
+    return image(labels)
+
+
+def stored(made, axes):
+    """Returns an image with its voxels stored in another order, such as LAS, and its affine to match."""
+    turn = nib.orientations.ornt_transform(nib.io_orientation(made.affine), nib.orientations.axcodes2ornt(tuple(axes)))
+    return made.as_reoriented(turn)
+
+
+def oblique():
+    turn = np.eye(4)
+    turn[:3, :3] = Rotation.from_euler("xyz", [20, -30, 40], degrees=True).as_matrix()
+    turn[:3, 3] = 5.0, 0.0, 9.0
+    return image(affine=turn @ AFFINE)
+
+
+def flat():
+    """Returns the same brain in slices of 2.4 mm, three times the voxels' edge in the other directions."""
+    labels, affine = phantom_labels(21.0, voxel_mm=0.8)
+    return image(labels[1::3], affine @ np.array([[3, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]))
+
+
+BAD = {
+    "headers": (lambda: with_wrong("qform", 2), "qform and sform disagree by up to"),
+    "metres": (lambda: image(unit="meter"), "The file seems to be in micrometres"),
+    "microns": (lambda: image(unit="micron"), "The file seems to be in metres"),
+    "series": (lambda: image(np.stack([LABELS] * 2, axis=-1)), "is not a volume of labels"),
+    "fractions": (lambda: with_values(1.5), "gyriflow does not segment images"),
+    "unknown": (lambda: relabelled([3], 30), "does not know; found 30 among"),
+    "missing": (lambda: relabelled([8], 1), "missing from the label volume"),
+    "empty": (lambda: relabelled([1, 2, 5, 6, 8], 0), "no voxel belongs to the cerebrum"),
+    "infinite": (lambda: with_values(np.inf, np.nan), "values that are NaN or infinite; found 2 voxels"),
+}
+# the same brain stored in other ways; what is not turned has the same world coordinates
+PLACED = {
+    "pir": lambda: stored(image(), "PIR"),
+    "las": lambda: stored(with_wrong("qform", 0), "LAS"),
+    "lps": lambda: stored(with_wrong("sform", 0), "LPS"),
+    "micrometres": lambda: image(affine=np.diag([1e3, 1e3, 1e3, 1.0]) @ AFFINE, unit="micron"),
+    # floats with a fourth axis, and two matrices of which the configuration names one
+    "told": lambda: with_wrong("qform", 2, image(LABELS[..., None], kind=np.float32)),
+}
+SAME = PLACED | {"oblique": oblique, "flat": flat}
+READING = {"told": {"affine_from": "sform"}}
+GOOD, SHIFTED = "good", "shifted"
+
+
+@pytest.fixture(scope="module")
+def study(checkout_copy, tmp_path_factory):
+    """One run of the surface stage over bad volumes and good ones."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("bad"))
+    brains = []
+    for name, made in {**{name: made for name, (made, _) in BAD.items()}, **SAME}.items():
+        nib.save(made(), workflow.directory / f"{name}.nii.gz")
+        brain = {"id": name, "week": 21, "labels": f"{name}.nii.gz", "scheme": "spina-bifida-atlas"}
+        brains.append(brain | READING.get(name, {}))
+    nib.save(image(), workflow.directory / "whole.nii.gz")
+    whole = (workflow.directory / "whole.nii.gz").read_bytes()
+    (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
+    brains.append({"id": "torn", "week": 21, "labels": "torn.nii.gz", "scheme": "spina-bifida-atlas"})
+    nib.save(image(1000 + LABELS), workflow.directory / "t2w.nii.gz")
+    moved = AFFINE.copy()
+    moved[:3, 3] += 1.0
+    nib.save(image(affine=moved), workflow.directory / "moved.nii.gz")
+    for name, source in {GOOD: "whole", SHIFTED: "moved"}.items():
+        command = f"echo my model on {{image}}; cp {workflow.directory / source}.nii.gz {{labels}}"
+        segmented = {"image": "t2w.nii.gz", "scheme": "mine", "segmentation": {"command": command}}
+        brains.append({"id": name, "week": 21.5, **segmented})
+    mine = {"cerebrum": [1, 2, 5, 6, 8], "cortex": [5], "known": {3: "cerebellum", 4: "CSF", 7: "brainstem"}}
+    config = {
+        "schemes": {"mine": mine},
+        "brains": brains,
+        "start": GOOD,
+        "surface": {"edge_length_mm": 2.0},
+        "folding": {"end_week": 23},
+    }
+    name = workflow.write("study.yaml", config)
+    targets = [f"results/{brain['id']}/surface/pial.surf.gii" for brain in brains]
+    outcome = workflow.run(*targets, "--cores", "2", "--keep-going", "--configfile", name)
+    return SimpleNamespace(directory=workflow.directory, outcome=outcome, results=workflow.directory / "results")
+
+
+def test_the_run_ends_in_2_without_a_traceback(study):
+    assert study.outcome.returncode == 2
+    assert "Traceback" not in study.outcome.stderr
+
+
+@pytest.mark.parametrize("name", [*BAD, "torn"])
+def test_a_bad_input_is_refused_with_a_message_and_nothing_is_left(study, name):
+    expected = BAD[name][1] if name in BAD else f"{study.directory / 'torn.nii.gz'}: cannot be read as an image"
+    log = (study.results / name / "logs" / "pial_surface.log").read_text()
+    assert expected in log
+    assert expected in study.outcome.stderr
+    assert not [path for path in (study.results / name / "surface").rglob("*") if path.is_file()]
+
+
+def test_matrices_that_disagree_are_both_printed(study):
+    log = (study.results / "headers" / "logs" / "pial_surface.log").read_text()
+    for matrix, code in (("qform", 2), ("sform", 1)):
+        assert f"{matrix} (code {code})\n[[" in log
+    assert "affine_from: qform or sform" in log
+
+
+def measured(study, name):
+    report = read_json(study.results / name / "surface" / "surface.json")
+    return np.array([*report["area_cm2"].values(), report["volume_mL"]])
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"), [*((name, 0.005) for name in PLACED), ("oblique", 0.005), ("flat", 0.06)]
+)
+def test_a_brain_is_the_same_however_it_is_stored(study, name, tolerance):
+    np.testing.assert_allclose(measured(study, name), measured(study, GOOD), rtol=tolerance)
+
+
+@pytest.mark.parametrize("name", PLACED)
+def test_storage_order_and_units_leave_a_brain_where_it_is(study, name):
+    found, expected = (
+        read_surface(study.results / brain / "surface" / "pial.surf.gii").vertices for brain in (name, GOOD)
+    )
+    for end in (np.min, np.max):
+        # a quarter of a voxel
+        np.testing.assert_allclose(end(found, axis=0), end(expected, axis=0), atol=0.5)
+
+
+def test_flat_voxels_are_used_with_a_warning(study):
+    log = (study.results / "flat" / "logs" / "pial_surface.log").read_text()
+    assert "flat.nii.gz: voxels of 2.4 x 0.8 x 0.8 mm are used as they are" in log
+    assert "are used as they are" not in (study.results / GOOD / "logs" / "pial_surface.log").read_text()
+
+
+def test_labels_on_another_grid_than_their_image_are_refused(study):
+    log = (study.results / SHIFTED / "logs" / "segmentation.log").read_text()
+    assert "labels.nii.gz: is not on the grid of its image" in log
+    assert not [path for path in (study.results / SHIFTED / "surface").rglob("*") if path.is_file()]
+
+
+def test_a_segmentation_of_ones_own_gives_a_surface_with_its_thickness_at_its_week(study):
+    folder = study.results / GOOD / "surface"
+    log = (study.results / GOOD / "logs" / "segmentation.log").read_text()
+    assert f"my model on {study.directory / 't2w.nii.gz'}" in log
+    report = json.loads((folder / "surface.json").read_text())
+    assert (report["week"], report["scheme"], report["euler_number"]) == (21.5, "mine", 2)
+    assert abs(report["smoothing"]["volume_change"]) < 0.01
+    thickness = nib.load(folder / "thickness.shape.gii").darrays
+    assert [len(array.data) for array in thickness] == [report["vertices"]]
+    assert report["cortical_thickness"]["mean_mm"] == pytest.approx(thickness[0].data.mean(), abs=0.2)
+    assert "a suggestion for thickness_mm" in (study.results / GOOD / "logs" / "pial_surface.log").read_text()
+
+
+def test_images_are_segmented_and_shown_where_they_are_given(workflow):
+    for name in ("t2w.nii.gz", "labels.nii.gz"):
+        (workflow.directory / name).touch()
+    volume = {"image": "t2w.nii.gz", "scheme": "feta-7"}
+    brains = [
+        {"id": "a", "week": 21, **volume, "segmentation": {"command": "model {image} {labels}"}},
+        {"id": "b", "week": 22, **volume, "labels": "labels.nii.gz"},
+        {"id": "c", "week": 23, "labels": "labels.nii.gz", "scheme": "binary"},
+    ]
+    study = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
+    jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
+    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_surface"], jobs["pial_surface_alone"]) == (
+        1,
+        2,
+        2,
+        1,
+    )
+
+
+def test_an_image_alone_is_refused_before_any_job(workflow):
+    (workflow.directory / "t2w.nii.gz").touch()
+    study = {"brains": [{"id": "a", "week": 21, "image": "t2w.nii.gz"}], "start": "a", "folding": {"end_week": 22}}
+    outcome = workflow.run("--cores", "1", "--configfile", workflow.write("study.yaml", study))
+    assert outcome.returncode == 2
+    assert "brains[0].image: gyriflow does not segment images" in outcome.stderr
+    assert not (workflow.directory / "results").exists()

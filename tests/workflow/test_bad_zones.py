@@ -1,0 +1,108 @@
+"""Brains that cannot be solved as they are clamped, in the real program: refused before the solve, or warned of."""
+
+import numpy as np
+import pytest
+from shapes import HALF_AXES, ellipsoid_mesh, hemisphere
+
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
+from gyriflow.io.files import read_json, write_json
+from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+
+from .conftest import Workflow
+
+
+def files_in(folder):
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+FOLDED = {
+    "brains": [{"id": "a", "week": 21, "phantom": {}}],
+    "start": "a",
+    "folding": {"end_week": 21.25, "output_every_gw": 0.25, "thickness_mm": 4.0},
+    "runs": {
+        # reaches the hemispheres from above
+        "floating": {"no_growth": {"shift_z": 0.45, "semi_axes": [0.35, 0.40, 0.30]}},
+        # within the fissure
+        "drifting": {"no_growth": {"semi_axes": [0.05, 0.05, 0.05]}},
+        # one step, in which nothing moves
+        "thin": {"thickness_mm": 0.5, "contact": {"kind": "none"}, "growth_rate_per_s": 0, "step_s": 151_200},
+    },
+}
+
+
+LEFT = "results/a/folding/thin/surfaces/week-21.25.left.pial.surf.gii"
+
+
+@pytest.fixture(scope="module")
+def meshed(checkout_copy, tmp_path_factory):
+    """A study whose mesh counts as made: two hemispheres, and a cerebellum that was left in."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshed"))
+    name = workflow.write("study.yaml", FOLDED)
+    listed = workflow.run("mesh", "--configfile", name, "--forceall", "--summary").stdout
+    for file in [line.split("\t")[0] for line in listed.splitlines()[1:]]:
+        (workflow.directory / file).parent.mkdir(parents=True, exist_ok=True)
+        (workflow.directory / file).touch()
+    results = workflow.directory / "results" / "a"
+    write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
+    for side, sign in (("left", -1), ("right", 1)):
+        write_surface(results / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
+    parts = [
+        (ellipsoid_mesh(10, HALF_AXES), [-12.5, 0, 0]),
+        (ellipsoid_mesh(10, HALF_AXES), [12.5, 0, 0]),
+        (ellipsoid_mesh(8, (12.0, 12.0, 12.0)), [0, -10, -32]),
+    ]
+    first = np.cumsum([0, *(len(part.vertices) for part, _ in parts)])
+    brain = TetrahedralMesh(
+        np.vstack([part.vertices + place for part, place in parts]),
+        np.vstack([part.tets + start for (part, _), start in zip(parts, first, strict=False)]),
+    )
+    write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", brain)
+    touched = workflow.run("--touch", "--cores", "1", "mesh", "--configfile", name)
+    assert touched.returncode == 0, touched.stderr
+    return workflow
+
+
+def test_a_part_that_floats_is_refused_before_the_solve(meshed):
+    target = "results/a/folding/floating/summary.json"
+    outcome = meshed.run(target, "--cores", "1", "--configfile", "study.yaml")
+    assert outcome.returncode == 3, outcome.stderr
+    message = "parts of the brain have no clamped facet and would float; found 1 of 3 parts, the largest with 729"
+    assert message in outcome.stderr
+    assert message in (meshed.directory / "results/a/logs/regions.floating.log").read_text()
+    assert {path.name for path in files_in(meshed.directory / "results/a/folding/floating")} == {"params.yaml"}
+
+
+@pytest.fixture(scope="module")
+def folded(meshed):
+    """A run that cannot be solved, and one that can."""
+    targets = [f"results/a/folding/{run}/summary.json" for run in ("drifting", "thin")]
+    return meshed.run(*targets, LEFT, "--cores", "1", "--keep-going", "--configfile", "study.yaml")
+
+
+def test_a_brain_that_nothing_clamps_is_refused_before_the_solve(meshed, folded):
+    assert folded.returncode == 2, folded.stderr
+    message = "no facet is clamped, so the brain would drift"
+    assert message in folded.stderr
+    assert message in (meshed.directory / "results/a/logs/regions.drifting.log").read_text()
+    assert {path.name for path in files_in(meshed.directory / "results/a/folding/drifting")} == {"params.yaml"}
+
+
+@pytest.mark.usefixtures("folded")
+def test_a_cortex_thinner_than_an_element_is_warned_of_with_the_ratio(meshed):
+    log = (meshed.directory / "results/a/logs/simulate.thin.log").read_text()
+    before, _, _ = log.partition("step    1")
+    ratio = read_json(meshed.directory / "results/a/folding/thin/zones.json")["elements_through_cortex"]
+    assert 0.1 < ratio < 0.5
+    assert f"fewer than two elements through the cortex ({ratio:.2f}): folds may be mesh noise" in before
+
+
+@pytest.mark.usefixtures("folded")
+def test_hemispheres_of_the_folded_brain_are_those_of_the_measured_one(meshed):
+    whole, left, right = (
+        read_surface(meshed.directory / LEFT.replace("left.", part)) for part in ("", "left.", "right.")
+    )
+    assert len(left.faces) + len(right.faces) == len(whole.faces)
+    # all of the left ellipsoid and about half of the cerebellum, which nearly touches both
+    assert left.vertices[:, 0].min() == pytest.approx(-12.5 - HALF_AXES[0], abs=0.1)
+    assert right.vertices[right.vertices[:, 2] > -15.0, 0].min() > 0
