@@ -224,7 +224,8 @@ def slab_with_a_sulcus():
     return TetrahedralMesh(np.stack([x, y, z * lift], axis=1), mesh.tets)
 
 
-def closed_sulcus(kind):
+def closing_sulcus(kind, **changes):
+    """Returns what folds a block with a groove that closes in some steps, and the state at the start."""
     mesh = slab_with_a_sulcus()
     p = parameters_from(
         {
@@ -238,18 +239,26 @@ def closed_sulcus(kind):
             "contact": {"kind": kind},
             "no_growth": {"kind": "none"},
         }
+        | changes
     )
-    zones = zones_of_run(mesh, p)
-    folding = Folding(COMM, mesh, zones, p)
-    state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
-    for _ in range(12):
-        state = folding.step(state, p.step_s)
-    _, crossing, _ = igl.predicates.find_self_intersections(state.positions * MM_PER_M, zones.facets)
+    return Folding(COMM, mesh, zones_of_run(mesh, p), p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+
+
+def after_steps(folding, state, number):
+    for _ in range(number):
+        state = folding.step(state, state.step_s)
+    return state
+
+
+def closed_sulcus(kind):
+    folding, state = closing_sulcus(kind)
+    state = after_steps(folding, state, 12)
+    _, crossing, _ = igl.predicates.find_self_intersections(state.positions * MM_PER_M, folding.zones.facets)
     return state, len(crossing) > 0
 
 
 def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
-    state, crosses = closed_sulcus("none")
+    _, crosses = closed_sulcus("none")
     assert crosses
     state, crosses = closed_sulcus("global")
     assert not crosses
@@ -258,6 +267,27 @@ def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
     assert 0 < row["min_distance_mm"] < 0.2
     assert min(row["min_J"] for row in state.rows) > 0
     assert (COMM.bcast(state.positions) == state.positions).all()
+
+
+def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
+    mesh = two_blocks()
+    _, contact = problem_with_contact(mesh, in_a_tube(mesh), None)
+    before = contact.distance_mm
+    assert before == pytest.approx(0.2 * 1.4, rel=0.15)
+    contact.domain.place(1.5 * contact.domain.positions)
+    contact.mesh_moved()
+    assert contact.distance_mm == pytest.approx(1.5 * before)
+
+
+def test_a_run_goes_on_in_the_middle_of_contact_as_if_it_had_not_stopped():
+    tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
+    folding, state = closing_sulcus("global", **tight)
+    middle = after_steps(folding, state, 9)
+    assert middle.rows[-1]["contact_pairs"] > 0
+    ended = after_steps(folding, middle, 2)
+    anew = after_steps(closing_sulcus("global", **tight)[0], middle, 2)
+    moved = np.abs(ended.positions - middle.positions).max()
+    assert np.abs(anew.positions - ended.positions).max() <= 1e-8 * moved
 
 
 def test_hemispheres_that_press_on_each_other_stay_mirror_images():

@@ -117,6 +117,17 @@ def changed(section, **values):
     return study
 
 
+def test_runs_that_write_contact_pressure_have_a_figure_of_it(workflow):
+    for fields, kind, expected in (
+        (["displacement", "contact_pressure"], "global", 2),
+        (["displacement", "contact_pressure"], "planes", 0),
+        (["displacement"], "global", 0),
+    ):
+        study = changed("folding", fields=fields, contact={"kind": kind})
+        jobs = workflow.jobs("--configfile", workflow.write("pressed.yaml", study))
+        assert jobs.get("contact_maps", 0) == expected
+
+
 def test_nothing_is_to_be_done_after_all_was_made(finished):
     assert finished.jobs("--configfile", "study.yaml") == {}
 

@@ -149,6 +149,13 @@ SINGLE_RUN_FIGURES = [
     rules.regions_figure,
     rules.steps_figure,
 ]
+# runs that write the pressure between their folds
+PRESSED = [
+    run
+    for run in RUNS
+    if "contact_pressure" in CONFIG.runs[run].fields
+    and CONFIG.runs[run].contact.kind == "global"
+]
 SHAPE_MEASURES = ["shape_index", "curvedness", "sulcal_depth_mm"]
 
 
@@ -165,6 +172,7 @@ rule figures:
             expand(rule.output, run=RUNS, measure=SHAPE_MEASURES)
             for rule in SINGLE_RUN_FIGURES
         ],
+        expand(rules.contact_maps.output, run=PRESSED),
         rules.runs_figure.output if len(RUNS) > 1 else [],
         rules.growth.input,
 

@@ -89,6 +89,33 @@ rule displacement_maps:
         "../scripts/displacement_maps.py"
 
 
+rule contact_maps:
+    input:
+        rules.simulate.output.frames,
+    output:
+        png=report(
+            f"{FIGURES}/contact_maps.{{run}}.png",
+            caption="../report/contact_maps.rst",
+            category="Folding",
+            labels={"figure": "contact pressure", "run": "{run}"},
+        ),
+        pdf=f"{FIGURES}/contact_maps.{{run}}.pdf",
+    log:
+        "results/study/logs/contact_maps.{run}.log",
+    benchmark:
+        "results/study/benchmarks/contact_maps.{run}.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        **DRAWING,
+        code=code("report"),
+    script:
+        "../scripts/contact_maps.py"
+
+
 rule shape_maps:
     input:
         simulated=lambda wildcards: folded(wildcards.run, "left.")

@@ -50,7 +50,8 @@ class BlockMatrix:
         global_columns = column_map.local_to_global(columns)
         own = (global_columns >= first_row) & (global_columns < end_row)
         order = np.lexsort((global_columns, rows))
-        self._stored = [order[own[order]], order[~own[order]]]
+        # ... and the entries of a block column by column
+        self._stored = [(9 * kept[:, None] + BY_COLUMNS).ravel() for kept in (order[own[order]], order[~own[order]])]
         # by global numbers, since the columns reach nodes that no local element has
         everywhere = np.concatenate(row_map.comm.allgather(fixed))
         across = everywhere[column_map.local_to_global(columns)]
@@ -93,16 +94,16 @@ class BlockMatrix:
             kept = int(self._products.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"])
             if kept != self._entries:
                 raise RuntimeError(f"PETSc kept {kept} of {self._entries} entries")
-        values = self.blocks.data[: self._entries].reshape(-1, 9)
+        values = self.blocks.data[: self._entries]
         parts = _sequential_parts(self._products)
         for part, stored in zip(parts, self._stored, strict=False):
             if not len(stored):  # a rank whose part of the mesh touches no other
                 continue
             address = ctypes.c_void_p()
             _check(_PETSC.MatSeqBAIJGetArray(part, ctypes.byref(address)))
-            array = np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(ctypes.c_double)), (9 * len(stored),))
-            # PETSc has the entries of a block column by column
-            array.reshape(-1, 9)[:] = values[stored][:, BY_COLUMNS]
+            array = np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(ctypes.c_double)), (len(stored),))
+            # an index is never out of range, and with "raise" NumPy would copy twice
+            np.take(values, stored, out=array, mode="clip")
             _check(_PETSC.MatSeqBAIJRestoreArray(part, ctypes.byref(address)))
         self._products.assemble()
         self._products.stateIncrease()

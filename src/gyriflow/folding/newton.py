@@ -245,6 +245,8 @@ class NewtonSolver:
         start, self.inverting = problem.admissible(start), None
         problem.set_displacement(np.zeros_like(start))
         at_rest = problem.residual(self._residual)
+        if not np.isfinite(at_rest):
+            raise NotConvergedError("the forces without any displacement are not finite")
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
         norm = at_rest
         if at_rest > tolerance:

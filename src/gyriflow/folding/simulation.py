@@ -236,9 +236,9 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
         Where the smallest step fails too.
     """
     p = folding.parameters
-    smallest = p.step_s / 2**p.solver.max_halvings
+    left = until_s - state.time_s
+    smallest = min(p.step_s, left) / 2**p.solver.max_halvings
     while True:
-        left = until_s - state.time_s
         # a remainder of a rounding error's length is no step of its own
         step_s = left if left < state.step_s * (1 + 1e-6) else state.step_s
         try:

@@ -94,8 +94,10 @@ class Tangent:
         size = diagonal.copy()
         size.abs()
         matrix.setDiagonal(diagonal + part * size)
-        yield
-        matrix.setDiagonal(diagonal)
+        try:
+            yield
+        finally:
+            matrix.setDiagonal(diagonal)
 
 
 def block_diagonal(matrix: PETSc.Mat) -> tuple[np.ndarray, np.ndarray]:

@@ -38,8 +38,10 @@ class TetrahedralMesh:
 
 def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
     """Returns the (m,) volumes of (m, 4) tetrahedra, negative for inverted ones, in the cube of the vertices' unit."""
-    a, b, c, d = (vertices[tets[:, i]] for i in range(4))
-    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+    a, b, c, d = (np.take(vertices, tets[:, i], axis=0) for i in range(4))
+    # the triple product of edges written out: faster than with NumPy's cross product
+    (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
+    return np.asarray(((b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2) / 6.0)
 
 
 def signed_volumes(mesh: TetrahedralMesh) -> Floats:

@@ -163,8 +163,8 @@ def scalar_maps(
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
     quantity
-        "shape_index" (−1 to 1, gyri red, sulci blue), "curvedness" (1/mm) or "sulcal_depth_mm"; the latter two from 0
-        to the 98th percentile of all surfaces.
+        "shape_index" (−1 to 1, gyri red, sulci blue), "curvedness" (1/mm), "sulcal_depth_mm" or "contact_pressure_pa";
+        all but the first from 0 to the 98th percentile of all surfaces (of pressure, where there is any).
     measured
         What the measured brains are called, where there are any.
 
@@ -184,8 +184,12 @@ def scalar_maps(
         case "sulcal_depth_mm":
             high = float(np.nanpercentile(values, 98))
             scale, label = colour_scale("YlGnBu", 0.0, high, cut=True), "sulcal depth (mm)"
+        case "contact_pressure_pa":
+            touching = values[values > 0]
+            high = float(np.percentile(touching, 98)) if len(touching) else 1.0
+            scale, label = colour_scale("YlOrRd", 0.0, high, cut=True), "contact pressure (Pa)"
         case _:
-            known = ["shape_index", "curvedness", "sulcal_depth_mm"]
+            known = ["shape_index", "curvedness", "sulcal_depth_mm", "contact_pressure_pa"]
             raise InputError("unknown quantity", found=quantity, expected=known)
     keys = _ordered(*maps.values())
     rows = [

@@ -75,6 +75,12 @@ def test_where_the_smallest_step_fails_the_place_is_named():
         steps_to(stepper, 604_800.0)
 
 
+def test_a_short_remainder_is_halved_as_often_as_a_whole_step():
+    # 43 200 s and 800 s: what is left over is far below the smallest part of a whole step
+    stepper = Stepper(lambda time_s: 1e9 if time_s < 43_000 else 300.0, solver={"max_halvings": 3})
+    assert steps_to(stepper, 44_000.0) == pytest.approx([43_200.0, 200.0, 200.0, 200.0, 200.0])
+
+
 def test_frames_of_every_step_need_no_other_steps():
     weeks = output_weeks(21.0, 22.0, 1 / 14)
     parameters = parameters_from(RUN | {"output_weeks": weeks})
