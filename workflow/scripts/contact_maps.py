@@ -1,7 +1,6 @@
-"""Maps of the contact pressure on the pial surface at the output weeks."""
+"""Maps of the contact pressure at the output weeks, on the surface of the start: there no fold hides it."""
 
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure
 from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.report.renders import scalar_maps
@@ -11,12 +10,11 @@ frames, params, run = snakemake.input[0], snakemake.params, snakemake.wildcards.
 with step(snakemake.log[0]):
     start, *weeks = read_weeks(frames)
     surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, start), read_tets(frames)))
-    maps = {
-        week: (
-            TriangleMesh(read_positions(frames, week)[pial], surface.faces),
-            read_field(frames, week, "contact_pressure_pa")[pial],
-        )
-        for week in weeks
-    }
-    figure = scalar_maps({f"run {run}": maps}, quantity="contact_pressure_pa", synthetic=params.synthetic)
+    maps = {week: (surface, read_field(frames, week, "contact_pressure_pa")[pial]) for week in weeks}
+    figure = scalar_maps(
+        {f"run {run}": maps},
+        quantity="contact_pressure_pa",
+        views=("left", "right", "top", "bottom"),
+        synthetic=params.synthetic,
+    )
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)
