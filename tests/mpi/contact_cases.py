@@ -279,6 +279,18 @@ def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
     assert contact.distance_mm == pytest.approx(1.5 * before)
 
 
+def test_no_pair_is_missed_where_the_distance_has_grown():
+    mesh = two_blocks()
+    zones = in_a_tube(mesh)
+    _, contact = problem_with_contact(mesh, zones, distance=0.15)
+    few = contact.pair_count()
+    contact.settings = ContactSettings(2 * MU, 0.5)
+    contact.mesh_moved()
+    _, other = problem_with_contact(mesh, zones, distance=0.5)
+    assert contact.pair_count() == other.pair_count() > few
+    assert contact.forces() == pytest.approx(other.forces(), rel=1e-12)
+
+
 def test_a_run_goes_on_in_the_middle_of_contact_as_if_it_had_not_stopped():
     tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
     folding, state = closing_sulcus("global", **tight)

@@ -96,7 +96,7 @@ rule regions:
         mem_mb=4000,
         runtime=15,
     params:
-        code=code("folding", "surface"),
+        code=code("folding", "mechanics", "surface"),
     script:
         "../scripts/regions.py"
 

@@ -1,5 +1,7 @@
 """The pial surface of a folding run at a week, and its hemispheres: the facets that were theirs at the start."""
 
+import numpy as np
+
 from gyriflow.folding.regions import LEFT
 from gyriflow.geometry.triangles import TriangleMesh, submesh
 from gyriflow.io.frames import read_positions
@@ -13,7 +15,7 @@ with step(snakemake.log[0]):
     positions = read_positions(snakemake.input.frames, float(snakemake.wildcards.week))
     surface, on_left = TriangleMesh(positions, regions.facets), regions.facet_tags["hemisphere"] == LEFT
     for name, part, structure in (
-        ("whole", on_left | ~on_left, None),
+        ("whole", np.ones_like(on_left), None),
         ("left", on_left, "CortexLeft"),
         ("right", ~on_left, "CortexRight"),
     ):

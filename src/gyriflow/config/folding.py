@@ -47,7 +47,7 @@ class ContactSettings(Settings):
         "plane, folds run through each other (the paper); `none`: no contact.",
     )  # fmt: skip
     distance_mm: float | None = setting(
-        None, "mm", "With `global`, distance at which contact begins; null: a fifth of its mean edge length.",
+        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's mean edge.",
         gt=0, le=5,
     )  # fmt: skip
     stiffness_pa: float | None = setting(

@@ -114,8 +114,9 @@ class SelfContact:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
         self._start = np.asfortranarray(self.domain.positions[self._vertices] * MM_PER_M)
         self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
-        mean_edge = float(np.linalg.norm(np.diff(self._start[self._edges], axis=1), axis=-1).mean())
-        self.distance_mm = self.settings.distance_mm or DISTANCE_PER_EDGE * mean_edge
+        edge = float(np.linalg.norm(np.diff(self._start[self._edges], axis=1), axis=-1).mean())
+        # the same on every rank whatever its processor rounds
+        self.distance_mm = self.settings.distance_mm or DISTANCE_PER_EDGE * self.domain.comm.bcast(edge, root=0)
         self._barrier = ipctk.BarrierPotential(
             BARRIER, self.distance_mm, self.settings.stiffness_pa, use_physical_barrier=True
         )
@@ -196,7 +197,6 @@ class SelfContact:
             free = ipctk.compute_collision_free_stepsize(
                 self._surface, positions, target, broad_phase=self._search, narrow_phase_ccd=SWEEP
             )
-        # the same on every rank whatever its processor rounds
         return self.domain.comm.allreduce(float(free), op=MPI.MIN)
 
     def smallest_distance_mm(self) -> float:

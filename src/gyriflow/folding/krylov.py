@@ -13,8 +13,8 @@ YARDSTICK = 5
 class Wear:
     """The wear of a preconditioner that is kept while the matrix changes.
 
-    It is stale once its solves have taken as many iterations too many as a new one costs: whatever is to come, that
-    takes at most twice the least possible. The first solves with it, easy and hard ones, are the yardstick.
+    It is stale once its solves have taken as many iterations too many as a new one costs. The first solves with it,
+    easy and hard ones, are the yardstick.
     """
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ def new_krylov(comm: MPI.Comm, method: str, preconditioner: str, max_iterations:
     return krylov
 
 
-def smooth_with(krylov: PETSc.KSP, products: PETSc.Mat, diagonal: PETSc.Mat) -> None:
+def smooth_with(krylov: PETSc.KSP, products: PETSc.Mat, smoothing: PETSc.Mat) -> None:
     """Gives the smoothers of a multigrid that is set up matrices stored by blocks, which are read in less time.
 
     Parameters
@@ -81,12 +81,12 @@ def smooth_with(krylov: PETSc.KSP, products: PETSc.Mat, diagonal: PETSc.Mat) -> 
         The solver, preconditioned by multigrid.
     products
         What the finest level is multiplied by.
-    diagonal
+    smoothing
         What the finest level's Jacobi smoother is made from.
     """
     multigrid = krylov.getPC()
     finest = multigrid.getMGLevels() - 1
-    multigrid.getMGSmoother(finest).setOperators(products, diagonal)
+    multigrid.getMGSmoother(finest).setOperators(products, smoothing)
     for level in range(1, finest):
         smoother = multigrid.getMGSmoother(level)
         operator, matrix = smoother.getOperators()

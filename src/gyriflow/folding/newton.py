@@ -67,6 +67,8 @@ class NotConvergedError(SolverError):
 class NewtonSolver:
     """Solves for the displacement of one step after the other with objects made once.
 
+    What it keeps from one step to the next decides how a solution is found, and changes it within the tolerance only.
+
     Parameters
     ----------
     problem
@@ -90,6 +92,7 @@ class NewtonSolver:
         self._trial = problem.new_vector()
         self._direction = problem.new_vector()
         self._wear = Wear()
+        self._doubtful = False  # whether the preconditioner was made of an indefinite tangent
         self._wanted_reduction = settings.krylov_tolerance
         self._cg = self._new_krylov("cg", "gamg")
         self._fallbacks: dict[int, PETSc.KSP] = {}
@@ -97,7 +100,7 @@ class NewtonSolver:
         self._convex = True  # whether the last tangent was positive definite as it was
         self._slow = False  # whether the last iteration has gained little, close to the solution
         self._energy: float | None = None  # at the present iterate, where it is known
-        self._first_gain = 0.0  # what the first iteration of the step before left of the residual
+        self._first_left = 0.0  # part of the residual that the first iteration of the step before left
         self._exhausted = False  # whether nothing is left to gain but round-off
         self.inverting: NDArray[np.float64] | None = None
 
@@ -135,18 +138,26 @@ class NewtonSolver:
             if reason == INDEFINITE[0]:
                 return reason
             if reason > 0:
-                self._wear.add(iterations, self._wanted_reduction)
+                self._served(iterations, definite=not shifted)
                 return reason
             count.rung = max(count.rung, REBUILT)
         tangent.whole().setNearNullSpace(self.problem.near_null_space())
         reason, iterations = self._run(self._cg, tangent, reuse=False, fast=not shifted)
         count.krylov += iterations
         self._wear.renew()
+        self._doubtful = reason == INDEFINITE[0]
         if reason > 0:
             self._wear.add(iterations, self._wanted_reduction)
-        elif reason != INDEFINITE[0]:
+        elif not self._doubtful:
             self._wear.wear_out()
         return reason
+
+    def _served(self, iterations: int, *, definite: bool) -> None:
+        """Takes note of a solve with the kept preconditioner."""
+        self._wear.add(iterations, self._wanted_reduction)
+        # one made of an indefinite tangent serves its shifts, and then gives way to a better one
+        if self._doubtful and definite:
+            self._wear.wear_out()
 
     def _solve_linear(self, tangent: Tangent, count: StepCount) -> None:
         """Leaves in the direction the solution of J d = −r; goes down the ladder until it is a descent direction."""
@@ -156,8 +167,10 @@ class NewtonSolver:
                 count.krylov += iterations
                 if reason > 0 and self._direction.dot(self._residual) < 0:
                     self._convex = True
-                    self._wear.add(iterations, self._wanted_reduction)
+                    self._served(iterations, definite=True)
                     return
+                if reason <= 0 and reason != INDEFINITE[0]:
+                    self._wear.wear_out()
             # folds pressed together would rather slide aside: without that the tangent is rarely indefinite, but wrong
             if not self._slow:
                 self.problem.convexify(tangent)
@@ -269,8 +282,8 @@ class NewtonSolver:
             floor = self.settings.krylov_tolerance
             if problem.contributions:
                 # while contact changes from one iterate to the next, a direction need not be better than the last was
-                gain = norm / before if np.isfinite(before) else self._first_gain
-                floor = max(floor, min(LOOSE, gain**2))
+                left = norm / before if np.isfinite(before) else self._first_left
+                floor = max(floor, min(LOOSE, left**2))
             self._wanted_reduction = enough if enough >= 0.1 * floor else floor
             if tangent is None or norm > NEAR * tolerance or norm > before / 4:
                 tangent = problem.tangent()
@@ -279,6 +292,6 @@ class NewtonSolver:
             self._solve_linear(tangent, count)
             norm = self._advance(norm)
             if count.newton == 1:
-                self._first_gain = norm / before
+                self._first_left = norm / before
         count.residual = norm / at_rest if at_rest > 0 else 0.0
         return count

@@ -160,7 +160,7 @@ class Folding:
             distance = self.contact.smallest_distance_mm()
             # what is farther apart than the barrier reaches is not looked for
             near = {"min_distance_mm": distance if distance < math.inf else math.nan}
-            return {"contact_pairs": self.contact.pair_count(), **near}
+            return {"contact_distance_mm": self.contact.distance_mm, "contact_pairs": self.contact.pair_count(), **near}
         return {"plane_penetration_mm": self.zones.penetration_mm(positions * MM_PER_M)}
 
     def trouble(self) -> str:
@@ -237,7 +237,9 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
     """
     p = folding.parameters
     left = until_s - state.time_s
-    smallest = min(p.step_s, left) / 2**p.solver.max_halvings
+    # a remainder shorter than a whole step can be halved as often as one
+    whole = min(p.step_s, left) if state.step_s >= p.step_s else p.step_s
+    smallest = whole / 2**p.solver.max_halvings
     while True:
         # a remainder of a rounding error's length is no step of its own
         step_s = left if left < state.step_s * (1 + 1e-6) else state.step_s
