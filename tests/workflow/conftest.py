@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -67,6 +68,28 @@ class Workflow:
         (self.directory / name).write_text(yaml.safe_dump(config))
         return name
 
+    def lay_out(self, *arguments: str) -> list[str]:
+        """Makes all files that a call would make, empty, and returns their names."""
+        summary = self.run(*arguments, "--forceall", "--summary").stdout
+        files = [line.split("\t")[0] for line in summary.splitlines()[1:]]
+        for file in files:
+            path = self.directory / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+        return files
+
+    def count_as_made(self, *arguments: str) -> None:
+        """Has Snakemake take the files of a call that are there for made."""
+        touched = self.run("--touch", "--cores", "1", *arguments)
+        assert touched.returncode == 0, touched.stderr
+
+    def surfaces(self, config: dict) -> SimpleNamespace:
+        """Makes the pial surfaces of all brains of a configuration, as far as that goes."""
+        name = self.write("study.yaml", config)
+        targets = [f"results/{brain['id']}/surface/pial.surf.gii" for brain in config["brains"]]
+        outcome = self.run(*targets, "--cores", "2", "--keep-going", "--configfile", name)
+        return SimpleNamespace(directory=self.directory, outcome=outcome, results=self.directory / "results")
+
 
 @pytest.fixture(scope="session")
 def checkout_copy(tmp_path_factory):
@@ -87,13 +110,7 @@ def finished(checkout_copy, tmp_path_factory):
     """A small study whose results count as made: empty files with the records that Snakemake keeps of real ones."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("finished"))
     workflow.write("study.yaml", SMALL_STUDY)
-    summary = workflow.run("--configfile", "study.yaml", "--forceall", "--summary").stdout
-    files = [line.split("\t")[0] for line in summary.splitlines()[1:]]
+    files = workflow.lay_out("--configfile", "study.yaml")
     assert "results/report/report.html" in files
-    for file in files:
-        path = workflow.directory / file
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    touched = workflow.run("--cores", "1", "--touch", "--forceall", "--configfile", "study.yaml")
-    assert touched.returncode == 0, touched.stderr
+    workflow.count_as_made("--forceall", "--configfile", "study.yaml")
     return workflow

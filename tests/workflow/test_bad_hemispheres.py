@@ -1,7 +1,5 @@
 """Surfaces of hemispheres: bad ones end with a message in the real program and exit code 2, good ones are posed."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -74,10 +72,7 @@ def study(checkout_copy, tmp_path_factory):
     torn = workflow.directory / "torn.right.gii"
     torn.write_bytes(torn.read_bytes()[: torn.stat().st_size // 2])
     config = {"brains": brains, "start": "placed", "surface": {"edge_length_mm": 2.0}, "folding": {"end_week": 23}}
-    name = workflow.write("study.yaml", config)
-    targets = [f"results/{brain['id']}/surface/pial.surf.gii" for brain in brains]
-    outcome = workflow.run(*targets, "--cores", "2", "--keep-going", "--configfile", name)
-    return SimpleNamespace(directory=workflow.directory, outcome=outcome, results=workflow.directory / "results")
+    return workflow.surfaces(config)
 
 
 def test_the_run_ends_in_2_without_a_traceback(study):

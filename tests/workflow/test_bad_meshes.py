@@ -44,14 +44,10 @@ def workflow(checkout_copy, tmp_path_factory):
     """Two brains whose surfaces count as made, and the mesh of the one whose hemispheres are apart."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshes"))
     config = workflow.write("study.yaml", STUDY)
-    listed = workflow.run("surface", "--configfile", config, "--forceall", "--summary").stdout
-    for file in [line.split("\t")[0] for line in listed.splitlines()[1:]]:
-        (workflow.directory / file).parent.mkdir(parents=True, exist_ok=True)
-        (workflow.directory / file).touch()
+    workflow.lay_out("surface", "--configfile", config)
     for name, gap in (("apart", GAP_MM), ("tangled", -OVERLAP_MM)):
         write_surface(workflow.directory / f"results/{name}/surface/pial.surf.gii", moved(gap - 3.0))
-    touched = workflow.run("--touch", "--cores", "1", "surface", "--configfile", config)
-    assert touched.returncode == 0, touched.stderr
+    workflow.count_as_made("surface", "--configfile", config)
     outcome = workflow.run(MESH, QUALITY, "--cores", "2", "--configfile", config)
     assert outcome.returncode == 0, outcome.stderr
     return workflow

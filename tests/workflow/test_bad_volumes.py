@@ -1,7 +1,6 @@
 """Label volumes: bad ones end with a message in the real program and exit code 2; the same brain is the same in any."""
 
 import json
-from types import SimpleNamespace
 
 import nibabel as nib
 import numpy as np
@@ -121,10 +120,7 @@ def study(checkout_copy, tmp_path_factory):
         "surface": {"edge_length_mm": 2.0},
         "folding": {"end_week": 23},
     }
-    name = workflow.write("study.yaml", config)
-    targets = [f"results/{brain['id']}/surface/pial.surf.gii" for brain in brains]
-    outcome = workflow.run(*targets, "--cores", "2", "--keep-going", "--configfile", name)
-    return SimpleNamespace(directory=workflow.directory, outcome=outcome, results=workflow.directory / "results")
+    return workflow.surfaces(config)
 
 
 def test_the_run_ends_in_2_without_a_traceback(study):

@@ -39,10 +39,7 @@ def meshed(checkout_copy, tmp_path_factory):
     """A study whose mesh counts as made: two hemispheres, and a cerebellum that was left in."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshed"))
     name = workflow.write("study.yaml", FOLDED)
-    listed = workflow.run("mesh", "--configfile", name, "--forceall", "--summary").stdout
-    for file in [line.split("\t")[0] for line in listed.splitlines()[1:]]:
-        (workflow.directory / file).parent.mkdir(parents=True, exist_ok=True)
-        (workflow.directory / file).touch()
+    workflow.lay_out("mesh", "--configfile", name)
     results = workflow.directory / "results" / "a"
     write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
     for side, sign in (("left", -1), ("right", 1)):
@@ -58,8 +55,7 @@ def meshed(checkout_copy, tmp_path_factory):
         np.vstack([part.tets + start for (part, _), start in zip(parts, first, strict=False)]),
     )
     write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", brain)
-    touched = workflow.run("--touch", "--cores", "1", "mesh", "--configfile", name)
-    assert touched.returncode == 0, touched.stderr
+    workflow.count_as_made("mesh", "--configfile", name)
     return workflow
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from .atlas import AtlasSettings, atlas_files
+from .atlas import AtlasFile, AtlasSettings, atlas_files
 from .base import Settings, setting
 from .brains import KINDS, Brain
 from .folding import VARYING, FoldingSettings, output_weeks
@@ -70,18 +70,18 @@ class Config(Settings):
     @property
     def downloads(self) -> dict[str, str]:
         """The URL of each file of the atlas, by its path in the atlas folder."""
-        if self.atlas is None:
-            return {}
-        folder = self.atlas.folder
-        return {str(file.path.relative_to(folder)): file.url for file in atlas_files(self.atlas)}
+        return {name: file.url for name, file in self._atlas_files.items()}
 
     @property
     def optional_downloads(self) -> list[str]:
         """The files among `downloads` that no brain needs."""
+        return [name for name, file in self._atlas_files.items() if not file.needed]
+
+    @property
+    def _atlas_files(self) -> dict[str, AtlasFile]:
         if self.atlas is None:
-            return []
-        folder = self.atlas.folder
-        return [str(file.path.relative_to(folder)) for file in atlas_files(self.atlas) if not file.needed]
+            return {}
+        return {str(file.path.relative_to(self.atlas.folder)): file for file in atlas_files(self.atlas)}
 
     @property
     def start_week(self) -> float:

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from ..errors import MeshError
-from ..geometry.triangles import TriangleMesh, edges
+from ..geometry.triangles import TriangleMesh, edges, mean_length
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
 from .parameters import FoldingParameters
@@ -114,13 +114,15 @@ class SelfContact:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
         self._start = np.asfortranarray(self.domain.positions[self._vertices] * MM_PER_M)
         self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
-        edge = float(np.linalg.norm(np.diff(self._start[self._edges], axis=1), axis=-1).mean())
-        # the same on every rank whatever its processor rounds
-        self.distance_mm = self.settings.distance_mm or DISTANCE_PER_EDGE * self.domain.comm.bcast(edge, root=0)
+        self.distance_mm = self.settings.distance_mm or self._distance_of_edges()
         self._barrier = ipctk.BarrierPotential(
             BARRIER, self.distance_mm, self.settings.stiffness_pa, use_physical_barrier=True
         )
         self._known: Floats | None = None
+
+    def _distance_of_edges(self) -> float:
+        """Returns the distance in mm that belongs to the present edges, the same whatever a rank's processor rounds."""
+        return DISTANCE_PER_EDGE * self.domain.comm.bcast(mean_length(self._start, self._edges), root=0)
 
     def _on_surface(self, local: Floats) -> Floats:
         """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""

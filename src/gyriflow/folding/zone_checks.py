@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError, MeshError
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
-from ..geometry.triangles import TriangleMesh, edges, face_areas
+from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
 from .zones import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES, Zones
 
 MUCH_BETWEEN_PLANES = 0.05
@@ -61,7 +61,7 @@ def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float)
     if not len(cortex):
         cortex = mesh.tets
     pairs = cortex[:, [0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3]].reshape(-1, 2)
-    return float(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1), axis=-1).mean())
+    return mean_length(mesh.vertices, pairs)
 
 
 def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:

@@ -110,8 +110,12 @@ def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
 
 def mean_edge_length(mesh: TriangleMesh) -> float:
     """Returns the mean edge length in mm."""
-    pairs, _ = edges(mesh)
-    return float(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1), axis=-1).mean())
+    return mean_length(mesh.vertices, edges(mesh)[0])
+
+
+def mean_length(vertices: Floats, pairs: NDArray[np.integer]) -> float:
+    """Returns the mean length of edges that are known, (e, 2) vertex indices, in the vertices' unit."""
+    return float(np.linalg.norm(np.diff(vertices[pairs], axis=1), axis=-1).mean())
 
 
 def is_closed(mesh: TriangleMesh) -> bool:

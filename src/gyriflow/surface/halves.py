@@ -147,13 +147,14 @@ def _half(mesh: TriangleMesh, side: str) -> Half:
         )
     points = np.asarray((mesh.vertices - shape.centre) / shape.size_mm, dtype=np.float64)
     start = np.asarray(-fit.rotation[0], dtype=np.float64)
-    wall = medial_wall(points, vertex_normals(mesh), vertex_areas(mesh), start)
+    areas = vertex_areas(mesh)
+    wall = medial_wall(points, vertex_normals(mesh), areas, start)
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ wall.normal])
     rotation = turn.as_matrix() @ fit.rotation
     rotation = about_x(pitch_deg(fit.rotation @ rotation.T)) @ rotation
     # of the surface the sulci may outweigh the Sylvian fissure, of the outline it may be shallow
-    both = (points, vertex_areas(mesh)), (shape.points, np.ones(len(shape.points)))
-    ahead = float(np.mean([_sylvian(places @ rotation.T, areas) for places, areas in both]))
+    both = (points, areas), (shape.points, np.ones(len(shape.points)))
+    ahead = float(np.mean([_sylvian(places @ rotation.T, weights) for places, weights in both]))
     return Half(shape, rotation, -wall.offset * shape.size_mm, wall.error_deg, fit.residual, confidence, ahead)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
+from ellipsoid import RUN, SEMI_AXES
 from shapes import ellipsoid_mesh
 
 from gyriflow.folding.regions import LEFT, RIGHT
@@ -19,15 +20,6 @@ from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 from gyriflow.surface.hemispheres import nearer_left
 
 SCRIPTS = Path(__file__).parents[3] / "workflow" / "scripts"
-SEMI_AXES = (20.0, 26.0, 18.0)
-RUN = {
-    "start_week": 21.0,
-    "end_week": 22.0,
-    "output_weeks": [21.0, 22.0],
-    "fissure_x_mm": 0.0,
-    "thickness_mm": 4.0,
-    "contact": {"kind": "planes", "gap_mm": 8.0},
-}
 
 
 def beyond_fissure(points):

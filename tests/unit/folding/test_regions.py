@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from ellipsoid import RUN, SEMI_AXES
 from shapes import ellipsoid_mesh
 
 from gyriflow.folding.layers import PialSearch, cortical_weight
@@ -9,16 +10,6 @@ from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.regions import BRIDGE, CORE, CORTEX, LEFT, RIGHT, cell_tags, facet_tags, no_growth_ellipsoid
 from gyriflow.folding.zones import inside_ellipsoid, zones_of_run
 from gyriflow.geometry.tetrahedra import signed_volumes
-
-SEMI_AXES = (20.0, 26.0, 18.0)
-RUN = {
-    "start_week": 21.0,
-    "end_week": 22.0,
-    "output_weeks": [21.0, 22.0],
-    "fissure_x_mm": 0.0,
-    "thickness_mm": 4.0,
-    "contact": {"kind": "planes", "gap_mm": 8.0},
-}
 
 
 @pytest.fixture(scope="module")
