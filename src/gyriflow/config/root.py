@@ -88,10 +88,24 @@ class Config(Settings):
         """The gestational age at which the folding starts."""
         return self.brain(self.start).week
 
-    def weeks(self, run: str) -> list[float]:
+    def run(self, name):
+        return self.runs[name]
+
+    def starts(self, run):
+        return [self.start]
+
+    @property
+    def folded(self):
+        return [(run, brain) for run in self.runs for brain in self.starts(run)]
+
+    @property
+    def start_brains(self):
+        return list(dict.fromkeys(brain for _, brain in self.folded))
+
+    def weeks(self, run: str, brain: str) -> list[float]:
         """Returns the output weeks of a run, the start included."""
         settings = self.runs[run]
-        return output_weeks(self.start_week, settings.end_week, settings.output_every_gw)
+        return output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
 
     @property
     def growth_series(self) -> dict[str, list[str]]:
@@ -99,10 +113,9 @@ class Config(Settings):
         kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
         return growth_series(kinds, {brain.id: brain.week for brain in self.brains}, self.growth.brains)
 
-    @property
-    def estimated_from(self) -> str | None:
+    def estimated_from(self, brain: str) -> str | None:
         """The series that `estimated` rates are taken from; None where there is no such series."""
-        return estimated_from(self.growth_series, self.growth.estimated_from, self.start)
+        return estimated_from(self.growth_series, self.growth.estimated_from, brain)
 
     @property
     def age_reference(self) -> list[str]:
