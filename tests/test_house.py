@@ -15,7 +15,7 @@ PLAIN = {"parameters", "geometry", "units", "errors"}
 EXCEPTIONS = {"folding": {"mechanics", "io"}}
 """What a room may import besides itself and the plain modules: the solve is a program of its own."""
 PROGRAMS = {"launch", "step", "provenance"}
-"""The shell around the rooms: how a workflow starts, how a step ends, what code it depends on; and `__main__.py` files."""
+"""The shell around the rooms: how a workflow starts, how a step ends, what code it depends on."""
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
