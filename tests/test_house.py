@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
 ROOMS = {"config", "io", "phantom", "surface", "growth", "mesh", "mechanics", "folding", "metrics", "report"}
-PLAIN = {"geometry", "units", "errors"}
+PLAIN = {"geometry", "parameters", "units", "errors"}
 EXCEPTIONS = {"folding": {"mechanics", "io"}}
 """What a room may import besides itself and the plain modules: the solve is a program of its own."""
 PROGRAMS = {"launch", "step"}
@@ -156,7 +156,7 @@ def test_snakefile_is_short():
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=short)
 def test_scripts_are_thin(path):
-    assert 5 <= code_lines(path) <= 25
+    assert 5 <= code_lines(path) <= 40
 
 
 def test_no_vague_names():

@@ -1,5 +1,5 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
-from gyriflow.surface.labels import label_scheme
+from gyriflow.parameters.schemes import LabelScheme
 
 SURFACE_SETTINGS = {
     "labels": (
@@ -23,7 +23,7 @@ WITH_CORTEX = [
     brain.id
     for brain in CONFIG.brains
     if brain.source in ("labels", "segmentation", "phantom")
-    and label_scheme(**CONFIG.scheme(brain)).cortex
+    and LabelScheme(**CONFIG.scheme(brain)).cortex
 ]
 WITHOUT_CORTEX = [brain for brain in BRAINS if brain not in WITH_CORTEX]
 # hemispheres whose pose is to be found, for all of a study at once

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from gyriflow.folding.regions import LEFT
 from gyriflow.geometry.triangles import TriangleMesh, submesh
 from gyriflow.io.frames import read_positions
 from gyriflow.io.regions import read_regions
 from gyriflow.io.surfaces import write_surface
+from gyriflow.parameters.terms import LEFT
 from gyriflow.step import step
 
 output = snakemake.output

@@ -3,15 +3,15 @@
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_surface, write_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial, from_shape
 
 files, output, params = list(snakemake.input), snakemake.output, snakemake.params
 with step(snakemake.log[0], *files[:2]):
     match params.source:
         case "labels":
-            scheme, volume = label_scheme(**params.scheme), read_label_volume(files[0], **params.reading)
+            scheme, volume = LabelScheme(**params.scheme), read_label_volume(files[0], **params.reading)
             surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
         case "hemispheres":
             given = *map(read_surface, files[:2]), *map(read_json, files[2:])

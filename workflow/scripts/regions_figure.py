@@ -1,12 +1,12 @@
 """Where and how much the start brain grows, on its surface and in sections, with its regions and normals there."""
 
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.regions import no_growth_ellipsoid
-from gyriflow.folding.zones import BASE
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.io.figures import write_figure
 from gyriflow.io.regions import read_regions
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.terms import BASE
 from gyriflow.report.sections import GROWTH, normal_arrows, region_sections
 from gyriflow.report.zones import field_picture
 from gyriflow.step import step
