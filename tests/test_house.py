@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
 ROOMS = {"config", "io", "phantom", "surface", "growth", "mesh", "mechanics", "folding", "metrics", "report"}
-PLAIN = {"parameters", "geometry", "units", "errors"}
+PLAIN = {"geometry", "parameters", "units", "errors"}
 EXCEPTIONS = {"folding": {"mechanics", "io"}}
 """What a room may import besides itself and the plain modules: the solve is a program of its own."""
 PROGRAMS = {"launch", "step", "provenance"}

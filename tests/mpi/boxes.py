@@ -6,8 +6,9 @@ from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import Material, Problem
-from gyriflow.folding.zones import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT, Zones
+from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.parameters.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
 
 COMM = MPI.COMM_WORLD
 MATERIAL = Material(poisson_ratio=0.45, penalty_pa_per_m=5e5)

@@ -1,5 +1,5 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
-from gyriflow.surface.labels import label_scheme
+from gyriflow.parameters.schemes import LabelScheme
 
 # what is made of every brain, whatever it is given as
 PIAL = {
@@ -12,7 +12,7 @@ WITH_LABELS = ("labels", "segmentation", "phantom")
 WITH_CORTEX = [
     brain.id
     for brain in CONFIG.brains
-    if brain.source in WITH_LABELS and label_scheme(**CONFIG.scheme(brain)).cortex
+    if brain.source in WITH_LABELS and LabelScheme(**CONFIG.scheme(brain)).cortex
 ]
 # hemispheres whose pose is to be found, for all of a study at once
 TO_POSE = [

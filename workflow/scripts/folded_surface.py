@@ -1,10 +1,10 @@
 """The pial surface of a folding run at a week, and its hemispheres: the facets that were theirs at the start."""
 
-from gyriflow.folding.regions import LEFT
 from gyriflow.geometry.triangles import TriangleMesh, submesh
 from gyriflow.io.frames import read_positions
 from gyriflow.io.regions import read_regions
 from gyriflow.io.surfaces import write_brain
+from gyriflow.parameters.terms import LEFT
 from gyriflow.step import step
 
 with step(snakemake.log[0]):

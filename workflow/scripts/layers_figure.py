@@ -1,10 +1,10 @@
 """Sections through the start brain of a run: hemispheres, what grows and how much, stiffness."""
 
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.regions import no_growth_ellipsoid
 from gyriflow.io.figures import write_figure
 from gyriflow.io.regions import read_regions
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.parameters.reading import parameters_from
 from gyriflow.report.sections import region_sections
 from gyriflow.step import step
 

@@ -1,8 +1,8 @@
 """Normals of the pial surface inside the start brain of a run, as arrows in sections."""
 
-from gyriflow.folding.zones import BASE
 from gyriflow.io.figures import write_figure
 from gyriflow.io.regions import read_regions
+from gyriflow.parameters.terms import BASE
 from gyriflow.report.sections import normal_arrows
 from gyriflow.step import step
 

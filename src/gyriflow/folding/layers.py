@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, unit, vertex_normals
-from .parameters import FoldingParameters
-from .varying import Maps
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import Maps, value_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -63,13 +63,14 @@ def layers_at(
     """
     p = parameters
     w = cortical_weight(distance_mm, p.thickness_at(week, maps))
-    core = p.core_growth_rate_per_s.at(week, maps) * (1 - w)
+    core = value_at(p.core_growth_rate_per_s, week, maps) * (1 - w)
     growing = growth * step_s
     return Layers(
         weight=w,
-        mu=p.shear_modulus_core_pa.at(week, maps) * (1 - w) + p.shear_modulus_cortex_pa.at(week, maps) * w,
-        dg=(p.growth_rate_per_s.at(week, maps) * w + core) * growing,
-        dr=(p.radial_growth_rate_per_s.at(week, maps) * (1 - w) + core) * growing,
+        mu=value_at(p.shear_modulus_core_pa, week, maps) * (1 - w)
+        + value_at(p.shear_modulus_cortex_pa, week, maps) * w,
+        dg=(value_at(p.growth_rate_per_s, week, maps) * w + core) * growing,
+        dr=(value_at(p.radial_growth_rate_per_s, week, maps) * (1 - w) + core) * growing,
     )
 
 

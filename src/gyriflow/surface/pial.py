@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
+from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.surface.extraction import (
     PAD_VOXELS,
     cropped,
@@ -28,7 +29,7 @@ from gyriflow.surface.hemispheres import (
     set_apart,
     split,
 )
-from gyriflow.surface.labels import LabelScheme, cerebrum_mask, require_sides
+from gyriflow.surface.labels import cerebrum_mask, require_sides
 from gyriflow.surface.orientation import MidPlane, mid_plane, upright
 from gyriflow.surface.outcome import PialSurface, described, faults, require_sound
 from gyriflow.surface.posing import as_poses, placed, poses
