@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, unit, vertex_normals
+from ..mechanics.growth import growth_increments
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_at
 
@@ -63,14 +64,16 @@ def layers_at(
     """
     p = parameters
     w = cortical_weight(distance_mm, p.thickness_at(week, maps))
-    core = value_at(p.core_growth_rate_per_s, week, maps) * (1 - w)
-    growing = growth * step_s
+    tangential = value_at(p.growth_rate_per_s, week, maps)
+    radial = value_at(p.radial_growth_rate_per_s, week, maps)
+    core = value_at(p.core_growth_rate_per_s, week, maps)
+    dg, dr = growth_increments(w, growth, tangential, radial, core, step_s)
+    stiff, soft = value_at(p.shear_modulus_cortex_pa, week, maps), value_at(p.shear_modulus_core_pa, week, maps)
     return Layers(
         weight=w,
-        mu=value_at(p.shear_modulus_core_pa, week, maps) * (1 - w)
-        + value_at(p.shear_modulus_cortex_pa, week, maps) * w,
-        dg=(value_at(p.growth_rate_per_s, week, maps) * w + core) * growing,
-        dr=(value_at(p.radial_growth_rate_per_s, week, maps) * (1 - w) + core) * growing,
+        mu=soft * (1 - w) + stiff * w,
+        dg=dg,
+        dr=dr,
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from ..mechanics.neo_hookean import bulk_to_shear_ratio
+from ..mechanics.materials import MATERIALS
 from ..parameters.folding import FoldingParameters
 from ..parameters.reading import require_maps
 from ..parameters.terms import ELEMENT_FIELDS
@@ -20,12 +20,13 @@ from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
+from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch, layers_at
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
-from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError
+from .newton import NewtonSettings, NewtonSolver
 from .output import say
-from .problem import Material, Problem
-from .stress import deformation_gradients, elastic_part, strain_fields, stress_fields, volume_ratio_fields
+from .problem import Problem
+from .stress import deformation_gradients, strain_fields, stress_fields, volume_ratio_fields
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -66,10 +67,14 @@ class Folding:
         require_maps(parameters, self.maps, len(mesh.vertices))
         self.domain = Domain(comm, mesh)
         by_planes = parameters.contact.kind == "planes"
-        material = Material(parameters.poisson_ratio, parameters.contact.penalty_pa_per_m if by_planes else 0.0)
         self._remembers = parameters.stress_memory_gw > 0
         self.problem = Problem(
-            self.domain, zones, material, quadrature_degree=quadrature_degree, remembers_stress=self._remembers
+            self.domain,
+            zones,
+            MATERIALS[parameters.material](parameters.poisson_ratio),
+            penalty_pa_per_m=parameters.contact.penalty_pa_per_m if by_planes else 0.0,
+            quadrature_degree=quadrature_degree,
+            remembers_stress=self._remembers,
         )
         self.contact: SelfContact | None = None
         if parameters.contact.kind == "global":
@@ -86,8 +91,6 @@ class Folding:
         )[1]
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
-        self._bulk_ratio = bulk_to_shear_ratio(parameters.poisson_ratio)
-        self._stretch: Floats | None = None  # what the last step started with
         self._start = self.domain.positions
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
@@ -125,10 +128,6 @@ class Folding:
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
 
-    def _elastic(self, F: Floats) -> Floats:
-        """Returns the (c, 3, 3) elastic parts of the last step's deformation gradients of the local elements."""
-        return elastic_part(F, np.eye(3) if self._stretch is None else self._stretch, *self.problem.growth)
-
     def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
 
@@ -138,17 +137,17 @@ class Folding:
         fields: dict[str, Floats] = {}
         if set(ELEMENT_FIELDS).isdisjoint(wanted):
             return fields
-        after = domain.local(domain.positions)
-        F = deformation_gradients(after - self.problem.displacement, after, domain.cells)
-        total = deformation_gradients(domain.local(self._start), after, domain.cells)
-        Fe = self._elastic(F)
+        after = domain.positions
+        total = deformation_gradients(domain.local(self._start), domain.local(after), domain.cells)
+        # back to where the step began, which its displacement refers to
+        domain.place(after - domain.gathered(self.problem.displacement[: domain.owned]))
         if "stress" in wanted:
-            mu = self.problem.shear_modulus
-            fields |= stress_fields(Fe, mu, self._bulk_ratio * mu)
+            fields |= stress_fields(self.problem.outcome("stress"))
         if "strain" in wanted:
-            fields |= strain_fields(Fe, total, self._start_normals)
+            fields |= strain_fields(self.problem.outcome("elastic"), total, self._start_normals)
         if "volume_ratio" in wanted:
-            fields |= volume_ratio_fields(F, total)
+            fields |= volume_ratio_fields(self.problem.outcome("deformation"), total)
+        domain.place(after)
         together = domain.gathered_cells(np.stack(list(fields.values()), axis=1))
         return dict(zip(fields, together.T, strict=True))
 
@@ -195,19 +194,15 @@ class Folding:
         if domain.positions is not state.positions:
             domain.place(state.positions)
         self.set_layers(state.time_s, step_s)
-        self._stretch = self._kept_stretch(state, step_s)
-        if self._stretch is not None:
-            problem.set_stretch(self._stretch)
+        kept = self._kept_stretch(state, step_s)
+        if kept is not None:
+            problem.set_stretch(kept)
         count = self.solver.solve(domain.local(state.predicted(step_s)))
         ratios = problem.volume_ratios()
         energy = problem.energy()
         u = domain.gathered(problem.displacement[: domain.owned])
         length = np.linalg.norm(u, axis=1) * MM_PER_M
-        left = None
-        if self._stretch is not None:
-            before = domain.local(domain.positions)
-            F = deformation_gradients(before, before + problem.displacement, domain.cells)
-            left = domain.gathered_cells(packed(left_stretch(self._elastic(F))))
+        left = None if kept is None else domain.gathered_cells(packed(left_stretch(problem.outcome("elastic"))))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,

@@ -122,12 +122,12 @@ def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh, right: Tria
     Parameters
     ----------
     files
-        Paths as attributes `whole`, `left` and `right`; with `stl`, the whole goes there as well.
+        Paths as attributes `whole`, `left` and `right`, and as `get("stl")` one for the whole too, if it is given.
     """
     write_surface(files.whole, whole)
     write_surface(files.left, left, "CortexLeft")
     write_surface(files.right, right, "CortexRight")
-    if stl := getattr(files, "stl", None):
+    if stl := files.get("stl"):
         write_surface(stl, whole)
 
 

@@ -26,6 +26,9 @@ REGION_FIELDS: tuple[VertexField, ...] = (
 )
 """Fields that are shown with the regions, before the solve."""
 
+MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
+"""Laws of the material; each is a class of `mechanics`."""
+
 FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y = range(8)
 """Zones of the boundary's facets."""
 ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y")

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from gyriflow.errors import SolverError
 from gyriflow.folding.checkpoint import State
-from gyriflow.folding.newton import NotConvergedError
+from gyriflow.folding.ladder import NotConvergedError
 from gyriflow.folding.run import seconds_to, shortened_steps
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
 from gyriflow.parameters.folding import output_weeks
