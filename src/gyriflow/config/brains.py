@@ -109,6 +109,10 @@ class Brain(Settings):
         ..., "", "Name in result paths and tables: letters, digits, - _ .", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
     )
     week: float = setting(..., "GW", "Gestational age.", ge=15, le=45)
+    population: str | None = setting(
+        None, "", "What figures and tables call the brain, as `spina bifida aperta, unoperated`; `null`: real brain.",
+        min_length=1,
+    )  # fmt: skip
     labels: str | None = setting(None, "", "Tissue label volume (NIfTI).")
     image: str | None = setting(
         None, "", "T2-weighted volume (NIfTI): what `segmentation` works on; with `labels`, for a figure only."

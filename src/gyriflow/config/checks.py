@@ -50,6 +50,7 @@ def brain_problems(raw: Any, where: str, schemes: Collection[str] = ()) -> list[
         problems.append(f"{where}.scheme: found {scheme!r}; expected one of {', '.join(known)}, or a name of schemes")
     problems += _segmentation_problems(raw, where)
     meanings = {"scheme": VOLUMES, "image": VOLUMES, "affine_from": VOLUMES, "coordinates": ("hemispheres", "pial")}
+    meanings["population"] = tuple(source for source in SOURCES if source not in ("phantom", "shape"))
     for key, sources in meanings.items():
         if key in raw and len(given) == 1 and given[0] not in sources:
             problems.append(f"{where}.{key}: has no meaning with {given[0]}; only with {' or '.join(sources)}")
@@ -150,7 +151,12 @@ def growth_problems(brains: Any, growth: Any, start: Any, runs: dict[str, dict[s
         ]
     reasons = {name: _too_few_weeks(ids, weeks) for name, ids in lists.items()}
     problems = [f"{paths[name]}: {reason}" for name, reason in reasons.items() if reason is not None]
-    series = growth_series(kinds, weeks, given)
+    populations = {entry["id"]: entry.get("population") for entry in entries}
+    for name, ids in lists.items() if isinstance(given, dict) else ():
+        mixed = sorted({str(populations[brain] or "of no known population") for brain in ids})
+        if len(mixed) > 1:
+            problems.append(f"{paths[name]}: found brains {' and '.join(mixed)}; a growth curve is of one population")
+    series = growth_series(kinds, weeks, given, populations)
     wanted = growth.get("estimated_from")
     if isinstance(wanted, str) and series and wanted not in series:
         problems.append(f"growth.estimated_from: found {wanted!r}; the series are {', '.join(series)}")

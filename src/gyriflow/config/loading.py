@@ -11,7 +11,9 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from ..errors import InputError
-from .atlas import AtlasSettings, atlas_brains, atlas_files, atlas_problems
+from ..io.yaml_files import read_yaml
+from .atlas import AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections, unknown_atlas
+from .atlas_description import Atlas
 from .brains import SIDES, SINGLE_FILES, Brain
 from .checks import brain_problems, growth_problems, study_problems
 from .folding import VARYING, FoldingSettings
@@ -23,7 +25,7 @@ from .varying import TAGS
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
 
 
-def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: bool = False) -> Config:
+def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
     """Returns the validated configuration, with input files as absolute paths.
 
     Parameters
@@ -32,8 +34,6 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: boo
         The configuration as read from YAML.
     base_dir
         Folder of the configuration file, for relative paths.
-    downloading
-        Whether the files of the atlas are about to be fetched, so that they need not be there yet.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: boo
     problems: list[str] = []
     valid: dict[str, Any] = {}
     for name, field in Config.model_fields.items():
-        if name in ("brains", "runs", "folding"):
+        if name in ("brains", "atlas", "runs", "folding"):
             continue
         if name in plain or field.is_required():
             valid[name] = _validated(field.annotation, plain.get(name, _ABSENT), (name,), problems)
@@ -56,13 +56,13 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: boo
     with_atlas = plain.get("atlas") is not None
     given = plain.get("brains", [] if with_atlas else _ABSENT)
     valid["brains"] = _brains(given, list(schemes), Path(base_dir), problems, alone=not with_atlas)
-    valid["atlas"], of_atlas = _atlas(valid.get("atlas"), Path(base_dir), problems, downloading=downloading)
-    valid["brains"] += tuple(Brain(**entry) for entry in of_atlas)
+    valid["atlas"], of_atlas = _atlases(plain.get("atlas"), Path(base_dir), list(schemes), problems)
+    valid["brains"] += tuple(Brain(**entry) for entry in of_atlas or ())
     folding = _with_map_files(plain.get("folding", {}), Path(base_dir), "folding", problems)
     valid["folding"] = _validated(FoldingSettings, folding, ("folding",), problems)
     runs = _runs(plain.get("runs"), folding if isinstance(folding, dict) else {}, Path(base_dir), problems)
-    entries = [*(given if isinstance(given, list) else []), *of_atlas]
-    if with_atlas and not of_atlas:
+    entries = [*(given if isinstance(given, list) else []), *(of_atlas or ())]
+    if of_atlas is None:
         # the ids of an atlas section that is wrong are not known
         problems += study_problems(entries, None, runs)
     else:
@@ -118,18 +118,47 @@ def _brains(
     return tuple(brains)
 
 
-def _atlas(
-    atlas: AtlasSettings | None, base_dir: Path, problems: list[str], *, downloading: bool
-) -> tuple[AtlasSettings | None, list[dict[str, Any]]]:
-    """Returns the atlas section with its folder as an absolute path, and the entries of `brains` that it stands for."""
-    if atlas is None:
-        return None, []
-    places = [base_dir / Path(atlas.folder).expanduser(), Path.cwd() / atlas.folder]
-    folder = next((place for place in places if place.exists()), places[0])
-    atlas = atlas.model_copy(update={"folder": str(folder.resolve())})
-    files = atlas_files(atlas)
-    problems += atlas_problems(atlas, files, downloading=downloading)
-    return atlas, atlas_brains(files)
+def _atlases(
+    raw: Any, base_dir: Path, schemes: list[str], problems: list[str]
+) -> tuple[tuple[AtlasSettings, ...], list[dict[str, Any]] | None]:
+    """Returns the sections of `atlas` with absolute paths, and the entries of `brains` that they stand for.
+
+    There are no entries (None) where a section or an atlas is so wrong that its brains are not known.
+    """
+    sections: list[AtlasSettings] = []
+    entries: list[dict[str, Any]] = []
+    complete = True
+    for path, section in atlas_sections(raw):
+        where, settings = _dotted(path), _validated(AtlasSettings, section, path, problems)
+        atlas = None if settings is None else _description(settings.located(base_dir), where, problems)
+        if settings is None or atlas is None:
+            complete = False
+            continue
+        used = UsedAtlas(settings.located(base_dir), atlas)
+        found = [f"{where}.{problem}" for problem in atlas_problems(used)]
+        brains = atlas_brains(used)
+        found += [problem for brain in brains for problem in brain_problems(brain, f"{where} {brain['id']}", schemes)]
+        problems += found
+        complete = complete and not found
+        sections.append(used.settings)
+        entries += brains
+    return tuple(sections), entries if complete else None
+
+
+def _description(settings: AtlasSettings, where: str, problems: list[str]) -> Atlas | None:
+    """Returns what the `atlas.yaml` of a section says, or adds what is wrong with it to `problems`."""
+    if (unknown := unknown_atlas(settings)) is not None:
+        problems.append(f"{where}.{unknown}")
+        return None
+    try:
+        content = read_yaml(settings.description)
+    except InputError as error:
+        problems.append(f"{where}.file: {error}")
+        return None
+    found: list[str] = []
+    atlas = _validated(Atlas, content, (), found)
+    problems += [f"{settings.description}: {problem.removeprefix(': ')}" for problem in found]
+    return atlas
 
 
 def _with_files(entry: Any, base_dir: Path, where: str, problems: list[str]) -> Any:

@@ -3,7 +3,9 @@
 from collections.abc import Iterable
 from typing import Any
 
-from .atlas import AtlasFile, AtlasSettings, atlas_files
+from ..io.yaml_files import read_yaml
+from .atlas import AtlasSettings, UsedAtlas
+from .atlas_description import Atlas
 from .base import Settings, setting
 from .brains import KINDS, Brain
 from .folding import VARYING, FoldingSettings, output_weeks
@@ -16,6 +18,10 @@ from .surface import SurfaceSettings
 from .varying import VaryingSettings
 
 
+REAL_BRAIN = "real brain"
+"""What a measured brain is called whose population is not known."""
+
+
 class Config(Settings):
     """A validated configuration. `folding` is the base of every run, `runs` holds the runs' complete settings."""
 
@@ -23,7 +29,10 @@ class Config(Settings):
         ..., "", "The brains: one the folding starts from, others to compare with and to estimate growth from. "
         "May be left out with `atlas`.",
     )  # fmt: skip
-    atlas: AtlasSettings | None = setting(None, "", "The dHCP atlases as further brains.")
+    atlas: tuple[AtlasSettings, ...] = setting(
+        (), "",
+        "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of these.",
+    )  # fmt: skip
     schemes: dict[str, SchemeSettings] = setting(
         {}, "", "Label schemes by name, beside those that gyriflow has; for the brains' `scheme`."
     )
@@ -46,18 +55,18 @@ class Config(Settings):
         raise KeyError(name)
 
     def measured_name(self, brains: Iterable[str]) -> str:
-        """Returns what measured brains of these ids are called in figures: real ones only where one is among them.
+        """Returns what measured brains of these ids are called in figures and tables: their populations where known.
 
-        Shapes go by their kind where all are of one.
+        Real brains of no known population are a "real brain"; shapes go by their kind where all are of one.
         """
         chosen = [self.brain(name) for name in brains]
         kinds = sorted({brain.shape.kind for brain in chosen if brain.shape is not None})
         names = [
-            "real brain" if not all(brain.synthetic for brain in chosen) else "",
+            *dict.fromkeys(brain.population or REAL_BRAIN for brain in chosen if not brain.synthetic),
             "phantom" if any(brain.source == "phantom" for brain in chosen) else "",
             (kinds[0] if len(kinds) == 1 else "simple shape") if kinds else "",
         ]
-        return " or ".join(name for name in names if name) or "real brain"
+        return " or ".join(name for name in names if name) or REAL_BRAIN
 
     def scheme(self, brain: Brain) -> dict[str, Any]:
         """Returns the scheme of a brain's labels: its name, and what the configuration says about it.
@@ -68,20 +77,9 @@ class Config(Settings):
         return {"name": name} | (self.schemes[name].model_dump() if name in self.schemes else {})
 
     @property
-    def downloads(self) -> dict[str, str]:
-        """The URL of each file of the atlas, by its path in the atlas folder."""
-        return {name: file.url for name, file in self._atlas_files.items()}
-
-    @property
-    def optional_downloads(self) -> list[str]:
-        """The files among `downloads` that no brain needs."""
-        return [name for name, file in self._atlas_files.items() if not file.needed]
-
-    @property
-    def _atlas_files(self) -> dict[str, AtlasFile]:
-        if self.atlas is None:
-            return {}
-        return {str(file.path.relative_to(self.atlas.folder)): file for file in atlas_files(self.atlas)}
+    def atlases(self) -> list[UsedAtlas]:
+        """The atlases with what their descriptions say, as the files lie at this moment."""
+        return [UsedAtlas(section, Atlas(**read_yaml(section.description))) for section in self.atlas]
 
     @property
     def start_week(self) -> float:
@@ -97,7 +95,9 @@ class Config(Settings):
     def growth_series(self) -> dict[str, list[str]]:
         """The ids of the brains of each series of growth rates, by its name; none where they are all of one week."""
         kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
-        return growth_series(kinds, {brain.id: brain.week for brain in self.brains}, self.growth.brains)
+        populations = {brain.id: brain.population for brain in self.brains}
+        weeks = {brain.id: brain.week for brain in self.brains}
+        return growth_series(kinds, weeks, self.growth.brains, populations)
 
     @property
     def estimated_from(self) -> str | None:
@@ -107,7 +107,7 @@ class Config(Settings):
     @property
     def age_reference(self) -> list[str]:
         """The ids of the brains that ages are told from; none where they are of too few weeks."""
-        return age_reference(self.brains, self.metrics.age_reference)
+        return age_reference(self.brains, self.metrics.age_reference, self.brain(self.start).population)
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its folding program, where a map goes by the name of its parameter.

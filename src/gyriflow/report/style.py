@@ -27,7 +27,9 @@ REAL_SURFACE_COLOUR = "#EBD6B4"
 MEASURED = "real"
 """The run name of measured brains."""
 REAL_BRAIN, PHANTOM = "real brain", "phantom"
-"""What brains that were not simulated are called."""
+"""What brains that were not simulated are called where their population is not known."""
+SYNTHETIC_NAMES = frozenset((PHANTOM, "simple shape", "sphere", "ellipsoid", "half-ellipsoid", "slab"))
+"""What brains are called that the workflow made itself."""
 _UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
 
 _SETTINGS: dict[Any, Any] = {
@@ -92,7 +94,12 @@ def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool
 
 def synthetic_note(measured: str = PHANTOM) -> str:
     """Returns the words under which a synthetic brain is shown, alone or beside brains that are called `measured`."""
-    return "simulated from a synthetic phantom" if REAL_BRAIN in measured else "synthetic phantom, not a real brain"
+    return "synthetic phantom, not a real brain" if all_synthetic(measured) else "simulated from a synthetic phantom"
+
+
+def all_synthetic(measured: str) -> bool:
+    """Returns whether brains that are called `measured`, several names joined by "or", were all made by the workflow."""
+    return set(measured.split(" or ")) <= SYNTHETIC_NAMES
 
 
 def shown_unit(unit: object) -> str:
