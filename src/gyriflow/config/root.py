@@ -57,12 +57,18 @@ class Config(Settings):
     def measured_name(self, brains: Iterable[str]) -> str:
         """Returns what measured brains of these ids are called in figures and tables: their populations where known.
 
-        Real brains of no known population are a "real brain"; shapes go by their kind where all are of one.
+        Several populations have their weeks with them. Real brains of no known population are a "real brain"; shapes go
+        by their kind where all are of one.
         """
         chosen = [self.brain(name) for name in brains]
+        populations: dict[str, list[float]] = {}
+        for brain in chosen:
+            if not brain.synthetic:
+                populations.setdefault(brain.population or REAL_BRAIN, []).append(brain.week)
+        several = len(populations) > 1
         kinds = sorted({brain.shape.kind for brain in chosen if brain.shape is not None})
         names = [
-            *dict.fromkeys(brain.population or REAL_BRAIN for brain in chosen if not brain.synthetic),
+            *(f"{name} ({_span(weeks)} GW)" if several else name for name, weeks in populations.items()),
             "phantom" if any(brain.source == "phantom" for brain in chosen) else "",
             (kinds[0] if len(kinds) == 1 else "simple shape") if kinds else "",
         ]
@@ -142,3 +148,8 @@ class Config(Settings):
         """Returns the parameters of a run that are curves or maps."""
         values = {name: getattr(self.runs[run], name) for name in VARYING}
         return {name: value for name, value in values.items() if isinstance(value, VaryingSettings)}
+
+
+def _span(weeks: list[float]) -> str:
+    first, last = min(weeks), max(weeks)
+    return f"{first:g}" if first == last else f"{first:g}–{last:g}"

@@ -1,6 +1,7 @@
 """The look that all figures share: sizes for print, fonts, colour-blind-safe colours, headings."""
 
 import math
+import textwrap
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from functools import wraps
@@ -100,6 +101,11 @@ def synthetic_note(measured: str = PHANTOM) -> str:
 def all_synthetic(measured: str) -> bool:
     """Returns whether brains that are called `measured`, several names joined by "or", were all made by the workflow."""
     return set(measured.split(" or ")) <= SYNTHETIC_NAMES
+
+
+def wrapped(text: str, letters: int) -> str:
+    """Returns text with each of its lines broken between words so that it has about so many letters at most."""
+    return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.split("\n"))
 
 
 def shown_unit(unit: object) -> str:
