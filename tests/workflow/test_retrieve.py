@@ -185,7 +185,9 @@ def test_a_narrow_licence_is_accepted_before_anything_is_planned(workflow, serve
     raw = study(workflow.directory, server.url, licence={"name": "own", "terms": "Ask me.", "accept": True})
     refused = workflow.run("retrieve", "--cores", "1", "--configfile", workflow.write("study.yaml", raw))
     assert refused.returncode == 2
-    assert "the licence of far (own) is to be accepted: Ask me. Write `accept_licence: true` if you do" in refused.stderr
+    assert (
+        "the licence of far (own) is to be accepted: Ask me. Write `accept_licence: true` if you do" in refused.stderr
+    )
     assert server.asked == []
     raw["atlas"] = {"file": "atlas.yaml", "accept_licence": True}
     assert workflow.run("-n", "--configfile", workflow.write("study.yaml", raw)).returncode == 0

@@ -49,8 +49,11 @@ def brain_problems(raw: Any, where: str, schemes: Collection[str] = ()) -> list[
     if isinstance(scheme, str) and scheme not in (known := dict.fromkeys([*BUILT_IN_SCHEMES, *schemes])):
         problems.append(f"{where}.scheme: found {scheme!r}; expected one of {', '.join(known)}, or a name of schemes")
     problems += _segmentation_problems(raw, where)
-    meanings = {"scheme": VOLUMES, "image": VOLUMES, "affine_from": VOLUMES, "coordinates": ("hemispheres", "pial")}
-    meanings["population"] = tuple(source for source in SOURCES if source not in ("phantom", "shape"))
+    meanings = {
+        "population": tuple(source for source in SOURCES if source not in ("phantom", "shape")),
+        **dict.fromkeys(("scheme", "image", "affine_from"), VOLUMES),
+        "coordinates": ("hemispheres", "pial"),
+    }
     for key, sources in meanings.items():
         if key in raw and len(given) == 1 and given[0] not in sources:
             problems.append(f"{where}.{key}: has no meaning with {given[0]}; only with {' or '.join(sources)}")

@@ -37,14 +37,12 @@ class MetricsSettings(Settings):
     age_reference: tuple[str, ...] | None = setting(
         None, "",
         "Ids of the measured brains that gestational ages are told from, of five weeks or more. `null`: all that are "
-        "not synthetic (of several populations, that of the start brain), or all phantoms where there are no others; no "
-        "age profile with fewer than five weeks.",
+        "not synthetic (of several populations, that of the start brain), or all phantoms where there are no others; "
+        "no age profile with fewer than five weeks.",
     )  # fmt: skip
 
 
-def age_reference(
-    brains: Sequence[Brain], given: tuple[str, ...] | None, population: str | None = None
-) -> list[str]:
+def age_reference(brains: Sequence[Brain], given: tuple[str, ...] | None, population: str | None = None) -> list[str]:
     """Returns the ids of the brains that ages are told from; none where they are of too few weeks.
 
     Where none are `given` and the real ones are of several populations, those of `population` are taken.

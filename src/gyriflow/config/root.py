@@ -17,7 +17,6 @@ from .schemes import SchemeSettings
 from .surface import SurfaceSettings
 from .varying import VaryingSettings
 
-
 REAL_BRAIN = "real brain"
 """What a measured brain is called whose population is not known."""
 
@@ -31,7 +30,8 @@ class Config(Settings):
     )  # fmt: skip
     atlas: tuple[AtlasSettings, ...] = setting(
         (), "",
-        "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of these.",
+        "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of "
+        "these.",
     )  # fmt: skip
     schemes: dict[str, SchemeSettings] = setting(
         {}, "", "Label schemes by name, beside those that gyriflow has; for the brains' `scheme`."
