@@ -24,8 +24,8 @@ class AtlasSettings(Settings):
     """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` where it has one series).
 
     `atlas: NAME` and `atlas: FILE.yaml` are short for a section with nothing but `name` or `file`; a list of names,
-    files and sections stands for several. Files that are not there are fetched when a stage needs them, and all of them by
-    `./run snakemake --cores 1 retrieve`; a file that exists is never replaced or deleted.
+    files and sections stands for several. Files that are not there are fetched when a stage needs them, and all of
+    them by `./run snakemake --cores 1 retrieve`; a file that exists is never replaced or deleted.
     """
 
     name: str | None = setting(None, "", "An atlas that comes with gyriflow: the name of a folder in `atlases`.")
