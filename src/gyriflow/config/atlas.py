@@ -23,9 +23,9 @@ DOWNLOADS = Path("resources", "atlases")
 class AtlasSettings(Settings):
     """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` where it has one series).
 
-    `atlas: NAME` and `atlas: FILE.yaml` are short for a section with nothing but `name` or `file`; a list of names, files
-    and sections stands for several. Files that are not there are fetched when a stage needs them, and all of them by
-    `./run snakemake --cores 1 retrieve`; a file that exists is never replaced or deleted.
+    `atlas: NAME` and `atlas: FILE.yaml` are short for a section with nothing but `name` or `file`; a list of names,
+    files and sections stands for several. Files that are not there are fetched when a stage needs them, and all of
+    them by `./run snakemake --cores 1 retrieve`; a file that exists is never replaced or deleted.
     """
 
     name: str | None = setting(None, "", "An atlas that comes with gyriflow: the name of a folder in `atlases`.")
@@ -263,8 +263,8 @@ def _week_problems(used: UsedAtlas) -> Iterator[str]:
         weeks = f"week{'s' if len(lacking) > 1 else ''} {_listed(lacking)}"
         chosen = "" if used.settings.series is None else f" ({', '.join(used.series)})"
         yield (
-            f"weeks: {used.atlas.name}{chosen} has no files of {weeks}; it has {_listed(sorted(have))}. A week is never "
-            "rounded"
+            f"weeks: {used.atlas.name}{chosen} has no files of {weeks}; it has {_listed(sorted(have))}. A week is "
+            "never rounded"
         )
 
 

@@ -205,12 +205,13 @@ def _check(path: Path, name: str, sha256: str | None) -> None:
         raise ValueError(f"the SHA-256 {found} instead of {sha256}")
     if sha256 is None and name.endswith((".nii", ".nii.gz", ".gii")):
         import nibabel as nib
+        import numpy as np
 
         try:
             image = nib.load(path)
-            # a NIfTI file is read lazily, a GIFTI file at once
-            if not name.endswith(".gii"):
-                image.dataobj[...]
+            # a GIFTI file is read at once, a NIfTI file lazily
+            if isinstance(image, nib.Nifti1Image):
+                np.asanyarray(image.dataobj)
         except Exception as error:
             raise ValueError(f"a file that cannot be read: {error}") from error
 

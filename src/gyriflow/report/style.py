@@ -100,7 +100,7 @@ def synthetic_note(measured: str = PHANTOM) -> str:
 
 
 def all_synthetic(measured: str) -> bool:
-    """Returns whether brains that are called `measured`, several names joined by "or", were all made by the workflow."""
+    """Returns whether brains called `measured`, several names joined by "or", were all made by the workflow."""
     return set(measured.split(" or ")) <= SYNTHETIC_NAMES
 
 

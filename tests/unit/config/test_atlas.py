@@ -196,9 +196,9 @@ def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
     put(tmp_path / "mine", "Other21_Study1/parcellation.nii.gz", "x/HarvardSTA22_Study1/parcellation.nii.gz")
     (found,) = problems(study(section, "crl-21"), tmp_path)
     assert found == (
-        f"atlas.folder: {tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz is not the file of crl: its SHA-256 is "
-        f"not {known[22]['labels']['sha256']}. Delete it, and it is fetched; or give a changed file as a brain of your "
-        "own under brains"
+        f"atlas.folder: {tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz is not the file of crl: its SHA-256 "
+        f"is not {known[22]['labels']['sha256']}. Delete it, and it is fetched; or give a changed file as a brain of "
+        "your own under brains"
     )
 
 
@@ -242,8 +242,8 @@ def test_a_file_that_neither_lies_there_nor_has_an_address_is_named(tmp_path):
     put(tmp_path, "w21.nii.gz")
     own_atlas(tmp_path)
     assert problems(study("atlas.yaml", "mine-21"), tmp_path) == [
-        f"atlas.weeks: {tmp_path}/resources/atlases/mine/w22.nii.gz is missing and cannot be fetched, as mine has no url "
-        "for it"
+        f"atlas.weeks: {tmp_path}/resources/atlases/mine/w22.nii.gz is missing and cannot be fetched, as mine has no "
+        "url for it"
     ]
 
 
@@ -316,7 +316,8 @@ def test_files_without_known_checksums_are_said(tmp_path):
         (
             ["spina-bifda", {"name": "spina-bifida", "series": "operatd"}],
             [
-                "atlas[0].name: found 'spina-bifda'; did you mean spina-bifida? An atlas.yaml of your own goes under file",
+                "atlas[0].name: found 'spina-bifda'; did you mean spina-bifida? An atlas.yaml of your own goes under "
+                "file",
                 "atlas[1].series: found operatd; spina-bifida has unoperated, operated",
             ],
         ),
