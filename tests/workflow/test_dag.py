@@ -54,7 +54,7 @@ def test_examples_are_planned_from_the_checkout_alone(workflow, example, expecte
     ("example", "expected"),
     [
         ("crl-atlas", {"atlas_file": 9, "pial_from_labels": 9}),
-        ("dhcp-atlas", {"atlas_file": 48, "pial_surface": 16, "pial_from_shape": 16}),
+        ("dhcp-atlas", {"atlas_file": 48, "pial_from_labels": 16, "pial_from_hemispheres": 16}),
     ],
 )
 def test_examples_of_narrow_licences_are_planned_once_these_are_accepted(workflow, example, expected):
