@@ -8,6 +8,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from .atlas_description import Atlas
 from .base import Settings
 from .root import Config
 from .varying import VaryingSettings
@@ -39,7 +40,8 @@ BOUNDS = {"gt": "> {}", "ge": "≥ {}", "lt": "< {}", "le": "≤ {}"}
 def documentation() -> str:
     """Returns the page config/README.md."""
     sections = [_section(name, model) for name, model in _sections(Config, "")]
-    return "\n".join([INTRODUCTION, *sections, _section("varying", VaryingSettings)])
+    described = [_section(name, model) for name, model in _sections(Atlas, "atlas.yaml")]
+    return "\n".join([INTRODUCTION, *sections, _section("varying", VaryingSettings), *described])
 
 
 def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
