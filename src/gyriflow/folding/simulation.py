@@ -111,9 +111,12 @@ class Folding:
         cells = domain.cells[directed]
         normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
         self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
-        self.problem.mesh_moved()
+        part = domain.part
         if self.contact is not None:
             self.contact.mesh_moved()
+            if self.problem.free:
+                part = self.contact.joined(part)
+        self.problem.mesh_moved(part)
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
