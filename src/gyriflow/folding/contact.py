@@ -17,10 +17,10 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError
 from ..geometry.triangles import TriangleMesh, edges, mean_length
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
-from .parameters import FoldingParameters
-from .varying import Maps
 
 Floats = NDArray[np.float64]
 DISTANCE_PER_EDGE = 0.2
@@ -55,7 +55,7 @@ class ContactSettings:
 def contact_settings(parameters: FoldingParameters, maps: Maps) -> ContactSettings:
     """Returns the settings of a run: as given, or from the stiffest cortex."""
     p = parameters
-    stiffest = p.shear_modulus_cortex_pa.range(maps, p.start_week, p.end_week)[1]
+    stiffest = value_range(p.shear_modulus_cortex_pa, maps, p.start_week, p.end_week)[1]
     return ContactSettings(p.contact.stiffness_pa or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm)
 
 

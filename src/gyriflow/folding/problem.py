@@ -17,13 +17,14 @@ from ..mechanics.fissure import contact_energy_density
 from ..mechanics.growth import inverse_growth_tensor
 from ..mechanics.kinematics import deformation_gradient, elastic_deformation
 from ..mechanics.materials import Material
+from ..parameters.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
 from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
 from .rigid import FreeOperator, RigidMotions
 from .tangent import SumOperator, Tangent
-from .zones import LEFT_CONTACT, RIGHT_CONTACT, Zones
+from .zones import Zones
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,8 @@ from scipy.spatial import cKDTree
 from ..errors import InputError, MeshError
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
-from .zones import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES, Zones
+from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES
+from .zones import Zones
 
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
