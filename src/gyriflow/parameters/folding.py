@@ -56,7 +56,8 @@ class Contact(Settings):
         "plane, folds run through each other (the paper); `none`: no contact.",
     )  # fmt: skip
     distance_mm: float | None = setting(
-        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's mean edge.",
+        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's mean edge, and "
+        "no more than the smallest gap at the start.",
         gt=0, le=5,
     )  # fmt: skip
     stiffness_pa: float | None = setting(
