@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-import pymeshlab
 import trimesh
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
+from ..geometry.meshlab import pymeshlab
 from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, vertex_normals
 
 ENVELOPE_RADIUS_MM = 5.0
@@ -117,7 +117,6 @@ def local_gyrification_index(mesh: TriangleMesh, around: Pieces, *, radius_mm: f
     pial = np.bincount(home, face_areas(mesh), len(around.centres))
     _, own = tree.query(mesh.vertices)
     used, back = np.unique(own, return_inverse=True)
-    near = tree.sparse_distance_matrix(cKDTree(around.centres[used]), radius_mm, output_type="coo_matrix").tocoo()
-    # a point is at no distance from itself, which a sparse matrix leaves out
-    shares = [np.bincount(near.col, values[near.row], len(used)) + values[used] for values in (pial, around.areas)]
-    return (shares[0] / shares[1])[back]
+    near = tree.sparse_distance_matrix(cKDTree(around.centres[used]), radius_mm, output_type="ndarray")
+    sums = [np.bincount(near["j"], values[near["i"]], len(used)) for values in (pial, around.areas)]
+    return (sums[0] / sums[1])[back]

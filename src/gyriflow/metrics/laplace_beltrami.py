@@ -22,6 +22,7 @@ DENSE_VERTICES = 600
 DENSE_VERTICES_MANY_MODES = 3000
 """Up to these sizes LAPACK solves the problem as a whole; the second where over a third of all modes are wanted."""
 
+
 @dataclass(frozen=True, eq=False)
 class Modes:
     """The lowest modes of a surface.

@@ -118,9 +118,7 @@ def spectrum(
     )
 
 
-def _band_table(
-    eigenvalues: Floats, band: Ints, power: Floats, edge_length_mm: float, reach: float
-) -> pd.DataFrame:
+def _band_table(eigenvalues: Floats, band: Ints, power: Floats, edge_length_mm: float, reach: float) -> pd.DataFrame:
     limits = band_limits(eigenvalues[1])
     numbers = np.array([np.count_nonzero(band == k) for k in range(BANDS + 1)])
     wavelengths = 2.0 * np.pi / np.sqrt(limits)
