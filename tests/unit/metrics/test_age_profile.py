@@ -8,8 +8,8 @@ import pytest
 
 from gyriflow.config.metrics import LEAST_AGE_WEEKS
 from gyriflow.errors import InputError
-from gyriflow.metrics.age_metrics import comparable_metrics
 from gyriflow.metrics import age_profile as profiles
+from gyriflow.metrics.age_metrics import comparable_metrics
 from gyriflow.metrics.age_profile import LEAST_WEEKS, age_profile_check, week_similarity
 
 WEEKS = np.arange(21.0, 29.0)
