@@ -23,14 +23,11 @@ from collections.abc import Callable
 import igl
 import numpy as np
 import trimesh
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from gyriflow.geometry.triangles import Floats, TriangleMesh, vertex_areas
 from gyriflow.io.surfaces import read_surface
-from gyriflow.metrics.curvature import curvature
-from gyriflow.metrics.gyrification import capped, convex_hull, envelope
-from gyriflow.metrics.laplace_beltrami import laplacian
+from gyriflow.metrics.depth import convex_hull, sulcal_depth
+from gyriflow.metrics.gyrification import capped, envelope
 
 DEPTH_MM = 8.0
 SEMI_AXES_MM = np.array([30.0, 22.0, 18.0])
@@ -39,8 +36,6 @@ CLOSING_MM = (16.0, 14.0, 12.0, 11.0, 10.0, 9.0, 8.0, 6.0, 4.5, 3.0)
 BOTTOM_MM = 12.0
 BEND_MM = 18.0
 """How far the ends of the smooth phantom are bent aside: its inner side is hollow by about 2 mm."""
-DEPTH_POTENTIAL = 0.03
-"""α of the depth potential function in mm⁻², the value of its authors."""
 
 
 def ellipsoid() -> TriangleMesh:
@@ -79,10 +74,7 @@ def banana() -> TriangleMesh:
 
 
 def to(outside: TriangleMesh, mesh: TriangleMesh) -> Floats:
-    signed, *_ = igl.signed_distance(
-        mesh.vertices, outside.vertices, outside.faces, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-    )
-    return np.maximum(-signed, 0.0)
+    return sulcal_depth(mesh, outside)
 
 
 def straight(radius_mm: float) -> Callable[[TriangleMesh], Floats]:
@@ -106,16 +98,6 @@ def geodesic(mesh: TriangleMesh) -> Floats:
     return np.maximum(igl.heat_geodesics_solve(data, np.flatnonzero(to_hull(mesh) < 0.5).astype(np.int32)), 0.0)
 
 
-def depth_potential(mesh: TriangleMesh) -> Floats:
-    """Returns the depth potential function of Boucher et al. 2009, positive inwards, 0 on average."""
-    stiffness, mass = laplacian(mesh)
-    bend = curvature(mesh).mean
-    areas = vertex_areas(mesh)
-    right = -2.0 * (mass @ (bend - np.average(bend, weights=areas)))
-    matrix = sparse.csc_matrix(stiffness + DEPTH_POTENTIAL * mass)
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(right)
-
-
 MEASURES: dict[str, Callable[[TriangleMesh], Floats]] = {
     "envelope 5 mm": straight(5.0),
     "envelope 10 mm": straight(10.0),
@@ -123,7 +105,6 @@ MEASURES: dict[str, Callable[[TriangleMesh], Floats]] = {
     "hull": to_hull,
     "graded": graded,
     "geodesic": geodesic,
-    "depth potential": depth_potential,
 }
 
 
