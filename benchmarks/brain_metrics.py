@@ -36,16 +36,12 @@ def main() -> None:
         volume = read_label_volume(path)
         scheme = label_scheme("spina-bifida-atlas")
         surface = from_labels(volume.labels, volume.affine, scheme, week=float(week), edge_length_mm=options.edge)
-        thickness = None
-        if surface.thickness:
-            thickness = surface.thickness.values_mm.copy()
-            thickness[~surface.thickness.measured] = float("nan")
         clock, cpu = time.perf_counter(), cpu_seconds()
         found = measure_brain(
             surface.whole,
             surface.left,
             surface.right,
-            thickness_mm=thickness,
+            thickness_mm=surface.thickness.measured_mm if surface.thickness else None,
             spangy_modes=options.last_band,
             threads=options.threads,
         )

@@ -1,4 +1,4 @@
-"""The pial surface of a folding run at a week, and its hemispheres: the facets that were theirs at the start."""
+"""The pial surface of a folding run at a week, its hemispheres (the facets that were theirs) and its thickness."""
 
 import numpy as np
 
@@ -6,7 +6,8 @@ from gyriflow.folding.regions import LEFT
 from gyriflow.geometry.triangles import TriangleMesh, submesh
 from gyriflow.io.frames import read_positions
 from gyriflow.io.regions import read_regions
-from gyriflow.io.surfaces import write_surface
+from gyriflow.io.surfaces import write_surface, write_vertex_maps
+from gyriflow.metrics.thickness import depth_of_weight, simulated_thickness
 from gyriflow.step import step
 
 output = snakemake.output
@@ -20,3 +21,6 @@ with step(snakemake.log[0]):
         ("right", ~on_left, "CortexRight"),
     ):
         write_surface(output[name], submesh(surface, part)[0], structure)
+    if output.get("thickness"):
+        depth, pial = depth_of_weight(regions.fields["cortex_weight"]), submesh(surface, np.ones_like(on_left))[0]
+        write_vertex_maps(output.thickness, {"thickness_mm": simulated_thickness(regions.mesh, depth, positions, pial)})

@@ -24,4 +24,6 @@ with step(snakemake.log[0], *files[:2]):
     write_surface(output.stl, surface.whole)
     if surface.thickness:
         write_vertex_maps(output.thickness, {"cortical thickness (mm)": surface.thickness.values_mm})
+    if surface.thickness and output.get("measured_thickness"):
+        write_vertex_maps(output.measured_thickness, {"thickness_mm": surface.thickness.measured_mm})
     write_json(output.report, {"week": params.week, "fissure_x_mm": surface.fissure_x_mm, **surface.report})

@@ -10,8 +10,21 @@ from ..geometry.layers import layer_thickness
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, TriangleMesh
 
+STEEPNESS = 10.0
+"""Of the cortical weight in the folding model."""
+
 SAME_POINT_MM = 1e-3
 """Surfaces are written in single precision: vertices that are nearer are the same."""
+
+
+def depth_of_weight(weight: Floats) -> Floats:
+    """Returns the depth in cortical thicknesses, d/H, at which the cortical weight has (m,) values.
+
+    The inverse of the folding model's w = 1/(1 + exp(10 (d/H − 1))), which is ½ at the border of cortex and core.
+    """
+    # beyond three thicknesses the weight is written as 0
+    within = np.clip(weight, 1e-9, 1.0 - 1e-9)
+    return 1.0 + np.log(1.0 / within - 1.0) / STEEPNESS
 
 
 def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats, pial: TriangleMesh) -> Floats:
@@ -27,8 +40,8 @@ def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats
     start
         The mesh of the start, with m vertices.
     depth : (m,) float
-        Distance to the pial surface at the start over the cortical thickness there (a number or a map): 1 at the
-        border.
+        Distance to the pial surface at the start over the cortical thickness there: 1 at the border. As
+        `depth_of_weight` gives it from the field `cortex_weight` of a run's regions.
     positions : (m, 3) float
         Present positions of the vertices in mm.
     pial

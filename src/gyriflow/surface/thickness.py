@@ -44,6 +44,11 @@ class Thickness:
     measured: Mask
     report: dict[str, Any]
 
+    @property
+    def measured_mm(self) -> Floats:
+        """The (n,) thickness at each vertex, NaN where it was not measured."""
+        return np.where(self.measured, self.values_mm, np.nan)
+
 
 def cortical_thickness(
     pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats, smoothing_voxels: float

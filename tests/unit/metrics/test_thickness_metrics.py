@@ -7,10 +7,11 @@ import trimesh
 from scipy.spatial import Delaunay
 
 from gyriflow.errors import InputError, MeshError
+from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
 from gyriflow.metrics.regions import asymmetry, region_metrics
-from gyriflow.metrics.thickness import at_part, simulated_thickness, thickness_metrics
+from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness, thickness_metrics
 
 RADIUS, CORTEX = 20.0, 2.5
 
@@ -31,6 +32,12 @@ def depth_of(mesh: TetrahedralMesh) -> np.ndarray:
 def test_thickness_at_the_start_is_the_cortex(ball) -> None:
     mesh, pial = ball
     np.testing.assert_allclose(simulated_thickness(mesh, depth_of(mesh), mesh.vertices, pial), CORTEX, atol=0.15)
+
+
+def test_depth_from_the_weight_of_the_model() -> None:
+    depth = np.linspace(0, 2.5, 26)
+    np.testing.assert_allclose(depth_of_weight(cortical_weight(1.5 * depth, 1.5)), depth, atol=1e-6)
+    assert depth_of_weight(np.array([0.0]))[0] > 2.5
 
 
 def test_the_border_is_carried_with_the_tissue(ball) -> None:
