@@ -159,7 +159,7 @@ rule folded_surface:
         mem_mb=2000,
         runtime=10,
     params:
-        code=code("folding"),
+        code=code("folding", "metrics"),
     script:
         "../scripts/folded_surface.py"
 
