@@ -79,6 +79,8 @@ rule cortical_thickness:
         report=rules.pial_from_labels.output.report,
     output:
         thickness=f"{BRAIN}/surface/thickness.shape.gii",
+        # not a number where it could not be measured
+        measured=f"{BRAIN}/surface/measured_thickness.shape.gii",
         report=f"{BRAIN}/surface/thickness.json",
     log:
         f"{BRAIN}/logs/cortical_thickness.log",

@@ -33,10 +33,13 @@ from .style import (
 METRIC_TITLES = {
     "volume": "volume",
     "area": "pial area",
-    "gyrification_index": "gyrification index, convex hull",
-    "gyrification_index_envelope": "gyrification index, envelope",
+    "gyrification_index": "gyrification index, hemispheres' hulls",
+    "gyrification_index_envelope": "gyrification index, envelopes",
     "mean_curvedness": "mean curvedness",
     "mean_shape_index": "mean shape index",
+    "mean_sulcal_depth": "mean depth below the hull",
+    "folding_index": "folding index",
+    "mean_thickness": "mean cortical thickness",
 }
 """The metrics of the overview and their titles."""
 HEMISPHERE_LINES: Mapping[str, Literal["-", "--", ":"]] = {"whole": "-", "left": "--", "right": ":"}

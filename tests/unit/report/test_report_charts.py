@@ -44,6 +44,7 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
                 "band": list(power),
                 "relative_power": [factor * value for value in power.values()],
                 "complete": complete,
+                "denominator_complete": complete,
                 "resolved": True,
             }
         )
