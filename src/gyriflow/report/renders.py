@@ -155,7 +155,7 @@ LABELS = {name: measure.label for name, measure in SHAPE_MEASURES.items()} | {
 
 
 def _scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Returns the colour scale of a quantity; without limits it ends at a percentile, since a few vertices are sharp."""
+    """Returns the colour scale of a quantity; without limits it ends below a few sharp vertices."""
     if quantity == "contact_pressure_pa":
         touching = values[values > 0]
         return colour_scale("YlOrRd", 0.0, float(np.percentile(touching, 98)) if len(touching) else 1.0, cut=True)
