@@ -210,7 +210,7 @@ rule overlay_figure:
         **figure(
             f"{BRAIN}/figures/overlay",
             "surface over the image",
-            "overlay.rst",
+            "figure.rst",
             "Brains and growth",
             brain="{brain}",
         ),
@@ -223,6 +223,11 @@ rule overlay_figure:
     conda:
         ENVIRONMENT
     params:
+        caption=(
+            "Outline of the pial surface of *{brain}* over the image that its labels belong to, in a "
+            "coronal and an axial plane through the middle and a sagittal plane through the right "
+            "hemisphere."
+        ),
         dpi=CONFIG.report.dpi,
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
         title=lambda wildcards: f"{wildcards.brain}, {CONFIG.brain(wildcards.brain).week:g} GW",
