@@ -48,6 +48,7 @@ class Waved:
     growth: float
     steps: int
     memory: float = 0.0
+    scheme: str = "implicit"
 
     @property
     def width_mm(self) -> float:
@@ -64,15 +65,15 @@ class Waved:
 
     def expected(self) -> Floats:
         """Returns the (steps + 1, waves) heights over those at the start, from `modes`."""
-        return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps)
+        return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps, self.scheme)
 
     def parameters(self) -> FoldingParameters:
         """Returns the parameters of the run."""
         memory_gw = self.memory / RATE_PER_S / SECONDS_PER_GW
         values = {
-            "start_week": 0.0,
-            "end_week": 1e3,
-            "output_weeks": [0.0, 1e3],
+            "start_week": 20.0,
+            "end_week": 40.0,
+            "output_weeks": [20.0, 40.0],
             "fissure_x_mm": self.width_mm / 2,
             "thickness_mm": 1.0,
             "shear_modulus_core_pa": 300.0,
@@ -80,6 +81,7 @@ class Waved:
             "growth_rate_per_s": RATE_PER_S,
             "step_s": self.growth / RATE_PER_S,
             "stress_memory_gw": "infinite" if np.isinf(memory_gw) else memory_gw,
+            "time_scheme": self.scheme,
             "support": "box",
             "contact": {"kind": "none"},
             "no_growth": {"kind": "none"},
