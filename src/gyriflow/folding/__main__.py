@@ -29,9 +29,12 @@ from .run import run
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
 from .zones import zones_of_run
 
-PREDICTED_MIB_PER_RANK = 180
-PREDICTED_KIB_PER_TET = 3.0
-"""Memory of a solve, from runs of 60 k to 450 k elements (see summary.json of any run)."""
+MIB_PER_RANK = 250.0
+KIB_PER_TET, KIB_PER_TET_AND_RANK = 0.9, 1.6
+"""Peak memory of a solve with linear elements: a part of the mesh, and all positions and searches on every rank. From
+runs of 60 k to 1 M elements on one rank and on two (docs/benchmarks.md), which are met within 10 %."""
+GLOBAL_CONTACT = 1.3
+"""Factor on what the elements take, where folds press on each other up to 36 GW."""
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -79,7 +82,9 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     )
     frame = per_vertex * len(mesh.vertices) + per_element * len(mesh.tets)
     stretch = 8 * 6 * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
-    checkpoint = 2 * (8 * 9 * len(mesh.vertices) + stretch)
+    # positions and two displacements, and two velocities where steps are made of them
+    vectors = 3 if parameters.time_scheme == "implicit" else 5
+    checkpoint = 2 * (8 * 3 * vectors * len(mesh.vertices) + stretch)
     needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 16 * len(mesh.tets)
     free = shutil.disk_usage(out).free
     if free < needed:
@@ -92,6 +97,12 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
         )
 
 
+def predicted_memory_mib(tets: int, ranks: int, contact: str) -> float:
+    """Returns the peak memory in MiB, over all ranks, that a run with linear elements is likely to take."""
+    per_tet = KIB_PER_TET + KIB_PER_TET_AND_RANK * ranks
+    return MIB_PER_RANK * ranks + per_tet * (GLOBAL_CONTACT if contact == "global" else 1.0) * tets / 1024
+
+
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Reads, checks, prints what is to be solved, and solves it."""
     parameters = read_parameters(arguments.params)
@@ -101,7 +112,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     if comm.rank == 0:
         require_maps(parameters, maps, len(mesh.vertices))
         report = zone_report(mesh, zones, float(np.median(parameters.thickness_at(parameters.start_week, maps))))
-        memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024
+        memory = predicted_memory_mib(len(mesh.tets), comm.size, parameters.contact.kind)
         say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")
         for name in ZONE_NAMES:
             zone = report["zones"][name]
