@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.crossings import crossing_faces
+from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
 from ..geometry.triangles import TriangleMesh, area, face_areas, mean_edge_length, signed_volume
 from .fidelity import gap_kept, gap_summary, gap_walls, surface_distance
@@ -17,8 +18,11 @@ OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
 
 
 def radius_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one."""
-    a, b, c, d = mesh.vertices[mesh.tets].transpose(1, 0, 2)
+    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
+
+    Of quadratic elements they are those of the corners, see `jacobian_ratios` for their sides.
+    """
+    a, b, c, d = mesh.vertices[mesh.corners].transpose(1, 0, 2)
     p, q, r = b - a, c - a, d - a
     volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
     surface2 = sum(np.linalg.norm(np.cross(x, y), axis=1) for x, y in ((p, q), (q, r), (r, p), (q - p, r - p)))
@@ -30,9 +34,19 @@ def radius_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     return 6 * volume6**2 / np.maximum(surface2 * numerator, np.finfo(float).tiny)
 
 
+def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
+    """Returns for each of (m,) elements a lower bound of the determinant of its map, over the mean.
+
+    It is 1 for straight sides with nodes on their middles, and positive only where the element folds over nowhere.
+    """
+    if mesh.order == 1:
+        return np.ones(len(mesh.tets))
+    return lower_bounds(mesh.vertices, mesh.tets) / (6 * signed_volumes(mesh))
+
+
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Returns the (m, 6) angles in degrees between the faces at each edge."""
-    corner = mesh.vertices[mesh.tets]
+    """Returns the (m, 6) angles in degrees between the faces at each edge, as they are between the corners."""
+    corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
     for i, ((a, b), (c, d)) in enumerate(zip(EDGES, OPPOSITE, strict=True)):
         edge = corner[:, b] - corner[:, a]
@@ -43,7 +57,7 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
 
 
 def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
-    """Returns per element radius_ratio, min_dihedral_deg, max_dihedral_deg and volume_mm3."""
+    """Returns per element radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3 and jacobian_ratio."""
     angles = dihedral_angles(mesh)
     return pd.DataFrame(
         {
@@ -51,27 +65,31 @@ def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
             "min_dihedral_deg": angles.min(axis=1),
             "max_dihedral_deg": angles.max(axis=1),
             "volume_mm3": signed_volumes(mesh),
+            "jacobian_ratio": jacobian_ratios(mesh),
         }
     )
 
 
 def elements_through(mesh: TetrahedralMesh, thickness_mm: float) -> float:
-    """Returns the elements through a layer below the surface: its thickness over the mean edge length in it.
+    """Returns the linear elements through a layer below the surface: its thickness over the mean edge length in it.
+
+    A quadratic element counts as two, since that many nodes follow each other along its edges.
 
     Those elements count whose centroid lies within `thickness_mm` of a vertex of the surface.
     """
     outer = np.unique(boundary_faces(mesh)[0])
-    depth = cKDTree(mesh.vertices[outer]).query(mesh.vertices[mesh.tets].mean(axis=1))[0]
-    corner = mesh.vertices[mesh.tets[depth <= thickness_mm]]
+    depth = cKDTree(mesh.vertices[outer]).query(mesh.vertices[mesh.corners].mean(axis=1))[0]
+    corner = mesh.vertices[mesh.corners[depth <= thickness_mm]]
     lengths = [np.linalg.norm(corner[:, b] - corner[:, a], axis=1) for a, b in EDGES]
-    return float(thickness_mm / np.mean(lengths))
+    return float(mesh.order * thickness_mm / np.mean(lengths))
 
 
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
     """Returns counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
     `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
-    that of the volume, relative to the one inside it; `gap_mm` holds the gaps of both, and `gap_kept` the share of the
+    that of the volume, relative to the one inside it; of quadratic elements both are taken on triangles between the nodes;
+    `gap_mm` holds the gaps of both, and `gap_kept` the share of the
     given one's gaps that the mesh leaves open, None where it has none (see `fidelity`). `histogram` holds for radius
     ratio, dihedral angles and volume the edges of the classes and the number of elements in each.
     """
@@ -86,6 +104,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "volume_mm3": 10.0 ** (np.arange(*_tenths_of_decades(volume)) / 10),
     }
     return {
+        "order": mesh.order,
         "tets": len(mesh.tets),
         "vertices": len(mesh.vertices),
         "pial_faces": len(own.faces),
@@ -104,6 +123,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "min_dihedral_deg": float(quality["min_dihedral_deg"].min()),
         "max_dihedral_deg": float(quality["max_dihedral_deg"].max()),
         "min_volume_mm3": float(volume.min()),
+        "min_jacobian_ratio": float(quality["jacobian_ratio"].min()),
         "histogram": {
             name: {"edges": edges.tolist(), "counts": np.histogram(quality[name], edges)[0].tolist()}
             for name, edges in classes.items()
