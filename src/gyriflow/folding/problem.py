@@ -6,6 +6,8 @@ With `domain` and `block_matrix`, the only files that use dolfinx: what differs 
 from dataclasses import dataclass
 from typing import Protocol
 
+import basix
+import basix.ufl
 import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
@@ -22,6 +24,7 @@ from ..units import M_PER_MM
 from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
+from .points import IntegrationPoints
 from .rigid import FreeOperator, RigidMotions
 from .tangent import SumOperator, Tangent
 from .zones import LEFT_CONTACT, RIGHT_CONTACT, Zones
@@ -35,6 +38,12 @@ class Material:
 
     poisson_ratio: float
     penalty_pa_per_m: float
+
+
+QUADRATURE_DEGREE = {1: 1, 2: 4}
+"""Degree of integration in elements by their order."""
+FACET_DEGREE = {1: 2, 2: 4}
+"""Degree of integration on facets by the order of the elements."""
 
 
 class Contribution(Protocol):
@@ -66,7 +75,7 @@ class Problem:
     remembers_stress
         Whether the present mesh may be stretched elastically, see `set_stretch`.
     quadrature_degree
-        1 takes stiffness and growth at the centre of each element; higher degrees take them as linear in it.
+        Degree of the polynomials that are integrated exactly; None takes that of `QUADRATURE_DEGREE`.
 
     Attributes
     ----------
@@ -76,6 +85,8 @@ class Problem:
         Further parts of the energy.
     free : bool
         Whether nothing holds the body.
+    points : IntegrationPoints
+        Where stiffness, growth, normals and kept stretch are taken: q points in each element.
     """
 
     def __init__(
@@ -84,29 +95,30 @@ class Problem:
         zones: Zones,
         material: Material,
         *,
-        quadrature_degree: int = 1,
+        quadrature_degree: int | None = None,
         remembers_stress: bool = False,
     ) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
         mesh = domain.mesh
         self.u = dolfinx.fem.Function(domain.space)
-        field = ("DG", 0) if quadrature_degree == 1 else ("Lagrange", 1)
-        space = dolfinx.fem.functionspace(mesh, field)
-        self._mu, self._dg, self._dr = (dolfinx.fem.Function(space) for _ in range(3))
-        self._N = dolfinx.fem.Function(dolfinx.fem.functionspace(mesh, ("DG", 0, (3,))))
-        self._by_cell = quadrature_degree == 1
+        degree = quadrature_degree or QUADRATURE_DEGREE[domain.order]
+        places, weights = basix.make_quadrature(basix.CellType.tetrahedron, degree)
+        barycentric = np.column_stack([1 - places.sum(axis=1), places])
+        self.points = IntegrationPoints(domain.order, barycentric, weights / weights.sum())
+        self._mu, self._dg, self._dr = (self._field_at_points(degree, ()) for _ in range(3))
+        self._N = self._field_at_points(degree, (3,))
 
         ratio = dolfinx.fem.Constant(mesh, bulk_to_shear_ratio(material.poisson_ratio))
         penalty = dolfinx.fem.Constant(mesh, material.penalty_pa_per_m)
         planes = [dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm]
         tags = domain.local_facets(zones.facets, zones.facet_zone)
-        dx = ufl.dx(metadata={"quadrature_degree": quadrature_degree})
-        ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": 2})
+        dx = ufl.dx(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
+        ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
         F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
         if remembers_stress:
-            self._V = dolfinx.fem.Function(dolfinx.fem.functionspace(mesh, ("DG", 0, (3, 3))))
+            self._V = self._field_at_points(degree, (3, 3))
             Fe = elastic_deformation(F * self._V, Fg_inverse)
             # counted per volume of the state without stress
             energy = strain_energy_density(Fe, self._mu, ratio * self._mu) / ufl.det(self._V) * dx
@@ -134,6 +146,11 @@ class Problem:
         self.vector = self.u.x.petsc_vec
         self.mesh_moved()
 
+    def _field_at_points(self, degree: int, shape: tuple[int, ...]) -> dolfinx.fem.Function:
+        """Returns a field with values at the integration points alone."""
+        element = basix.ufl.quadrature_element("tetrahedron", shape, scheme="default", degree=degree)
+        return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
+
     def mesh_moved(self) -> None:
         """Takes note of a mesh that has been placed anew."""
         self._motions = RigidMotions(self.domain, self.domain.part) if self.free else None
@@ -152,28 +169,18 @@ class Problem:
         return RigidMotions(self.domain, np.zeros_like(self.domain.part)).null_space(self.vector)
 
     def set_layers(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
-        """Sets shear modulus (Pa) and growth increments at the local nodes, and the unit normals of the local cells."""
-        for function, nodal in ((self._mu, mu), (self._dg, dg), (self._dr, dr)):
-            if self._by_cell:
-                function.x.array[function.function_space.dofmap.list[:, 0]] = nodal[self.domain.cells].mean(axis=1)
-            else:
-                function.x.array[function.function_space.dofmap.list] = nodal[self.domain.cells]
-        self._N.x.array.reshape(-1, 3)[self._N.function_space.dofmap.list[:, 0]] = normals
+        """Sets smooth layers: shear modulus (Pa) and growth increments (k,) at the local nodes, normals (c, 3) of cells."""
+        at_points = (nodal[self.domain.cells] @ self.points.smooth.T for nodal in (mu, dg, dr))
+        self.set_layers_at_points(*at_points, np.repeat(normals[:, None], len(self.points.weights), axis=1))
 
-    @property
-    def growth(self) -> tuple[Floats, Floats, Floats]:
-        """Growth increments dg and dr (c,) and unit normals (c, 3) of the local cells."""
-        dg, dr = (values.x.array[values.function_space.dofmap.list].mean(axis=1) for values in (self._dg, self._dr))
-        return dg, dr, self._N.x.array.reshape(-1, 3)[self._N.function_space.dofmap.list[:, 0]]
-
-    @property
-    def shear_modulus(self) -> Floats:
-        """The (c,) shear moduli in Pa of the local cells."""
-        return self._mu.x.array[self._mu.function_space.dofmap.list].mean(axis=1)
+    def set_layers_at_points(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
+        """Sets shear modulus (Pa) and growth increments (c, q), and unit normals (c, q, 3), at the integration points."""
+        for function, values in ((self._mu, mu), (self._dg, dg), (self._dr, dr), (self._N, normals)):
+            set_at_points(function, values)
 
     def set_stretch(self, V: Floats) -> None:
-        """Sets the elastic left stretch (c, 3, 3) of the local cells that the present mesh has kept."""
-        self._V.x.array.reshape(-1, 9)[self._V.function_space.dofmap.list[:, 0]] = V.reshape(-1, 9)
+        """Sets the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
+        set_at_points(self._V, V)
 
     @property
     def displacement(self) -> Floats:
@@ -249,10 +256,19 @@ class Problem:
         return self.vector.duplicate()
 
     def volume_ratios(self) -> Floats:
-        """Returns det F of the (c,) local elements."""
-        current = self.domain.local(self.domain.positions)
-        return self.domain.cell_volumes(current + self.displacement) / self.domain.volumes
+        """Returns det F of the local elements: (c, 1), or (c, 10) at the nodes of quadratic ones."""
+        return self.domain.volume_ratios(self._moved())
 
     def smallest_volume_ratio(self) -> float:
-        """Returns the smallest det F over all elements: positive where no element is inverted."""
-        return self.domain.minimum(self.volume_ratios())
+        """Returns a number that det F is nowhere below: positive only where no element is turned inside out anywhere."""
+        return self.domain.smallest_volume_ratio(self._moved())
+
+    def _moved(self) -> Floats:
+        """Returns the (k, 3) positions in m of the local nodes after the displacement."""
+        return np.asarray(self.domain.local(self.domain.positions) + self.displacement)
+
+
+def set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:
+    """Gives a field at integration points its (c, q, ...) values."""
+    places = field.function_space.dofmap.list
+    field.x.array.reshape(-1, field.function_space.dofmap.bs)[places] = values.reshape(*places.shape, -1)

@@ -16,7 +16,7 @@ from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
-from .layers import WEIGHT_REACH, PialSearch, layers_at
+from .layers import WEIGHT_REACH, PialSearch, layers_at, normals_between
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError
 from .output import say
@@ -27,6 +27,8 @@ from .varying import Maps
 from .zones import Zones
 
 Floats = NDArray[np.float64]
+AtPoints = tuple[Floats, Floats, Floats, Floats]
+"""Shear modulus in Pa and growth increments, (c, q), and unit normals, (c, q, 3), at the integration points."""
 NO_GROWTH = 1e-10
 """Growth increment of a step that counts as none, a hundred-millionth of what the cortex grows."""
 STEPS_BEFORE_GROWING = 4
@@ -56,7 +58,7 @@ class Folding:
         parameters: FoldingParameters,
         maps: Maps | None = None,
         *,
-        quadrature_degree: int = 1,
+        quadrature_degree: int | None = None,
     ) -> None:
         self.parameters = parameters
         self.zones = zones
@@ -98,19 +100,42 @@ class Folding:
         week = p.start_week + (time_s + step_s / 2) / SECONDS_PER_GW
         reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
         search = PialSearch(domain.positions, self.zones.cortex_facets)
-        nodes = domain.local(domain.positions)
-        to_vertex, nearest = search.nearest(nodes)
-        distance = search.distance(nodes, reach, to_vertex) * MM_PER_M
-        layers = layers_at(distance, self._growth, p, self._local_maps, week, step_s)
-        # the direction matters only where growth differs along and across it
-        directed = np.abs(layers.dg - layers.dr)[domain.cells].max(axis=1) > NO_GROWTH
-        normals = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
-        cells = domain.cells[directed]
-        normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
-        self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
+        at_points = self._linear_layers if domain.order == 1 else self._quadratic_layers
+        self.problem.set_layers_at_points(*at_points(search, reach, week, step_s))
         self.problem.mesh_moved()
         if self.contact is not None:
             self.contact.mesh_moved()
+
+    def _linear_layers(self, search: PialSearch, reach: float, week: float, step_s: float) -> AtPoints:
+        """Returns layers that are worked out at the nodes, with one normal for each element."""
+        nodes, cells = self.domain.local(self.domain.positions), self.domain.cells
+        to_vertex, nearest = search.nearest(nodes)
+        distance = search.distance(nodes, reach, to_vertex) * MM_PER_M
+        layers = layers_at(distance, self._growth, self.parameters, self._local_maps, week, step_s)
+        # the direction matters only where growth differs along and across it
+        directed = np.abs(layers.dg - layers.dr)[cells].max(axis=1) > NO_GROWTH
+        normals = np.tile([0.0, 0.0, 1.0], (len(cells), 1))
+        normals[directed] = search.normals_from(nodes[cells[directed]].mean(axis=1), nearest[cells[directed]])
+        points = self.problem.points
+        mu, dg, dr = (values[cells] @ points.smooth.T for values in (layers.mu, layers.dg, layers.dr))
+        return mu, dg, dr, np.repeat(normals[:, None], len(points.weights), axis=1)
+
+    def _quadratic_layers(self, search: PialSearch, reach: float, week: float, step_s: float) -> AtPoints:
+        """Returns layers that are worked out at the integration points, from the distance that is quadratic between nodes.
+
+        So the cortical weight may fall from 1 to 0 within an element. What jumps between nodes, growth and maps, is linear
+        between them.
+        """
+        nodes, cells, points = self.domain.local(self.domain.positions), self.domain.cells, self.problem.points
+        to_pial, at_nodes = search.distance_and_normals(nodes, reach)
+        distance = np.maximum(to_pial[cells] @ points.smooth.T, 0.0) * MM_PER_M
+        growth = self._growth[cells] @ points.bounded.T
+        maps = {name: values[cells] @ points.bounded.T for name, values in self._local_maps.items()}
+        layers = layers_at(distance, growth, self.parameters, maps, week, step_s)
+        directed = np.abs(layers.dg - layers.dr).max(axis=1) > NO_GROWTH
+        normals = np.tile([0.0, 0.0, 1.0], (*distance.shape, 1))
+        normals[directed] = normals_between(at_nodes[cells[directed]], points.smooth, points.bounded)
+        return layers.mu, layers.dg, layers.dr, normals
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""

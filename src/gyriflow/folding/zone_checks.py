@@ -8,6 +8,8 @@ from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
 from .zones import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES, Zones
 
+NEEDED_THROUGH_CORTEX = {1: (2, "two elements"), 2: (1, "one quadratic element")}
+"""Elements through the cortex by their order, below which a user is warned."""
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
 
@@ -31,6 +33,7 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
         "clamped_share": {
             side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
         },
+        "order": mesh.order,
         "growing_vertices": int((zones.growth > 0).sum()),
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
         "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
@@ -40,9 +43,9 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
 def zone_warnings(report: dict) -> list[str]:
     """Returns what a user should know of the zones, from their report, before trusting a run."""
     warnings = []
-    through = report["elements_through_cortex"]
-    if through < 2:
-        warnings.append(f"fewer than two elements through the cortex ({through:.2f}): folds may be mesh noise")
+    through, (needed, name) = report["elements_through_cortex"], NEEDED_THROUGH_CORTEX[report["order"]]
+    if through < needed:
+        warnings.append(f"fewer than {name} through the cortex ({through:.2f}): folds may be mesh noise")
     areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
     share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
     if share > MUCH_BETWEEN_PLANES:
@@ -55,11 +58,11 @@ def zone_warnings(report: dict) -> list[str]:
 
 def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
     """Returns the mean edge length in mm of the elements whose centroid lies in the cortex."""
-    centroids = mesh.vertices[mesh.tets].mean(axis=1)
+    centroids = mesh.vertices[mesh.corners].mean(axis=1)
     depth = cKDTree(mesh.vertices[np.unique(zones.cortex_facets)]).query(centroids)[0]
-    cortex = mesh.tets[depth <= thickness_mm]
+    cortex = mesh.corners[depth <= thickness_mm]
     if not len(cortex):
-        cortex = mesh.tets
+        cortex = mesh.corners
     pairs = cortex[:, [0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3]].reshape(-1, 2)
     return mean_length(mesh.vertices, pairs)
 

@@ -143,6 +143,12 @@ def whole_faces(triangles: NDArray[np.integer], order: int) -> NDArray[np.intege
     return triangles.reshape(-1, PIECES_OF_ORDER[2], 3)[:, [0, 1, 2], [0, 1, 2]]
 
 
+def on_whole_faces(chosen: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
+    """Returns which of the (f,) triangles of `boundary_faces` belong to a face of which all triangles are chosen."""
+    pieces = PIECES_OF_ORDER[order]
+    return np.repeat(chosen.reshape(-1, pieces).all(axis=1), pieces)
+
+
 def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
     """Returns the outward surface of the mesh and its vertices' indices in the mesh."""
     faces, _ = boundary_faces(mesh)

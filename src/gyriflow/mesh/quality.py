@@ -71,9 +71,7 @@ def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
 
 
 def elements_through(mesh: TetrahedralMesh, thickness_mm: float) -> float:
-    """Returns the linear elements through a layer below the surface: its thickness over the mean edge length in it.
-
-    A quadratic element counts as two, since that many nodes follow each other along its edges.
+    """Returns the elements through a layer below the surface: its thickness over the mean edge length in it.
 
     Those elements count whose centroid lies within `thickness_mm` of a vertex of the surface.
     """
@@ -81,7 +79,7 @@ def elements_through(mesh: TetrahedralMesh, thickness_mm: float) -> float:
     depth = cKDTree(mesh.vertices[outer]).query(mesh.vertices[mesh.corners].mean(axis=1))[0]
     corner = mesh.vertices[mesh.corners[depth <= thickness_mm]]
     lengths = [np.linalg.norm(corner[:, b] - corner[:, a], axis=1) for a, b in EDGES]
-    return float(mesh.order * thickness_mm / np.mean(lengths))
+    return float(thickness_mm / np.mean(lengths))
 
 
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
