@@ -7,9 +7,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.problem import Material, Problem
+from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT, Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.mechanics.materials import NeoHookean
 
 from .manufactured import STRETCH
 
@@ -36,7 +37,7 @@ def problem_of(zone_of, comm: MPI.Comm, uniform: bool) -> Problem:
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, zone_of(mesh.vertices[facets].mean(axis=1)), np.ones(len(mesh.vertices)), 0.0, (-3.2, 3.2))
     domain = Domain(comm, mesh)
-    problem = Problem(domain, zones, Material(0.45, 5e5), remembers_stress=True)
+    problem = Problem(domain, zones, NeoHookean(0.45), penalty_pa_per_m=5e5, remembers_stress=True)
     x = 0 if uniform else domain.local(domain.positions)[:, 2] / (SIDE_MM * 1e-3)
     ones, cells = np.ones(len(domain.vertex_of_node)), len(domain.cells)
     problem.set_layers(1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones, np.tile([1 / 3, 2 / 3, 2 / 3], (cells, 1)))

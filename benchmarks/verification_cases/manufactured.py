@@ -16,9 +16,10 @@ from petsc4py import PETSc
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-from gyriflow.folding.problem import Material, Problem
+from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import CLAMPED, Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.mechanics.materials import NeoHookean
 
 Floats = NDArray[np.float64]
 
@@ -116,7 +117,7 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Errors:
     zones = Zones(facets, np.full(len(facets), CLAMPED), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
     domain = Domain(comm, mesh)
     kept = case == STRETCHED
-    problem = Problem(domain, zones, Material(POISSON_RATIO, 1.0), remembers_stress=kept)
+    problem = Problem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=kept)
 
     side = SIDE_MM * 1e-3
     nodes = domain.local(domain.positions) / side

@@ -5,12 +5,14 @@ from mpi4py import MPI
 from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.problem import Material, Problem
+from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT, Zones
 from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.mechanics.materials import NeoHookean
 
 COMM = MPI.COMM_WORLD
-MATERIAL = Material(poisson_ratio=0.45, penalty_pa_per_m=5e5)
+MATERIAL = NeoHookean(poisson_ratio=0.45)
+PENALTY_PA_PER_M = 5e5
 
 
 def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
@@ -38,7 +40,7 @@ def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=No
 def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=1):
     """Returns a problem with layers that are uniform, or nodal functions of the position in m."""
     domain = Domain(COMM, mesh)
-    problem = Problem(domain, zones, MATERIAL, quadrature_degree=degree)
+    problem = Problem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M, quadrature_degree=degree)
     x = domain.local(domain.positions)
 
     def nodal(value):

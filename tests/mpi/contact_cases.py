@@ -164,9 +164,9 @@ def test_the_energy_falls_in_every_step_of_newtons_method(monkeypatch):
     solver = NewtonSolver(problem, NewtonSettings(1e-8, 1e-6, max_newton=60), residual_floor=0.0)
     advance, energies = solver._advance, []
 
-    def recorded(norm):
+    def recorded(iterate, **known):
         energies.append(problem.energy())
-        reached = advance(norm)
+        reached = advance(iterate, **known)
         energies.append(problem.energy())
         return reached
 

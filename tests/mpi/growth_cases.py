@@ -5,7 +5,10 @@ import pytest
 from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
 
 from gyriflow.folding.domain import Domain
+from gyriflow.folding.parameters import parameters_from
+from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.tetrahedra import signed_volumes
+from gyriflow.mechanics.materials import MATERIALS
 
 
 def test_isotropic_growth_of_a_free_body_is_free_of_stress():
@@ -51,6 +54,24 @@ def test_energy_of_a_known_stretch():
     bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
     density = 500.0 * (3.44 * 1.2 ** (-2 / 3) - 3) + bulk / 2 * 0.04
     assert problem.energy() == pytest.approx(density * 288e-9, rel=1e-12)
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_a_run_has_the_material_that_it_names(material):
+    # Fe = diag(1.2, 1, 1): tr(FeᵀFe) = 3.44, Je = 1.2
+    mesh = distorted_box()
+    values = {"start_week": 21.0, "end_week": 22.0, "output_weeks": [21.0, 22.0], "fissure_x_mm": 0.0}
+    values |= {"shear_modulus_cortex_pa": 1000, "shear_modulus_core_pa": 1000, "growth_rate_per_s": 0}
+    folding = Folding(COMM, mesh, zones_of(mesh), parameters_from(values | {"material": material}))
+    folding.set_layers(0.0, 43200.0)
+    problem = folding.problem
+    problem.set_displacement(problem.domain.local(problem.domain.positions) * [0.2, 0.0, 0.0])
+    bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
+    densities = {
+        "neo-hookean": 500.0 * (3.44 * 1.2 ** (-2 / 3) - 3) + bulk / 2 * 0.04,
+        "compressible-neo-hookean": 500.0 * (0.44 - 2 * np.log(1.2)) + (bulk - 2000 / 3) / 2 * 0.04,
+    }
+    assert problem.energy() == pytest.approx(densities[material] * 288e-9, rel=1e-12)
 
 
 def test_gathering_and_placing_keep_every_vertex_in_its_place():

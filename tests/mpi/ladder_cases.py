@@ -8,7 +8,8 @@ from boxes import COMM, distorted_box, everywhere_known, problem_on, smooth_disp
 from petsc4py import PETSc
 from shapes import box_mesh
 
-from gyriflow.folding.newton import DIRECT, GMRES, KEPT, REBUILT, SHIFTED, NewtonSettings, NewtonSolver
+from gyriflow.folding.ladder import DIRECT, GMRES, KEPT, REBUILT, SHIFTED
+from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 
 

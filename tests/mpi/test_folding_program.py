@@ -18,7 +18,7 @@ from shapes import ellipsoid_mesh
 from gyriflow.errors import SolverError, StorageError
 from gyriflow.folding.__main__ import require_space
 from gyriflow.folding.checkpoint import read_checkpoint, run_key
-from gyriflow.folding.newton import NotConvergedError
+from gyriflow.folding.ladder import NotConvergedError
 from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.run import run
 from gyriflow.folding.simulation import Folding

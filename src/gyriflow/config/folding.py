@@ -101,6 +101,11 @@ class FoldingSettings(Settings):
     )
     shear_modulus_cortex_pa: Varying = varying(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
     shear_modulus_core_pa: Varying = varying(300.0, "Pa", "Shear modulus of what lies under it.", gt=0, le=1e7)
+    material: Literal["neo-hookean", "compressible-neo-hookean"] = setting(
+        "neo-hookean", "",
+        "Law of the material: `neo-hookean`, whose shape and volume store energy apart (the paper); "
+        "`compressible-neo-hookean`, whose energy is not split (docs/model.md).",
+    )  # fmt: skip
     poisson_ratio: float = setting(0.45, "", "Poisson's ratio ν.", ge=0, lt=0.5)
     growth_rate_per_s: VaryingOrEstimated = varying(
         2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated`: from the brains' areas.", ge=-1e-5, le=1e-5

@@ -40,8 +40,9 @@ class State:
         Lengths of the two last steps; zero where there was none.
     successes : int
         Steps since the last halving.
-    stretch : (m, 6) float or None
-        Elastic stretch of the elements that the next step starts with, where stress is remembered (see `memory`).
+    stretch : (m, q, 6) float or None
+        Elastic stretch at the integration points of the elements that the next step starts with, where stress is
+        remembered (see `memory`).
     rows : tuple of dict
         The step table so far.
     """
@@ -73,7 +74,7 @@ class State:
         return (rate + slope * (self.last_s + step_s) / 2) * step_s
 
     def after(self, displacement: Floats, step_s: float, row: dict, stretch: Floats | None = None) -> "State":
-        """Returns the state after an accepted step with its (n, 3) displacement in m and the (m, 6) stretch it left."""
+        """Returns the state after an accepted step with its (n, 3) displacement in m and the stretch it left."""
         return replace(
             self,
             positions=self.positions + displacement,

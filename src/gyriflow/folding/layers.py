@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, unit, vertex_normals
+from ..mechanics.growth import growth_increments
 from .parameters import FoldingParameters
 from .varying import Maps
 
@@ -63,13 +64,13 @@ def layers_at(
     """
     p = parameters
     w = cortical_weight(distance_mm, p.thickness_at(week, maps))
-    core = p.core_growth_rate_per_s.at(week, maps) * (1 - w)
-    growing = growth * step_s
+    tangential, radial = p.growth_rate_per_s.at(week, maps), p.radial_growth_rate_per_s.at(week, maps)
+    dg, dr = growth_increments(w, growth, tangential, radial, p.core_growth_rate_per_s.at(week, maps), step_s)
     return Layers(
         weight=w,
         mu=p.shear_modulus_core_pa.at(week, maps) * (1 - w) + p.shear_modulus_cortex_pa.at(week, maps) * w,
-        dg=(p.growth_rate_per_s.at(week, maps) * w + core) * growing,
-        dr=(p.radial_growth_rate_per_s.at(week, maps) * (1 - w) + core) * growing,
+        dg=dg,
+        dr=dr,
     )
 
 

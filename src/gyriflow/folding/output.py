@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, write_frame
-from ..mechanics.neo_hookean import bulk_to_shear_ratio
+from ..mechanics.materials import MATERIALS
 from ..units import MM_PER_M, week_tag
 from .layers import PialSearch, layers_at
 from .parameters import FoldingParameters
@@ -60,12 +60,13 @@ def layer_fields(
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
     layers = layers_at(distance, zones.growth, parameters, maps, week, parameters.step_s)
+    material = MATERIALS[parameters.material](parameters.poisson_ratio)
     fields: dict[str, dict[str, NDArray]] = {
         "distance": {"distance_to_pial_mm": distance},
         "cortex_weight": {"cortex_weight": layers.weight},
         "growth": {"tangential_growth_per_step": layers.dg, "radial_growth_per_step": layers.dr},
         "shear_modulus": {"shear_modulus_pa": layers.mu},
-        "bulk_modulus": {"bulk_modulus_pa": bulk_to_shear_ratio(parameters.poisson_ratio) * layers.mu},
+        "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * layers.mu},
         "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in wanted else {},
         "zones": {"zone": vertex_zones(zones, len(positions_mm)), "growing": zones.growth},
     }

@@ -8,6 +8,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 
 from ..errors import InputError
+from ..mechanics.materials import MATERIALS
 from .varying import Maps, Varying
 
 ELEMENT_FIELDS = ("stress", "strain", "volume_ratio")
@@ -82,6 +83,7 @@ class FoldingParameters:
     thickness_growth_mm_per_gw: float = 0.0
     shear_modulus_cortex_pa: Varying = field(default=Varying.constant(1500.0))
     shear_modulus_core_pa: Varying = field(default=Varying.constant(300.0))
+    material: str = "neo-hookean"
     poisson_ratio: float = 0.45
     growth_rate_per_s: Varying = field(default=Varying.constant(2e-7))
     radial_growth_rate_per_s: Varying = field(default=Varying.constant(0.0))
@@ -102,6 +104,7 @@ class FoldingParameters:
             "end_week must come after start_week": self.end_week > self.start_week,
             "step_s must be positive": self.step_s > 0,
             "poisson_ratio must lie in [0, 0.5)": 0 <= self.poisson_ratio < 0.5,
+            f"material must be among {', '.join(MATERIALS)}": self.material in MATERIALS,
             "stress_memory_gw must not be negative": self.stress_memory_gw >= 0,
             f"support must be among {', '.join(SUPPORTS)}": self.support in SUPPORTS,
             "no_growth.kind must be ellipsoid or none": self.no_growth.kind in ("ellipsoid", "none"),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.jacobians import NODES, PARTS, shape_values
+from ..geometry.jacobians import NODES, PARTS, SLOPES, shape_slopes, shape_values
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +32,13 @@ class IntegrationPoints:
     def smooth(self) -> Floats:
         """The (q, 4) or (q, 10) matrix that gives values at the points of a function in the elements' own space."""
         return self.places if self.order == 1 else shape_values(self.places)
+
+    @property
+    def slopes(self) -> Floats:
+        """The (q, 4, 3) or (q, 10, 3) gradients of the nodes' shape functions in the regular element, at the points."""
+        if self.order == 1:
+            return np.broadcast_to(SLOPES, (len(self.places), *SLOPES.shape))
+        return shape_slopes(self.places)
 
     @property
     def bounded(self) -> Floats:

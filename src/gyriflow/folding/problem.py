@@ -3,8 +3,7 @@
 With `domain` and `block_matrix`, the only files that use dolfinx: what differs between its versions is kept to them.
 """
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import basix
 import basix.ufl
@@ -17,9 +16,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..mechanics.fissure import contact_energy_density
-from ..mechanics.growth_tensor import inverse_growth_tensor
+from ..mechanics.growth import inverse_growth_tensor
 from ..mechanics.kinematics import deformation_gradient, elastic_deformation
-from ..mechanics.neo_hookean import bulk_to_shear_ratio, strain_energy_density
+from ..mechanics.materials import Material
 from ..units import M_PER_MM
 from .block_matrix import BlockMatrix
 from .compilation import form_compiler
@@ -30,14 +29,6 @@ from .tangent import SumOperator, Tangent
 from .zones import LEFT_CONTACT, RIGHT_CONTACT, Zones
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Material:
-    """What the problem needs of the parameters, in SI units; without a penalty the planes hold nothing back."""
-
-    poisson_ratio: float
-    penalty_pa_per_m: float
 
 
 QUADRATURE_DEGREE = {1: 1, 2: 4}
@@ -71,7 +62,9 @@ class Problem:
     Parameters
     ----------
     domain, zones, material
-        The mesh, its fixed zones, and constants.
+        The mesh, its fixed zones, and what the tissue is made of.
+    penalty_pa_per_m
+        Pressure per depth of what passes the planes at the fissure; with 0 they hold nothing back.
     remembers_stress
         Whether the present mesh may be stretched elastically, see `set_stretch`.
     quadrature_degree
@@ -95,6 +88,7 @@ class Problem:
         zones: Zones,
         material: Material,
         *,
+        penalty_pa_per_m: float = 0.0,
         quadrature_degree: int | None = None,
         remembers_stress: bool = False,
     ) -> None:
@@ -109,24 +103,29 @@ class Problem:
         self._mu, self._dg, self._dr = (self._field_at_points(degree, ()) for _ in range(3))
         self._N = self._field_at_points(degree, (3,))
 
-        ratio = dolfinx.fem.Constant(mesh, bulk_to_shear_ratio(material.poisson_ratio))
-        penalty = dolfinx.fem.Constant(mesh, material.penalty_pa_per_m)
+        # constants, so that other values need no other forms
+        ratio = dolfinx.fem.Constant(mesh, material.bulk_to_shear_ratio)
+        penalty = dolfinx.fem.Constant(mesh, penalty_pa_per_m)
         planes = [dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm]
         tags = domain.local_facets(zones.facets, zones.facet_zone)
         dx = ufl.dx(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
         F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
+        moduli = self._mu, ratio * self._mu
         if remembers_stress:
             self._V = self._field_at_points(degree, (3, 3))
+            self.set_stretch(np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1)))
             Fe = elastic_deformation(F * self._V, Fg_inverse)
             # counted per volume of the state without stress
-            energy = strain_energy_density(Fe, self._mu, ratio * self._mu) / ufl.det(self._V) * dx
+            energy = material.energy_density(Fe, *moduli) / ufl.det(self._V) * dx
         else:
             Fe = elastic_deformation(F, Fg_inverse)
-            energy = strain_energy_density(Fe, self._mu, ratio * self._mu) * dx
+            energy = material.energy_density(Fe, *moduli) * dx
+        self._outcomes = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
+        self._evaluated: dict[str, dolfinx.fem.Expression] = {}
         x = ufl.SpatialCoordinate(mesh)[0] + self.u[0]
-        if material.penalty_pa_per_m and len(zones.vertices_of(LEFT_CONTACT, RIGHT_CONTACT)):
+        if penalty_pa_per_m and len(zones.vertices_of(LEFT_CONTACT, RIGHT_CONTACT)):
             energy += contact_energy_density(x, planes[0], -1, penalty) * ds(LEFT_CONTACT)
             energy += contact_energy_density(x, planes[1], +1, penalty) * ds(RIGHT_CONTACT)
         residual = ufl.derivative(energy, self.u)
@@ -181,6 +180,19 @@ class Problem:
     def set_stretch(self, V: Floats) -> None:
         """Sets the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
         set_at_points(self._V, V)
+
+    def outcome(self, name: Literal["deformation", "elastic", "stress"]) -> Floats:
+        """Returns the (c, q, 3, 3) tensors at the integration points of the local elements; all ranks have to ask.
+
+        `deformation` is the step's F and `elastic` its Fe = F·V·Fg⁻¹; `stress` is Cauchy's, in Pa, of the energy that
+        is minimised. They refer to the mesh before the step: while it has not been placed anew.
+        """
+        if name not in self._evaluated:
+            with form_compiler(self.domain.comm) as options:
+                expression = dolfinx.fem.Expression(self._outcomes[name], self.points.places[:, 1:], jit_options=options)
+            self._evaluated[name] = expression
+        cells = np.arange(len(self.domain.cells), dtype=np.int32)
+        return self._evaluated[name].eval(self.domain.mesh, cells).reshape(len(cells), -1, 3, 3)
 
     @property
     def displacement(self) -> Floats:

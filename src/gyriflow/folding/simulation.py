@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -11,18 +12,19 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from ..mechanics.neo_hookean import bulk_to_shear_ratio
+from ..mechanics.materials import MATERIALS
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
+from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch, layers_at, normals_between
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
-from .newton import RUNGS, NewtonSettings, NewtonSolver, NotConvergedError
+from .newton import NewtonSettings, NewtonSolver
 from .output import say
 from .parameters import ELEMENT_FIELDS, FoldingParameters, require_maps
-from .problem import Material, Problem
-from .stress import deformation_gradients, elastic_part, strain_fields, stress_fields, volume_ratio_fields
+from .problem import Problem
+from .stress import deformation_gradients, strain_fields, stress_fields, volume_ratio_fields
 from .varying import Maps
 from .zones import Zones
 
@@ -66,10 +68,14 @@ class Folding:
         require_maps(parameters, self.maps, len(mesh.vertices))
         self.domain = Domain(comm, mesh)
         by_planes = parameters.contact.kind == "planes"
-        material = Material(parameters.poisson_ratio, parameters.contact.penalty_pa_per_m if by_planes else 0.0)
         self._remembers = parameters.stress_memory_gw > 0
         self.problem = Problem(
-            self.domain, zones, material, quadrature_degree=quadrature_degree, remembers_stress=self._remembers
+            self.domain,
+            zones,
+            MATERIALS[parameters.material](parameters.poisson_ratio),
+            penalty_pa_per_m=parameters.contact.penalty_pa_per_m if by_planes else 0.0,
+            quadrature_degree=quadrature_degree,
+            remembers_stress=self._remembers,
         )
         self.contact: SelfContact | None = None
         if parameters.contact.kind == "global":
@@ -84,12 +90,10 @@ class Folding:
         stiffness = parameters.shear_modulus_cortex_pa.range(self.maps, parameters.start_week, parameters.end_week)[1]
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
-        self._bulk_ratio = bulk_to_shear_ratio(parameters.poisson_ratio)
-        self._stretch: Floats | None = None  # what the last step started with
         self._start = self.domain.positions
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
-            centres = nodes[self.domain.cells].mean(axis=1)
+            centres = nodes[self.domain.corners].mean(axis=1)
             self._start_normals = PialSearch(self._start, zones.cortex_facets).nearest_normals(centres)
         limits = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
         self.solver = NewtonSolver(self.problem, limits, floor)
@@ -138,39 +142,43 @@ class Folding:
         return layers.mu, layers.dg, layers.dr, normals
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
-        """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
+        """Returns the (c, q, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
         if not self._remembers:
             return None
         if state.stretch is None:
-            return unpacked(unstretched(len(self.domain.cells)))
+            return unpacked(unstretched(len(self.domain.cells), len(self.problem.points.weights)))
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
-
-    def _elastic(self, F: Floats) -> Floats:
-        """Returns the (c, 3, 3) elastic parts of the last step's deformation gradients of the local elements."""
-        return elastic_part(F, np.eye(3) if self._stretch is None else self._stretch, *self.problem.growth)
 
     def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
 
-        Names are those of the parameter `fields`; those of the arrays carry their units. Right after a step only.
+        They are means over the integration points. Names are those of the parameter `fields`; those of the arrays carry their units. Right after a step only.
         """
         domain = self.domain
         fields: dict[str, Floats] = {}
         if set(ELEMENT_FIELDS).isdisjoint(wanted):
             return fields
-        after = domain.local(domain.positions)
-        F = deformation_gradients(after - self.problem.displacement, after, domain.cells)
-        total = deformation_gradients(domain.local(self._start), after, domain.cells)
-        Fe = self._elastic(F)
+        after = domain.positions
+        slopes = self.problem.points.slopes
+        total = deformation_gradients(domain.local(self._start), domain.local(after), domain.cells, slopes)
+        total = total.reshape(-1, 3, 3)
+
+        def at_all_points(name: Literal["deformation", "elastic", "stress"]) -> Floats:
+            return self.problem.outcome(name).reshape(-1, 3, 3)
+
+        # back to where the step began, which its displacement refers to
+        domain.place(after - domain.gathered(self.problem.displacement[: domain.owned]))
         if "stress" in wanted:
-            mu = self.problem.shear_modulus
-            fields |= stress_fields(Fe, mu, self._bulk_ratio * mu)
+            fields |= stress_fields(at_all_points("stress"))
         if "strain" in wanted:
-            fields |= strain_fields(Fe, total, self._start_normals)
+            normals = np.repeat(self._start_normals, len(slopes), axis=0)
+            fields |= strain_fields(at_all_points("elastic"), total, normals)
         if "volume_ratio" in wanted:
-            fields |= volume_ratio_fields(F, total)
-        together = domain.gathered_cells(np.stack(list(fields.values()), axis=1))
+            fields |= volume_ratio_fields(at_all_points("deformation"), total)
+        domain.place(after)
+        by_cell = [values.reshape(-1, len(slopes)) @ self.problem.points.weights for values in fields.values()]
+        together = domain.gathered_cells(np.stack(by_cell, axis=1))
         return dict(zip(fields, together.T, strict=True))
 
     def contact_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
@@ -196,7 +204,8 @@ class Folding:
         residual = problem.new_vector()
         problem.residual(residual)
         forces = -np.linalg.norm(residual.array_r.reshape(-1, 3), axis=1)
-        ratio, tet, centre = domain.least(ratios, domain.tet_of_cell, before[domain.cells].mean(axis=1) * MM_PER_M)
+        centres = before[domain.corners].mean(axis=1) * MM_PER_M
+        ratio, tet, centre = domain.least(ratios.min(axis=1), domain.tet_of_cell, centres)
         force, vertex, place = domain.least(forces, domain.vertex_of_node, before * MM_PER_M)
         return (
             f"smallest det F {ratio:.3g} in element {tet} at {np.round(centre, 1).tolist()} mm, "
@@ -216,19 +225,15 @@ class Folding:
         if domain.positions is not state.positions:
             domain.place(state.positions)
         self.set_layers(state.time_s, step_s)
-        self._stretch = self._kept_stretch(state, step_s)
-        if self._stretch is not None:
-            problem.set_stretch(self._stretch)
+        kept = self._kept_stretch(state, step_s)
+        if kept is not None:
+            problem.set_stretch(kept)
         count = self.solver.solve(domain.local(state.predicted(step_s)))
         ratios = problem.volume_ratios()
         energy = problem.energy()
         u = domain.gathered(problem.displacement[: domain.owned])
         length = np.linalg.norm(u, axis=1) * MM_PER_M
-        left = None
-        if self._stretch is not None:
-            before = domain.local(domain.positions)
-            F = deformation_gradients(before, before + problem.displacement, domain.cells)
-            left = domain.gathered_cells(packed(left_stretch(self._elastic(F))))
+        left = None if kept is None else domain.gathered_cells(packed(left_stretch(problem.outcome("elastic"))))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,

@@ -1,7 +1,7 @@
-"""Deformation, strain and stress per element, from positions and the fields of a step: plain NumPy on whole arrays.
+"""Measures of the deformation and stress of elements: plain NumPy on whole arrays.
 
-An element has one constant deformation gradient, and one value each of stiffness, growth and normal (the mean of its
-vertices' values), as in the solve. Arrays of tensors are (c, 3, 3), of scalars (c,).
+The tensors of a step, elastic deformation and stress, come from the problem that was solved (`Problem.outcome`). Arrays
+of tensors are (c, 3, 3), of scalars (c,).
 """
 
 import numpy as np
@@ -11,55 +11,21 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.integer]
 
 
-def deformation_gradients(before: Floats, after: Floats, cells: Ints) -> Floats:
-    """Returns the (c, 3, 3) deformation gradients F = ∂x_after/∂x_before of linear tetrahedra.
+def deformation_gradients(before: Floats, after: Floats, cells: Ints, slopes: Floats) -> Floats:
+    """Returns the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
 
     Parameters
     ----------
     before, after : (k, 3) float
-        Positions of the vertices in one unit.
-    cells : (c, 4) int
+        Positions of the nodes in one unit.
+    cells : (c, n) int
         Their indices per element; the elements have a volume before.
+    slopes : (q, n, 3) float
+        Gradients of the nodes' shape functions in the regular element, at the points.
     """
-    # edges from the first vertex, a row each: rows after = rows before · Fᵀ
-    first, second = (x[cells[:, 1:]] - x[cells[:, :1]] for x in (before, after))
-    return np.asarray(np.linalg.solve(first, second), dtype=np.float64).transpose(0, 2, 1)
-
-
-def elastic_part(F: Floats, V_old: Floats, dg: Floats, dr: Floats, N: Floats) -> Floats:
-    """Returns the (c, 3, 3) elastic parts Fe = F·V_old·Fg⁻¹ of a step.
-
-    Parameters
-    ----------
-    F
-        Deformation gradients of the step.
-    V_old
-        Elastic stretches that remain from the steps before; one identity (3, 3) for all where stress is forgotten.
-    dg, dr : (c,) float
-        Growth of the step along the pial surface and across it, as stretches less 1.
-    N : (c, 3) float
-        Unit normals: Fg = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
-    """
-    across = N[:, :, None] * N[:, None, :]
-    along = np.eye(3) - across
-    return F @ V_old @ (along / (1 + dg)[:, None, None] + across / (1 + dr)[:, None, None])
-
-
-def cauchy_stress(Fe: Floats, mu: Floats, K: Floats) -> Floats:
-    """Returns the (c, 3, 3) Cauchy stress σ = μ Je^(−5/3) dev(Fe·Feᵀ) + K (Je − 1) I in Pa.
-
-    That is σ = 1/Je · ∂ψ/∂Fe · Feᵀ of ψ = μ/2 (tr(Feᵀ·Fe) Je^(−2/3) − 3) + K/2 (Je − 1)² per volume of the natural
-    state. The model counts ψ per volume before the step's growth (docs/model.md), so that the stress in its equilibrium
-    is smaller by the factor det Fg: by less than 2 % in a step of the reference parameters.
-
-    Parameters
-    ----------
-    mu, K : (c,) float
-        Shear and bulk modulus in Pa.
-    """
-    Je = np.linalg.det(Fe)
-    shear = (mu * Je ** (-5 / 3))[:, None, None] * deviator(Fe @ Fe.transpose(0, 2, 1))
-    return shear + (K * (Je - 1))[:, None, None] * np.eye(3)
+    # the transposed maps from the regular element: those after = those before · Fᵀ
+    first, second = (np.matmul(slopes.transpose(0, 2, 1), x[cells][:, None]) for x in (before, after))
+    return np.asarray(np.linalg.solve(first, second), dtype=np.float64).swapaxes(-1, -2)
 
 
 def pressure(stress: Floats) -> Floats:
@@ -114,9 +80,8 @@ def areal_stretch(F: Floats, N: Floats) -> Floats:
     return np.linalg.det(F) * np.linalg.norm(rows, axis=1)
 
 
-def stress_fields(Fe: Floats, mu: Floats, K: Floats) -> dict[str, Floats]:
-    """Returns the equivalent stress and the pressure per element, (c,), in Pa; parameters as of `cauchy_stress`."""
-    stress = cauchy_stress(Fe, mu, K)
+def stress_fields(stress: Floats) -> dict[str, Floats]:
+    """Returns the equivalent stress and the pressure per element, (c,), in Pa, of Cauchy stresses (c, 3, 3) in Pa."""
     return {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
 
 

@@ -1,11 +1,11 @@
-"""Rigid alignment of two surfaces, with a measure of how sure its pose is."""
+"""Rigid alignment of two triangle surfaces, with a measure of how sure its pose is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import igl
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ..geometry.alignment import CUBE_ROTATIONS, Fit, angle_deg, fits_from_all_sides, margin, step_towards_planes
 from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, face_normals
 
 CONVERGED_MM = 0.01
@@ -22,9 +22,6 @@ ROUGH = 150, 10, 0.5
 
 CANDIDATES = 5
 """How many poses that differ from each other are compared."""
-
-TURNS = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
-"""The 24 rotations of a cube, none first: no rotation is more than 63 degrees from all of them."""
 
 SAME_POSE_DEG = 30.0
 """Rotations that differ by less are one pose."""
@@ -52,7 +49,7 @@ class Alignment:
     @property
     def rotation_deg(self) -> float:
         """The angle of the rotation."""
-        return _angle_deg(self.matrix)
+        return angle_deg(self.matrix[:3, :3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,25 +83,23 @@ def rigid_alignment(a: TriangleMesh, b: TriangleMesh) -> Alignment:
     better. The pose that is kept is aligned in full.
     """
     surfaces = _surface(a), _surface(b)
-    rough = [_closest_points(*surfaces, _together(*surfaces, turn), ROUGH) for turn in TURNS]
-    poses = [_closest_points(*surfaces, end, FAIR) for end in _apart(surfaces, rough)]
-    # of less than they are aligned to, distances say nothing
-    far = np.array([max(_mean_distance(*surfaces, pose, FULL[0]), CONVERGED_MM) for pose in poses])
-    best = int(far.argmin())
-    chosen = best if far[best] < CLEARLY_BETTER * far[0] else 0
-    elsewhere = [_angle_deg(pose @ np.linalg.inv(poses[chosen])) > SAME_POSE_DEG for pose in poses]
-    margin = far[elsewhere].min(initial=np.inf) / far[chosen]
-    return Alignment(_closest_points(*surfaces, poses[chosen], FULL), float(margin))
 
+    def roughly(turn: Floats) -> Fit:
+        shift = surfaces[1].centroid - turn @ surfaces[0].centroid
+        return _closest_points(*surfaces, Fit(turn, shift, np.inf), ROUGH)
 
-def _apart(surfaces: tuple[_Surface, _Surface], rough: list[Floats]) -> list[Floats]:
-    """Returns the first of the motions, and after it the best of all that differ from each other."""
-    far = [_mean_distance(*surfaces, matrix, ROUGH[0]) for matrix in rough]
-    apart: list[int] = []
-    for end in map(int, np.argsort(far)):
-        if all(_angle_deg(rough[end] @ np.linalg.inv(rough[other])) > SAME_POSE_DEG for other in apart):
-            apart.append(end)
-    return [rough[end] for end in dict.fromkeys([0, *apart[:CANDIDATES]])]
+    def better(fit: Fit) -> Fit:
+        closer = _closest_points(*surfaces, fit, FAIR)
+        # of less than they are aligned to, distances say nothing
+        return replace(closer, residual=max(_mean_distance(*surfaces, closer, FULL[0]), CONVERGED_MM))
+
+    poses = fits_from_all_sides(CUBE_ROTATIONS, roughly, better, CANDIDATES, SAME_POSE_DEG)
+    best = min(poses, key=lambda pose: pose.residual)
+    chosen = best if best.residual < CLEARLY_BETTER * poses[0].residual else poses[0]
+    fit = _closest_points(*surfaces, chosen, FULL)
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = fit.rotation, fit.shift
+    return Alignment(matrix, margin(poses, chosen, SAME_POSE_DEG))
 
 
 def _surface(mesh: TriangleMesh) -> _Surface:
@@ -113,24 +108,16 @@ def _surface(mesh: TriangleMesh) -> _Surface:
     return _Surface(mesh, tree, face_normals(mesh), centroid(mesh))
 
 
-def _together(a: _Surface, b: _Surface, turn: Floats) -> Floats:
-    """Returns the (4, 4) motion that turns `a` about its centroid and takes that onto the centroid of `b`."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = turn
-    matrix[:3, 3] = b.centroid - turn @ a.centroid
-    return matrix
+def _closest_points(a: _Surface, b: _Surface, fit: Fit, effort: tuple[int, int, float]) -> Fit:
+    """Returns the motion of `a` onto `b` that closest points lead to from a motion.
 
-
-def _closest_points(a: _Surface, b: _Surface, matrix: Floats, effort: tuple[int, int, float]) -> Floats:
-    """Returns the (4, 4) motion of `a` onto `b` that closest points lead to from the motion `matrix`.
-
-    In both directions, each iteration the least-squares motion of points towards the planes of their nearest faces
-    (Chen and Medioni 1992).
+    In both directions, each iteration a step towards the planes of the nearest faces. The residual is that of the
+    effort's points.
     """
     count, max_iterations, converged_mm = effort
     of_a, of_b = a.spread(count), b.spread(count)
+    rotation, shift = fit.rotation, fit.shift
     for _ in range(max_iterations):
-        rotation, shift = matrix[:3, :3], matrix[:3, 3]
         moved = of_a @ rotation.T + shift
         _, on_b, normals_b = b.nearest(moved)
         # points of b are taken back to where a is given
@@ -138,27 +125,17 @@ def _closest_points(a: _Surface, b: _Surface, matrix: Floats, effort: tuple[int,
         points = np.concatenate([moved, on_a @ rotation.T + shift])
         targets = np.concatenate([on_b, of_b])
         normals = np.concatenate([normals_b, normals_a @ rotation.T])
-        centre = points.mean(axis=0)
-        # a turn w and a shift t move a point p by w x (p - centre) + t; directions without a pull (a sphere) stay
-        columns = np.hstack([np.cross(points - centre, normals), normals])
-        pull = np.einsum("ij,ij->i", targets - points, normals)
-        turn, move = np.split(np.linalg.lstsq(columns, pull, rcond=1e-6)[0], 2)
-        step = np.eye(4)
-        step[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
-        step[:3, 3] = centre + move - step[:3, :3] @ centre
-        matrix = step @ matrix
-        if np.linalg.norm(moved @ step[:3, :3].T + step[:3, 3] - moved, axis=1).max() < converged_mm:
+        ahead = np.einsum("ij,ij->i", targets - points, normals)
+        turn, move = step_towards_planes(points, normals, ahead)
+        rotation, shift = turn @ rotation, turn @ shift + move
+        if np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < converged_mm:
             break
-    return matrix
+    found = Fit(rotation, shift, np.inf)
+    return replace(found, residual=_mean_distance(a, b, found, count))
 
 
-def _mean_distance(a: _Surface, b: _Surface, matrix: Floats, count: int) -> float:
+def _mean_distance(a: _Surface, b: _Surface, fit: Fit, count: int) -> float:
     """Returns the mean over both directions of the distance in mm of points of one surface to the other."""
-    rotation, shift = matrix[:3, :3], matrix[:3, 3]
-    there, _, _ = b.nearest(a.spread(count) @ rotation.T + shift)
-    back, _, _ = a.nearest((b.spread(count) - shift) @ rotation)
+    there, _, _ = b.nearest(a.spread(count) @ fit.rotation.T + fit.shift)
+    back, _, _ = a.nearest((b.spread(count) - fit.shift) @ fit.rotation)
     return float(0.5 * (there.mean() + back.mean()))
-
-
-def _angle_deg(matrix: Floats) -> float:
-    return float(np.degrees(Rotation.from_matrix(matrix[:3, :3]).magnitude()))

@@ -11,10 +11,11 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import Fit
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
 from gyriflow.surface.medial_wall import medial_wall
 from gyriflow.surface.outlines import Outline, outline, reference
-from gyriflow.surface.registration import Fit, Target, found, matched
+from gyriflow.surface.registration import Target, found, matched
 
 Floats = NDArray[np.float64]
 

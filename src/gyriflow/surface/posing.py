@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import angle_deg
 from gyriflow.surface.halves import MIRROR, SYLVIAN_AHEAD, Pair, about_x, pitch_deg
-from gyriflow.surface.registration import Target, angle_deg, registered
+from gyriflow.surface.registration import Target, registered
 
 Floats = NDArray[np.float64]
 

@@ -1,12 +1,17 @@
 """Rigid registration of hemispheres' outlines, from a start or from none, with a measure of confidence."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from gyriflow.geometry.alignment import (
+    CUBE_ROTATIONS,
+    Fit,
+    fits_from_all_sides,
+    margin,
+    step_towards_planes,
+)
 from gyriflow.geometry.triangles import unit
 from gyriflow.surface.outlines import Outline
 
@@ -22,22 +27,6 @@ DISTINCT_DEG = 40.0
 FURTHEST = 0.3
 # smooth deformations: how much their mean square counts beside that of the distances left, and the rounds
 STIFFNESS, BENDS = 0.03, 20
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A rigid motion of one outline onto another, in sizes of the hemisphere: p → rotation p + shift.
-
-    Attributes
-    ----------
-    rotation, shift : (3, 3) and (3,) float
-    residual : float
-        Root mean square distance between the outlines, from each to the other.
-    """
-
-    rotation: Floats
-    shift: Floats
-    residual: float
 
 
 class Target:
@@ -56,20 +45,22 @@ def registered(source: Outline, target: Target, start: Floats, shift: Floats | N
 
 
 def found(source: Outline, target: Target) -> tuple[Fit, float]:
-    """Returns the best fit of `source` on `target` from all starts, and how many times worse the next best one is.
+    """Returns the best fit of `source` on `target` from all sides, and how many times worse the next best one is.
 
     The starts are the 24 rotations of the cube, after one at random. The next best is more than 40° away.
     """
     random = Rotation.random(random_state=1).as_matrix()
-    coarse = []
-    for cube in Rotation.create_group("O").as_matrix():
-        rotation, shift = _descended(source, target, cube @ random, COARSE, 12, 4)
-        coarse.append(Fit(rotation, shift, _residual(source, target, rotation, shift)))
-    coarse.sort(key=lambda fit: fit.residual)
-    fits = [registered(source, target, fit.rotation, fit.shift) for fit in coarse[:REFINED]] + coarse[REFINED:]
-    fits.sort(key=lambda fit: fit.residual)
-    others = [fit.residual for fit in fits if angle_deg(fit.rotation @ fits[0].rotation.T) > DISTINCT_DEG]
-    return fits[0], min(others, default=np.inf) / fits[0].residual
+
+    def roughly(start: Floats) -> Fit:
+        rotation, shift = _descended(source, target, start, COARSE, 12, 4)
+        return Fit(rotation, shift, _residual(source, target, rotation, shift))
+
+    def better(fit: Fit) -> Fit:
+        return registered(source, target, fit.rotation, fit.shift)
+
+    fits = fits_from_all_sides(CUBE_ROTATIONS @ random, roughly, better, REFINED, DISTINCT_DEG)
+    best = min(fits, key=lambda fit: fit.residual)
+    return best, margin(fits, best, DISTINCT_DEG)
 
 
 def matched(one: Target, other: Target, start: Floats) -> Fit:
@@ -124,11 +115,6 @@ def _met(at: Floats, facing: Floats, target: Target, scale: float) -> tuple[Floa
     return ahead, plane, (np.einsum("ij,ij->i", theirs, facing) > 0.5) / (1.0 + (ahead / scale) ** 2) ** 2
 
 
-def angle_deg(rotation: Floats) -> float:
-    """Returns the angle of a (3, 3) rotation in degrees."""
-    return float(np.degrees(Rotation.from_matrix(rotation).magnitude()))
-
-
 def _descended(
     source: Outline,
     target: Target,
@@ -144,11 +130,9 @@ def _descended(
     for _ in range(rounds):
         at, facing = points @ rotation.T + shift, normals @ rotation.T
         ahead, plane, weights = _met(at, facing, target, scale)
-        rows = np.hstack([np.cross(at, plane), plane])
-        step = np.linalg.solve((rows * weights[:, None]).T @ rows + 1e-9 * np.eye(6), rows.T @ (weights * ahead))
-        turn = Rotation.from_rotvec(step[:3]).as_matrix()
-        rotation, shift = turn @ rotation, turn @ shift + step[3:]
-        if np.linalg.norm(step) < 1e-4:
+        turn, move = step_towards_planes(at, plane, ahead, weights)
+        rotation, shift = turn @ rotation, turn @ shift + move
+        if np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-4:
             break
     return rotation, shift
 

@@ -237,7 +237,9 @@ def test_names_that_config_and_folding_both_keep_are_the_same():
 
     from gyriflow.config import folding as settings
     from gyriflow.folding import parameters
+    from gyriflow.mechanics.materials import MATERIALS
 
+    assert get_args(settings.FoldingSettings.model_fields["material"].annotation) == tuple(MATERIALS)
     assert settings.VARYING == parameters.VARYING
     assert settings.GROWTH_RATES == parameters.GROWTH_RATES
     assert get_args(settings.FieldName) == parameters.FIELDS

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from gyriflow.config.folding import output_weeks
 from gyriflow.errors import SolverError
 from gyriflow.folding.checkpoint import State
-from gyriflow.folding.newton import NotConvergedError
+from gyriflow.folding.ladder import NotConvergedError
 from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.run import seconds_to, shortened_steps
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance

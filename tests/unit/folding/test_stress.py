@@ -1,15 +1,18 @@
 """Deformation, stress and strain of elements whose answers are known in closed form, or from the model's own energy."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import ufl
+from mpi4py import MPI
 from shapes import box_mesh
 
+from gyriflow.folding.domain import Domain
+from gyriflow.folding.problem import Problem
 from gyriflow.folding.stress import (
     areal_stretch,
-    cauchy_stress,
     deformation_gradients,
-    elastic_part,
     green_lagrange_maximum,
     hencky_equivalent,
     pressure,
@@ -19,22 +22,45 @@ from gyriflow.folding.stress import (
     volume_ratio_fields,
     von_mises,
 )
-from gyriflow.mechanics.growth_tensor import inverse_growth_tensor
-from gyriflow.mechanics.neo_hookean import bulk_to_shear_ratio, strain_energy_density
+from gyriflow.folding.zones import FREE, Zones
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
+from gyriflow.mechanics.materials import MATERIALS, CompressibleNeoHookean, Material, NeoHookean
 
-MU, K = 300.0, 300.0 * bulk_to_shear_ratio(0.45)
+MU, K = 300.0, 300.0 * NeoHookean(0.45).bulk_to_shear_ratio
 RNG = np.random.default_rng(3)
 # far from the identity, det > 0, no symmetry
 SOME = np.array([np.eye(3) + 0.25 * RNG.standard_normal((3, 3)) for _ in range(6)])
-NO_MEMORY = np.eye(3)
+UP = np.array([0.0, 0.0, 1.0])
 
 
-def moduli(count):
-    return np.full(count, MU), np.full(count, K)
+@cache
+def problem_of(law: type[Material], order: int) -> Problem:
+    """Returns a problem on a few elements that may remember stress."""
+    mesh = box_mesh((1, 1, 1), (2.0, 3.0, 1.0))
+    mesh = quadratic(mesh) if order == 2 else mesh
+    facets, _ = boundary_faces(mesh)
+    zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
+    return Problem(Domain(MPI.COMM_SELF, mesh), zones, law(0.45), remembers_stress=True)
 
 
-def stress_of(*gradients):
-    return cauchy_stress(np.array(gradients, dtype=float), *moduli(len(gradients)))
+def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):
+    """Returns the tensor that linear and quadratic elements have at all points after a homogeneous deformation."""
+    found = []
+    for order in (1, 2):
+        problem = problem_of(law, order)
+        x, cells = problem.domain.local(problem.domain.positions), len(problem.domain.cells)
+        ones, points = np.ones(len(x)), len(problem.points.weights)
+        problem.set_layers(MU * ones, dg * ones, dr * ones, np.tile(normal, (cells, 1)))
+        problem.set_stretch(np.tile(np.eye(3) if stretch is None else stretch, (cells, points, 1, 1)))
+        problem.set_displacement(x @ (F - np.eye(3)).T)
+        found.append(problem.outcome(name).reshape(-1, 3, 3))
+    tensors = np.concatenate(found)
+    np.testing.assert_allclose(tensors, np.broadcast_to(tensors[0], tensors.shape), rtol=1e-9, atol=1e-9)
+    return tensors[:1]
+
+
+def stress_of(*gradients, law=NeoHookean):
+    return np.concatenate([outcomes(np.array(F, dtype=float), "stress", law) for F in gradients])
 
 
 def rotation(axis, angle):
@@ -43,50 +69,80 @@ def rotation(axis, angle):
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def energy(Fe):
-    """Returns the energy density that the solver minimises, from its own UFL expression."""
-    return float(strain_energy_density(ufl.as_matrix(Fe.tolist()), MU, K)(()))
+def energy(Fe, law):
+    """Returns a law's energy density from its UFL expression."""
+    return float(law.energy_density(ufl.as_matrix(Fe.tolist()), MU, K)(()))
 
 
-def test_every_element_of_an_affine_motion_has_its_gradient():
+@pytest.mark.parametrize("order", [1, 2])
+def test_every_element_of_an_affine_motion_has_its_gradient(order):
     mesh = box_mesh((2, 3, 2), (2.0, 3.0, 1.0))
+    if order == 2:  # with curved sides
+        mesh = quadratic(mesh)
+        mesh = TetrahedralMesh(mesh.vertices + RNG.uniform(-0.02, 0.02, mesh.vertices.shape), mesh.tets)
+    points = problem_of(NeoHookean, order).points
     moved = mesh.vertices @ SOME[0].T + [5.0, -1.0, 2.0]
-    F = deformation_gradients(mesh.vertices, moved, mesh.tets)
-    np.testing.assert_allclose(F, np.broadcast_to(SOME[0], (len(mesh.tets), 3, 3)), atol=1e-12)
+    F = deformation_gradients(mesh.vertices, moved, mesh.tets, points.slopes)
+    assert F.shape == (len(mesh.tets), len(points.weights), 3, 3)
+    np.testing.assert_allclose(F, np.broadcast_to(SOME[0], F.shape), atol=1e-12)
 
 
 def test_the_elastic_part_is_what_growth_and_old_stretch_leave():
     normal = np.array([2.0, -1.0, 2.0]) / 3
     V_old = SOME[1] @ SOME[1].T
-    inverse = inverse_growth_tensor(0.3, 0.1, ufl.as_vector(normal.tolist()))
-    expected = SOME[0] @ V_old @ np.array([[float(inverse[i, j](())) for j in range(3)] for i in range(3)])
-    Fe = elastic_part(SOME[:1], V_old[None], np.array([0.3]), np.array([0.1]), normal[None])
-    np.testing.assert_allclose(Fe[0], expected, atol=1e-12)
+    Fg = 1.3 * np.eye(3) - 0.2 * np.outer(normal, normal)
+    Fe = outcomes(SOME[0], "elastic", stretch=V_old, dg=0.3, dr=0.1, normal=normal)
+    np.testing.assert_allclose(Fe[0], SOME[0] @ V_old @ np.linalg.inv(Fg), atol=1e-12)
+    np.testing.assert_allclose(outcomes(SOME[0], "deformation", stretch=V_old, dg=0.3)[0], SOME[0], atol=1e-12)
 
 
 @pytest.mark.parametrize("dr", [0.2, 0.0])
-def test_a_free_body_that_grows_as_it_likes_has_no_stress(dr):
+@pytest.mark.parametrize("law", MATERIALS.values())
+def test_a_free_body_that_grows_as_it_likes_has_no_stress(law, dr):
     # grown by Fg and turned: no elastic deformation, though the volume has changed
     normal = np.array([0.0, 0.6, 0.8])
     Fg = 1.2 * np.eye(3) + (dr - 0.2) * np.outer(normal, normal)
-    F = (rotation([1, 2, 3], 0.7) @ Fg)[None]
-    Fe = elastic_part(F, NO_MEMORY, np.array([0.2]), np.array([dr]), normal[None])
-    fields = stress_fields(Fe, *moduli(1)) | strain_fields(Fe, F, normal[None]) | volume_ratio_fields(F, F)
+    F = rotation([1, 2, 3], 0.7) @ Fg
+    growth = {"law": law, "dg": 0.2, "dr": dr, "normal": normal}
+    Fe, stress = outcomes(F, "elastic", **growth), outcomes(F, "stress", **growth)
+    fields = stress_fields(stress) | strain_fields(Fe, F[None], normal[None]) | volume_ratio_fields(F[None], F[None])
     for name in ("von_mises_pa", "pressure_pa", "elastic_strain", "elastic_volume_strain"):
         assert fields[name] == pytest.approx(0, abs=1e-12 * K), name
     assert fields["volume_ratio"] == pytest.approx(1.44 * (1 + dr))
     assert fields["area_stretch"] == pytest.approx(1.44)
 
 
-def test_stress_is_the_derivative_of_the_solvers_energy():
+@pytest.mark.parametrize("law", MATERIALS.values())
+def test_stress_is_the_derivative_of_the_energy(law):
     step = 1e-5
-    for Fe, stress in zip(SOME, stress_of(*SOME), strict=True):
+    for Fe, stress in zip(SOME, stress_of(*SOME, law=law), strict=True):
         P = np.empty((3, 3))
         for i, j in np.ndindex(3, 3):
             change = np.zeros((3, 3))
             change[i, j] = step
-            P[i, j] = (energy(Fe + change) - energy(Fe - change)) / (2 * step)
+            P[i, j] = (energy(Fe + change, law) - energy(Fe - change, law)) / (2 * step)
         np.testing.assert_allclose(stress, P @ Fe.T / np.linalg.det(Fe), atol=1e-6 * np.abs(P).max())
+
+
+@pytest.mark.parametrize("law", MATERIALS.values())
+def test_all_laws_have_the_same_moduli_at_small_strain(law):
+    strain = np.array([[2.0, 0.5, -1.0], [0.5, -1.0, 0.3], [-1.0, 0.3, 1.5]]) * 1e-6
+    expected = 2 * MU * strain + (K - 2 * MU / 3) * np.trace(strain) * np.eye(3)
+    np.testing.assert_allclose(stress_of(np.eye(3) + strain, law=law)[0], expected, atol=2e-5 * np.abs(expected).max())
+
+
+def test_the_compressible_law_has_the_stress_of_its_closed_form():
+    # σ = μ/J (b − I) + λ (J − 1) I
+    for F, stress in zip(SOME, stress_of(*SOME, law=CompressibleNeoHookean), strict=True):
+        J = np.linalg.det(F)
+        expected = MU / J * (F @ F.T - np.eye(3)) + (K - 2 * MU / 3) * (J - 1) * np.eye(3)
+        np.testing.assert_allclose(stress, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_poissons_ratio_is_bounded():
+    assert NeoHookean(0.0).bulk_to_shear_ratio == pytest.approx(2 / 3)
+    with pytest.raises(ValueError, match=r"between -1 and 0\.5"):
+        NeoHookean(0.5)
 
 
 def test_stress_turns_with_the_body_and_does_not_see_turns_before():
@@ -121,7 +177,7 @@ def test_simple_shear():
     F = np.eye(3)
     F[0, 1] = gamma
     (stress,) = stress_of(F)
-    assert stress[0, 1] == stress[1, 0] == pytest.approx(MU * gamma)
+    assert [stress[0, 1], stress[1, 0]] == pytest.approx([MU * gamma] * 2)
     assert stress[0, 0] - stress[1, 1] == pytest.approx(MU * gamma**2)
     assert pressure(stress[None]) == pytest.approx(0, abs=1e-12 * K)
     assert von_mises(stress[None]) == pytest.approx(MU * gamma * np.sqrt(gamma**2 + 3))
@@ -146,7 +202,7 @@ def test_fields_tell_elastic_from_total_deformation():
     layer, grown = np.sqrt(1.5), np.sqrt(2.0)
     total = np.diag([layer, layer, 1.2])[None]
     normal = np.array([[0.0, 0.0, 1.0]])
-    Fe = elastic_part(total, NO_MEMORY, np.array([grown - 1]), np.array([0.0]), normal)
+    Fe = outcomes(total[0], "elastic", dg=grown - 1)
     fields = strain_fields(Fe, total, normal) | volume_ratio_fields(np.diag([1.0, 1.0, 1.1])[None], total)
     assert fields["elastic_volume_strain"] == pytest.approx(np.log(0.75 * 1.2))
     assert fields["elastic_strain"] == pytest.approx(2 / 3 * (np.log(1.2) - np.log(layer / grown)))

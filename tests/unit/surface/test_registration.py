@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import unit
 from gyriflow.surface.outlines import reference
-from gyriflow.surface.registration import Target, angle_deg, matched, registered
+from gyriflow.surface.registration import Target, matched, registered
 
 
 def bent(outline, seed):

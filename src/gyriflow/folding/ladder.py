@@ -1,0 +1,211 @@
+"""The linear systems of Newton's method: conjugate gradients with multigrid, and what follows where they fail.
+
+The preconditioner is kept across iterations and steps and rebuilt when it has gone stale. A ladder of further means
+follows; the rung used is reported.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..errors import SolverError
+from .krylov import Wear, new_krylov, smooth_with
+from .problem import Problem
+from .tangent import Tangent
+
+RUNGS = ("cg", "cg, preconditioner rebuilt", "cg, tangent shifted", "gmres", "mumps")
+KEPT, REBUILT, SHIFTED, GMRES, DIRECT = range(5)
+INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
+SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
+"""Parts of its diagonal that are added to a tangent until it is positive definite."""
+FREE_SHIFT = 1e-6
+"""The same for the factorisation of a free body's tangent, which is singular."""
+FALLBACKS = {GMRES: ("gmres", "gamg"), DIRECT: ("preonly", "lu")}
+
+
+class NotConvergedError(SolverError):
+    """The step was not solved; a smaller one may be."""
+
+
+@dataclass
+class LinearCount:
+    """What a linear solve took, and whether the tangent was positive definite as it was."""
+
+    iterations: int = 0
+    rung: int = KEPT
+    convex: bool = True
+
+
+class LinearLadder:
+    """Finds descent directions from one tangent after the other, with solvers made once.
+
+    What it keeps from one solve to the next decides how a direction is found.
+
+    Parameters
+    ----------
+    problem
+        Whose tangents are solved with.
+    max_iterations
+        Iterations after which a solver has failed.
+    """
+
+    def __init__(self, problem: Problem, max_iterations: int) -> None:
+        self.problem = problem
+        self.max_iterations = max_iterations
+        self._cg = self._new_krylov("cg", "gamg")
+        self._fallbacks: dict[int, PETSc.KSP] = {}
+        self._wear = Wear()
+        self._doubtful = False  # whether the preconditioner was made of an indefinite tangent
+        self._level = 0  # of the shift that the last tangent needed
+
+    def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
+        return new_krylov(self.problem.domain.comm, method, preconditioner, self.max_iterations)
+
+    def solve(
+        self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
+    ) -> LinearCount:
+        """Leaves in `direction` a solution of J d = −r that descends; goes down the ladder until there is one.
+
+        Parameters
+        ----------
+        tangent
+            J; where contact makes it indefinite, it may be made convex.
+        residual
+            r.
+        reduction
+            Part of the right-hand side that may be left.
+        convexify
+            Whether terms of contact may be made convex where conjugate gradients fail with the true ones.
+
+        Raises
+        ------
+        NotConvergedError
+            Where the last rung fails too.
+        """
+        system = _System(self.problem, tangent, residual, direction, reduction)
+        count = LinearCount()
+        if self.problem.contributions:
+            if self._solve_with_kept(system, count):
+                return count
+            # folds pressed together would rather slide aside: without that the tangent is rarely indefinite, but wrong
+            if convexify:
+                self.problem.convexify(tangent)
+        if self._solve_shifted(system, count):
+            return count
+        count.convex = False
+        self._fall_back(system, count)
+        return count
+
+    def _solve_with_kept(self, system: "_System", count: LinearCount) -> bool:
+        """Tries conjugate gradients with the kept preconditioner alone; returns whether the direction descends."""
+        if self._wear.stale:
+            return False
+        reason, iterations = system.run(self._cg, reuse=True, fast=True)
+        count.iterations += iterations
+        if reason > 0 and system.slope < 0:
+            self._served(iterations, system.reduction, definite=True)
+            return True
+        if reason <= 0 and reason != INDEFINITE[0]:
+            self._wear.wear_out()
+        return False
+
+    def _solve_shifted(self, system: "_System", count: LinearCount) -> bool:
+        """Raises the diagonal until conjugate gradients find no direction in which the tangent is negative."""
+        # where the tangent was not positive definite before, it may still not be
+        for level in range(max(self._level - 1, 0), len(SHIFTS)):
+            with system.tangent.raised(SHIFTS[level]):
+                reason = self._run_cg(system, count, shifted=level > 0)
+            count.rung = max(count.rung, SHIFTED if level else KEPT)
+            if reason > 0 or reason not in INDEFINITE:
+                self._level = level
+                break
+        count.convex = level == 0
+        return reason > 0 and system.slope < 0
+
+    def _run_cg(self, system: "_System", count: LinearCount, *, shifted: bool) -> int:
+        """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
+        if not self._wear.stale:
+            reason, iterations = system.run(self._cg, reuse=True, fast=not shifted)
+            count.iterations += iterations
+            # a matrix that is not positive definite is no fault of the preconditioner
+            if reason == INDEFINITE[0]:
+                return reason
+            if reason > 0:
+                self._served(iterations, system.reduction, definite=not shifted)
+                return reason
+            count.rung = max(count.rung, REBUILT)
+        system.tangent.whole().setNearNullSpace(self.problem.near_null_space())
+        reason, iterations = system.run(self._cg, reuse=False, fast=not shifted)
+        count.iterations += iterations
+        self._wear.renew()
+        self._doubtful = reason == INDEFINITE[0]
+        if reason > 0:
+            self._wear.add(iterations, system.reduction)
+        elif not self._doubtful:
+            self._wear.wear_out()
+        return reason
+
+    def _served(self, iterations: int, reduction: float, *, definite: bool) -> None:
+        """Takes note of a solve with the kept preconditioner."""
+        self._wear.add(iterations, reduction)
+        # one made of an indefinite tangent serves its shifts, and then gives way to a better one
+        if self._doubtful and definite:
+            self._wear.wear_out()
+
+    def _fall_back(self, system: "_System", count: LinearCount) -> None:
+        """Takes the solvers that need no positive definite tangent, one after the other."""
+        for rung, method in FALLBACKS.items():
+            # the operator of a free body is not its matrix, which is singular
+            singular = rung == DIRECT and self.problem.free
+            if rung not in self._fallbacks:
+                self._fallbacks[rung] = self._new_krylov("gmres" if singular else method[0], method[1])
+            with system.tangent.raised(FREE_SHIFT if singular else 0.0):
+                reason, iterations = system.run(self._fallbacks[rung], reuse=False)
+            count.iterations += iterations
+            count.rung = max(count.rung, rung)
+            slope = system.slope
+            if reason > 0 and slope != 0:
+                if slope > 0:  # the way to a saddle: the energy falls in the other direction
+                    system.direction.scale(-1.0)
+                return
+        raise NotConvergedError("no linear solver found a descent direction")
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """One linear system J d = −r, to be solved up to a part of its right-hand side."""
+
+    problem: Problem
+    tangent: Tangent
+    residual: PETSc.Vec
+    direction: PETSc.Vec
+    reduction: float
+
+    @property
+    def slope(self) -> float:
+        """The energy's slope along the direction."""
+        return self.direction.dot(self.residual)
+
+    def run(self, krylov: PETSc.KSP, *, reuse: bool, fast: bool = False) -> tuple[int, int]:
+        """Solves into the direction; returns PETSc's reason for the end, 0 for one without, and the iterations.
+
+        `fast` takes the forms of the tangent that are made for products and smoothing.
+        """
+        tangent = self.tangent
+        krylov.setTolerances(rtol=self.reduction)
+        matrix = tangent.smoothing if fast and reuse else tangent.whole()
+        krylov.setOperators(self.problem.operator(tangent.products if fast else matrix), matrix)
+        multigrid = krylov.getPC()
+        multigrid.setReusePreconditioner(reuse)
+        try:
+            if fast:
+                krylov.setUp()
+                smooth_with(krylov, tangent.products, tangent.smoothing)
+            krylov.solve(self.residual, self.direction)
+        except PETSc.Error:  # a factorisation that broke down
+            return 0, 0
+        self.direction.scale(-1.0)
+        self.problem.hold(self.direction)
+        finite = bool(np.isfinite(self.direction.norm()))
+        return krylov.getConvergedReason() if finite else 0, krylov.getIterationNumber()

@@ -1,0 +1,79 @@
+"""The materials that tissue can be made of. A material law is one class here, and its name in the configuration."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import ufl
+from ufl.core.expr import Expr
+
+
+@dataclass(frozen=True)
+class Material(ABC):
+    """An isotropic hyperelastic material; everything that the model needs of it follows from its energy.
+
+    Energies count per volume of the updated reference, without the factor det Fg: the paper's choice.
+
+    Attributes
+    ----------
+    poisson_ratio
+        ν, the same in all tissue; −1 < ν < 0.5, else ValueError.
+    """
+
+    poisson_ratio: float
+    name: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        if not -1 < self.poisson_ratio < 0.5:
+            raise ValueError(f"Poisson's ratio must lie between -1 and 0.5, found {self.poisson_ratio}")
+
+    @property
+    def bulk_to_shear_ratio(self) -> float:
+        """K/μ = 2(1 + ν) / (3(1 − 2ν))."""
+        return 2 * (1 + self.poisson_ratio) / (3 * (1 - 2 * self.poisson_ratio))
+
+    @staticmethod
+    @abstractmethod
+    def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
+        """Returns ψ in Pa of the elastic deformation Fe; μ and K, in Pa, are the moduli of small strains."""
+
+    def cauchy_stress(self, Fe: Expr, mu: Expr, K: Expr) -> Expr:
+        """Returns Cauchy's stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of the state without stress.
+
+        The energy that the model minimises counts per volume before the step's growth (docs/model.md), so that the
+        stress in its equilibrium is smaller by the factor det Fg: by less than 2 % in a step of the reference
+        parameters.
+        """
+        Fe = ufl.variable(Fe)
+        return ufl.diff(self.energy_density(Fe, mu, K), Fe) * Fe.T / ufl.det(Fe)
+
+
+class NeoHookean(Material):
+    """The slightly compressible neo-Hookean material of the paper: shape and volume store energy apart."""
+
+    name = "neo-hookean"
+
+    @staticmethod
+    def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
+        """Returns ψ = μ/2 (tr(Feᵀ·Fe) Je^(−2/3) − 3) + K/2 (Je − 1)² in Pa."""
+        Je = ufl.det(Fe)
+        return mu / 2 * (ufl.inner(Fe, Fe) * Je ** (-2 / 3) - 3) + K / 2 * (Je - 1) ** 2
+
+
+class CompressibleNeoHookean(Material):
+    """The compressible neo-Hookean material (Bonet and Wood 2008, §6.4.3), with (Je − 1)² in the place of (ln Je)².
+
+    Its energy is not split into those of shape and volume.
+    """
+
+    name = "compressible-neo-hookean"
+
+    @staticmethod
+    def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
+        """Returns ψ = μ/2 (tr(Feᵀ·Fe) − 3 − 2 ln Je) + λ/2 (Je − 1)² in Pa, with λ = K − 2μ/3."""
+        Je = ufl.det(Fe)
+        return mu / 2 * (ufl.inner(Fe, Fe) - 3 - 2 * ufl.ln(Je)) + (K - 2 * mu / 3) / 2 * (Je - 1) ** 2
+
+
+MATERIALS: dict[str, type[Material]] = {law.name: law for law in (NeoHookean, CompressibleNeoHookean)}
+"""The laws by the names that the configuration has for them."""
