@@ -12,7 +12,36 @@ from petsc4py import PETSc
 from ..geometry.jacobians import EDGES
 from .domain import Domain
 
-COARSE_PREFIX = "mg_coarse_"
+
+class OrderHierarchy:
+    """The two upper levels of multigrid for quadratic elements; parameters as of `linear_in_quadratic`."""
+
+    def __init__(self, domain: Domain, fixed: NDArray[np.bool_]) -> None:
+        self._prolongation, self._corners = linear_in_quadratic(domain, fixed)
+
+    def attach(self, multigrid: PETSc.PC) -> None:
+        """Makes a preconditioner multigrid of two levels, whose coarse one is solved by algebraic multigrid."""
+        multigrid.setType("mg")
+        multigrid.setMGLevels(2)
+        multigrid.setMGInterpolation(1, self._prolongation)
+
+    def renew(self, multigrid: PETSc.PC, matrix: PETSc.Mat) -> None:
+        """Gives a preconditioner that is to be set up the coarse level of a matrix, with its near-null space."""
+        coarse = matrix.ptap(self._prolongation)
+        coarse.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        vectors: list[PETSc.Vec] = []
+        for mode in matrix.getNearNullSpace().getVecs():
+            vector = coarse.createVecRight()
+            vector.array[:] = mode.array_r.reshape(-1, 3)[self._corners].ravel()
+            for other in vectors:
+                vector.axpy(-vector.dot(other), other)
+            vector.normalize()
+            vectors.append(vector)
+        coarse.setNearNullSpace(PETSc.NullSpace().create(vectors=vectors, comm=matrix.comm))
+        multigrid.getMGCoarseSolve().setOperators(coarse, coarse)
+        # the solver holds them now
+        for held in (coarse, *vectors):
+            held.destroy()
 
 
 def linear_in_quadratic(domain: Domain, fixed: NDArray[np.bool_]) -> tuple[PETSc.Mat, NDArray[np.int64]]:

@@ -23,6 +23,7 @@ from ..units import M_PER_MM
 from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
+from .multigrid import OrderHierarchy
 from .points import IntegrationPoints
 from .rigid import FreeOperator, RigidMotions
 from .tangent import SumOperator, Tangent
@@ -78,6 +79,8 @@ class Problem:
         Further parts of the energy.
     free : bool
         Whether nothing holds the body.
+    hierarchy : OrderHierarchy or None
+        The linear level below quadratic elements for multigrid, None for linear ones.
     points : IntegrationPoints
         Where stiffness, growth, normals and kept stretch are taken: q points in each element.
     """
@@ -108,7 +111,7 @@ class Problem:
         penalty = dolfinx.fem.Constant(mesh, penalty_pa_per_m)
         planes = [dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm]
         tags = domain.local_facets(zones.facets, zones.facet_zone)
-        dx = ufl.dx(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
+        dx = ufl.dx(metadata={"quadrature_degree": degree})
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
         F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
@@ -140,6 +143,7 @@ class Problem:
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
         self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
+        self.hierarchy = OrderHierarchy(domain, fixed) if domain.order == 2 else None
         self._sum: SumOperator | None = None
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
