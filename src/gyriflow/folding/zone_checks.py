@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InputError, MeshError
+from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
 from .zones import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES, Zones
@@ -75,8 +76,18 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     InputError
         Where nothing grows, there is no cortex, no facet is clamped, or the fissure lies outside the brain.
     MeshError
-        Where the pial surface is not closed, or a part of the brain has no clamped facet and would float.
+        Where elements are inside out, the pial surface is not closed, or a part of the brain has no clamped facet and
+        would float.
     """
+    if mesh.order == 2:
+        folded = np.flatnonzero(lower_bounds(mesh.vertices, mesh.tets) <= 0)
+        if len(folded):
+            place = np.round(mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1).tolist()
+            raise MeshError(
+                "the mesh has curved elements that are folded over",
+                found=f"{len(folded)} of {len(mesh.tets)}, one at {place} mm",
+                remedy="Move the nodes on their edges towards the middles of the edges.",
+            )
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
     if not low < zones.fissure_x_mm < high:
         raise InputError(
