@@ -5,7 +5,6 @@ With `domain` and `block_matrix`, the only files that use dolfinx: what differs 
 
 from typing import Literal, Protocol
 
-import basix
 import basix.ufl
 import dolfinx
 import dolfinx.fem.petsc
@@ -32,8 +31,6 @@ from .zones import LEFT_CONTACT, RIGHT_CONTACT, Zones
 Floats = NDArray[np.float64]
 
 
-QUADRATURE_DEGREE = {1: 1, 2: 4}
-"""Degree of integration in elements by their order."""
 FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""
 
@@ -69,7 +66,7 @@ class Problem:
     remembers_stress
         Whether the present mesh may be stretched elastically, see `set_stretch`.
     quadrature_degree
-        Degree of the polynomials that are integrated exactly; None takes that of `QUADRATURE_DEGREE`.
+        Degree of the polynomials that are integrated exactly; None takes what the elements' order needs.
 
     Attributes
     ----------
@@ -99,25 +96,25 @@ class Problem:
         self.contributions: list[Contribution] = []
         mesh = domain.mesh
         self.u = dolfinx.fem.Function(domain.space)
-        degree = quadrature_degree or QUADRATURE_DEGREE[domain.order]
-        places, weights = basix.make_quadrature(basix.CellType.tetrahedron, degree)
-        barycentric = np.column_stack([1 - places.sum(axis=1), places])
-        self.points = IntegrationPoints(domain.order, barycentric, weights / weights.sum())
-        self._mu, self._dg, self._dr = (self._field_at_points(degree, ()) for _ in range(3))
-        self._N = self._field_at_points(degree, (3,))
+        self.points = IntegrationPoints.of_degree(domain.order, quadrature_degree)
+        # reference coordinates, and parts of the regular element's volume
+        self._rule = self.points.places[:, 1:].copy(), self.points.weights / 6
+        self._mu, self._dg, self._dr = (self._field_at_points(()) for _ in range(3))
+        self._N = self._field_at_points((3,))
 
         # constants, so that other values need no other forms
         ratio = dolfinx.fem.Constant(mesh, material.bulk_to_shear_ratio)
         penalty = dolfinx.fem.Constant(mesh, penalty_pa_per_m)
         planes = [dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm]
         tags = domain.local_facets(zones.facets, zones.facet_zone)
-        dx = ufl.dx(metadata={"quadrature_degree": degree})
+        names = "quadrature_points", "quadrature_weights"
+        dx = ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, self._rule, strict=True)))
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
         F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
         moduli = self._mu, ratio * self._mu
         if remembers_stress:
-            self._V = self._field_at_points(degree, (3, 3))
+            self._V = self._field_at_points((3, 3))
             self.set_stretch(np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1)))
             Fe = elastic_deformation(F * self._V, Fg_inverse)
             # counted per volume of the state without stress
@@ -149,9 +146,9 @@ class Problem:
         self.vector = self.u.x.petsc_vec
         self.mesh_moved()
 
-    def _field_at_points(self, degree: int, shape: tuple[int, ...]) -> dolfinx.fem.Function:
+    def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
         """Returns a field with values at the integration points alone."""
-        element = basix.ufl.quadrature_element("tetrahedron", shape, scheme="default", degree=degree)
+        element = basix.ufl.quadrature_element("tetrahedron", shape, points=self._rule[0], weights=self._rule[1])
         return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
 
     def mesh_moved(self) -> None:
@@ -193,7 +190,7 @@ class Problem:
         """
         if name not in self._evaluated:
             with form_compiler(self.domain.comm) as options:
-                expression = dolfinx.fem.Expression(self._outcomes[name], self.points.places[:, 1:], jit_options=options)
+                expression = dolfinx.fem.Expression(self._outcomes[name], self._rule[0], jit_options=options)
             self._evaluated[name] = expression
         cells = np.arange(len(self.domain.cells), dtype=np.int32)
         return self._evaluated[name].eval(self.domain.mesh, cells).reshape(len(cells), -1, 3, 3)
