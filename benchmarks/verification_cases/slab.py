@@ -16,7 +16,7 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.parameters import FoldingParameters, parameters_from
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 from .modes import Slab, amplifications
@@ -33,7 +33,7 @@ COARSENING = 1.8
 LARGEST = 8
 """Height of the deepest elements over that of the finest."""
 ROWS = 2
-"""Vertices across the slab; all lie on sides that keep them from moving across it."""
+"""Corners across the slab; all lie on sides that keep them from moving across it."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,15 @@ class Waved:
     """A slab with waves, and steps in which its cortex grows by `growth` each.
 
     `memory` is the growth in which stress relaxes; width and depth hold two waves of the length that grows fastest.
+    `order` is that of the elements.
     """
 
     contrast: float
     growth: float
     steps: int
     memory: float = 0.0
+    poisson_ratio: float = 0.45
+    order: int = 1
 
     @property
     def width_mm(self) -> float:
@@ -59,7 +62,7 @@ class Waved:
 
     @property
     def in_theory(self) -> Slab:
-        return Slab(self.contrast, depth=self.width_mm, memory=self.memory)
+        return Slab(self.contrast, self.poisson_ratio, depth=self.width_mm, memory=self.memory)
 
     def expected(self) -> Floats:
         """Returns the (steps + 1, waves) heights over those at the start, from `modes`."""
@@ -74,6 +77,7 @@ class Waved:
             "output_weeks": [0.0, 1e3],
             "fissure_x_mm": self.width_mm / 2,
             "thickness_mm": 1.0,
+            "poisson_ratio": self.poisson_ratio,
             "shear_modulus_core_pa": 300.0,
             "shear_modulus_cortex_pa": 300.0 * self.contrast,
             "growth_rate_per_s": RATE_PER_S,
@@ -102,6 +106,7 @@ def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
     )
     x = np.linspace(0.0, case.width_mm, round(case.width_mm * cells) + 1)
     slab = grid([x, np.arange(ROWS) / cells, -down[::-1]])
+    slab = slab if case.order == 1 else quadratic(slab)
     vertices = slab.vertices.copy()
     waves = np.cos(np.outer(vertices[:, 0], np.pi * WAVES / case.width_mm)).sum(axis=1)
     vertices[:, 2] += height_mm * waves * (1 + vertices[:, 2] / case.width_mm) ** 2
@@ -116,10 +121,14 @@ def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats
     states = [State.at_start(mesh.vertices * M_PER_MM, p.step_s)]
     for _ in range(case.steps):
         states.append(folding.step(states[-1], p.step_s))
-    columns = round(case.width_mm * cells) + 1
-    # vertices are numbered along z first: the surface comes last
-    surface = np.array([s.positions.reshape(columns, ROWS, -1, 3)[:, :, -1, 2].mean(axis=1) for s in states])
-    return (dct(surface, type=1, axis=1) / (columns - 1))[:, WAVES] * MM_PER_M
+    flat = mesh_of(case, cells, 0.0).vertices
+    top = np.flatnonzero(flat[:, 2] == 0.0)
+    # evenly spaced along x, several across
+    spacings = case.order * round(case.width_mm * cells)
+    column = np.rint(flat[top, 0] * spacings / case.width_mm).astype(int)
+    across = np.bincount(column)
+    surface = np.array([np.bincount(column, state.positions[top, 2]) / across for state in states])
+    return (dct(surface, type=1, axis=1) / spacings)[:, WAVES] * MM_PER_M
 
 
 def amplified(case: Waved, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Floats:
