@@ -7,6 +7,7 @@ from snakemake.utils import min_version
 min_version("9.0")
 SOURCE = f"{workflow.basedir}/src"
 sys.path.insert(0, SOURCE)
+from gyriflow.provenance import code_hash
 
 # a configuration given on the command line replaces the demo instead of being mixed with it
 if not workflow.overwrite_configfiles:
@@ -29,8 +30,7 @@ include: "workflow/rules/folding.smk"
 include: "workflow/rules/metrics.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/run_figures.smk"
-include: "workflow/rules/metric_figures.smk"
-include: "workflow/rules/figures.smk"
+include: "workflow/rules/study_figures.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -59,3 +59,10 @@ rule all:
         rules.metrics.input,
         rules.figures.input,
         rules.report.input,
+
+
+# a change of the code reruns what depends on it: a hash of the modules that a script imports is a parameter of its rule
+for job in workflow.rules:
+    if job.script:
+        source = job.basedir.join(job.script).get_path_or_uri(secret_free=False)
+        job.set_params(code=code_hash(Path(source)))

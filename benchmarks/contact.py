@@ -1,6 +1,6 @@
 """Folding with and without contact: what crosses what, week by week, and what it costs.
 
-    ./run python benchmarks/contact.py results/week21/mesh/brain.xdmf --out contact --figure contact.png
+    ./run python benchmarks/contact.py results/brains/week21/mesh/brain.xdmf --out contact --figure contact.png
 
 Each kind of contact folds the mesh with the reference parameters from `--start` to `--end`, on `--ranks` ranks, into a
 folder of its own; a run that is there already, complete or not, is gone on with. For each week the crossing faces of

@@ -1,6 +1,6 @@
 """Errors of curvature on surfaces where it is known, at three densities, clean and noisy, beside other estimators.
 
-    ./run python benchmarks/curvature.py --docs docs/metrics.md --surface results/week29/surface/pial.surf.gii
+    ./run python benchmarks/curvature.py --docs docs/metrics.md --surface results/brains/week29/surface/pial.surf.gii
 
 The tables are printed; `--docs` puts them between the markers of that page. `--surface` adds a table of a closed real
 surface remeshed at several densities. The last line is one JSON object.

@@ -61,11 +61,11 @@ def measure(arguments: argparse.Namespace) -> None:
 
     from gyriflow.folding.checkpoint import State
     from gyriflow.folding.output import peak_memory_mib
-    from gyriflow.folding.parameters import parameters_from
     from gyriflow.folding.simulation import Folding
     from gyriflow.folding.zone_checks import refuse_impossible
     from gyriflow.folding.zones import zones_of_run
     from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+    from gyriflow.parameters.reading import parameters_from
     from gyriflow.units import M_PER_MM, MM_PER_M
 
     comm = MPI.COMM_WORLD

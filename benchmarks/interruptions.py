@@ -1,7 +1,7 @@
 """What a folding run loses when it is killed: SIGKILL to all its processes at a random step, again and again.
 
-    ./run python benchmarks/interruptions.py results/phantom-21/mesh/brain.xdmf \\
-        results/phantom-21/folding/reference/params.yaml --runs 10 --ranks 2
+    ./run python benchmarks/interruptions.py results/brains/phantom-21/mesh/brain.xdmf \\
+        results/runs/reference/phantom-21/params.yaml --runs 10 --ranks 2
 
 One run goes through. Each of the others is killed within a random step (seeded) and started again by the same command.
 Counted are the steps that had been reported before the kill and were done again, and the largest distance of a vertex

@@ -1,6 +1,6 @@
 """Meshing of one pial surface: time, size, quality, and how well the surface was kept, as one line of JSON.
 
-SURFACE is a closed surface in mm (GIFTI, STL, PLY), such as results/{start}/surface/pial.surf.gii.
+SURFACE is a closed surface in mm (GIFTI, STL, PLY), such as results/brains/{brain}/surface/pial.surf.gii.
 """
 
 import argparse

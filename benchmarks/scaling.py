@@ -66,7 +66,7 @@ def parse() -> argparse.Namespace:
 
 def reference_parameters():
     """Returns the paper's parameters for the synthetic brain."""
-    from gyriflow.folding.parameters import parameters_from
+    from gyriflow.parameters.reading import parameters_from
 
     values = {"start_week": 21.0, "end_week": 36.0, "output_weeks": [21.0, 36.0], "fissure_x_mm": 0.0}
     contact = {"kind": "planes", "gap_mm": CONTACT_GAP_MM}

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import Problem
-from gyriflow.folding.zones import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT, Zones
+from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
+from gyriflow.parameters.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
 
 from .manufactured import STRETCH
 

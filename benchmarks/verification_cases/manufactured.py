@@ -17,9 +17,10 @@ from gyriflow.folding.compilation import form_compiler
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import Problem
-from gyriflow.folding.zones import CLAMPED, Zones
+from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
+from gyriflow.parameters.terms import CLAMPED
 
 Floats = NDArray[np.float64]
 

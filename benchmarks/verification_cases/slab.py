@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 
 from gyriflow.folding.checkpoint import State
-from gyriflow.folding.parameters import FoldingParameters, parameters_from
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
+from gyriflow.parameters.folding import FoldingParameters
+from gyriflow.parameters.reading import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 from .modes import Slab, amplifications

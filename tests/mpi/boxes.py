@@ -6,9 +6,10 @@ from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import Problem
-from gyriflow.folding.zones import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT, Zones
+from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import boundary_faces
 from gyriflow.mechanics.materials import NeoHookean
+from gyriflow.parameters.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
 
 COMM = MPI.COMM_WORLD
 MATERIAL = NeoHookean(poisson_ratio=0.45)

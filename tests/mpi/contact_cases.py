@@ -16,11 +16,12 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import ContactSettings, SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import CLAMPED, FREE, SIDE_X, SIDE_Y, Zones, zones_of_run
+from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
 from gyriflow.units import M_PER_MM, MM_PER_M
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))

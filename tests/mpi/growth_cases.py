@@ -5,10 +5,10 @@ import pytest
 from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
 
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.tetrahedra import signed_volumes
 from gyriflow.mechanics.materials import MATERIALS
+from gyriflow.parameters.reading import parameters_from
 
 
 def test_isotropic_growth_of_a_free_body_is_free_of_stress():

@@ -11,10 +11,10 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.memory import packed, unpacked
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
+from gyriflow.parameters.reading import parameters_from
 from gyriflow.units import M_PER_MM, SECONDS_PER_GW
 
 RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0]}

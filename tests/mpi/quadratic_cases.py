@@ -17,12 +17,13 @@ from gyriflow.folding.ladder import KEPT
 from gyriflow.folding.memory import unpacked
 from gyriflow.folding.multigrid import linear_in_quadratic
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import CLAMPED, FREE, SIDE_X, SIDE_Y, Zones
+from gyriflow.folding.zones import Zones
 from gyriflow.geometry.jacobians import lower_bounds
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
+from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))

@@ -19,7 +19,6 @@ from gyriflow.errors import SolverError, StorageError
 from gyriflow.folding.__main__ import require_space
 from gyriflow.folding.checkpoint import read_checkpoint, run_key
 from gyriflow.folding.ladder import NotConvergedError
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.run import run
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
@@ -27,6 +26,7 @@ from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
 from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
+from gyriflow.parameters.reading import parameters_from
 
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
 WEEK = {

@@ -84,11 +84,11 @@ class Workflow:
         assert touched.returncode == 0, touched.stderr
 
     def surfaces(self, config: dict) -> SimpleNamespace:
-        """Makes the pial surfaces of all brains of a configuration, as far as that goes."""
+        """Makes the pial surfaces of all brains of a configuration, and their thickness, as far as that goes."""
         name = self.write("study.yaml", config)
-        targets = [f"results/{brain['id']}/surface/pial.surf.gii" for brain in config["brains"]]
-        outcome = self.run(*targets, "--cores", "2", "--keep-going", "--configfile", name)
-        return SimpleNamespace(directory=self.directory, outcome=outcome, results=self.directory / "results")
+        targets = [f"results/brains/{brain['id']}/surface/pial.surf.gii" for brain in config["brains"]]
+        outcome = self.run("surface", *targets, "--cores", "2", "--keep-going", "--configfile", name)
+        return SimpleNamespace(directory=self.directory, outcome=outcome, results=self.directory / "results" / "brains")
 
 
 @pytest.fixture(scope="session")

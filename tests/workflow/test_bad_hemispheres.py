@@ -84,7 +84,7 @@ def test_the_run_ends_in_2_without_a_traceback(study):
 def test_bad_hemispheres_are_refused_with_a_message_and_nothing_is_left(study, name):
     *_, files, said = BAD[name]
     expected = f"{files.format(study.directory / name)}: {said}"
-    log = (study.results / name / "logs" / "pial_surface.log").read_text()
+    log = (study.results / name / "logs" / "pial_from_hemispheres.log").read_text()
     for text in (expected, GUESSES.get(name, expected)):
         assert text in log
         assert text in study.outcome.stderr
@@ -95,7 +95,7 @@ def test_bad_hemispheres_are_refused_with_a_message_and_nothing_is_left(study, n
 def test_coordinates_that_the_file_or_the_configuration_names_are_honoured(study, name):
     surface = read_surface(study.results / name / "surface" / "pial.surf.gii")
     np.testing.assert_allclose(surface.vertices.min(axis=0), [-23.5, -24.0, -16.0], atol=0.6)
-    log = (study.results / name / "logs" / "pial_surface.log").read_text()
+    log = (study.results / name / "logs" / "pial_from_hemispheres.log").read_text()
     applied = "placed.left.gii: the coordinate-system matrix of the file was applied" in log
     assert applied == (name == "placed")
 
@@ -117,7 +117,7 @@ def test_hemispheres_in_any_pose_are_posed_and_a_swapped_pair_alone_is_refused(w
     good = {"id": "a", "week": 24, "coordinates": "auto", "hemispheres": {"left": "left.gii", "right": "right.gii"}}
     bad = good | {"id": "b", "hemispheres": {"left": "right.gii", "right": "left.gii"}}
     name = workflow.write("study.yaml", study | {"brains": [good, bad]})
-    targets = [f"results/{brain}/surface/pial.surf.gii" for brain in "ab"]
+    targets = [f"results/brains/{brain}/surface/pial.surf.gii" for brain in "ab"]
     outcome = workflow.run(*targets, "--cores", "2", "--keep-going", "--configfile", name)
     assert outcome.returncode == 2
     refusal = ", ".join(str(workflow.directory / f"{side}.gii") for side in ("right", "left"))
@@ -125,7 +125,7 @@ def test_hemispheres_in_any_pose_are_posed_and_a_swapped_pair_alone_is_refused(w
     assert refusal in outcome.stderr
     assert refusal in (workflow.directory / "results/study/logs/poses.log").read_text()
     assert not (workflow.directory / targets[1]).exists()
-    report = read_json(workflow.directory / "results/a/surface/surface.json")
+    report = read_json(workflow.directory / "results/brains/a/surface/surface.json")
     assert (report["euler_number"], report["posing"]["together"]) == (4, False)
     for side, turn in zip(("left", "right"), motions, strict=True):
         rest = np.array(report["posing"]["matrices"][side]) @ turn
@@ -134,4 +134,4 @@ def test_hemispheres_in_any_pose_are_posed_and_a_swapped_pair_alone_is_refused(w
     name = workflow.write("study.yaml", study | {"brains": [good, good | {"id": "b"}]})
     outcome = workflow.run("poses", "--cores", "1", "--configfile", name)
     assert outcome.returncode == 0, outcome.stderr
-    assert workflow.jobs(*targets, "--configfile", name) == {"pial_surface_alone": 1}
+    assert workflow.jobs(*targets, "--configfile", name) == {"pial_from_hemispheres": 1}

@@ -30,9 +30,9 @@ STUDY = {
     "mesh": MESHING,
     "folding": {"end_week": 22},
 }
-MESH = "results/apart/mesh/brain.xdmf"
-QUALITY = "results/study/figures/mesh_quality.png"
-REFUSED = "results/apart/mesh/refused"
+MESH = "results/brains/apart/mesh/brain.xdmf"
+QUALITY = "results/brains/apart/figures/mesh_quality.png"
+REFUSED = "results/brains/apart/mesh/refused"
 
 
 def moved(x):
@@ -46,7 +46,7 @@ def workflow(checkout_copy, tmp_path_factory):
     config = workflow.write("study.yaml", STUDY)
     workflow.lay_out("surface", "--configfile", config)
     for name, gap in (("apart", GAP_MM), ("tangled", -OVERLAP_MM)):
-        write_surface(workflow.directory / f"results/{name}/surface/pial.surf.gii", moved(gap - 3.0))
+        write_surface(workflow.directory / f"results/brains/{name}/surface/pial.surf.gii", moved(gap - 3.0))
     workflow.count_as_made("surface", "--configfile", config)
     outcome = workflow.run(MESH, QUALITY, "--cores", "2", "--configfile", config)
     assert outcome.returncode == 0, outcome.stderr
@@ -54,7 +54,7 @@ def workflow(checkout_copy, tmp_path_factory):
 
 
 def test_the_quality_of_the_mesh_is_told_and_drawn(workflow):
-    quality = read_json(workflow.directory / "results/apart/mesh/quality.json")
+    quality = read_json(workflow.directory / "results/brains/apart/mesh/quality.json")
     assert quality["volume_mm3"] / 1e3 == pytest.approx(2 * VOLUME_ML, rel=0.05)
     assert {sum(kind["counts"]) for kind in quality["histogram"].values()} == {quality["tets"]}
     assert quality["gap_mm"]["input"]["median"] == pytest.approx(1.5, abs=0.5)
@@ -65,8 +65,8 @@ def test_the_quality_of_the_mesh_is_told_and_drawn(workflow):
 def remeshing(workflow, brain="apart", **settings):
     """Runs the mesh of a brain again with other settings and returns the outcome and the log."""
     name = workflow.write("changed.yaml", STUDY | {"start": brain, "mesh": MESHING | settings})
-    outcome = workflow.run(f"results/{brain}/mesh/brain.xdmf", "--cores", "1", "--configfile", name)
-    return outcome, (workflow.directory / f"results/{brain}/logs/tetrahedralise.log").read_text()
+    outcome = workflow.run(f"results/brains/{brain}/mesh/brain.xdmf", "--cores", "1", "--configfile", name)
+    return outcome, (workflow.directory / f"results/brains/{brain}/logs/tetrahedralise.log").read_text()
 
 
 def refused(workflow, outcome, log, *messages, brain="apart"):
@@ -76,7 +76,7 @@ def refused(workflow, outcome, log, *messages, brain="apart"):
         assert message in log
         assert message in outcome.stderr
     assert "Traceback" not in outcome.stderr
-    folder = workflow.directory / f"results/{brain}/mesh"
+    folder = workflow.directory / f"results/brains/{brain}/mesh"
     assert not [path for path in folder.glob("*") if path.is_file()]
 
 

@@ -116,10 +116,10 @@ def study(checkout_copy, tmp_path_factory):
     for name, (left, right, *_) in (GOOD | BAD).items():
         save_gifti(workflow.directory / f"{name}.l.gii", left())
         save_gifti(workflow.directory / f"{name}.r.gii", right())
-    targets = [f"results/{name}/surface/pial.surf.gii" for name in (*GOOD, *BAD)]
+    targets = [f"results/brains/{name}/surface/pial.surf.gii" for name in (*GOOD, *BAD)]
     config = workflow.write("study.yaml", STUDY)
     outcome = workflow.run(*targets, "--cores", "2", "--keep-going", "--configfile", config)
-    return SimpleNamespace(workflow=workflow, outcome=outcome, results=workflow.directory / "results")
+    return SimpleNamespace(workflow=workflow, outcome=outcome, results=workflow.directory / "results" / "brains")
 
 
 def files_in(folder):
@@ -151,7 +151,7 @@ def test_a_mended_brain_is_two_closed_outward_spheres_of_its_size(study, name):
 @pytest.mark.parametrize("name", BAD)
 def test_a_broken_surface_is_refused_with_a_message_and_nothing_is_left(study, name):
     expected = BAD[name][2]
-    assert expected in (study.results / name / "logs" / "pial_surface.log").read_text()
+    assert expected in (study.results / name / "logs" / "pial_from_hemispheres.log").read_text()
     assert expected in study.outcome.stderr
     assert f"{name}.l.gii, {study.workflow.directory / name}.r.gii: the surface" in study.outcome.stderr
     assert not files_in(study.results / name / "surface")

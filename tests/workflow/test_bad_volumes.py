@@ -131,14 +131,14 @@ def test_the_run_ends_in_2_without_a_traceback(study):
 @pytest.mark.parametrize("name", [*BAD, "torn"])
 def test_a_bad_input_is_refused_with_a_message_and_nothing_is_left(study, name):
     expected = BAD[name][1] if name in BAD else f"{study.directory / 'torn.nii.gz'}: cannot be read as an image"
-    log = (study.results / name / "logs" / "pial_surface.log").read_text()
+    log = (study.results / name / "logs" / "pial_from_labels.log").read_text()
     assert expected in log
     assert expected in study.outcome.stderr
     assert not [path for path in (study.results / name / "surface").rglob("*") if path.is_file()]
 
 
 def test_matrices_that_disagree_are_both_printed(study):
-    log = (study.results / "headers" / "logs" / "pial_surface.log").read_text()
+    log = (study.results / "headers" / "logs" / "pial_from_labels.log").read_text()
     for matrix, code in (("qform", 2), ("sform", 1)):
         assert f"{matrix} (code {code})\n[[" in log
     assert "affine_from: qform or sform" in log
@@ -167,9 +167,9 @@ def test_storage_order_and_units_leave_a_brain_where_it_is(study, name):
 
 
 def test_flat_voxels_are_used_with_a_warning(study):
-    log = (study.results / "flat" / "logs" / "pial_surface.log").read_text()
+    log = (study.results / "flat" / "logs" / "pial_from_labels.log").read_text()
     assert "flat.nii.gz: voxels of 2.4 x 0.8 x 0.8 mm are used as they are" in log
-    assert "are used as they are" not in (study.results / GOOD / "logs" / "pial_surface.log").read_text()
+    assert "are used as they are" not in (study.results / GOOD / "logs" / "pial_from_labels.log").read_text()
 
 
 def test_labels_on_another_grid_than_their_image_are_refused(study):
@@ -187,8 +187,9 @@ def test_a_segmentation_of_ones_own_gives_a_surface_with_its_thickness_at_its_we
     assert abs(report["smoothing"]["volume_change"]) < 0.01
     thickness = nib.load(folder / "thickness.shape.gii").darrays
     assert [len(array.data) for array in thickness] == [report["vertices"]]
-    assert report["cortical_thickness"]["mean_mm"] == pytest.approx(thickness[0].data.mean(), abs=0.2)
-    assert "a suggestion for thickness_mm" in (study.results / GOOD / "logs" / "pial_surface.log").read_text()
+    measured = json.loads((folder / "thickness.json").read_text())
+    assert measured["mean_mm"] == pytest.approx(thickness[0].data.mean(), abs=0.2)
+    assert "a suggestion for thickness_mm" in (study.results / GOOD / "logs" / "cortical_thickness.log").read_text()
 
 
 def test_images_are_segmented_and_shown_where_they_are_given(workflow):
@@ -202,7 +203,7 @@ def test_images_are_segmented_and_shown_where_they_are_given(workflow):
     ]
     study = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
     jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
-    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_surface"], jobs["pial_surface_alone"]) == (
+    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_from_labels"], jobs["pial_from_labels_alone"]) == (
         1,
         2,
         2,

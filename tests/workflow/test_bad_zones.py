@@ -31,7 +31,7 @@ FOLDED = {
 }
 
 
-LEFT = "results/a/folding/thin/surfaces/week-21.25.left.pial.surf.gii"
+LEFT = "results/runs/thin/a/surfaces/week-21.25/left.pial.surf.gii"
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def meshed(checkout_copy, tmp_path_factory):
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshed"))
     name = workflow.write("study.yaml", FOLDED)
     workflow.lay_out("mesh", "--configfile", name)
-    results = workflow.directory / "results" / "a"
+    results = workflow.directory / "results" / "brains" / "a"
     write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
     for side, sign in (("left", -1), ("right", 1)):
         write_surface(results / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
@@ -60,19 +60,19 @@ def meshed(checkout_copy, tmp_path_factory):
 
 
 def test_a_part_that_floats_is_refused_before_the_solve(meshed):
-    target = "results/a/folding/floating/summary.json"
+    target = "results/runs/floating/a/folding/summary.json"
     outcome = meshed.run(target, "--cores", "1", "--configfile", "study.yaml")
     assert outcome.returncode == 3, outcome.stderr
     message = "parts of the brain have no clamped facet and would float; found 1 of 3 parts, the largest with 729"
     assert message in outcome.stderr
-    assert message in (meshed.directory / "results/a/logs/regions.floating.log").read_text()
-    assert {path.name for path in files_in(meshed.directory / "results/a/folding/floating")} == {"params.yaml"}
+    assert message in (meshed.directory / "results/runs/floating/a/logs/regions.log").read_text()
+    assert not files_in(meshed.directory / "results/runs/floating/a/folding")
 
 
 @pytest.fixture(scope="module")
 def folded(meshed):
     """A run that cannot be solved, and one that can."""
-    targets = [f"results/a/folding/{run}/summary.json" for run in ("drifting", "thin")]
+    targets = [f"results/runs/{run}/a/folding/summary.json" for run in ("drifting", "thin")]
     return meshed.run(*targets, LEFT, "--cores", "1", "--keep-going", "--configfile", "study.yaml")
 
 
@@ -80,15 +80,15 @@ def test_a_brain_that_nothing_clamps_is_refused_before_the_solve(meshed, folded)
     assert folded.returncode == 2, folded.stderr
     message = "no facet is clamped, so the brain would drift"
     assert message in folded.stderr
-    assert message in (meshed.directory / "results/a/logs/regions.drifting.log").read_text()
-    assert {path.name for path in files_in(meshed.directory / "results/a/folding/drifting")} == {"params.yaml"}
+    assert message in (meshed.directory / "results/runs/drifting/a/logs/regions.log").read_text()
+    assert not files_in(meshed.directory / "results/runs/drifting/a/folding")
 
 
 @pytest.mark.usefixtures("folded")
 def test_a_cortex_thinner_than_an_element_is_warned_of_with_the_ratio(meshed):
-    log = (meshed.directory / "results/a/logs/simulate.thin.log").read_text()
+    log = (meshed.directory / "results/runs/thin/a/logs/simulate.log").read_text()
     before, _, _ = log.partition("step    1")
-    ratio = read_json(meshed.directory / "results/a/folding/thin/zones.json")["elements_through_cortex"]
+    ratio = read_json(meshed.directory / "results/runs/thin/a/folding/zones.json")["elements_through_cortex"]
     assert 0.1 < ratio < 0.5
     assert f"fewer than two elements through the cortex ({ratio:.2f}): folds may be mesh noise" in before
 

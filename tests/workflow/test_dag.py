@@ -13,7 +13,8 @@ ATLAS = Path(os.environ.get("GYRIFLOW_DATA", CHECKOUT.parent / "shared" / "data"
 
 def test_the_demo_is_planned_from_any_folder(workflow):
     jobs = workflow.jobs()
-    assert jobs["pial_surface"] == jobs["phantom"] == jobs["measure_real"] > 1
+    assert jobs["pial_from_labels"] == jobs["phantom"] == jobs["cortical_thickness"] > 1
+    assert jobs["measure"] > jobs["phantom"]
     assert jobs["simulate"] >= 1
     assert jobs["html_report"] == 1
 
@@ -21,10 +22,10 @@ def test_the_demo_is_planned_from_any_folder(workflow):
 @pytest.mark.parametrize(
     ("target", "present", "absent"),
     [
-        ("surface", "pial_surface", "tetrahedralise"),
+        ("surface", "pial_from_labels", "tetrahedralise"),
         ("mesh", "tetrahedralise", "simulate"),
         ("growth", "growth_figure", "tetrahedralise"),
-        ("folding", "folded_surface", "measure_simulated"),
+        ("folding", "folded_surface", "measure"),
         ("metrics", "study_table", "metrics_figure"),
         ("figures", "weekly_figure", "html_report"),
         ("paper", "displacement_maps", "steps_figure"),
@@ -43,7 +44,7 @@ def test_the_atlas_example_is_planned(workflow):
     (workflow.directory / "atlas.yaml").write_text(text)
     jobs = workflow.jobs("--configfile", "atlas.yaml")
     assert "phantom" not in jobs
-    assert (jobs["pial_surface"], jobs["simulate"], jobs["measure_simulated"], jobs["similarity"]) == (9, 1, 9, 8)
+    assert (jobs["pial_from_labels"], jobs["simulate"], jobs["measure"], jobs["similarity"]) == (9, 1, 18, 8)
 
 
 def test_one_brain_alone_is_folded_without_growth_rates(workflow):
@@ -77,33 +78,36 @@ def test_maps_are_planned_for_the_runs_that_have_any(workflow):
     assert "parameter_maps" not in workflow.jobs("--configfile", workflow.write("none.yaml", SMALL_STUDY))
     shown = workflow.run("-n", "folding", "--printshellcmds", "--configfile", with_maps).stdout
     commands = [line for line in shown.splitlines() if "gyriflow.folding" in line]
-    assert sorted("--maps results/a/folding/thick/maps.h5 --out" in command for command in commands) == [False, True]
+    assert sorted("--maps results/runs/thick/a/folding/maps.h5 --out" in command for command in commands) == [
+        False,
+        True,
+    ]
 
 
 def test_growth_is_estimated_before_a_folding_that_asks_for_it(workflow):
-    target = "results/a/folding/reference/params.yaml"
+    target = "results/runs/reference/a/params.yaml"
     growth = SMALL_STUDY["folding"] | {"growth_rate_per_s": "estimated"}
     asked = workflow.write("asked.yaml", SMALL_STUDY | {"folding": growth})
     assert workflow.jobs(target, "--configfile", asked) == {
         "phantom": 2,
-        "pial_surface": 2,
+        "pial_from_labels": 2,
         "growth_rates": 1,
         "parameters": 1,
     }
     plain = workflow.write("plain.yaml", SMALL_STUDY)
-    assert workflow.jobs(target, "--configfile", plain) == {"phantom": 1, "pial_surface": 1, "parameters": 1}
+    assert workflow.jobs(target, "--configfile", plain) == {"phantom": 1, "pial_from_labels": 1, "parameters": 1}
 
 
 def test_growth_comes_from_the_brains_that_are_named(workflow):
     third = {"id": "c", "week": 23, "phantom": {"voxel_mm": 1.5}}
     study = SMALL_STUDY | {"brains": [*SMALL_STUDY["brains"], third], "growth": {"brains": ["a", "c"]}}
     jobs = workflow.jobs("growth", "--configfile", workflow.write("some.yaml", study))
-    assert (jobs["pial_surface"], jobs["growth_rates"]) == (2, 1)
+    assert (jobs["pial_from_labels"], jobs["growth_rates"]) == (2, 1)
 
 
 def test_only_a_common_number_of_modes_ties_measured_brains_to_simulated_ones(workflow):
-    target = "results/b/metrics/real/metrics.csv"
-    alone = {"phantom": 1, "pial_surface": 1, "measure_real": 1}
+    target = "results/brains/b/metrics/metrics.csv"
+    alone = {"phantom": 1, "pial_from_labels": 1, "measure": 1}
     assert workflow.jobs(target, "--configfile", workflow.write("plain.yaml", SMALL_STUDY)) == alone
     common = workflow.write("common.yaml", SMALL_STUDY | {"metrics": {"spangy_modes": "common"}})
     jobs = workflow.jobs(target, "--configfile", common)
@@ -136,10 +140,10 @@ REPORT = {"html_report": 1, "all": 1}
 NEW_RESULTS = REPORT | {"study_resources": 1}
 SHAPE = NEW_RESULTS | {"metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1}
 ONE_RUN = SHAPE | {
-    "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure_simulated": 2, "run_metrics": 2,
-    "displacement": 1,
+    "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "displacement": 1,
     "similarity": 1, "study_table": 4, "study_runs": 1, "zones_figure": 1, "steps_figure": 1, "weekly_figure": 1,
-    "displacement_maps": 1, "shape_maps": 3, "displacement_figure": 1, "runs_figure": 1, "regions_figure": 1,
+    "displacement_maps": 1, "shape_maps": 3, "displacement_figure": 1, "runs_figure": 1, "growth_zone_figure": 1,
+    "layers_figure": 1, "normals_figure": 1,
 }  # fmt: skip
 OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "runs_figure"}
 BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count in ONE_RUN.items()}
@@ -147,7 +151,7 @@ MESH = {"tetrahedralise": 1, "quality_figure": 1}
 FIGURES = {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "displacement_figure": 1, "quality_figure": 1,
     "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 6,
-    "zones_figure": 2, "regions_figure": 2, "steps_figure": 2,
+    "zones_figure": 2, "growth_zone_figure": 2, "layers_figure": 2, "normals_figure": 2, "steps_figure": 2,
 }  # fmt: skip
 
 
@@ -157,7 +161,7 @@ FIGURES = {
         (
             "metrics",
             {"curvature_radius_mm": 4.0},
-            SHAPE | {"measure_real": 2, "measure_simulated": 4, "run_metrics": 4, "study_table": 2, "shape_maps": 6},
+            SHAPE | {"measure": 6, "study_table": 2, "shape_maps": 6},
         ),
         ("runs", {"thick": {"thickness_mm": 3.5}}, ONE_RUN),
         ("folding", {"growth_rate_per_s": 1e-7}, BOTH_RUNS | {"growth_figure": 1}),
@@ -165,7 +169,15 @@ FIGURES = {
         (
             "surface",
             {"edge_length_mm": 1.5},
-            BOTH_RUNS | MESH | {"pial_surface": 2, "measure_real": 2, "growth_rates": 1, "growth_figure": 1},
+            BOTH_RUNS
+            | MESH
+            | {
+                "pial_from_labels": 2,
+                "cortical_thickness": 2,
+                "measure": 6,
+                "growth_rates": 1,
+                "growth_figure": 1,
+            },
         ),
         ("report", {"dpi": 100}, NEW_RESULTS | FIGURES),
         ("report", {"energy": {"pue": 1.67}}, NEW_RESULTS),
@@ -189,4 +201,4 @@ def test_a_change_of_a_rooms_code_reruns_what_uses_it(finished):
     finally:
         source.write_bytes(before)
     assert "similarity" in jobs
-    assert not {"pial_surface", "simulate"} & set(jobs)
+    assert not {"pial_from_labels", "simulate", "measure"} & set(jobs)

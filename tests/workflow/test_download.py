@@ -90,7 +90,12 @@ def test_the_atlas_is_fetched_once_and_then_planned(workflow, server):
         assert f"lacks the {source} files of week 23, such as " in lacking.stderr
 
     jobs = workflow.jobs("growth", "--configfile", name)
-    assert (jobs["poses"], jobs["pial_surface"], jobs["pial_surface_alone"], jobs["growth_rates"]) == (1, 2, 2, 1)
+    assert (jobs["poses"], jobs["pial_from_labels"], jobs["pial_from_hemispheres"], jobs["growth_rates"]) == (
+        1,
+        2,
+        2,
+        1,
+    )
 
 
 def test_no_network_ends_in_5_with_one_message_and_nothing_torn(workflow):

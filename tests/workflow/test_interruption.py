@@ -22,26 +22,21 @@ STUDY = SMALL_STUDY | {
     "folding": {"end_week": 22.5, "thickness_mm": 3.0, "step_s": 3600.0},
     "runs": {"reference": {}},
 }
-SUMMARY = "results/a/folding/reference/summary.json"
-LOG = "results/a/logs/simulate.reference.log"
+SUMMARY = "results/runs/reference/a/folding/summary.json"
+LOG = "results/runs/reference/a/logs/simulate.log"
 
 
 @pytest.fixture
 def meshed(workflow):
     """A study whose surface and mesh count as made: an ellipsoid."""
     workflow.write("study.yaml", STUDY)
-    listed = workflow.run("mesh", "--configfile", "study.yaml", "--forceall", "--summary").stdout
-    for file in [line.split("\t")[0] for line in listed.splitlines()[1:]]:
-        path = workflow.directory / file
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    results = workflow.directory / "results" / "a"
+    workflow.lay_out("mesh", "--configfile", "study.yaml")
+    results = workflow.directory / "results" / "brains" / "a"
     write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
     for side, sign in (("left", -1), ("right", 1)):
         write_surface(results / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
     write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", ellipsoid_mesh(10, (20.0, 26.0, 18.0)))
-    touched = workflow.run("--touch", "--cores", "1", "mesh", "--configfile", "study.yaml")
-    assert touched.returncode == 0, touched.stderr
+    workflow.count_as_made("mesh", "--configfile", "study.yaml")
     return workflow
 
 
@@ -79,7 +74,7 @@ def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
     assert "interrupted; the same command goes on from here" in printed
     _, alive = psutil.wait_procs(below, timeout=10)
     assert alive == []
-    assert list((meshed.directory / "results/a/folding/reference").glob("checkpoint-*/state.h5"))
+    assert list((meshed.directory / "results/runs/reference/a/folding").glob("checkpoint-*/state.h5"))
     again = meshed.run("--cores", "2", SUMMARY, "--configfile", "study.yaml")
     assert again.returncode == 0, again.stdout + again.stderr
     assert "going on from the checkpoint after step" in (meshed.directory / LOG).read_text()

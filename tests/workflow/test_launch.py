@@ -58,14 +58,17 @@ def test_the_code_of_the_first_failed_step_is_handed_on(workflow):
     outcome = workflow.run("--cores", "1", "surface", "--configfile", name)
     assert outcome.returncode == 2
     assert "labels.nii.gz" in message(outcome)
-    assert "labels.nii.gz" in (workflow.directory / "results" / "x" / "logs" / "pial_surface.log").read_text()
+    assert (
+        "labels.nii.gz"
+        in (workflow.directory / "results" / "brains" / "x" / "logs" / "pial_from_labels.log").read_text()
+    )
     assert not list((workflow.directory / ".snakemake").glob("gyriflow-exit-*"))
 
 
 def stale(directory):
     lock = directory / ".snakemake" / "locks" / "0.output.lock"
     lock.parent.mkdir(parents=True)
-    lock.write_text("results/a/surface/pial.surf.gii\n")
+    lock.write_text("results/brains/a/surface/pial.surf.gii\n")
     return lock
 
 

@@ -10,12 +10,12 @@ STUDY = {
     "start": "dome",
     "folding": {"end_week": 22, "contact": {"kind": "none"}},
 }
-TARGET = "results/dome/surface/pial.surf.gii"
+TARGET = "results/brains/dome/surface/pial.surf.gii"
 
 
 def test_a_shape_is_made_and_takes_the_path_of_a_brain(workflow):
     jobs = workflow.jobs("--configfile", workflow.write("study.yaml", STUDY))
-    assert (jobs["shape"], jobs["pial_surface_alone"], jobs["phantom"], jobs["pial_surface"]) == (1, 1, 1, 1)
+    assert (jobs["shape"], jobs["pial_from_shape"], jobs["phantom"], jobs["pial_from_labels"]) == (1, 1, 1, 1)
     assert jobs["measure_real"] == 2
     assert jobs["tetrahedralise"] == jobs["simulate"] == 1
     assert jobs["html_report"] == 1
@@ -25,7 +25,7 @@ def test_a_shape_is_made_and_takes_the_path_of_a_brain(workflow):
 def made(workflow):
     """The surface of the shape, which counts as made."""
     name = workflow.write("study.yaml", STUDY)
-    folder = workflow.directory / "results" / "dome" / "surface"
+    folder = workflow.directory / "results" / "brains" / "dome" / "surface"
     folder.mkdir(parents=True)
     sides = [f"{side}pial.surf.gii" for side in ("", "left.", "right.")]
     for file in ["shape.surf.gii", "pial.stl", "surface.json", *sides]:
@@ -39,9 +39,9 @@ def made(workflow):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"surface": {"edge_length_mm": 1.2}}, {"shape": 1, "pial_surface_alone": 1}),
-        ({"shape": {"kind": "slab"}}, {"shape": 1, "pial_surface_alone": 1}),
-        ({"shape": {"kind": "half-ellipsoid", "seed": 1}}, {"shape": 1, "pial_surface_alone": 1}),
+        ({"surface": {"edge_length_mm": 1.2}}, {"shape": 1, "pial_from_shape": 1}),
+        ({"shape": {"kind": "slab"}}, {"shape": 1, "pial_from_shape": 1}),
+        ({"shape": {"kind": "half-ellipsoid", "seed": 1}}, {"shape": 1, "pial_from_shape": 1}),
         # defaults written out, and what is for other kinds of input
         ({"shape": {"kind": "half-ellipsoid", "noise_mm": 0.05}}, {}),
         ({"surface": {"smoothing_iterations": 3, "max_hole_mm": 1.0}}, {}),

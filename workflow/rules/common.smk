@@ -1,5 +1,4 @@
-# What all rules share: the validated configuration, names, and the hash of the code behind a rule.
-import hashlib
+# What all rules share: the validated configuration, names, and where results lie.
 import re
 
 from gyriflow.errors import GyriflowError
@@ -40,14 +39,26 @@ def validated_config():
 
 
 CONFIG = validated_config()
-START = CONFIG.start
 BRAINS = [brain.id for brain in CONFIG.brains]
-RUNS = list(CONFIG.runs)
-SYNTHETIC = CONFIG.brain(START).synthetic
+# every run with each of the brains that it folds
+FOLDED = CONFIG.folded
 
 # held as long as this process lives: how `gyriflow.launch` tells a live run from one that was interrupted
 if workflow.is_main_process and not workflow.dryrun:
     LOCK = hold_lock(Path.cwd())
+
+# where results lie
+BRAIN = "results/brains/{brain}"
+RUN = "results/runs/{run}/{brain}"
+STUDY = "results/study"
+SIDES = ("left", "right")
+# the surfaces of a brain, measured or simulated, by what their names begin with
+SURFACES = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
+
+
+def surfaces_in(folder):
+    """Returns the surface files of a brain in a folder, by part."""
+    return {part: f"{folder}/{name}.surf.gii" for part, name in SURFACES.items()}
 
 
 def one_of(names):
@@ -55,32 +66,70 @@ def one_of(names):
     return "|".join(map(re.escape, names)) or r"(?!)"
 
 
-def code(*rooms):
-    """Returns a hash of the source of rooms of the package, so that a change of the code reruns the rules it serves."""
-    total = hashlib.sha256()
-    for room in sorted({*rooms, "geometry", "io"}):
-        for path in sorted(Path(SOURCE, "gyriflow", room).rglob("*.py")):
-            total.update(path.read_bytes())
-    return total.hexdigest()[:12]
+def from_source(*sources):
+    """Returns a pattern of the brains that come from one of some sources, such as `labels`."""
+    return one_of(brain.id for brain in CONFIG.brains if brain.source in sources)
 
 
-def week_tags(run):
-    """Returns the output weeks of a run as they stand in file names."""
-    return [week_tag(week) for week in CONFIG.weeks(run)]
+def of_runs(pattern, **wildcards):
+    """Returns the files of a pattern for every run and each brain that it folds."""
+    return [
+        file
+        for run, brain in FOLDED
+        for file in expand(pattern, run=run, brain=brain, **wildcards)
+    ]
+
+
+def week_tags(run, brain):
+    """Returns the output weeks of a run from a brain as they stand in file names."""
+    return [week_tag(week) for week in CONFIG.weeks(run, brain)]
+
+
+def of_weeks(pattern):
+    """Returns the files of a pattern for every run, brain and output week."""
+    return [
+        file
+        for run, brain in FOLDED
+        for file in expand(pattern, run=run, brain=brain, week=week_tags(run, brain))
+    ]
 
 
 def comparisons():
-    """Returns (run, week, brain) for every output week after the start for which there is a measured brain."""
+    """Returns (run, brain, week, measured brain) for every output week after the start with a measured brain."""
     return [
-        (run, week_tag(week), brain.id)
-        for run in RUNS
-        for week in CONFIG.weeks(run)[1:]
-        for brain in CONFIG.brains
-        if abs(brain.week - week) < 1e-6
+        (run, brain, week_tag(week), measured.id)
+        for run, brain in FOLDED
+        for week in CONFIG.weeks(run, brain)[1:]
+        for measured in CONFIG.brains
+        if abs(measured.week - week) < 1e-6
     ]
+
+
+def figure(path, title, caption, category, **labels):
+    """Returns the outputs of a rule that draws a figure: PNG, marked for the report, and PDF."""
+    labels = {"figure": title, **labels}
+    return {
+        "png": report(
+            f"{path}.png",
+            caption=f"../report/{caption}",
+            category=category,
+            labels=labels,
+        ),
+        "pdf": f"{path}.pdf",
+    }
+
+
+def drawing(*brains):
+    """Returns what all figures are told: their resolution, and whether what they show is synthetic."""
+    if brains:
+        synthetic = all(CONFIG.brain(brain).synthetic for brain in brains)
+    else:
+        synthetic = lambda wildcards: CONFIG.brain(wildcards.brain).synthetic
+    return {"synthetic": synthetic, "dpi": CONFIG.report.dpi}
 
 
 wildcard_constraints:
     brain=one_of(BRAINS),
-    run=one_of(RUNS),
+    run=one_of(CONFIG.runs),
     week=r"\d+\.\d+",
+    side="left|right",

@@ -1,5 +1,5 @@
-# The folding simulation of each run, and its surfaces at the output weeks.
-RUNS_WITH_MAPS = [run for run in RUNS if CONFIG.maps(run)]
+# The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
+RUNS_WITH_MAPS = [run for run in CONFIG.runs if CONFIG.maps(run)]
 
 
 def maps_of_run(wildcards):
@@ -15,26 +15,22 @@ def rates_of_run(wildcards):
 
 rule parameters:
     input:
-        surface=f"results/{START}/surface/surface.json",
+        surface=PIAL["report"],
         rates=rates_of_run,
     output:
-        f"results/{START}/folding/{{run}}/params.yaml",
+        f"{RUN}/params.yaml",
     log:
-        f"results/{START}/logs/parameters.{{run}}.log",
+        f"{RUN}/logs/parameters.log",
     benchmark:
-        f"results/{START}/benchmarks/parameters.{{run}}.tsv"
+        f"{RUN}/benchmarks/parameters.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=500,
-        runtime=5,
     params:
         settings=lambda wildcards: CONFIG.parameters(wildcards.run),
-        weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
+        weeks=lambda wildcards: CONFIG.weeks(wildcards.run, wildcards.brain),
         estimated_from=lambda wildcards: (
-            CONFIG.estimated_from if rates_of_run(wildcards) else None
+            CONFIG.estimated_from(wildcards.brain) if rates_of_run(wildcards) else None
         ),
-        code=lambda wildcards: code("growth") if rates_of_run(wildcards) else None,
     script:
         "../scripts/parameters.py"
 
@@ -46,15 +42,15 @@ rule parameter_maps:
             for files in CONFIG.maps(wildcards.run).values()
             for file in (*files["map"], *files["surface"])
         ],
-        mesh=f"results/{START}/mesh/brain.xdmf",
-        data=f"results/{START}/mesh/brain.h5",
-        surface=f"results/{START}/surface/surface.json",
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        surface=PIAL["report"],
     output:
-        f"results/{START}/folding/{{run}}/maps.h5",
+        f"{RUN}/folding/maps.h5",
     log:
-        f"results/{START}/logs/parameter_maps.{{run}}.log",
+        f"{RUN}/logs/parameter_maps.log",
     benchmark:
-        f"results/{START}/benchmarks/parameter_maps.{{run}}.tsv"
+        f"{RUN}/benchmarks/parameter_maps.tsv"
     wildcard_constraints:
         run=one_of(RUNS_WITH_MAPS),
     conda:
@@ -68,70 +64,69 @@ rule parameter_maps:
             name: CONFIG.bounds(name) for name in CONFIG.maps(wildcards.run)
         },
         # files of maps are understood as those of the brain
-        reading=CONFIG.brain(START).model_dump(include={"coordinates", "affine_from"}),
-        code=code("mesh", "surface"),
+        reading=lambda wildcards: CONFIG.brain(wildcards.brain).model_dump(
+            include={"coordinates", "affine_from"}
+        ),
     script:
         "../scripts/parameter_maps.py"
 
 
 rule regions:
     input:
-        mesh=f"results/{START}/mesh/brain.xdmf",
-        data=f"results/{START}/mesh/brain.h5",
-        params=f"results/{START}/folding/{{run}}/params.yaml",
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        params=rules.parameters.output[0],
         maps=maps_of_run,
         # the hemispheres of the folded brain are those of the measured one
-        left=f"results/{START}/surface/left.pial.surf.gii",
-        right=f"results/{START}/surface/right.pial.surf.gii",
+        left=PIAL["left"],
+        right=PIAL["right"],
     output:
-        mesh=f"results/{START}/folding/{{run}}/regions.xdmf",
-        data=f"results/{START}/folding/{{run}}/regions.h5",
+        mesh=f"{RUN}/folding/regions.xdmf",
+        data=f"{RUN}/folding/regions.h5",
     log:
-        f"results/{START}/logs/regions.{{run}}.log",
+        f"{RUN}/logs/regions.log",
     benchmark:
-        f"results/{START}/benchmarks/regions.{{run}}.tsv"
+        f"{RUN}/benchmarks/regions.tsv"
     conda:
         ENVIRONMENT
     resources:
         mem_mb=4000,
         runtime=15,
-    params:
-        code=code("folding", "mechanics", "surface"),
     script:
         "../scripts/regions.py"
 
 
 rule simulate:
     input:
-        mesh=f"results/{START}/mesh/brain.xdmf",
-        data=f"results/{START}/mesh/brain.h5",
-        params=f"results/{START}/folding/{{run}}/params.yaml",
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        params=rules.parameters.output[0],
         maps=maps_of_run,
         # impossible zones are refused there, before the ranks start
-        regions=f"results/{START}/folding/{{run}}/regions.xdmf",
+        regions=rules.regions.output.mesh,
     output:
-        steps=f"results/{START}/folding/{{run}}/steps.csv",
-        frames=f"results/{START}/folding/{{run}}/frames.h5",
-        series=f"results/{START}/folding/{{run}}/frames.xdmf",
-        zones=f"results/{START}/folding/{{run}}/zones.json",
-        summary=f"results/{START}/folding/{{run}}/summary.json",
+        steps=f"{RUN}/folding/steps.csv",
+        frames=f"{RUN}/folding/frames.h5",
+        series=f"{RUN}/folding/frames.xdmf",
+        zones=f"{RUN}/folding/zones.json",
+        summary=f"{RUN}/folding/summary.json",
     log:
-        f"results/{START}/logs/simulate.{{run}}.log",
+        f"{RUN}/logs/simulate.log",
     benchmark:
-        f"results/{START}/benchmarks/simulate.{{run}}.tsv"
+        f"{RUN}/benchmarks/simulate.tsv"
     conda:
         ENVIRONMENT
     # on one machine the ranks are its threads; a cluster's profile sets threads to 1 and counts tasks
-    threads: lambda wildcards: CONFIG.runs[wildcards.run].ranks
+    threads: lambda wildcards: CONFIG.run(wildcards.run).ranks
     resources:
         mpi="mpiexec",
-        tasks=lambda wildcards: CONFIG.runs[wildcards.run].ranks,
+        tasks=lambda wildcards: CONFIG.run(wildcards.run).ranks,
         mem_mb=8000,
         runtime=1440,
     params:
         folder=subpath(output.steps, parent=True),
         maps=lambda wildcards, input: ["--maps", input.maps] if input.maps else [],
-        code=code("folding", "mechanics"),
+        code=code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py")),
     shell:
         # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
         "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
@@ -146,32 +141,18 @@ rule folded_surface:
         regions=rules.regions.output.mesh,
         data=rules.regions.output.data,
     output:
-        whole=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.pial.surf.gii",
-        left=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.left.pial.surf.gii",
-        right=f"results/{START}/folding/{{run}}/surfaces/week-{{week}}.right.pial.surf.gii",
+        **surfaces_in(f"{RUN}/surfaces/week-{{week}}"),
     log:
-        f"results/{START}/logs/folded_surface.{{run}}.week-{{week}}.log",
+        f"{RUN}/logs/folded_surface.week-{{week}}.log",
     benchmark:
-        f"results/{START}/benchmarks/folded_surface.{{run}}.week-{{week}}.tsv"
+        f"{RUN}/benchmarks/folded_surface.week-{{week}}.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
-    params:
-        code=code("folding"),
     script:
         "../scripts/folded_surface.py"
 
 
-FOLDED_SURFACES = [
-    file
-    for run in RUNS
-    for file in expand(rules.folded_surface.output, run=run, week=week_tags(run))
-]
-
-
 rule folding:
     input:
-        expand(rules.simulate.output, run=RUNS),
-        FOLDED_SURFACES,
+        of_runs(rules.simulate.output),
+        of_weeks(rules.folded_surface.output),

@@ -18,27 +18,23 @@ def folding_rate():
 
 rule growth_rates:
     input:
-        whole=expand("results/{brain}/surface/pial.surf.gii", brain=GROWTH_BRAINS),
-        left=expand("results/{brain}/surface/left.pial.surf.gii", brain=GROWTH_BRAINS),
-        right=expand("results/{brain}/surface/right.pial.surf.gii", brain=GROWTH_BRAINS),
+        whole=expand(PIAL["whole"], brain=GROWTH_BRAINS),
+        left=expand(PIAL["left"], brain=GROWTH_BRAINS),
+        right=expand(PIAL["right"], brain=GROWTH_BRAINS),
     output:
-        areas=f"results/{START}/growth/areas.csv",
-        rates=f"results/{START}/growth/rates.csv",
-        agreement=f"results/{START}/growth/agreement.csv",
+        areas=f"{STUDY}/growth/areas.csv",
+        rates=f"{STUDY}/growth/rates.csv",
+        agreement=f"{STUDY}/growth/agreement.csv",
     log:
-        f"results/{START}/logs/growth_rates.log",
+        f"{STUDY}/logs/growth_rates.log",
     benchmark:
-        f"results/{START}/benchmarks/growth_rates.tsv"
+        f"{STUDY}/benchmarks/growth_rates.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         series=[series for series, _ in GROWTH_SERIES],
         brains=GROWTH_BRAINS,
         weeks=[CONFIG.brain(brain).week for brain in GROWTH_BRAINS],
-        code=code("growth"),
     script:
         "../scripts/growth_rates.py"
 
@@ -49,35 +45,30 @@ rule growth_figure:
         rates=rules.growth_rates.output.rates,
         agreement=rules.growth_rates.output.agreement,
     output:
-        png=report(
-            f"results/{START}/growth/growth.png",
-            caption="../report/growth.rst",
-            category="Brains and growth",
-            labels={"figure": "cortical growth rates"},
+        **figure(
+            f"{STUDY}/growth/growth",
+            "cortical growth rates",
+            "growth.rst",
+            "Brains and growth",
         ),
-        pdf=f"results/{START}/growth/growth.pdf",
         table=report(
-            f"results/{START}/growth/rates.html",
+            f"{STUDY}/growth/rates.html",
             caption="../report/growth_table.rst",
             category="Brains and growth",
             labels={"figure": "growth rates, table"},
         ),
     log:
-        f"results/{START}/logs/growth_figure.log",
+        f"{STUDY}/logs/growth_figure.log",
     benchmark:
-        f"results/{START}/benchmarks/growth_figure.tsv"
+        f"{STUDY}/benchmarks/growth_figure.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         folding_rate_per_s=folding_rate(),
-        estimated_from=CONFIG.estimated_from,
+        estimated_from=CONFIG.estimated_from(CONFIG.start_brains[0]),
         series_names=list(CONFIG.growth_series),
         measured=CONFIG.measured_name(GROWTH_BRAINS),
         dpi=CONFIG.report.dpi,
-        code=code("growth", "report"),
     script:
         "../scripts/growth_figure.py"
 

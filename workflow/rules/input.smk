@@ -13,22 +13,18 @@ def shape_settings(wildcards):
 
 rule phantom:
     output:
-        "results/{brain}/surface/labels.nii.gz",
+        f"{BRAIN}/surface/labels.nii.gz",
     log:
-        "results/{brain}/logs/phantom.log",
+        f"{BRAIN}/logs/phantom.log",
     benchmark:
-        "results/{brain}/benchmarks/phantom.tsv"
+        f"{BRAIN}/benchmarks/phantom.tsv"
     wildcard_constraints:
-        brain=one_of(brain.id for brain in CONFIG.brains if brain.phantom),
+        brain=from_source("phantom"),
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
         week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
         settings=lambda wildcards: CONFIG.brain(wildcards.brain).phantom.model_dump(),
-        code=code("phantom"),
     script:
         "../scripts/phantom.py"
 
@@ -37,13 +33,13 @@ rule segmentation:
     input:
         lambda wildcards: CONFIG.brain(wildcards.brain).image,
     output:
-        "results/{brain}/surface/labels.nii.gz",
+        f"{BRAIN}/surface/labels.nii.gz",
     log:
-        "results/{brain}/logs/segmentation.log",
+        f"{BRAIN}/logs/segmentation.log",
     benchmark:
-        "results/{brain}/benchmarks/segmentation.tsv"
+        f"{BRAIN}/benchmarks/segmentation.tsv"
     wildcard_constraints:
-        brain=one_of(brain.id for brain in CONFIG.brains if brain.segmentation),
+        brain=from_source("segmentation"),
     conda:
         ENVIRONMENT
     resources:
@@ -54,27 +50,22 @@ rule segmentation:
         container=lambda wildcards: CONFIG.brain(wildcards.brain).segmentation.container,
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
         scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
-        code=code("surface"),
     script:
         "../scripts/segmentation.py"
 
 
 rule shape:
     output:
-        "results/{brain}/surface/shape.surf.gii",
+        f"{BRAIN}/surface/shape.surf.gii",
     log:
-        "results/{brain}/logs/shape.log",
+        f"{BRAIN}/logs/shape.log",
     benchmark:
-        "results/{brain}/benchmarks/shape.tsv"
+        f"{BRAIN}/benchmarks/shape.tsv"
     wildcard_constraints:
-        brain=one_of(brain.id for brain in CONFIG.brains if brain.shape),
+        brain=from_source("shape"),
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
         shape=shape_settings,
-        code=code("phantom"),
     script:
         "../scripts/shape.py"

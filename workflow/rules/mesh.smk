@@ -1,4 +1,4 @@
-# The start brain as a tetrahedral mesh.
+# The brains that runs start from as tetrahedral meshes.
 MESH_GATES = {
     key: value
     for key, value in CONFIG.mesh.model_dump().items()
@@ -8,16 +8,16 @@ MESH_GATES = {
 
 rule tetrahedralise:
     input:
-        f"results/{START}/surface/pial.surf.gii",
+        PIAL["whole"],
     output:
-        mesh=f"results/{START}/mesh/brain.xdmf",
-        data=f"results/{START}/mesh/brain.h5",
-        surface=f"results/{START}/mesh/pial.stl",
-        quality=f"results/{START}/mesh/quality.json",
+        mesh=f"{BRAIN}/mesh/brain.xdmf",
+        data=f"{BRAIN}/mesh/brain.h5",
+        surface=f"{BRAIN}/mesh/pial.stl",
+        quality=f"{BRAIN}/mesh/quality.json",
     log:
-        f"results/{START}/logs/tetrahedralise.log",
+        f"{BRAIN}/logs/tetrahedralise.log",
     benchmark:
-        f"results/{START}/benchmarks/tetrahedralise.tsv"
+        f"{BRAIN}/benchmarks/tetrahedralise.tsv"
     conda:
         ENVIRONMENT
     resources:
@@ -27,12 +27,48 @@ rule tetrahedralise:
         settings=CONFIG.mesh.model_dump(exclude=set(MESH_GATES)),
         gates=MESH_GATES,
         # no output: it stays where the rule fails
-        refused=f"results/{START}/mesh/refused",
-        code=code("mesh"),
+        refused=f"{BRAIN}/mesh/refused",
     script:
         "../scripts/tetrahedralise.py"
 
 
+rule quality_figure:
+    input:
+        rules.tetrahedralise.output.quality,
+    output:
+        **figure(
+            f"{BRAIN}/figures/mesh_quality",
+            "mesh quality",
+            "mesh_quality.rst",
+            "Brains and growth",
+            brain="{brain}",
+        ),
+    log:
+        f"{BRAIN}/logs/quality_figure.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/quality_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+        gates=MESH_GATES,
+    script:
+        "../scripts/quality_figure.py"
+
+
+# of a mesh that did not pass the gates; made when asked for
+use rule quality_figure as refused_quality_figure with:
+    input:
+        f"{BRAIN}/mesh/refused/quality.json",
+    output:
+        png=f"{BRAIN}/mesh/refused/quality.png",
+        pdf=f"{BRAIN}/mesh/refused/quality.pdf",
+    log:
+        f"{BRAIN}/logs/refused_quality_figure.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/refused_quality_figure.tsv"
+
+
 rule mesh:
     input:
-        rules.tetrahedralise.output,
+        expand(rules.tetrahedralise.output, brain=CONFIG.start_brains),

@@ -1,118 +1,89 @@
-# Metrics of measured and simulated brains, by the same code with the same settings.
+# Metrics of brains, measured and simulated: one rule, so that both go through the same code with the same settings.
+def surface_folder(where):
+    """Returns the folder with the surfaces that metrics in a folder belong to."""
+    return (
+        where.removesuffix("/metrics") + "/surface"
+        if where.startswith("brains/")
+        else where.replace("/metrics/", "/surfaces/")
+    )
 
 
-def folded_surfaces(side):
-    """Returns the surfaces of a hemisphere of all runs at all output weeks."""
-    return [
-        file
-        for run in RUNS
-        for file in expand(
-            rules.folded_surface.output[side], run=run, week=week_tags(run)
-        )
-    ]
+def brain_labels(where):
+    """Returns what stands before every row of a brain's tables: its id, the run ("real" for measured ones), its week."""
+    match where.split("/"):
+        case ["brains", brain, "metrics"]:
+            return {"subject": brain, "run": "real", "week": CONFIG.brain(brain).week}
+        case ["runs", run, brain, "metrics", week]:
+            return {
+                "subject": brain,
+                "run": run,
+                "week": float(week.removeprefix("week-")),
+            }
+
+
+# where the metrics of a brain lie under results
+MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
+SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
 
 
 # Only a common number of modes ties brains to each other: measured ones then wait for all simulations.
 rule weyl_numbers:
     input:
-        left=expand("results/{brain}/surface/left.pial.surf.gii", brain=BRAINS)
-        + folded_surfaces("left"),
-        right=expand("results/{brain}/surface/right.pial.surf.gii", brain=BRAINS)
-        + folded_surfaces("right"),
+        left=[
+            f"results/{surface_folder(where)}/left.pial.surf.gii"
+            for where in MEASURED + SIMULATED
+        ],
+        right=[
+            f"results/{surface_folder(where)}/right.pial.surf.gii"
+            for where in MEASURED + SIMULATED
+        ],
     output:
-        "results/study/weyl_numbers.csv",
+        f"{STUDY}/weyl_numbers.csv",
     log:
-        "results/study/logs/weyl_numbers.log",
+        f"{STUDY}/logs/weyl_numbers.log",
     benchmark:
-        "results/study/benchmarks/weyl_numbers.tsv"
+        f"{STUDY}/benchmarks/weyl_numbers.tsv"
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
         runtime=20,
     params:
-        labels=[
-            {"subject": brain.id, "run": "real", "week": brain.week}
-            for brain in CONFIG.brains
-        ]
-        + [
-            {"subject": START, "run": run, "week": week}
-            for run in RUNS
-            for week in CONFIG.weeks(run)
-        ],
+        labels=[brain_labels(where) for where in MEASURED + SIMULATED],
         formula=CONFIG.metrics.spangy_wavelength,
-        code=code("metrics"),
     script:
         "../scripts/weyl_numbers.py"
 
 
-MODE_NUMBERS = (
-    rules.weyl_numbers.output[0] if CONFIG.metrics.spangy_modes == "common" else []
-)
-
-
-rule measure_real:
+rule measure:
     input:
-        whole="results/{brain}/surface/pial.surf.gii",
-        left="results/{brain}/surface/left.pial.surf.gii",
-        right="results/{brain}/surface/right.pial.surf.gii",
-        mode_numbers=MODE_NUMBERS,
+        unpack(
+            lambda wildcards: surfaces_in(f"results/{surface_folder(wildcards.where)}")
+        ),
+        mode_numbers=(
+            rules.weyl_numbers.output[0]
+            if CONFIG.metrics.spangy_modes == "common"
+            else []
+        ),
     output:
-        metrics="results/{brain}/metrics/real/metrics.csv",
-        spectra="results/{brain}/metrics/real/spectra.csv",
-        coefficients="results/{brain}/metrics/real/coefficients.csv",
-        left="results/{brain}/metrics/real/left.shape.gii",
-        right="results/{brain}/metrics/real/right.shape.gii",
+        metrics="results/{where}/metrics.csv",
+        spectra="results/{where}/spectra.csv",
+        coefficients="results/{where}/coefficients.csv",
+        left="results/{where}/left.shape.gii",
+        right="results/{where}/right.shape.gii",
     log:
-        "results/{brain}/logs/measure_real.log",
+        "results/{where}/logs/measure.log",
     benchmark:
-        "results/{brain}/benchmarks/measure_real.tsv"
+        "results/{where}/benchmarks/measure.tsv"
+    wildcard_constraints:
+        where=one_of(MEASURED + SIMULATED),
     conda:
         ENVIRONMENT
     resources:
         mem_mb=4000,
         runtime=60,
     params:
-        labels=lambda wildcards: {
-            "subject": wildcards.brain,
-            "run": "real",
-            "week": CONFIG.brain(wildcards.brain).week,
-        },
+        labels=lambda wildcards: brain_labels(wildcards.where),
         settings=CONFIG.metrics.model_dump(exclude={"age_reference"}),
-        code=code("metrics"),
-    script:
-        "../scripts/measure.py"
-
-
-rule measure_simulated:
-    input:
-        whole=rules.folded_surface.output.whole,
-        left=rules.folded_surface.output.left,
-        right=rules.folded_surface.output.right,
-        mode_numbers=MODE_NUMBERS,
-    output:
-        metrics=f"results/{START}/metrics/{{run}}/week-{{week}}/metrics.csv",
-        spectra=f"results/{START}/metrics/{{run}}/week-{{week}}/spectra.csv",
-        coefficients=f"results/{START}/metrics/{{run}}/week-{{week}}/coefficients.csv",
-        left=f"results/{START}/metrics/{{run}}/week-{{week}}/left.shape.gii",
-        right=f"results/{START}/metrics/{{run}}/week-{{week}}/right.shape.gii",
-    log:
-        f"results/{START}/logs/measure_simulated.{{run}}.week-{{week}}.log",
-    benchmark:
-        f"results/{START}/benchmarks/measure_simulated.{{run}}.week-{{week}}.tsv"
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=4000,
-        runtime=60,
-    params:
-        labels=lambda wildcards: {
-            "subject": START,
-            "run": wildcards.run,
-            "week": float(wildcards.week),
-        },
-        settings=CONFIG.metrics.model_dump(exclude={"age_reference"}),
-        code=code("metrics"),
     script:
         "../scripts/measure.py"
 
@@ -121,43 +92,42 @@ rule displacement:
     input:
         rules.simulate.output.frames,
     output:
-        f"results/{START}/metrics/{{run}}/displacement.csv",
+        f"{RUN}/metrics/displacement.csv",
     log:
-        f"results/{START}/logs/displacement.{{run}}.log",
+        f"{RUN}/logs/displacement.log",
     benchmark:
-        f"results/{START}/benchmarks/displacement.{{run}}.tsv"
+        f"{RUN}/benchmarks/displacement.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
-        labels=lambda wildcards: {"subject": START, "run": wildcards.run},
-        code=code("metrics"),
+        labels=lambda wildcards: {"subject": wildcards.brain, "run": wildcards.run},
     script:
         "../scripts/displacement.py"
 
 
-rule run_metrics:
+rule similarity:
     input:
-        lambda wildcards: expand(
-            f"results/{START}/metrics/{wildcards.run}/week-{{week}}/{wildcards.table}.csv",
-            week=week_tags(wildcards.run),
-        ),
+        simulated=list(surfaces_in(f"{RUN}/surfaces/week-{{week}}").values()),
+        real=list(surfaces_in("results/brains/{measured}/surface").values()),
     output:
-        f"results/{START}/metrics/{{run}}/{{table}}.csv",
+        f"{RUN}/metrics/week-{{week}}/similarity.{{measured}}.csv",
     log:
-        f"results/{START}/logs/run_metrics.{{run}}.{{table}}.log",
+        f"{RUN}/logs/similarity.week-{{week}}.{{measured}}.log",
     benchmark:
-        f"results/{START}/benchmarks/run_metrics.{{run}}.{{table}}.tsv"
+        f"{RUN}/benchmarks/similarity.week-{{week}}.{{measured}}.tsv"
     wildcard_constraints:
-        table="metrics|spectra",
+        measured=one_of(BRAINS),
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=500,
-        runtime=5,
+        runtime=20,
     params:
-        code=code(),
+        labels=lambda wildcards: {
+            "subject": wildcards.brain,
+            "run": wildcards.run,
+            "week": float(wildcards.week),
+            "real": wildcards.measured,
+        },
+        parts=list(SURFACES),
     script:
-        "../scripts/join_tables.py"
+        "../scripts/similarity.py"

@@ -10,30 +10,26 @@ rule study_resources:
         # the files of benchmarks are no inputs: a lost one would have its stage run again
         rules.figures.input,
         rules.metrics.input,
-        summaries=expand(rules.simulate.output.summary, run=RUNS),
-        steps=expand(rules.simulate.output.steps, run=RUNS),
+        summaries=of_runs(rules.simulate.output.summary),
+        steps=of_runs(rules.simulate.output.steps),
     output:
-        csv="results/study/resources.csv",
+        csv=f"{STUDY}/resources.csv",
         table=report(
-            "results/study/resources.html",
+            f"{STUDY}/resources.html",
             caption="../report/resources_table.rst",
             category="Resources",
             labels={"figure": "time, memory, energy and emissions"},
         ),
     log:
-        "results/study/logs/study_resources.log",
+        f"{STUDY}/logs/study_resources.log",
     benchmark:
-        "results/study/benchmarks/study_resources.tsv"
+        f"{STUDY}/benchmarks/study_resources.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=500,
-        runtime=5,
     params:
         benchmarks=BENCHMARKS,
         power=CONFIG.report.energy.model_dump(),
-        runs=RUNS,
-        code=code("report"),
+        folded=FOLDED,
     script:
         "../scripts/study_resources.py"
 
@@ -53,7 +49,6 @@ rule html_report:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
         runtime=20,
     params:
         snakefile=f"{workflow.basedir}/Snakefile",

@@ -1,63 +1,66 @@
-# Figures of each run: PNG, marked for the report, and PDF.
-FIGURES = "results/study/figures"
-DRAWING = {"synthetic": SYNTHETIC, "dpi": CONFIG.report.dpi}
+# Figures of each run from each brain that it folds.
+from gyriflow.parameters.measures import SHAPE_MEASURES
 
 
-def shown_beside(run):
+def measured_beside(run, brain):
     """Returns, by week, the measured brain that a run's surface of that week is shown beside."""
-    measured = {week_tag(brain.week): brain.id for brain in reversed(CONFIG.brains)}
-    return {week: measured[week] for week in week_tags(run) if week in measured}
+    measured = {week_tag(one.week): one.id for one in reversed(CONFIG.brains)}
+    tags = week_tags(run, brain)
+    return {week: measured[week] for week in tags if week in measured}
 
 
-def folded(run, side="", weeks=None):
-    """Returns a run's surface files of the given weeks, by default of all output weeks."""
-    return [
-        f"results/{START}/folding/{run}/surfaces/week-{week}.{side}pial.surf.gii"
-        for week in (week_tags(run) if weeks is None else weeks)
+def beside(wildcards):
+    """Returns the measured brains that the surfaces of a run are shown beside."""
+    return list(measured_beside(wildcards.run, wildcards.brain).values())
+
+
+def run_surfaces(part):
+    """Returns an input function: a run's surfaces of a part at all output weeks."""
+    return lambda wildcards: [
+        surfaces_in(f"{RUN}/surfaces/week-{week}")[part]
+        for week in week_tags(wildcards.run, wildcards.brain)
     ]
 
 
-# the last week of which every run has a surface
-LAST_WEEK = max(set.intersection(*(set(week_tags(run)) for run in RUNS)))
-LAST_BRAINS = [
-    brain for week, brain in shown_beside(RUNS[0]).items() if week == LAST_WEEK
-]
+def measured_surfaces(part):
+    """Returns an input function: the surfaces of a part of the measured brains beside a run."""
+    return lambda wildcards: [
+        PIAL[part].format(brain=brain) for brain in beside(wildcards)
+    ]
+
+
+# what figures that show simulated beside measured brains are told
+BESIDE = {
+    **drawing(),
+    "measured": lambda wildcards: CONFIG.measured_name(beside(wildcards)),
+    "simulated_weeks": lambda wildcards: CONFIG.weeks(wildcards.run, wildcards.brain),
+    "real_weeks": lambda wildcards: [
+        float(week) for week in measured_beside(wildcards.run, wildcards.brain)
+    ],
+}
+
+
+def run_figure(name, title, caption, category="Folding"):
+    """Returns the outputs of a rule that draws a figure of a run."""
+    return figure(
+        f"{RUN}/figures/{name}", title, caption, category, run="{run}", brain="{brain}"
+    )
 
 
 rule weekly_figure:
     input:
-        simulated=lambda wildcards: folded(wildcards.run),
-        real=lambda wildcards: [
-            f"results/{brain}/surface/pial.surf.gii"
-            for brain in shown_beside(wildcards.run).values()
-        ],
+        simulated=run_surfaces("whole"),
+        real=measured_surfaces("whole"),
     output:
-        png=report(
-            f"{FIGURES}/weekly.{{run}}.png",
-            caption="../report/weekly.rst",
-            category="Folding",
-            labels={"figure": "simulated beside measured brains", "run": "{run}"},
-        ),
-        pdf=f"{FIGURES}/weekly.{{run}}.pdf",
+        **run_figure("weekly", "simulated beside measured brains", "weekly.rst"),
     log:
-        "results/study/logs/weekly_figure.{run}.log",
+        f"{RUN}/logs/weekly_figure.log",
     benchmark:
-        "results/study/benchmarks/weekly_figure.{run}.tsv"
+        f"{RUN}/benchmarks/weekly_figure.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
-        **DRAWING,
-        measured=lambda wildcards: CONFIG.measured_name(
-            shown_beside(wildcards.run).values()
-        ),
-        simulated_weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
-        real_weeks=lambda wildcards: [
-            float(week) for week in shown_beside(wildcards.run)
-        ],
-        code=code("report"),
+        **BESIDE,
     script:
         "../scripts/weekly_figure.py"
 
@@ -66,25 +69,15 @@ rule displacement_maps:
     input:
         rules.simulate.output.frames,
     output:
-        png=report(
-            f"{FIGURES}/displacement_maps.{{run}}.png",
-            caption="../report/displacement_maps.rst",
-            category="Folding",
-            labels={"figure": "displacement maps", "run": "{run}"},
-        ),
-        pdf=f"{FIGURES}/displacement_maps.{{run}}.pdf",
+        **run_figure("displacement_maps", "displacement maps", "displacement_maps.rst"),
     log:
-        "results/study/logs/displacement_maps.{run}.log",
+        f"{RUN}/logs/displacement_maps.log",
     benchmark:
-        "results/study/benchmarks/displacement_maps.{run}.tsv"
+        f"{RUN}/benchmarks/displacement_maps.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
-        **DRAWING,
-        code=code("report"),
+        **drawing(),
     script:
         "../scripts/displacement_maps.py"
 
@@ -93,80 +86,48 @@ rule contact_maps:
     input:
         rules.simulate.output.frames,
     output:
-        png=report(
-            f"{FIGURES}/contact_maps.{{run}}.png",
-            caption="../report/contact_maps.rst",
-            category="Folding",
-            labels={"figure": "contact pressure", "run": "{run}"},
-        ),
-        pdf=f"{FIGURES}/contact_maps.{{run}}.pdf",
+        **run_figure("contact_maps", "contact pressure", "contact_maps.rst"),
     log:
-        "results/study/logs/contact_maps.{run}.log",
+        f"{RUN}/logs/contact_maps.log",
     benchmark:
-        "results/study/benchmarks/contact_maps.{run}.tsv"
+        f"{RUN}/benchmarks/contact_maps.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
-        **DRAWING,
-        code=code("report"),
+        **drawing(),
     script:
         "../scripts/contact_maps.py"
 
 
 rule shape_maps:
     input:
-        simulated=lambda wildcards: folded(wildcards.run, "left.")
-        + folded(wildcards.run, "right."),
+        simulated_left=run_surfaces("left"),
+        simulated_right=run_surfaces("right"),
+        real_left=measured_surfaces("left"),
+        real_right=measured_surfaces("right"),
+        # the maps lie beside the metrics
         simulated_maps=lambda wildcards: [
-            f"results/{START}/metrics/{wildcards.run}/week-{week}/{side}.shape.gii"
-            for side in ("left", "right")
-            for week in week_tags(wildcards.run)
-        ],
-        real=lambda wildcards: [
-            f"results/{brain}/surface/{side}.pial.surf.gii"
-            for side in ("left", "right")
-            for brain in shown_beside(wildcards.run).values()
+            f"{RUN}/metrics/week-{week}/{side}.shape.gii"
+            for side in SIDES
+            for week in week_tags(wildcards.run, wildcards.brain)
         ],
         real_maps=lambda wildcards: [
-            f"results/{brain}/metrics/real/{side}.shape.gii"
-            for side in ("left", "right")
-            for brain in shown_beside(wildcards.run).values()
+            f"results/brains/{brain}/metrics/{side}.shape.gii"
+            for side in SIDES
+            for brain in beside(wildcards)
         ],
     output:
-        png=report(
-            f"{FIGURES}/{{measure}}.{{run}}.png",
-            caption="../report/shape_maps.rst",
-            category="Metrics",
-            labels=lambda wildcards: {
-                "figure": f"{wildcards.measure.removesuffix('_mm').replace('_', ' ')} maps",
-                "run": wildcards.run,
-            },
-        ),
-        pdf=f"{FIGURES}/{{measure}}.{{run}}.pdf",
+        **run_figure("{measure}", "{measure} maps", "shape_maps.rst", "Metrics"),
     log:
-        "results/study/logs/shape_maps.{measure}.{run}.log",
+        f"{RUN}/logs/shape_maps.{{measure}}.log",
     benchmark:
-        "results/study/benchmarks/shape_maps.{measure}.{run}.tsv"
+        f"{RUN}/benchmarks/shape_maps.{{measure}}.tsv"
     wildcard_constraints:
-        measure="shape_index|curvedness|sulcal_depth_mm",
+        measure=one_of(SHAPE_MEASURES),
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
-        **DRAWING,
-        measured=lambda wildcards: CONFIG.measured_name(
-            shown_beside(wildcards.run).values()
-        ),
-        simulated_weeks=lambda wildcards: CONFIG.weeks(wildcards.run),
-        real_weeks=lambda wildcards: [
-            float(week) for week in shown_beside(wildcards.run)
-        ],
-        code=code("report"),
+        **BESIDE,
     script:
         "../scripts/shape_maps.py"
 
@@ -177,94 +138,90 @@ rule zones_figure:
         data=rules.tetrahedralise.output.data,
         params=rules.parameters.output[0],
     output:
-        png=report(
-            f"{FIGURES}/zones.{{run}}.png",
-            caption="../report/zones.rst",
-            category="Folding",
-            labels={"figure": "zones of the boundary", "run": "{run}"},
-        ),
-        pdf=f"{FIGURES}/zones.{{run}}.pdf",
+        **run_figure("zones", "zones of the boundary", "zones.rst"),
     log:
-        "results/study/logs/zones_figure.{run}.log",
+        f"{RUN}/logs/zones_figure.log",
     benchmark:
-        "results/study/benchmarks/zones_figure.{run}.tsv"
+        f"{RUN}/benchmarks/zones_figure.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
-        **DRAWING,
-        code=code("report", "folding"),
+        **drawing(),
     script:
         "../scripts/zones_figure.py"
 
 
-rule regions_figure:
+# what the three figures of the regions share
+REGIONS = {
+    "mesh": rules.regions.output.mesh,
+    "data": rules.regions.output.data,
+    "params": rules.parameters.output[0],
+}
+
+
+rule growth_zone_figure:
     input:
-        mesh=rules.regions.output.mesh,
-        data=rules.regions.output.data,
-        params=rules.parameters.output[0],
+        **REGIONS,
     output:
-        png=report(
-            f"{FIGURES}/growth_zone.{{run}}.png",
-            caption="../report/growth_zone.rst",
-            category="Folding",
-            labels={"figure": "growth on the surface", "run": "{run}"},
-        ),
-        pdf=f"{FIGURES}/growth_zone.{{run}}.pdf",
-        section_png=report(
-            f"{FIGURES}/layers.{{run}}.png",
-            caption="../report/layers.rst",
-            category="Folding",
-            labels={"figure": "regions and growth in sections", "run": "{run}"},
-        ),
-        section_pdf=f"{FIGURES}/layers.{{run}}.pdf",
-        normals_png=report(
-            f"{FIGURES}/normals.{{run}}.png",
-            caption="../report/normals.rst",
-            category="Folding",
-            labels={"figure": "pial normals in sections", "run": "{run}"},
-        ),
-        normals_pdf=f"{FIGURES}/normals.{{run}}.pdf",
+        **run_figure("growth_zone", "growth on the surface", "growth_zone.rst"),
     log:
-        "results/study/logs/regions_figure.{run}.log",
+        f"{RUN}/logs/growth_zone_figure.log",
     benchmark:
-        "results/study/benchmarks/regions_figure.{run}.tsv"
+        f"{RUN}/benchmarks/growth_zone_figure.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
-        **DRAWING,
-        code=code("report", "folding"),
+        **drawing(),
     script:
-        "../scripts/regions_figure.py"
+        "../scripts/growth_zone_figure.py"
+
+
+rule layers_figure:
+    input:
+        **REGIONS,
+    output:
+        **run_figure("layers", "regions and growth in sections", "layers.rst"),
+    log:
+        f"{RUN}/logs/layers_figure.log",
+    benchmark:
+        f"{RUN}/benchmarks/layers_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+    script:
+        "../scripts/layers_figure.py"
+
+
+rule normals_figure:
+    input:
+        **REGIONS,
+    output:
+        **run_figure("normals", "pial normals in sections", "normals.rst"),
+    log:
+        f"{RUN}/logs/normals_figure.log",
+    benchmark:
+        f"{RUN}/benchmarks/normals_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+    script:
+        "../scripts/normals_figure.py"
 
 
 rule steps_figure:
     input:
         rules.simulate.output.steps,
     output:
-        png=report(
-            f"{FIGURES}/steps.{{run}}.png",
-            caption="../report/steps.rst",
-            category="Folding",
-            labels={"figure": "steps of the solver", "run": "{run}"},
-        ),
-        pdf=f"{FIGURES}/steps.{{run}}.pdf",
+        **run_figure("steps", "steps of the solver", "steps.rst"),
     log:
-        "results/study/logs/steps_figure.{run}.log",
+        f"{RUN}/logs/steps_figure.log",
     benchmark:
-        "results/study/benchmarks/steps_figure.{run}.tsv"
+        f"{RUN}/benchmarks/steps_figure.tsv"
     conda:
         ENVIRONMENT
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
-        **DRAWING,
-        code=code("report"),
+        **drawing(),
     script:
         "../scripts/steps_figure.py"

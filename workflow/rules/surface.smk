@@ -1,31 +1,19 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
-from gyriflow.surface.labels import label_scheme
+from gyriflow.parameters.schemes import LabelScheme
 
-SURFACE_SETTINGS = {
-    "labels": (
-        "smoothing_voxels",
-        "edge_length_mm",
-        "smoothing_iterations",
-        "fissure_mm",
-    ),
-    "hemispheres": ("gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"),
-    "pial": ("edge_length_mm", "smoothing_iterations", "max_hole_mm"),
-    # made with the edge length that they keep
-    "shape": (),
+# what is made of every brain, whatever it is given as
+PIAL = {
+    **surfaces_in(f"{BRAIN}/surface"),
+    "stl": f"{BRAIN}/surface/pial.stl",
+    "report": f"{BRAIN}/surface/surface.json",
 }
-MADE_INPUTS = {
-    "phantom": "labels.nii.gz",
-    "segmentation": "labels.nii.gz",
-    "shape": "shape.surf.gii",
-}
+WITH_LABELS = ("labels", "segmentation", "phantom")
 # brains of which labels of the cortex give its thickness
 WITH_CORTEX = [
     brain.id
     for brain in CONFIG.brains
-    if brain.source in ("labels", "segmentation", "phantom")
-    and label_scheme(**CONFIG.scheme(brain)).cortex
+    if brain.source in WITH_LABELS and LabelScheme(**CONFIG.scheme(brain)).cortex
 ]
-WITHOUT_CORTEX = [brain for brain in BRAINS if brain not in WITH_CORTEX]
 # hemispheres whose pose is to be found, for all of a study at once
 TO_POSE = [
     brain
@@ -34,88 +22,68 @@ TO_POSE = [
 ]
 
 
-def surface_files(wildcards):
-    brain = CONFIG.brain(wildcards.brain)
-    return brain.files or [f"results/{brain.id}/surface/{MADE_INPUTS[brain.source]}"]
+def surface_settings(*names):
+    """Returns the settings of the surfaces that matter for a kind of data."""
+    return CONFIG.surface.model_dump(include=set(names))
 
 
-def surface_source(wildcards):
-    """Returns what the surface is made from; phantoms and segmentations are label volumes."""
-    source = CONFIG.brain(wildcards.brain).source
-    return "labels" if source in ("phantom", "segmentation") else source
+def label_volume(wildcards):
+    """Returns the label volume of a brain: the user's, or the one that the workflow makes."""
+    own = CONFIG.brain(wildcards.brain).labels
+    return own or f"results/brains/{wildcards.brain}/surface/labels.nii.gz"
 
 
-def surface_settings(wildcards):
-    """Returns the settings that matter for the brain's kind of data."""
-    chosen = SURFACE_SETTINGS[surface_source(wildcards)]
-    return CONFIG.surface.model_dump(include=set(chosen))
+def coordinates_of(wildcards):
+    """Returns the axes of the coordinates in a brain's surface files."""
+    return CONFIG.brain(wildcards.brain).coordinates
 
 
-def surface_reading(wildcards):
-    """Returns how the brain's files are to be understood."""
-    brain = CONFIG.brain(wildcards.brain)
-    match surface_source(wildcards):
-        case "labels":
-            return {"affine_from": brain.affine_from}
-        case "shape":
-            return {}
-        case "pial" if brain.coordinates == "auto":
-            return {"coordinates": "ras"}
-        case _:
-            return {"coordinates": brain.coordinates}
-
-
-def surface_scheme(wildcards):
-    """Returns what the labels of the brain's volume mean; None where it is given by surfaces."""
-    from_volume = surface_source(wildcards) == "labels"
-    return CONFIG.scheme(CONFIG.brain(wildcards.brain)) if from_volume else None
-
-
-def poses_of(wildcards):
-    """Returns the file with the pose of a brain, where it has to be found."""
+def pose_of(wildcards):
+    """Returns the file with the pose of a brain's hemispheres, where it has to be found."""
     if wildcards.brain in [brain.id for brain in TO_POSE]:
-        return f"results/{wildcards.brain}/surface/pose.json"
+        return f"results/brains/{wildcards.brain}/surface/pose.json"
     return []
 
 
-rule poses:
+rule pial_from_labels:
     input:
-        [path for brain in TO_POSE for path in brain.files],
+        labels=label_volume,
     output:
-        [f"results/{brain.id}/surface/pose.json" for brain in TO_POSE],
+        **PIAL,
     log:
-        "results/study/logs/poses.log",
+        f"{BRAIN}/logs/pial_from_labels.log",
     benchmark:
-        "results/study/benchmarks/poses.tsv"
+        f"{BRAIN}/benchmarks/pial_from_labels.tsv"
+    wildcard_constraints:
+        brain=from_source(*WITH_LABELS),
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=2000,
+        mem_mb=4000,
         runtime=30,
     params:
-        # exchanged files are the same inputs to Snakemake
-        order=[path for brain in TO_POSE for path in brain.files],
-        max_hole_mm=CONFIG.surface.max_hole_mm,
-        code=code("surface"),
+        week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
+        settings=surface_settings(
+            "smoothing_voxels", "edge_length_mm", "smoothing_iterations", "fissure_mm"
+        ),
     script:
-        "../scripts/poses.py"
+        "../scripts/pial_from_labels.py"
 
 
-rule pial_surface:
+rule cortical_thickness:
     input:
-        surface_files,
-        pose=poses_of,
+        labels=label_volume,
+        surface=rules.pial_from_labels.output.whole,
+        report=rules.pial_from_labels.output.report,
     output:
-        whole="results/{brain}/surface/pial.surf.gii",
-        left="results/{brain}/surface/left.pial.surf.gii",
-        right="results/{brain}/surface/right.pial.surf.gii",
-        stl="results/{brain}/surface/pial.stl",
-        report="results/{brain}/surface/surface.json",
-        thickness="results/{brain}/surface/thickness.shape.gii",
+        thickness=f"{BRAIN}/surface/thickness.shape.gii",
+        report=f"{BRAIN}/surface/thickness.json",
     log:
-        "results/{brain}/logs/pial_surface.log",
+        f"{BRAIN}/logs/cortical_thickness.log",
     benchmark:
-        "results/{brain}/benchmarks/pial_surface.tsv"
+        f"{BRAIN}/benchmarks/cortical_thickness.tsv"
     wildcard_constraints:
         brain=one_of(WITH_CORTEX),
     conda:
@@ -124,31 +92,143 @@ rule pial_surface:
         mem_mb=4000,
         runtime=30,
     params:
-        order=surface_files,
-        source=surface_source,
-        week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
-        reading=surface_reading,
-        scheme=surface_scheme,
-        settings=surface_settings,
-        code=code("surface"),
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
+        settings=surface_settings("smoothing_voxels"),
     script:
-        "../scripts/pial_surface.py"
+        "../scripts/cortical_thickness.py"
 
 
-use rule pial_surface as pial_surface_alone with:
+rule poses:
+    input:
+        [path for brain in TO_POSE for path in brain.files],
     output:
-        whole="results/{brain}/surface/pial.surf.gii",
-        left="results/{brain}/surface/left.pial.surf.gii",
-        right="results/{brain}/surface/right.pial.surf.gii",
-        stl="results/{brain}/surface/pial.stl",
-        report="results/{brain}/surface/surface.json",
+        [f"results/brains/{brain.id}/surface/pose.json" for brain in TO_POSE],
+    log:
+        f"{STUDY}/logs/poses.log",
     benchmark:
-        "results/{brain}/benchmarks/pial_surface_alone.tsv"
+        f"{STUDY}/benchmarks/poses.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        runtime=30,
+    params:
+        # exchanged files are the same inputs to Snakemake
+        order=[path for brain in TO_POSE for path in brain.files],
+        max_hole_mm=CONFIG.surface.max_hole_mm,
+    script:
+        "../scripts/poses.py"
+
+
+rule pial_from_hemispheres:
+    input:
+        left=lambda wildcards: CONFIG.brain(wildcards.brain).hemispheres.left,
+        right=lambda wildcards: CONFIG.brain(wildcards.brain).hemispheres.right,
+        pose=pose_of,
+    output:
+        **PIAL,
+    log:
+        f"{BRAIN}/logs/pial_from_hemispheres.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/pial_from_hemispheres.tsv"
     wildcard_constraints:
-        brain=one_of(WITHOUT_CORTEX),
+        brain=from_source("hemispheres"),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        # exchanged files are the same inputs to Snakemake
+        order=lambda wildcards: CONFIG.brain(wildcards.brain).files,
+        week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+        coordinates=coordinates_of,
+        settings=surface_settings(
+            "gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"
+        ),
+    script:
+        "../scripts/pial_from_hemispheres.py"
+
+
+rule pial_from_surface:
+    input:
+        lambda wildcards: CONFIG.brain(wildcards.brain).pial,
+    output:
+        **PIAL,
+    log:
+        f"{BRAIN}/logs/pial_from_surface.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/pial_from_surface.tsv"
+    wildcard_constraints:
+        brain=from_source("pial"),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+        coordinates=coordinates_of,
+        settings=surface_settings(
+            "edge_length_mm", "smoothing_iterations", "max_hole_mm"
+        ),
+    script:
+        "../scripts/pial_from_surface.py"
+
+
+rule pial_from_shape:
+    input:
+        rules.shape.output[0],
+    output:
+        **PIAL,
+    log:
+        f"{BRAIN}/logs/pial_from_shape.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/pial_from_shape.tsv"
+    wildcard_constraints:
+        brain=from_source("shape"),
+    conda:
+        ENVIRONMENT
+    params:
+        week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+    script:
+        "../scripts/pial_from_shape.py"
+
+
+# brains with an image that their surface can be compared with
+OVERLAID = [brain.id for brain in CONFIG.brains if brain.image]
+
+
+rule overlay_figure:
+    input:
+        image=lambda wildcards: CONFIG.brain(wildcards.brain).image,
+        surface=PIAL["whole"],
+        report=PIAL["report"],
+    output:
+        **figure(
+            f"{BRAIN}/figures/overlay",
+            "surface over the image",
+            "overlay.rst",
+            "Brains and growth",
+            brain="{brain}",
+        ),
+    log:
+        f"{BRAIN}/logs/overlay_figure.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/overlay_figure.tsv"
+    wildcard_constraints:
+        brain=one_of(OVERLAID),
+    conda:
+        ENVIRONMENT
+    params:
+        dpi=CONFIG.report.dpi,
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        title=lambda wildcards: f"{wildcards.brain}, {CONFIG.brain(wildcards.brain).week:g} GW",
+    script:
+        "../scripts/overlay_figure.py"
 
 
 rule surface:
     input:
-        expand(rules.pial_surface.output, brain=WITH_CORTEX),
-        expand(rules.pial_surface_alone.output, brain=WITHOUT_CORTEX),
+        expand(list(PIAL.values()), brain=BRAINS),
+        expand(rules.cortical_thickness.output, brain=WITH_CORTEX),

@@ -3,10 +3,11 @@
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_table
 from gyriflow.report.ages import age_profile_chart
+from gyriflow.report.style import runs_by_name
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    tables = read_table(files.profile), read_table(files.check)
+    tables = runs_by_name(read_table(files.profile)), read_table(files.check)
     figure = age_profile_chart(*tables, measured=params.measured, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

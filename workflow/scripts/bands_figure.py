@@ -3,12 +3,13 @@
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_table
 from gyriflow.report.spectra import spectra_chart
+from gyriflow.report.style import runs_by_name
 from gyriflow.step import step
 
 params = snakemake.params
 with step(snakemake.log[0]):
     figure = spectra_chart(
-        read_table(snakemake.input[0]),
+        runs_by_name(read_table(snakemake.input[0])),
         week=params.week,
         bands=range(1, 7),
         measured=params.measured,

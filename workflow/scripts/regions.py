@@ -1,8 +1,7 @@
 """Zones, tags and fields of a run on the start mesh, for a look before the solve."""
 
 from gyriflow.folding.output import layer_fields
-from gyriflow.folding.parameters import parameters_from, require_maps
-from gyriflow.folding.regions import SHOWN_FIELDS, cell_tags, facet_tags
+from gyriflow.folding.regions import cell_tags, facet_tags
 from gyriflow.folding.zone_checks import refuse_impossible
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh
@@ -11,6 +10,8 @@ from gyriflow.io.regions import Regions, write_regions
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.parameters.reading import parameters_from, require_maps
+from gyriflow.parameters.terms import REGION_FIELDS
 from gyriflow.step import step
 from gyriflow.surface.hemispheres import nearer_left
 
@@ -21,7 +22,7 @@ with step(snakemake.log[0]):
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    fields = layer_fields(mesh.vertices, zones, parameters, maps, parameters.start_week, SHOWN_FIELDS)
+    fields = layer_fields(mesh.vertices, zones, parameters, maps, parameters.start_week, REGION_FIELDS)
     on_left = nearer_left(TriangleMesh(mesh.vertices, zones.facets), *map(read_surface, (files.left, files.right)))
     tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
     write_regions(snakemake.output.mesh, Regions(mesh, zones.facets, fields, *tags))

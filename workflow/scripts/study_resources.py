@@ -4,15 +4,20 @@ from gyriflow.io.benchmarks import read_benchmarks
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.report.resources import Power, resources_html, simulation, stage_resources
+from gyriflow.report.style import run_names
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
+    names = run_names(params.folded)
+    folded = {tuple(pair): name for pair, name in zip(params.folded, names, strict=True)}
     runs = {
-        run: simulation(read_json(summary), read_table(steps))
-        for run, summary, steps in zip(params.runs, files.summaries, files.steps, strict=True)
+        name: simulation(read_json(summary), read_table(steps))
+        for name, summary, steps in zip(names, files.summaries, files.steps, strict=True)
     }
+    jobs = read_benchmarks(".", params.benchmarks)
+    jobs["run"] = [folded.get((run, brain)) for run, brain in zip(jobs["run"], jobs["brain"], strict=True)]
     power = Power(**params.power)
-    stages = stage_resources(read_benchmarks(".", params.benchmarks), runs, power)
+    stages = stage_resources(jobs, runs, power)
     write_table(output.csv, stages)
     write_html(output.table, resources_html(stages, power, caption="Time, memory, energy and emissions"))

@@ -1,11 +1,11 @@
 """The zones of the start mesh's boundary: free, clamped, contact."""
 
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.parameters.reading import parameters_from
 from gyriflow.report.zones import zones_picture
 from gyriflow.step import step
 

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from pydantic import field_validator
 
-from .base import Settings, setting
-from .varying import Week
+from ..parameters.settings import Settings, setting
+from ..parameters.varying import Week
 
 PUBLISHED_WEEKS = tuple(float(week) for week in range(21, 37))
 """Gestational weeks that the atlases have; others are used where a folder has files of them."""

@@ -1,10 +1,13 @@
 """The brains of a study: what each is, and from which kind of data its pial surface comes."""
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Literal
 
-from pydantic import Field
-
-from .base import Settings, setting
+from ..parameters.files import InputFile
+from ..parameters.schemes import SCHEMES
+from ..parameters.settings import NotValidError, Problem, Settings, check, setting
+from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
+from ..parameters.varying import Week
 
 SOURCES = ("labels", "segmentation", "hemispheres", "pial", "phantom", "shape")
 """The keys of a brain of which exactly one is given."""
@@ -19,62 +22,12 @@ KINDS = {
 }
 """The kind of data behind each source: a label volume, or surfaces as they are given."""
 
-SIDES = ("left", "right")
-
-SINGLE_FILES = ("labels", "image", "pial")
-"""The keys of a brain that hold one file each."""
-
-ShapeKind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
-
-SHAPE_SIZES = {
-    "sphere": "radius_mm",
-    "ellipsoid": "semi_axes_mm",
-    "half-ellipsoid": "semi_axes_mm",
-    "slab": "extent_mm",
-}
-"""The key that holds the size of each kind of shape."""
-
-Length = Annotated[float, Field(ge=5, le=150)]
-
-
-class PhantomSettings(Settings):
-    """A synthetic brain, made for the brain's week."""
-
-    voxel_mm: float = setting(0.8, "mm", "Edge of the isotropic voxels.", ge=0.3, le=2.0)
-    seed: int = setting(0, "", "Seed of the folds' random pattern.", ge=0)
-    cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
-
-
-class ShapeSettings(Settings):
-    """A simple geometry in the place of a brain, for teaching and verification, centred on x = 0 and y = 0."""
-
-    kind: ShapeKind = setting(
-        ..., "",
-        "`sphere`, `ellipsoid` (both centred on z = 0), `half-ellipsoid` (a dome on a flat base at z = 0) or `slab` "
-        "(a box upwards from z = 0).",
-    )  # fmt: skip
-    radius_mm: float = setting(23.0, "mm", "Radius of a sphere.", ge=5, le=150)
-    semi_axes_mm: tuple[Length, Length, Length] = setting(
-        (21.0, 28.0, 22.0), "mm",
-        "Semi-axes along X, Y, Z of an ellipsoid or half-ellipsoid, each 5 to 150; the longest is at most twice the "
-        "shortest.",
-    )  # fmt: skip
-    extent_mm: tuple[Length, Length, Length] = setting(
-        (40.0, 40.0, 12.0), "mm", "Extents of a slab along X, Y, Z, each 5 to 150."
-    )
-    noise_mm: float = setting(
-        0.05, "mm",
-        "Root mean square height of smooth bumps that folding starts from, at most a fiftieth of the smallest size; "
-        "flat bases and a slab's sides stay flat.",
-        ge=0, le=0.5,
-    )  # fmt: skip
-    seed: int = setting(0, "", "Seed of the bumps' random pattern.", ge=0)
-
-    @property
-    def size_mm(self) -> tuple[float, float, float]:
-        """The three semi-axes, or the three extents of a slab."""
-        size = getattr(self, SHAPE_SIZES[self.kind])
-        return (size, size, size) if self.kind == "sphere" else size
+VOLUMES = ("labels", "segmentation")
+"""Sources that give a label volume."""
+MEANINGS = {"scheme": VOLUMES, "image": VOLUMES, "affine_from": VOLUMES, "coordinates": ("hemispheres", "pial")}
+"""Keys that belong to some sources only."""
+PLACEHOLDERS = ("{image}", "{labels}")
+"""What stands for the two files in a command that segments."""
 
 
 class SegmentationSettings(Settings):
@@ -91,12 +44,19 @@ class SegmentationSettings(Settings):
         "`docker://NAME` or a .sif file.",
     )  # fmt: skip
 
+    @check
+    def _names_its_files(self) -> Iterator[Problem]:
+        missing = [place for place in PLACEHOLDERS if place not in self.command]
+        if missing:
+            text = f"lacks {' and '.join(missing)}, which stand for the files it reads and writes"
+            yield Problem(text, ("command",))
+
 
 class HemisphereFiles(Settings):
     """The pial surfaces of one brain's hemispheres."""
 
-    left: str = setting(..., "", "GIFTI, STL or PLY file of the left hemisphere.")
-    right: str = setting(..., "", "GIFTI, STL or PLY file of the right hemisphere.")
+    left: InputFile = setting(..., "", "GIFTI, STL or PLY file of the left hemisphere.")
+    right: InputFile = setting(..., "", "GIFTI, STL or PLY file of the right hemisphere.")
 
 
 class Brain(Settings):
@@ -108,9 +68,9 @@ class Brain(Settings):
     id: str = setting(
         ..., "", "Name in result paths and tables: letters, digits, - _ .", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
     )
-    week: float = setting(..., "GW", "Gestational age.", ge=15, le=45)
-    labels: str | None = setting(None, "", "Tissue label volume (NIfTI).")
-    image: str | None = setting(
+    week: Week = setting(..., "GW", "Gestational age.")
+    labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI).")
+    image: InputFile | None = setting(
         None, "", "T2-weighted volume (NIfTI): what `segmentation` works on; with `labels`, for a figure only."
     )
     segmentation: SegmentationSettings | None = setting(
@@ -118,14 +78,14 @@ class Brain(Settings):
     )
     scheme: str | None = setting(
         None, "",
-        "What the labels mean: `spina-bifida-atlas`, `dhcp-19`, `feta-7`, `binary`, or a name of `schemes`. Needed "
-        "with `labels` and `segmentation`.",
+        f"What the labels mean: {', '.join(f'`{name}`' for name in SCHEMES)}, or a name of `schemes`. Needed with "
+        "`labels` and `segmentation`.",
     )  # fmt: skip
     affine_from: Literal["auto", "sform", "qform"] = setting(
         "auto", "", "Which NIfTI affine of `labels` and `image` is used; `auto` refuses two that disagree."
     )
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
-    pial: str | None = setting(None, "", "Surface file of the whole brain, closed.")
+    pial: InputFile | None = setting(None, "", "Surface file of the whole brain, closed.")
     coordinates: Literal["auto", "ras", "lps"] = setting(
         "auto", "",
         "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose of `hemispheres` in any rigid "
@@ -137,7 +97,10 @@ class Brain(Settings):
     @property
     def source(self) -> str:
         """The one key that says where the surface comes from."""
-        return next(name for name in SOURCES if getattr(self, name) is not None)
+        for name in SOURCES:
+            if self.gives(name):
+                return name
+        raise NotValidError("source")
 
     @property
     def synthetic(self) -> bool:
@@ -149,3 +112,36 @@ class Brain(Settings):
         """The files that the surface is made from, the left hemisphere's first."""
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
         return [path for path in (self.labels, self.pial, *sides) if path is not None]
+
+    @check
+    def _has_one_source(self) -> Iterator[Problem]:
+        given = [key for key in SOURCES if self.gives(key)]
+        if not given and self.gives("image"):
+            yield Problem(
+                "gyriflow does not segment images; give a label volume under labels, or under segmentation your own "
+                "command that makes one from the image",
+                ("image",),
+            )
+        elif len(given) != 1:
+            found = " and ".join(given) or "none"
+            yield Problem(f"found {found} as its source; expected exactly one of {', '.join(SOURCES)}")
+        else:
+            for key, sources in MEANINGS.items():
+                if key in self.model_fields_set and given[0] not in sources:
+                    yield Problem(f"has no meaning with {given[0]}; only with {' or '.join(sources)}", (key,))
+
+    @check
+    def _labels_have_a_scheme(self) -> Iterator[Problem]:
+        if any(self.gives(key) for key in VOLUMES) and not self.gives("scheme"):
+            yield Problem("is missing; it says what the labels mean", ("scheme",))
+
+    @check
+    def _segmentation_has_an_image(self) -> Iterator[Problem]:
+        if self.gives("segmentation") and not self.gives("image"):
+            yield Problem("has no image to work on; give one under image", ("segmentation",))
+
+    @check
+    def _phantoms_have_weeks(self) -> Iterator[Problem]:
+        first, last = PHANTOM_WEEKS
+        if self.gives("phantom") and not first <= self.week <= last:
+            yield Problem(f"found {self.week:g}; a phantom's should be {first:g} to {last:g}", ("week",))

@@ -1,252 +1,176 @@
-"""Checks across keys, on raw values so that they are made even where another key is wrong."""
+"""Checks across sections: brains, starts, runs, growth and metrics against each other, on what is valid of each."""
 
 from collections import Counter
-from collections.abc import Collection
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
-from .brains import KINDS, SHAPE_SIZES, SOURCES, ShapeSettings
-from .folding import GROWTH_RATES, FoldingSettings
-from .growth import estimated_from, growth_series
-from .schemes import BUILT_IN_SCHEMES
+from ..parameters.folding import GROWTH_RATES, VARYING, value_problems
+from ..parameters.messages import nearest
+from ..parameters.schemes import SCHEMES
+from ..parameters.settings import Problem
+from ..parameters.varying import Varying
+from .brains import KINDS, Brain
+from .growth import GrowthSettings, estimated_from, growth_series
+from .metrics import LEAST_AGE_WEEKS
+from .runs import ALL, Run, Start, start_ids
 
-VOLUMES = ("labels", "segmentation")
-"""Sources that give a label volume."""
-PLACEHOLDERS = ("{image}", "{labels}")
-"""What stands for the two files in a command that segments."""
-PHANTOM_WEEKS = (21, 36)
-"""Gestational weeks of which synthetic brains can be made."""
-MOST_UNEQUAL_AXES = 2.0
-"""Longest over shortest semi-axis of a shape: beyond this its ends are too sharp for even triangles."""
-MOST_NOISE = 0.02
-"""Height of the bumps over the smallest size of a shape."""
-RESERVED_BRAINS = ("study", "report")
-"""Folders of results that belong to no brain."""
+RESERVED_BRAINS = ("study", "report", ALL)
+"""Names that stand for something else in results, tables and settings."""
 RESERVED_RUNS = ("real",)
 """What stands for the run in tables of measured brains."""
 
 
-def brain_problems(raw: Any, where: str, schemes: Collection[str] = ()) -> list[str]:
-    """Returns what is wrong with one entry of `brains` beyond its single keys.
-
-    `schemes` are the names of the label schemes that the configuration adds.
-    """
-    if not isinstance(raw, dict):
-        return []
-    given = [key for key in SOURCES if raw.get(key) is not None]
-    problems = []
-    if not given and raw.get("image") is not None:
-        problems.append(
-            f"{where}.image: gyriflow does not segment images; give a label volume under labels, or under segmentation "
-            "your own command that makes one from the image"
-        )
-    elif len(given) != 1:
-        found = " and ".join(given) or "none"
-        problems.append(f"{where}: found {found} as its source; expected exactly one of {', '.join(SOURCES)}")
-    volumes = [key for key in VOLUMES if key in given]
-    if volumes and raw.get("scheme") is None:
-        problems.append(f"{where}.scheme: is missing; it says what the labels of {where}.{volumes[0]} mean")
-    scheme = raw.get("scheme")
-    if isinstance(scheme, str) and scheme not in (known := dict.fromkeys([*BUILT_IN_SCHEMES, *schemes])):
-        problems.append(f"{where}.scheme: found {scheme!r}; expected one of {', '.join(known)}, or a name of schemes")
-    problems += _segmentation_problems(raw, where)
-    meanings = {"scheme": VOLUMES, "image": VOLUMES, "affine_from": VOLUMES, "coordinates": ("hemispheres", "pial")}
-    for key, sources in meanings.items():
-        if key in raw and len(given) == 1 and given[0] not in sources:
-            problems.append(f"{where}.{key}: has no meaning with {given[0]}; only with {' or '.join(sources)}")
-    week = _number(raw.get("week"))
-    if "phantom" in given and week is not None and not PHANTOM_WEEKS[0] <= week <= PHANTOM_WEEKS[1]:
-        problems.append(f"{where}.week: found {week:g}; a phantom's should be {PHANTOM_WEEKS[0]} to {PHANTOM_WEEKS[1]}")
-    if isinstance(raw.get("shape"), dict):
-        problems += [f"{where}.shape.{problem}" for problem in _shape_problems(raw["shape"])]
-    return problems
+def ids_of(brains: Sequence[Brain]) -> list[str]:
+    """Returns the ids of the brains, each once; wrong ones are left out."""
+    return list(dict.fromkeys(brain.id for brain in brains if brain.has("id")))
 
 
-def _segmentation_problems(raw: dict[str, Any], where: str) -> list[str]:
-    """Returns what is wrong with the `segmentation` of one brain (raw)."""
-    if not isinstance(raw.get("segmentation"), dict):
-        return []
-    where, problems = f"{where}.segmentation", []
-    if raw.get("image") is None:
-        problems.append(f"{where}: has no image to work on; give one under image")
-    command = raw["segmentation"].get("command")
-    missing = [place for place in PLACEHOLDERS if isinstance(command, str) and place not in command]
-    if missing:
-        problems.append(
-            f"{where}.command: lacks {' and '.join(missing)}, which stand for the files it reads and writes"
-        )
-    return problems
+def name_problems(brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[Problem]:
+    """Yields what is wrong with the names of brains and runs, which are folders of the results."""
+    counts = Counter(brain.id for brain in brains if brain.has("id"))
+    for name, count in counts.items():
+        if count > 1:
+            yield Problem(f"{count} brains have the id {name}; ids are unique", ("brains",))
+        if name in RESERVED_BRAINS:
+            yield Problem(f"the id {name} is reserved; choose another", ("brains",))
+    for first, second in _equal_but_for_case(counts):
+        yield Problem(f"the ids {first} and {second} are the same folder on some disks; rename one", ("brains",))
+    for name in runs:
+        if name in RESERVED_RUNS:
+            yield Problem("the name is reserved; choose another", ("runs", name))
+        elif not name or not all(char.isalnum() or char in "-_." for char in name) or not name[0].isalnum():
+            text = "a run's name has letters, digits, - _ . only and begins with a letter or digit"
+            yield Problem(text, ("runs", name))
+    for first, second in _equal_but_for_case(runs):
+        yield Problem(f"is the same folder as that of the run {first} on some disks; rename one", ("runs", second))
 
 
-def _shape_problems(shape: dict[str, Any]) -> list[str]:
-    """Returns what is wrong between the keys of one shape, each with its key in front."""
-    kind = shape.get("kind")
-    if not isinstance(kind, str) or kind not in SHAPE_SIZES:
-        return []
-    key = SHAPE_SIZES[kind]
-    problems = [
-        f"{other}: has no meaning with kind {kind}, whose size is {key}"
-        for other in dict.fromkeys(SHAPE_SIZES.values())
-        if other in shape and other != key
-    ]
-    given = shape.get(key, ShapeSettings.model_fields[key].default)
-    sizes = [_number(size) for size in (given if isinstance(given, list | tuple) else [given])]
-    known = [size for size in sizes if size is not None and size > 0]
-    if len(known) < len(sizes) or not known:
-        return problems
-    if key == "semi_axes_mm" and max(known) > MOST_UNEQUAL_AXES * min(known):
-        expected = f"at most {MOST_UNEQUAL_AXES:g} times the shortest, {min(known):g}"
-        problems.append(f"{key}: found {max(known):g} as the longest; it should be {expected}")
-    noise = _number(shape.get("noise_mm"))
-    if noise is not None and noise > MOST_NOISE * min(known):
-        expected = f"at most {MOST_NOISE * min(known):g}, a fiftieth of the smallest size in {key}"
-        problems.append(f"noise_mm: found {noise:g}; it should be {expected}")
-    return problems
+def _equal_but_for_case(names: Mapping[str, object]) -> Iterator[tuple[str, str]]:
+    first: dict[str, str] = {}
+    for name in names:
+        if (other := first.setdefault(name.lower(), name)) != name:
+            yield other, name
 
 
-def study_problems(brains: Any, start: Any, runs: dict[str, dict[str, Any]]) -> list[str]:
-    """Returns what is wrong between the brains, the start and the runs (each run's whole settings, raw)."""
-    entries = [entry for entry in brains if isinstance(entry, dict)] if isinstance(brains, list) else []
-    names = Counter(entry.get("id") for entry in entries if isinstance(entry.get("id"), str))
-    problems = [
-        f"brains: {count} brains have the id {name}; ids are unique" for name, count in names.items() if count > 1
-    ]
-    problems += [f"brains: the id {name} is reserved; choose another" for name in names if name in RESERVED_BRAINS]
-    if isinstance(start, str) and names and start not in names:
-        problems.append(f"start: found {start!r}; expected the id of a brain: {', '.join(map(str, names))}")
-    start_week = next((_number(entry.get("week")) for entry in entries if entry.get("id") == start), None)
-    said = set()
-    for name, settings in runs.items():
-        problems += _name_problems(name)
-        for key, problem in _run_problems(settings, start_week):
-            if (key, problem) not in said:
-                said.add((key, problem))
-                problems.append(f"{_where(name, key, runs)}: {problem}")
-    return problems
+def scheme_problems(brains: Sequence[Brain], schemes: Mapping[str, object]) -> Iterator[Problem]:
+    """Yields names of schemes that are taken, and those of brains that are unknown."""
+    for name in schemes:
+        if name in SCHEMES:
+            yield Problem("the name is that of a scheme of gyriflow; choose another", ("schemes", name))
+    known = dict.fromkeys([*SCHEMES, *schemes])
+    for number, brain in enumerate(brains):
+        if brain.has("scheme") and brain.scheme is not None and brain.scheme not in known:
+            expected = f"expected one of {', '.join(known)}, or a name of schemes"
+            yield Problem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
 
 
-def growth_problems(brains: Any, growth: Any, start: Any, runs: dict[str, dict[str, Any]]) -> list[str]:
-    """Returns what is wrong between the brains, the series that growth rates are estimated from, and the runs (raw)."""
-    entries = [entry for entry in brains if isinstance(entry, dict)] if isinstance(brains, list) else []
-    entries = [entry for entry in entries if isinstance(entry.get("id"), str)]
-    weeks = {entry["id"]: week for entry in entries if (week := _number(entry.get("week"))) is not None}
-    kinds = {
-        entry["id"]: next((kind for key, kind in KINDS.items() if entry.get(key) is not None), "volume")
-        for entry in entries
-        if entry["id"] in weeks
-    }
-    growth = growth if isinstance(growth, dict) else {}
-    given = growth.get("brains")
-    lists = given if isinstance(given, dict) else {"": given} if given is not None else {}
-    if not all(isinstance(ids, list) and all(isinstance(name, str) for name in ids) for ids in lists.values()):
-        return []
-    known = [entry["id"] for entry in entries]
-    paths = {name: f"growth.brains.{name}".rstrip(".") for name in lists}
+def start_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[Problem]:
+    """Yields what is wrong with the start brains of the study and of its runs."""
+    known = ids_of(brains)
+    yield from _id_problems(start, known, ("start",))
+    for name, run in runs.items():
+        if run.has("start") and run.start is not None:
+            yield from _id_problems(run.start, known, ("runs", name, "start"))
+    without = [name for name, run in runs.items() if run.has("start") and run.start is None]
+    if start is None and without:
+        yield Problem("is missing; it is the id of the brain that is folded, a list of ids, or all", ("start",))
+
+
+def _id_problems(start: Start | None, known: Sequence[str], key: tuple[str, ...]) -> Iterator[Problem]:
+    if start is None or start == ALL or not known:
+        return
+    names = [start] if isinstance(start, str) else list(start)
+    if not names:
+        yield Problem("found no ids; expected one or more", key)
+    if twice := [name for name, count in Counter(names).items() if count > 1]:
+        yield Problem(f"found {', '.join(twice)} more than once", key)
+    for name in dict.fromkeys(names):
+        if name not in known:
+            expected = f"expected the id of a brain: {', '.join(known)}"
+            hint = nearest(name, known) if len(known) > 1 else ""
+            hint = f"; {hint}" if hint.startswith("did you") else ""
+            yield Problem(f"found {name!r}; {expected}{hint}", key)
+
+
+def run_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[Problem]:
+    """Yields what is wrong between the settings of each run and its start brains."""
+    weeks = {brain.id: brain.week for brain in brains if brain.has("id", "week")}
+    for name, run in runs.items():
+        ids = start_ids(run.start if run.has("start") and run.start is not None else start, ids_of(brains))
+        starts = [(weeks[brain], f"the week of the start brain {brain}") for brain in ids if brain in weeks]
+        # without a start, what holds at the end is checked
+        for week, called in starts or ([(run.end_week - 1e-9, "the start")] if run.has("end_week") else []):
+            for problem in value_problems(run, week, {}, called):
+                yield Problem(problem.text, _place(name, problem.key, runs))
+        for key in VARYING if len(ids) > 1 else ():
+            value = getattr(run, key, None)
+            if isinstance(value, Varying) and value.surface is not None:
+                text = f"has a map on a surface, which belongs to one brain; the run starts from {', '.join(ids)}"
+                yield Problem(text, _place(name, (key,), runs))
+
+
+def _place(run: str, key: tuple[str | int, ...], runs: Mapping[str, Run]) -> tuple[str | int, ...]:
+    """Returns the path of a run's key: that of `folding` where all runs share the value."""
+    values = [getattr(settings, str(key[0]), None) for settings in runs.values()]
+    return ("folding", *key) if all(value == values[0] for value in values) else ("runs", run, *key)
+
+
+def growth_problems(
+    growth: GrowthSettings, start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]
+) -> Iterator[Problem]:
+    """Yields what is wrong between the brains, the series that growth rates are estimated from, and the runs."""
+    given = growth.brains
+    lists = dict(given) if isinstance(given, Mapping) else {"": given} if given is not None else {}
+    paths = {name: ("growth", "brains", *([name] if name else [])) for name in lists}
+    known = ids_of(brains)
     unknown = {name: [brain for brain in ids if brain not in known] for name, ids in lists.items()}
-    if any(unknown.values()):
-        return [
-            f"{paths[name]}: found {', '.join(ids)}; expected ids of brains: {', '.join(known)}"
-            for name, ids in unknown.items()
-            if ids
-        ]
-    reasons = {name: _too_few_weeks(ids, weeks) for name, ids in lists.items()}
-    problems = [f"{paths[name]}: {reason}" for name, reason in reasons.items() if reason is not None]
-    series = growth_series(kinds, weeks, given)
-    wanted = growth.get("estimated_from")
-    if isinstance(wanted, str) and series and wanted not in series:
-        problems.append(f"growth.estimated_from: found {wanted!r}; the series are {', '.join(series)}")
+    for name, ids in unknown.items():
+        if ids:
+            yield Problem(f"found {', '.join(ids)}; expected ids of brains: {', '.join(known)}", paths[name])
+    if any(unknown.values()) or not all(brain.has("id", "week", "source") for brain in brains):
+        return
+    weeks = {brain.id: brain.week for brain in brains}
+    for name, chosen in lists.items():
+        if (reason := _too_few_weeks(chosen, weeks)) is not None:
+            yield Problem(reason, paths[name])
+    series = growth_series({brain.id: KINDS[brain.source] for brain in brains}, weeks, given)
+    wanted = growth.estimated_from if growth.has("estimated_from") else None
+    if wanted is not None and series and wanted not in series:
+        yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))
     reason = _too_few_weeks([brain for ids in lists.values() for brain in ids] if lists else list(weeks), weeks)
-    if reason is None and wanted is None and estimated_from(series, None, str(start)) is None:
-        reason = f"the start brain is in none of the series {', '.join(series)}; name one under growth.estimated_from"
-    if reason is not None:
-        estimated = [(name, key) for name in runs for key in GROWTH_RATES if runs[name].get(key) == "estimated"]
-        problems += dict.fromkeys(f"{_where(name, key, runs)}: can't be estimated: {reason}" for name, key in estimated)
-    return problems
+    for name, run in runs.items():
+        for key in GROWTH_RATES:
+            if getattr(run, key, None) != "estimated":
+                continue
+            ids = start_ids(run.start if run.has("start") and run.start is not None else start, known)
+            without = [brain for brain in ids if wanted is None and estimated_from(series, None, brain) is None]
+            found = reason
+            if found is None and without:
+                plural = f"the start brain{'s' if len(without) > 1 else ''} {', '.join(without)}"
+                found = (
+                    f"{plural} {'are' if len(without) > 1 else 'is'} in none of the series {', '.join(series)}; name "
+                    "one under growth.estimated_from"
+                )
+            if found is not None:
+                yield Problem(f"can't be estimated: {found}", _place(name, (key,), runs))
 
 
-def _too_few_weeks(brains: list[str], weeks: dict[str, float]) -> str | None:
+def _too_few_weeks(brains: Sequence[str], weeks: Mapping[str, float]) -> str | None:
     """Returns what is wrong with the weeks of brains that are to give growth rates, None where nothing is."""
-    found = len({weeks[brain] for brain in brains if brain in weeks})
+    found = len({weeks[brain] for brain in brains})
     if found > 1:
         return None
     return f"found brains of {found} week{'' if found == 1 else 's'}; a growth rate needs two or more"
 
 
-def _name_problems(name: str) -> list[str]:
-    if name in RESERVED_RUNS:
-        return [f"runs.{name}: the name is reserved; choose another"]
-    if not name or not all(char.isalnum() or char in "-_." for char in name) or not name[0].isalnum():
-        return [f"runs.{name}: a run's name has letters, digits, - _ . only and begins with a letter or digit"]
-    return []
-
-
-def _where(run: str, key: str, runs: dict[str, dict[str, Any]]) -> str:
-    """Returns the path of a key: that of `folding` where all runs share the value."""
-    values = [settings.get(key) for settings in runs.values()]
-    return f"folding.{key}" if all(value == values[0] for value in values) else f"runs.{run}.{key}"
-
-
-def _run_problems(settings: dict[str, Any], start_week: float | None) -> list[tuple[str, str]]:
-    problems = []
-    end_week = _number(settings.get("end_week"))
-    if start_week is not None and end_week is not None and end_week <= start_week:
-        problems.append(("end_week", f"found {end_week:g}; it should be above the start brain's week, {start_week:g}"))
-    if start_week is not None and end_week is not None:
-        problems += _value_problems(settings, start_week, end_week)
-    if settings.get("allow_negative_growth") not in (True, "true"):
-        for key in GROWTH_RATES:
-            value = settings.get(key, FoldingSettings.model_fields[key].default)
-            curve = value.get("weeks") if isinstance(value, dict) else {"": value}
-            rates = [_number(rate) for rate in curve.values()] if isinstance(curve, dict) else []
-            problems += [
-                (key, f"found {rate:g}; it should be 0 or more unless allow_negative_growth is true")
-                for rate in rates
-                if rate is not None and rate < 0
-            ]
-    return problems
-
-
-def _number(value: Any) -> float | None:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return None
-
-
-def _curve(settings: dict[str, Any], key: str) -> dict[float, float] | None:
-    """Returns the values of a parameter by week, one at week 0 for a number; None where it has a map or is wrong."""
-    value = settings.get(key, FoldingSettings.model_fields[key].default)
-    if isinstance(value, dict) and value.get("map") is None and isinstance(value.get("weeks"), dict):
-        points = {_number(week): _number(number) for week, number in value["weeks"].items()}
-    else:
-        points = {0.0: _number(value)}
-    known = {week: number for week, number in points.items() if week is not None and number is not None}
-    return dict(sorted(known.items())) if known and len(known) == len(points) else None
-
-
-def _value_problems(settings: dict[str, Any], start: float, end: float) -> list[tuple[str, str]]:
-    """Returns what is wrong with the values that parameters take from the start to the end, curves included."""
-    problems = []
-    loss = _number(settings.get("thickness_growth_mm_per_gw", 0.0))
-    thickness = _curve(settings, "thickness_mm")
-    if thickness is not None and loss is not None and min(thickness.values()) > 0:
-        for week in (start, *(week for week in thickness if start < week < end), end):
-            reached = _at(thickness, week) + loss * (week - start)
-            if reached <= 0:
-                problems.append(("thickness_mm", f"reaches {reached:g} mm at {week:g} GW; it should stay above 0"))
-                break
-    step = _number(settings.get("step_s", FoldingSettings.model_fields["step_s"].default))
-    rates = [curve for key in GROWTH_RATES if (curve := _curve(settings, key)) is not None]
-    growth = sum(max(map(abs, curve.values())) for curve in rates)
-    if step is not None and step > 0 and growth * step >= 1:
-        problems.append(("step_s", f"found {step:g}; tissue would grow by {growth * step:.3g} in a step, beyond 1"))
-    return problems
-
-
-def _at(curve: dict[float, float], week: float) -> float:
-    """Returns the value of a curve at a week: linear in between, constant beyond."""
-    weeks = list(curve)
-    if week <= weeks[0] or week >= weeks[-1]:
-        return curve[weeks[0] if week <= weeks[0] else weeks[-1]]
-    after = next(i for i, known in enumerate(weeks) if known >= week)
-    a, b = weeks[after - 1], weeks[after]
-    return curve[a] + (curve[b] - curve[a]) * (week - a) / (b - a)
+def age_reference_problems(brains: Sequence[Brain], given: Sequence[str] | None) -> Iterator[Problem]:
+    """Yields what is wrong with the brains from which apparent ages are estimated."""
+    if given is None:
+        return
+    known, key = ids_of(brains), ("metrics", "age_reference")
+    if unknown := [name for name in given if name not in known]:
+        yield Problem(f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}", key)
+    elif all(brain.has("week") for brain in brains):
+        found = len({brain.week for brain in brains if brain.id in given})
+        if found < LEAST_AGE_WEEKS:
+            plural = "" if found == 1 else "s"
+            yield Problem(f"found brains of {found} week{plural}; it should have {LEAST_AGE_WEEKS} or more", key)

@@ -8,9 +8,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from .base import Settings
+from ..parameters.settings import Settings
+from ..parameters.varying import Varying
 from .root import Config
-from .varying import VaryingSettings
 
 INTRODUCTION = """\
 # Configuration
@@ -21,16 +21,20 @@ changed on the command line: `--config 'folding={end_week: 26}'`.
 
 All problems of a configuration are reported at once, before any job starts; unknown keys are problems. Paths are
 relative to the configuration file or, if no such file is there, to the working directory. The keys of `folding` are
-the base of every run; each entry of `runs` has a name and what differs from it:
+the base of every run; each entry of `runs` has a name, the brain or brains that it folds, and what differs from
+`folding`:
 
 ```yaml
+start: week21                                     # the id of a brain, a list of ids, or all
 runs:
-  reference: {}
+  reference: {}                                   # from the `start` above
   thick: {thickness_mm: 2.5}
-  stiff: {shear_modulus_cortex_pa: 3000, solver: {max_newton: 30}}
+  cohort: {start: [case1, case2], end_week: 32}   # each of them is folded
+  stiff: {start: all, shear_modulus_cortex_pa: 3000, solver: {max_newton: 30}}
 ```
 
-This page is made from the models in `src/gyriflow/config` by `./run python -m gyriflow.config`.
+This page is made from the models in `src/gyriflow/parameters` and `src/gyriflow/config` by
+`./run python -m gyriflow.config`.
 """
 
 BOUNDS = {"gt": "> {}", "ge": "≥ {}", "lt": "< {}", "le": "≤ {}"}
@@ -39,7 +43,7 @@ BOUNDS = {"gt": "> {}", "ge": "≥ {}", "lt": "< {}", "le": "≤ {}"}
 def documentation() -> str:
     """Returns the page config/README.md."""
     sections = [_section(name, model) for name, model in _sections(Config, "")]
-    return "\n".join([INTRODUCTION, *sections, _section("varying", VaryingSettings)])
+    return "\n".join([INTRODUCTION, *sections, _section("varying", Varying)])
 
 
 def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -48,7 +52,7 @@ def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[Bas
     for name, field in model.model_fields.items():
         # runs have the keys of `folding`
         if name != "runs":
-            for inner in (model for model in _models(field.annotation) if model is not VaryingSettings):
+            for inner in (model for model in _models(field.annotation) if model is not Varying):
                 yield from _sections(inner, f"{path}.{name}".lstrip(".") + ("[]" if _is_list(field) else ""))
 
 
@@ -70,6 +74,7 @@ def _section(path: str, model: type[BaseModel]) -> str:
 def _row(name: str, field: FieldInfo) -> str:
     extra = field.json_schema_extra
     unit = str(extra["unit"]) if isinstance(extra, dict) else ""
+    word = f" or `{extra['word']}`" if isinstance(extra, dict) and "word" in extra else ""
     held: Any = extra.get("bounds", {}) if isinstance(extra, dict) else {}
     bounds = [text.format(_number(held[key])) for key, text in BOUNDS.items() if key in held] + [
         text.format(_number(getattr(bound, key)))
@@ -79,7 +84,7 @@ def _row(name: str, field: FieldInfo) -> str:
     ]
     cells = [
         f"`{name}`",
-        _type_name(field.annotation),
+        _type_name(field.annotation) + word,
         unit,
         _default(field),
         ", ".join(bounds),
@@ -120,7 +125,7 @@ def _type_name(annotation: Any) -> str:
         return "list of " + _type_name(parts[0])
     if origin is dict:
         return "names with lists" if parts[1] == tuple[str, ...] else "names with settings"
-    if annotation is VaryingSettings:
+    if annotation is Varying:
         return "varying"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "section"

@@ -5,12 +5,12 @@ from typing import Annotated
 
 from pydantic import Discriminator, Tag
 
-from .base import Settings, setting
+from ..parameters.settings import Settings, setting
 
 Names = tuple[str, ...]
 Series = Annotated[
-    Annotated[Names, Tag("list")] | Annotated[dict[str, Names], Tag("table")],
-    Discriminator(lambda value: "table" if isinstance(value, dict) else "list"),
+    Annotated[Names, Tag("(list)")] | Annotated[dict[str, Names], Tag("(table)")],
+    Discriminator(lambda value: "(table)" if isinstance(value, dict) else "(list)"),
 ]
 
 

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from .base import Settings, setting
+from ..parameters.settings import Settings, setting
 
 
 class MeshSettings(Settings):

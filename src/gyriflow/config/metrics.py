@@ -1,15 +1,20 @@
-"""Settings of the metrics, and the brains that ages are told from."""
+"""Settings of the metrics, and the brains from which the apparent age is estimated."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
-from .base import Settings, setting
+from ..parameters.settings import Settings, setting
 from .brains import Brain
 
 LEAST_AGE_WEEKS = 5
 """Weeks of reference brains that an age profile needs."""
+Modes = Annotated[
+    Annotated[int, Field(ge=2, le=20000), Tag("(number)")]
+    | Annotated[Literal["B4", "B5", "B6", "common", "own"], Tag("(word)")],
+    Discriminator(lambda value: "(word)" if isinstance(value, str) and not value.isdigit() else "(number)"),
+]
 
 
 class MetricsSettings(Settings):
@@ -24,7 +29,7 @@ class MetricsSettings(Settings):
     spangy_proxy: Literal["shape_index", "mean_curvature"] = setting(
         "shape_index", "", "The map whose spectrum is analysed."
     )
-    spangy_modes: Annotated[int, Field(ge=2, le=20000)] | Literal["B4", "B5", "B6", "common", "own"] = setting(
+    spangy_modes: Modes = setting(
         "B5", "",
         "Number of eigenmodes, from 2 to 20000, or the last band, all modes up to whose end are computed: `B4`, `B5` "
         "or `B6`, each four times as many as before; `common`: per hemisphere the largest Weyl number (modes that the "
@@ -36,29 +41,14 @@ class MetricsSettings(Settings):
     )
     age_reference: tuple[str, ...] | None = setting(
         None, "",
-        "Ids of the measured brains that gestational ages are told from, of five weeks or more. `null`: all that are "
-        "not synthetic, or all phantoms where there are no others; no age profile with fewer than five weeks.",
+        "Ids of the measured brains from which the apparent age of a surface is estimated, of five weeks or more. "
+        "`null`: all that are not synthetic, or all phantoms where there are no others; no age profile with fewer "
+        "than five weeks.",
     )  # fmt: skip
 
 
 def age_reference(brains: Sequence[Brain], given: tuple[str, ...] | None) -> list[str]:
-    """Returns the ids of the brains that ages are told from; none where they are of too few weeks."""
+    """Returns the ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
     real = [brain for brain in brains if not brain.synthetic] or [b for b in brains if b.source == "phantom"]
     chosen = real if given is None else [brain for brain in brains if brain.id in given]
     return [brain.id for brain in chosen] if len({brain.week for brain in chosen}) >= LEAST_AGE_WEEKS else []
-
-
-def age_reference_problems(brains: Sequence[Any], metrics: Any) -> list[str]:
-    """Returns what is wrong with the brains that ages are told from, of all brains and settings as given (raw)."""
-    entries = [entry for entry in brains if isinstance(entry, dict) and isinstance(entry.get("id"), str)]
-    weeks = {entry["id"]: entry.get("week") for entry in entries}
-    given = metrics.get("age_reference") if isinstance(metrics, dict) else None
-    if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
-        return []
-    if unknown := [name for name in given if name not in weeks]:
-        return [f"metrics.age_reference: found {', '.join(unknown)}; expected ids of brains: {', '.join(weeks)}"]
-    found = len({str(weeks[name]) for name in given})
-    if found >= LEAST_AGE_WEEKS:
-        return []
-    plural = "" if found == 1 else "s"
-    return [f"metrics.age_reference: found brains of {found} week{plural}; it should have {LEAST_AGE_WEEKS} or more"]

@@ -1,6 +1,6 @@
 """Settings of the figures and the report."""
 
-from .base import Settings, setting
+from ..parameters.settings import Settings, setting
 
 
 class EnergySettings(Settings):

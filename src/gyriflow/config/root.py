@@ -1,42 +1,102 @@
 """The whole configuration."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
+from pydantic import field_validator
+
+from ..parameters.folding import VARYING, FoldingSettings, bounds_of, output_weeks
+from ..parameters.schemes import SCHEMES, LabelScheme, SchemeSettings
+from ..parameters.settings import Problem, Settings, check, refused, setting
+from ..parameters.varying import Varying, files_of
+from . import checks
 from .atlas import AtlasFile, AtlasSettings, atlas_files
-from .base import Settings, setting
 from .brains import KINDS, Brain
-from .folding import VARYING, FoldingSettings, output_weeks
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
 from .metrics import MetricsSettings, age_reference
 from .report import ReportSettings
-from .schemes import SchemeSettings
+from .runs import Run, Start, start_ids
 from .surface import SurfaceSettings
-from .varying import VaryingSettings
+
+PHANTOM_SCHEME = "spina-bifida-atlas"
+"""Phantoms have the labels of this atlas."""
 
 
 class Config(Settings):
     """A validated configuration. `folding` is the base of every run, `runs` holds the runs' complete settings."""
 
     brains: tuple[Brain, ...] = setting(
-        ..., "", "The brains: one the folding starts from, others to compare with and to estimate growth from. "
-        "May be left out with `atlas`.",
+        (), "", "The brains: those that are folded, others to compare with and to estimate growth from. Needed without "
+        "`atlas`.",
     )  # fmt: skip
     atlas: AtlasSettings | None = setting(None, "", "The dHCP atlases as further brains.")
     schemes: dict[str, SchemeSettings] = setting(
         {}, "", "Label schemes by name, beside those that gyriflow has; for the brains' `scheme`."
     )
-    start: str = setting(..., "", "The id of the brain whose folding is simulated.")
+    start: Start | None = setting(
+        None, "", "Id of the brain that is folded, a list of ids, or `all`; needed where a run names none of its own."
+    )
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
     mesh: MeshSettings = setting(MeshSettings(), "", "Tetrahedral mesh.")
     growth: GrowthSettings = setting(GrowthSettings(), "", "Growth rates.")
     folding: FoldingSettings = setting(..., "", "Folding simulation.")
-    runs: dict[str, FoldingSettings] = setting(
-        {}, "", "Runs by name, each with what differs from `folding`; without any, one run named `reference`."
-    )
+    runs: dict[str, Run] = setting(
+        {}, "",
+        "Runs by name, each with its `start` and what differs from `folding`; without any, one run named `reference`.",
+    )  # fmt: skip
     metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")
     report: ReportSettings = setting(ReportSettings(), "", "Figures and report.")
+
+    @field_validator("brains", mode="before")
+    @classmethod
+    def _list_of_brains(cls, value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise refused(f"found {value!r}; expected a list of brains, each with id, week and a source")
+        return value
+
+    @field_validator("runs", mode="before")
+    @classmethod
+    def _table_of_runs(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            raise refused(f"found {value!r}; expected names, each with the settings that differ from folding")
+        return value
+
+    @check
+    def _some_brains(self) -> Iterator[Problem]:
+        if not self.brains and self.atlas is None:
+            text = "found nothing; expected a list of brains, each with id, week and a source"
+            yield Problem(text, ("brains",))
+
+    @check
+    def _names(self) -> Iterator[Problem]:
+        yield from checks.name_problems(self.brains, self.runs)
+
+    @check
+    def _schemes(self) -> Iterator[Problem]:
+        yield from checks.scheme_problems(self.brains, self.schemes)
+
+    # the ids of an atlas section that is wrong are not known: these checks ask for `atlas` first
+
+    @check
+    def _starts(self) -> Iterator[Problem]:
+        if self.has("atlas"):
+            yield from checks.start_problems(self.start, self.brains, self.runs)
+
+    @check
+    def _runs(self) -> Iterator[Problem]:
+        yield from checks.run_problems(self.start if self.has("start") else None, self.brains, self.runs)
+
+    @check
+    def _growth(self) -> Iterator[Problem]:
+        if self.has("atlas"):
+            start = self.start if self.has("start") else None
+            yield from checks.growth_problems(self.growth, start, self.brains, self.runs)
+
+    @check
+    def _age_reference(self) -> Iterator[Problem]:
+        if self.has("atlas"):
+            yield from checks.age_reference_problems(self.brains, self.metrics.age_reference)
 
     def brain(self, name: str) -> Brain:
         """Returns the brain of an id; KeyError if there is none."""
@@ -60,12 +120,11 @@ class Config(Settings):
         return " or ".join(name for name in names if name) or "real brain"
 
     def scheme(self, brain: Brain) -> dict[str, Any]:
-        """Returns the scheme of a brain's labels: its name, and what the configuration says about it.
-
-        Phantoms have the labels of the example atlas.
-        """
-        name = brain.scheme or "spina-bifida-atlas"
-        return {"name": name} | (self.schemes[name].model_dump() if name in self.schemes else {})
+        """Returns the scheme of a brain's labels, the fields of a `LabelScheme`; for a phantom too."""
+        name = brain.scheme or PHANTOM_SCHEME
+        own = self.schemes.get(name)
+        scheme = SCHEMES[name] if own is None else LabelScheme(name=name, **own.model_dump())
+        return scheme.model_dump()
 
     @property
     def downloads(self) -> dict[str, str]:
@@ -83,15 +142,30 @@ class Config(Settings):
             return {}
         return {str(file.path.relative_to(self.atlas.folder)): file for file in atlas_files(self.atlas)}
 
-    @property
-    def start_week(self) -> float:
-        """The gestational age at which the folding starts."""
-        return self.brain(self.start).week
+    def run(self, name: str) -> FoldingSettings:
+        """Returns the complete settings of a run."""
+        return self.runs[name]
 
-    def weeks(self, run: str) -> list[float]:
-        """Returns the output weeks of a run, the start included."""
+    def starts(self, run: str) -> list[str]:
+        """Returns the ids of the brains that a run folds, in the order of `brains`."""
+        own = self.runs[run].start
+        return start_ids(self.start if own is None else own, [brain.id for brain in self.brains])
+
+    @property
+    def folded(self) -> list[tuple[str, str]]:
+        """All (run, start brain) pairs."""
+        return [(run, brain) for run in self.runs for brain in self.starts(run)]
+
+    @property
+    def start_brains(self) -> list[str]:
+        """The ids of the brains that some run folds, each once, in the order of `brains`."""
+        folded = {brain for _, brain in self.folded}
+        return [brain.id for brain in self.brains if brain.id in folded]
+
+    def weeks(self, run: str, brain: str) -> list[float]:
+        """Returns the output weeks of a run from a start brain, whose own week is the first."""
         settings = self.runs[run]
-        return output_weeks(self.start_week, settings.end_week, settings.output_every_gw)
+        return output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
 
     @property
     def growth_series(self) -> dict[str, list[str]]:
@@ -99,46 +173,39 @@ class Config(Settings):
         kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
         return growth_series(kinds, {brain.id: brain.week for brain in self.brains}, self.growth.brains)
 
-    @property
-    def estimated_from(self) -> str | None:
-        """The series that `estimated` rates are taken from; None where there is no such series."""
-        return estimated_from(self.growth_series, self.growth.estimated_from, self.start)
+    def estimated_from(self, brain: str) -> str | None:
+        """Returns the series that `estimated` rates are taken from where a brain is the start; None without one."""
+        return estimated_from(self.growth_series, self.growth.estimated_from, brain)
 
     @property
     def age_reference(self) -> list[str]:
-        """The ids of the brains that ages are told from; none where they are of too few weeks."""
+        """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
         return age_reference(self.brains, self.metrics.age_reference)
 
     def parameters(self, run: str) -> dict[str, Any]:
-        """Returns the settings of a run for its folding program, where a map goes by the name of its parameter.
+        """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.
 
         The number of ranks is left out, since no result depends on it.
         """
-        settings = self.runs[run].model_dump(mode="json", exclude={"ranks"})
+        settings = self.runs[run].model_dump(mode="json", exclude={"ranks", "start"})
         for name, value in self._tables(run).items():
-            curve = {"weeks": dict(sorted(value.weeks.items()))} if value.weeks else {}
+            curve = {"weeks": value.weeks} if value.weeks else {}
             settings[name] = curve | ({"map": name} if value.map is not None else {})
         return settings
 
     def bounds(self, parameter: str) -> dict[str, float]:
         """Returns the bounds (gt, ge, le) of a parameter of the folding that may vary."""
-        extra = FoldingSettings.model_fields[parameter].json_schema_extra
-        assert isinstance(extra, dict)
-        return dict(extra["bounds"])  # type: ignore[arg-type]
+        return bounds_of(parameter)
 
     def maps(self, run: str) -> dict[str, dict[str, list[str]]]:
         """Returns for each parameter of a run that has a map its files under "map" and "surface", none for volumes."""
-
-        def listed(files: str | tuple[str, str] | None) -> list[str]:
-            return [files] if isinstance(files, str) else list(files or ())
-
         return {
-            name: {"map": listed(value.map), "surface": listed(value.surface)}
+            name: {"map": files_of(value.map), "surface": files_of(value.surface)}
             for name, value in self._tables(run).items()
             if value.map is not None
         }
 
-    def _tables(self, run: str) -> dict[str, VaryingSettings]:
+    def _tables(self, run: str) -> dict[str, Varying]:
         """Returns the parameters of a run that are curves or maps."""
         values = {name: getattr(self.runs[run], name) for name in VARYING}
-        return {name: value for name, value in values.items() if isinstance(value, VaryingSettings)}
+        return {name: value for name, value in values.items() if isinstance(value, Varying)}

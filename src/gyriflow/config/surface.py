@@ -1,6 +1,6 @@
 """Settings of the pial surfaces."""
 
-from .base import Settings, setting
+from ..parameters.settings import Settings, setting
 
 
 class SurfaceSettings(Settings):

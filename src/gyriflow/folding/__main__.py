@@ -18,13 +18,15 @@ from ..io.files import write_json
 from ..io.maps import read_maps
 from ..io.tetmeshes import read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
+from ..parameters.folding import FoldingParameters
+from ..parameters.reading import parameters_from, require_maps
+from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
+from ..parameters.varying import Maps
 from ..step import record_exit_code
 from .output import ZONES, say
-from .parameters import ELEMENT_FIELDS, FoldingParameters, parameters_from, require_maps
 from .run import run
-from .varying import Maps
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
-from .zones import ZONE_NAMES, zones_of_run
+from .zones import zones_of_run
 
 PREDICTED_MIB_PER_RANK = 180
 PREDICTED_KIB_PER_TET = 3.0

@@ -6,7 +6,7 @@ a checksum of its own content; one that does not fit or is torn is not used.
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import h5py
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.hdf5 import new_hdf5
-from .parameters import FoldingParameters
-from .varying import Maps
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import Maps
 
 Floats = NDArray[np.float64]
 ARRAYS = ("positions", "last", "before_last", "stretch")
@@ -95,14 +95,16 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) ->
     Left out is what only decides how far it goes, when it writes and on how many ranks: a run that failed can be
     called again with an earlier end or more halvings and goes on.
     """
-    values = asdict(parameters)
+    values = parameters.model_dump(mode="json")
     for name in ("ranks", "end_week", "output_weeks", "output_every_gw"):
         del values[name]
     for name in ("max_newton", "max_halvings"):
         del values["solver"][name]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
     package = Path(__file__).parents[1]
-    rooms = [path for room in ("folding", "mechanics", "geometry") for path in package.glob(f"{room}/*.py")]
+    rooms = [
+        path for room in ("folding", "mechanics", "geometry", "parameters") for path in package.glob(f"{room}/*.py")
+    ]
     for source in sorted([*rooms, package / "units.py"]):
         digest.update(source.read_bytes())
     digest.update(mesh.vertices.tobytes())

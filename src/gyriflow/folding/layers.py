@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, unit, vertex_normals
 from ..mechanics.growth import growth_increments
-from .parameters import FoldingParameters
-from .varying import Maps
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import Maps, value_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -64,11 +64,15 @@ def layers_at(
     """
     p = parameters
     w = cortical_weight(distance_mm, p.thickness_at(week, maps))
-    tangential, radial = p.growth_rate_per_s.at(week, maps), p.radial_growth_rate_per_s.at(week, maps)
-    dg, dr = growth_increments(w, growth, tangential, radial, p.core_growth_rate_per_s.at(week, maps), step_s)
+    tangential, radial, core = (
+        value_at(rate, week, maps)
+        for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
+    )
+    dg, dr = growth_increments(w, growth, tangential, radial, core, step_s)
     return Layers(
         weight=w,
-        mu=p.shear_modulus_core_pa.at(week, maps) * (1 - w) + p.shear_modulus_cortex_pa.at(week, maps) * w,
+        mu=value_at(p.shear_modulus_core_pa, week, maps) * (1 - w)
+        + value_at(p.shear_modulus_cortex_pa, week, maps) * w,
         dg=dg,
         dr=dr,
     )

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, write_frame
 from ..mechanics.materials import MATERIALS
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import Maps
 from ..units import MM_PER_M, week_tag
 from .layers import PialSearch, layers_at
-from .parameters import FoldingParameters
-from .varying import Maps
 from .zones import Zones
 
 Floats = NDArray[np.float64]

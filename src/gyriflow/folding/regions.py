@@ -7,16 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
-from .parameters import FoldingParameters
+from ..parameters.folding import FoldingParameters
+from ..parameters.terms import BRIDGE, CORE, CORTEX, LEFT, RIGHT
 from .zones import Zones
 
 Floats = NDArray[np.float64]
 Tags = dict[str, NDArray[np.int32]]
-
-LEFT, RIGHT, BRIDGE = 1, 2, 3
-CORTEX, CORE = 1, 2
-SHOWN_FIELDS = ("zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal")
-"""The fields that are shown with the regions."""
 
 
 def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:

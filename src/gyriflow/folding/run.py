@@ -11,12 +11,12 @@ import numpy as np
 from mpi4py import MPI
 
 from ..geometry.tetrahedra import TetrahedralMesh
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say
-from .parameters import FoldingParameters
 from .simulation import Folding, advance
-from .varying import Maps
 from .zones import Zones
 
 

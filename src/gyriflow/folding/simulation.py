@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..mechanics.materials import MATERIALS
+from ..parameters.folding import FoldingParameters
+from ..parameters.reading import require_maps
+from ..parameters.terms import ELEMENT_FIELDS
+from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
@@ -22,10 +26,8 @@ from .layers import WEIGHT_REACH, PialSearch, layers_at, normals_between
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import NewtonSettings, NewtonSolver
 from .output import say
-from .parameters import ELEMENT_FIELDS, FoldingParameters, require_maps
 from .problem import Problem
 from .stress import deformation_gradients, strain_fields, stress_fields, volume_ratio_fields
-from .varying import Maps
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -87,7 +89,9 @@ class Folding:
         self._local_maps = {name: self.domain.local(values) for name, values in self.maps.items()}
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         # far below any force of growth: a brain that does not grow must stay where it is
-        stiffness = parameters.shear_modulus_cortex_pa.range(self.maps, parameters.start_week, parameters.end_week)[1]
+        stiffness = value_range(
+            parameters.shear_modulus_cortex_pa, self.maps, parameters.start_week, parameters.end_week
+        )[1]
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
@@ -106,9 +110,12 @@ class Folding:
         search = PialSearch(domain.positions, self.zones.cortex_facets)
         at_points = self._linear_layers if domain.order == 1 else self._quadratic_layers
         self.problem.set_layers_at_points(*at_points(search, reach, week, step_s))
-        self.problem.mesh_moved()
+        part = domain.part
         if self.contact is not None:
             self.contact.mesh_moved()
+            if self.problem.free:
+                part = self.contact.joined(part)
+        self.problem.mesh_moved(part)
 
     def _linear_layers(self, search: PialSearch, reach: float, week: float, step_s: float) -> AtPoints:
         """Returns layers that are worked out at the nodes, with one normal for each element."""

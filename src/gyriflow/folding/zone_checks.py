@@ -7,7 +7,8 @@ from ..errors import InputError, MeshError
 from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
-from .zones import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES, Zones
+from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES
+from .zones import Zones
 
 NEEDED_THROUGH_CORTEX = {1: (2, "two elements"), 2: (1, "one quadratic element")}
 """Elements through the cortex by their order, below which a user is warned."""

@@ -10,11 +10,20 @@ from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
 from ..geometry.triangles import TriangleMesh, face_normals
+from ..parameters.folding import FoldingParameters
+from ..parameters.terms import (
+    BASE,
+    BETWEEN_PLANES,
+    CLAMPED,
+    FLAT_CUTS,
+    FREE,
+    LEFT_CONTACT,
+    RIGHT_CONTACT,
+    SIDE_X,
+    SIDE_Y,
+)
 from .layers import PialSearch
-from .parameters import FoldingParameters
 
-FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y = range(8)
-ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y")
 FLAT = 0.01
 """Part of the extent within which vertices of a flat base or side lie."""
 
@@ -60,7 +69,7 @@ class Zones:
     @property
     def cortex_facets(self) -> NDArray[np.int64]:
         """The (c, 3) facets under which the cortex lies: all but flat cuts."""
-        return self.facets[self.facet_zone < BASE]
+        return self.facets[~np.isin(self.facet_zone, FLAT_CUTS)]
 
     @property
     def fixed(self) -> NDArray[np.bool_]:

@@ -19,23 +19,24 @@ def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFram
     Parameters
     ----------
     folder
-        What paths are relative to; the files are looked for in its `results/*/benchmarks`.
+        What paths are relative to; the files are looked for in folders `benchmarks` of its `results`.
     patterns : {rule: regular expression}
-        Paths of a rule's files; what a group named `run` matches is the job's run.
+        Paths of a rule's files; groups named `run` and `brain` match the job's run and brain.
 
     Returns
     -------
-    DataFrame with columns rule, run (None where there is none), wall_s, cpu_s, memory_MiB
+    DataFrame with columns rule, run and brain (None where there is none), wall_s, cpu_s, memory_MiB
         In the order of the rules. Values are NaN where Snakemake could not measure ("NA", "-") or the file is torn.
     """
     folder = Path(folder)
-    found = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/*/benchmarks/*.tsv"))
+    found = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/**/benchmarks/*.tsv"))
     rows = []
     for rule, pattern in patterns.items():
         for path in found:
             if match := re.fullmatch(pattern, path):
-                rows.append({"rule": rule, "run": match.groupdict().get("run"), **_measured(folder / path)})
-    return pd.DataFrame(rows, columns=["rule", "run", *COLUMNS.values()])
+                of = {name: match.groupdict().get(name) for name in ("run", "brain")}
+                rows.append({"rule": rule, **of, **_measured(folder / path)})
+    return pd.DataFrame(rows, columns=["rule", "run", "brain", *COLUMNS.values()])
 
 
 def _measured(path: Path) -> dict[str, float]:

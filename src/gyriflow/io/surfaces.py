@@ -4,7 +4,7 @@ import binascii
 import logging
 import zlib
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 from xml.parsers.expat import ExpatError
 
 import nibabel as nib
@@ -114,6 +114,21 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
     )
     with replaced(path) as temporary:
         nib.save(GiftiImage(darrays=[points, triangles]), temporary)
+
+
+def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> None:
+    """Writes a brain's pial surface and its hemispheres.
+
+    Parameters
+    ----------
+    files
+        Paths as attributes `whole`, `left` and `right`; with `stl`, the whole goes there as well.
+    """
+    write_surface(files.whole, whole)
+    write_surface(files.left, left, "CortexLeft")
+    write_surface(files.right, right, "CortexRight")
+    if stl := getattr(files, "stl", None):
+        write_surface(stl, whole)
 
 
 def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Structure | None = None) -> None:

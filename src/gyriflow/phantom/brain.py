@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gyriflow.errors import InputError
+from gyriflow.parameters.synthetic import PHANTOM_WEEKS, PhantomSettings
 from gyriflow.units import ML_PER_MM3
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-FIRST_WEEK, LAST_WEEK = 21.0, 36.0
+DEFAULTS = PhantomSettings()
+FIRST_WEEK, LAST_WEEK = PHANTOM_WEEKS
 WHITE, VENTRICLES, CEREBELLUM, CSF, CORTEX, DEEP_GREY, BRAINSTEM, CALLOSUM = range(1, 9)
 
 # half lengths (left-right, anterior-posterior, inferior-superior) for an ellipsoid of half length one in y; the
@@ -74,7 +76,11 @@ def cerebral_volume_ml(week: float) -> float:
 
 
 def phantom_labels(
-    week: float, *, voxel_mm: float = 0.8, seed: int = 0, cortex_mm: float = 2.0
+    week: float,
+    *,
+    voxel_mm: float = DEFAULTS.voxel_mm,
+    seed: int = DEFAULTS.seed,
+    cortex_mm: float = DEFAULTS.cortex_mm,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Returns the (i, j, k) labels of a synthetic brain and their (4, 4) affine to RAS+ mm.
 
@@ -84,7 +90,9 @@ def phantom_labels(
     InputError outside 21 to 36 GW.
     """
     if not FIRST_WEEK <= week <= LAST_WEEK:
-        raise InputError("no phantom of this week", found=f"week {week:g}", expected="21 to 36 GW")
+        raise InputError(
+            "no phantom of this week", found=f"week {week:g}", expected=f"{FIRST_WEEK:g} to {LAST_WEEK:g} GW"
+        )
     age = (week - FIRST_WEEK) / (LAST_WEEK - FIRST_WEEK)
     shape = Shape(
         half_length=28.0 * (cerebral_volume_ml(week) / 48.0) ** (1 / 3),

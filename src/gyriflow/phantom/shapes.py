@@ -3,8 +3,6 @@
 All stand in RAS+ with x = 0 as their middle.
 """
 
-from typing import Literal
-
 import numpy as np
 import pymeshlab
 import trimesh
@@ -13,10 +11,9 @@ from scipy.spatial import Delaunay, cKDTree
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, edges, submesh, unit
+from gyriflow.parameters.synthetic import ShapeKind, ShapeSettings
 
 Floats = NDArray[np.float64]
-
-Kind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
 
 REMESHING_ROUNDS = 10
 # the sharp edges have 90°, a finely sampled curved face far less
@@ -31,7 +28,12 @@ WAVES = 64
 
 
 def shape_surface(
-    kind: Kind, size_mm: tuple[float, float, float], *, edge_length_mm: float, noise_mm: float = 0.05, seed: int = 0
+    kind: ShapeKind,
+    size_mm: tuple[float, float, float],
+    *,
+    edge_length_mm: float,
+    noise_mm: float = ShapeSettings.model_fields["noise_mm"].default,
+    seed: int = ShapeSettings.model_fields["seed"].default,
 ) -> TriangleMesh:
     """Returns a closed, outward surface of even triangles, its vertices on the shape and its sharp edges kept.
 
@@ -63,7 +65,7 @@ def shape_surface(
     return mesh if noise_mm == 0 else _with_bumps(mesh, kind, size, noise_mm, seed)
 
 
-def _longest_edge(kind: Kind, size: Floats) -> float:
+def _longest_edge(kind: ShapeKind, size: Floats) -> float:
     """Returns half the smallest radius of curvature of an ellipsoid, a quarter of the smallest extent of a slab."""
     return float(0.25 * size.min() if kind == "slab" else 0.5 * size.min() ** 2 / size.max())
 
@@ -77,7 +79,7 @@ def _slab(size: Floats, edge_length_mm: float) -> TriangleMesh:
     return TriangleMesh(vertices, box.faces)
 
 
-def _ellipsoid(kind: Kind, size: Floats, edge_length_mm: float) -> TriangleMesh:
+def _ellipsoid(kind: ShapeKind, size: Floats, edge_length_mm: float) -> TriangleMesh:
     """Returns a whole ellipsoid, or its upper half with a base."""
     half = kind == "half-ellipsoid"
     mesh = _even_hull(size * _directions(int(np.ceil(np.pi * size.max() / edge_length_mm)), half), edge_length_mm)
@@ -138,7 +140,7 @@ def _with_base(dome: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
     return TriangleMesh(np.concatenate([dome.vertices, inside]), np.concatenate([dome.faces, own[triangles]]))
 
 
-def _with_bumps(mesh: TriangleMesh, kind: Kind, size: Floats, noise_mm: float, seed: int) -> TriangleMesh:
+def _with_bumps(mesh: TriangleMesh, kind: ShapeKind, size: Floats, noise_mm: float, seed: int) -> TriangleMesh:
     """Returns the surface with bumps along the normal of its curved face, or upwards on the top of a slab.
 
     In flat cuts the vertices move along, less and less away from the bumps, and stay in the cut.

@@ -3,10 +3,12 @@
 from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
+from ..parameters.measures import SHAPE_MEASURES
 from .panels import Panel, Row, panel_grid
 from .scene import colour_scale, named_views, painted, uniform_colours
 from .style import (
@@ -146,6 +148,21 @@ def displacement_maps(
     )
 
 
+LABELS = {**SHAPE_MEASURES, "contact_pressure_pa": "contact pressure (Pa)"}
+"""What maps can be drawn of, with the labels of their scales."""
+
+
+def _scale_of(quantity: str, values: Floats) -> ScalarMappable:
+    """Returns the colours of a quantity; all but the shape index end at a percentile, past a few sharp vertices."""
+    if quantity == "shape_index":
+        return colour_scale("RdBu_r", -1.0, 1.0)
+    if quantity == "contact_pressure_pa":
+        touching = values[values > 0]
+        return colour_scale("YlOrRd", 0.0, float(np.percentile(touching, 98)) if len(touching) else 1.0, cut=True)
+    colours = "YlGnBu" if quantity == "sulcal_depth_mm" else "viridis"
+    return colour_scale(colours, 0.0, float(np.nanpercentile(values, 98)), cut=True)
+
+
 @styled
 def scalar_maps(
     maps: Mapping[str, Mapping[Hashable, SurfaceMap]],
@@ -173,24 +190,10 @@ def scalar_maps(
     InputError
         For another quantity or an unknown view.
     """
+    if quantity not in LABELS:
+        raise InputError("unknown quantity", found=quantity, expected=list(LABELS))
     values = np.concatenate([values for group in maps.values() for _, values in group.values()])
-    match quantity:
-        case "shape_index":
-            scale, label = colour_scale("RdBu_r", -1.0, 1.0), "shape index (sulci −1, gyri +1)"
-        case "curvedness":
-            # a few sharp vertices would take the whole scale
-            high = float(np.nanpercentile(values, 98))
-            scale, label = colour_scale("viridis", 0.0, high, cut=True), "curvedness (mm⁻¹)"
-        case "sulcal_depth_mm":
-            high = float(np.nanpercentile(values, 98))
-            scale, label = colour_scale("YlGnBu", 0.0, high, cut=True), "sulcal depth (mm)"
-        case "contact_pressure_pa":
-            touching = values[values > 0]
-            high = float(np.percentile(touching, 98)) if len(touching) else 1.0
-            scale, label = colour_scale("YlOrRd", 0.0, high, cut=True), "contact pressure (Pa)"
-        case _:
-            known = ["shape_index", "curvedness", "sulcal_depth_mm", "contact_pressure_pa"]
-            raise InputError("unknown quantity", found=quantity, expected=known)
+    scale, label = _scale_of(quantity, values), LABELS[quantity]
     keys = _ordered(*maps.values())
     rows = [
         Row(

@@ -7,6 +7,7 @@ from functools import wraps
 from typing import Any
 
 import matplotlib as mpl
+import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -121,6 +122,22 @@ def column_label(key: Hashable) -> str:
 def simulated_runs(runs: Iterable[str]) -> list[str]:
     """Returns the names of the simulated runs, each once, in the order given."""
     return [run for run in dict.fromkeys(runs) if run != MEASURED]
+
+
+def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
+    """Returns what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
+    pairs = [(run, brain) for run, brain in folded]
+    several = {run for run, _ in pairs if sum(run == other for other, _ in pairs) > 1}
+    return [f"{run} · {brain}" if run in several else run for run, brain in pairs]
+
+
+def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
+    """Returns a table with columns run and subject in which simulated brains go by the names of `run_names`."""
+    pairs = list(dict.fromkeys(zip(table["run"], table["subject"], strict=True)))
+    pairs = [pair for pair in pairs if pair[0] != MEASURED]
+    names = dict(zip(pairs, run_names(pairs), strict=True))
+    shown = [names.get(pair, pair[0]) for pair in zip(table["run"], table["subject"], strict=True)]
+    return table.assign(run=shown)
 
 
 def run_colours(runs: Iterable[str]) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, area, euler_number, is_closed, mean_edge_length, signed_volume
 from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.repair import pieces
-from gyriflow.surface.thickness import Thickness
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
 
@@ -27,8 +26,6 @@ class PialSurface:
         Where the interhemispheric fissure is: the plane x = const between the hemispheres.
     report
         What was found and done, in plain values for JSON.
-    thickness
-        Cortical thickness at the vertices of `whole`, where labels of the cortex give it.
     """
 
     whole: TriangleMesh
@@ -36,7 +33,6 @@ class PialSurface:
     right: TriangleMesh
     fissure_x_mm: float
     report: dict[str, Any]
-    thickness: Thickness | None = None
 
 
 def described(

@@ -1,13 +1,13 @@
 """A brain's pial surface from each kind of input, posed in RAS+ mm: the calls of the surface stage."""
 
 import logging
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
+from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.surface.extraction import (
     PAD_VOXELS,
     cropped,
@@ -29,7 +29,7 @@ from gyriflow.surface.hemispheres import (
     set_apart,
     split,
 )
-from gyriflow.surface.labels import LabelScheme, cerebrum_mask, require_sides
+from gyriflow.surface.labels import cerebrum_mask, require_sides
 from gyriflow.surface.orientation import MidPlane, mid_plane, upright
 from gyriflow.surface.outcome import PialSurface, described, faults, require_sound
 from gyriflow.surface.posing import as_poses, placed, poses
@@ -38,7 +38,7 @@ from gyriflow.surface.remeshing import evened
 from gyriflow.surface.repair import cleaned, pieces
 from gyriflow.surface.sides import fissure_between_labels, sampled, to_the_right
 from gyriflow.surface.size import require_plausible_size
-from gyriflow.surface.thickness import cortical_thickness
+from gyriflow.surface.thickness import Thickness, cortical_thickness
 from gyriflow.surface.volume import KEPT, after_repairs, with_volume
 from gyriflow.units import ML_PER_MM3
 
@@ -70,8 +70,8 @@ def from_labels(
     The cerebrum's mask is smoothed (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an
     isosurface, which is smoothed, remeshed to `edge_length_mm` and turned so that the mid-sagittal plane is
     x = const, and set outwards by what smoothing took of the volume. Where the scheme tells cortex from the tissue
-    inside and cortex labels of both sides touch, the fissure is opened to `fissure_mm` (0: left shut), and cortical
-    thickness is estimated. The fissure is half-way between the labels of the two sides where the scheme has them.
+    inside and cortex labels of both sides touch, the fissure is opened to `fissure_mm` (0: left shut).
+    The fissure is half-way between the labels of the two sides where the scheme has them.
     InputError for labels that don't fit the scheme or the week, MeshError where the surface stays tangled.
     """
     mask = cerebrum_mask(labels, scheme)
@@ -107,16 +107,42 @@ def from_labels(
         _warn(report, f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it")
     centres = corners(mesh).mean(axis=1)
     left = left_faces(mesh, fissure.height_above(centres) if to_right is None else sampled(to_right, grid, centres))
-    surface = _posed(mesh, left, plane, report, week)
-    if not scheme.cortex:
-        return surface
-    thickness = cortical_thickness(mesh, mask, np.isin(tissue, scheme.cortex), grid, smoothing_voxels)
-    report["cortical_thickness"] = thickness.report
+    return _posed(mesh, left, plane, report, week)
+
+
+def thickness_from_labels(
+    labels: NDArray[np.integer],
+    affine: NDArray[np.float64],
+    scheme: LabelScheme,
+    surface: TriangleMesh,
+    pose: NDArray[np.float64],
+    *,
+    smoothing_voxels: float = 1.0,
+) -> Thickness:
+    """Returns the cortical thickness at the vertices of the pial surface that `from_labels` made of the same labels.
+
+    Parameters
+    ----------
+    labels, affine, scheme, smoothing_voxels
+        As for `from_labels`; the scheme has to tell cortex from the tissue inside.
+    surface
+        The whole pial surface, posed.
+    pose : (4, 4) float
+        The motion from the labels' world to the surface's, as in the report of `from_labels`.
+    """
+    mask = cerebrum_mask(labels, scheme)
+    box, first = cropped(mask)
+    mask, tissue = np.pad(mask[box], PAD_VOXELS), np.pad(labels[box], PAD_VOXELS)
+    pial = transformed(surface, np.linalg.inv(pose))
+    cortex = np.isin(tissue, scheme.cortex)
+    thickness = cortical_thickness(pial, mask, cortex, shifted_affine(affine, first), smoothing_voxels)
+    thickness.report["warnings"] = []
     suggested, voxels = thickness.report["suggested_thickness_mm"], thickness.report["voxels_through_cortex"]
     log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
     if voxels < RESOLVED_VOXELS:
-        _warn(report, f"the cortex's labels are {voxels:.1f} voxels thick: their thickness is a coarse one")
-    return replace(surface, thickness=thickness)
+        message = f"the cortex's labels are {voxels:.1f} voxels thick: their thickness is a coarse one"
+        _warn(thickness.report, message)
+    return thickness
 
 
 def from_hemispheres(

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.surface.fissure import BEND_MM, FURTHEST_MM, SPACING_MM, Fissure
-from gyriflow.surface.labels import LabelScheme
 
 Floats = NDArray[np.float64]
 

@@ -137,7 +137,7 @@ def test_a_dump_has_the_brains_in_the_place_of_the_atlas(tmp_path):
     config = load(study({"weeks": [21, 22]}, growth={"estimated_from": "volume"}), tmp_path)
     again = load(config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}))
     assert (again.brains, again.growth_series) == (config.brains, config.growth_series)
-    assert (again.atlas, again.estimated_from) == (None, "volume")
+    assert (again.atlas, again.estimated_from("volume-week21")) == (None, "volume")
 
 
 def test_all_published_weeks_are_the_default(tmp_path):

@@ -1,10 +1,12 @@
 """Maps and estimated growth in a configuration: what the steps of the workflow are handed."""
 
+import numpy as np
 import pytest
 
 from gyriflow.config import load
-from gyriflow.config.checks import growth_problems
 from gyriflow.errors import InputError
+from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.varying import value_at
 
 BRAINS = [
     {"id": "a", "week": 21, "phantom": {}},
@@ -52,19 +54,19 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
 
 
 def test_the_folding_program_reads_curves_and_maps(tmp_path):
-    from gyriflow.folding.parameters import parameters_from
-
     (tmp_path / "soft.nii.gz").touch()
     varying = {
         "growth_rate_per_s": {"weeks": {"21.5": "1e-7", "22.5": 3e-7}},
         "shear_modulus_core_pa": {"map": "soft.nii.gz", "weeks": {21: 1.0, 23: 2.0}},
     }
     config = load(study(varying), tmp_path)
-    known = {"start_week": 21.0, "output_weeks": config.weeks("reference"), "fissure_x_mm": 0.0}
+    known = {"start_week": 21.0, "output_weeks": config.weeks("reference", "a"), "fissure_x_mm": 0.0}
     read = parameters_from(known | config.parameters("reference"))
-    assert read.growth_rate_per_s.at(22.0, {}) == pytest.approx(2e-7)
+    assert value_at(read.growth_rate_per_s, 22.0, {}) == pytest.approx(2e-7)
     assert read.maps == {"shear_modulus_core_pa"}
-    assert read.shear_modulus_core_pa.at(22.0, {"shear_modulus_core_pa": 300.0}) == pytest.approx(450.0)
+    assert value_at(read.shear_modulus_core_pa, 22.0, {"shear_modulus_core_pa": np.array([300.0])}) == pytest.approx(
+        450.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -87,9 +89,8 @@ def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_estimat
     raw = both_kinds(tmp_path, (21, 22))
     config = load(raw, tmp_path)
     assert config.growth_series == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
-    assert config.estimated_from == "surface"
-    assert load(raw | {"start": "v21"}, tmp_path).estimated_from == "volume"
-    assert load(raw | {"growth": {"estimated_from": "volume"}}, tmp_path).estimated_from == "volume"
+    assert (config.estimated_from("s21"), config.estimated_from("v21")) == ("surface", "volume")
+    assert load(raw | {"growth": {"estimated_from": "volume"}}, tmp_path).estimated_from("s21") == "volume"
     assert load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path).growth_series == {"volume": ["v21", "v22"]}
 
 
@@ -105,7 +106,7 @@ def test_series_may_be_named(tmp_path):
     named = {"early": ["s21", "s22"], "late": ["v22", "s23"]}
     config = load(raw | {"growth": {"brains": named, "estimated_from": "late"}}, tmp_path)
     assert config.growth_series == {"early": ["s21", "s22"], "late": ["v22", "s23"]}
-    assert config.estimated_from == "late"
+    assert config.estimated_from("s21") == "late"
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_series_may_be_named(tmp_path):
         (
             {"brains": {"one": ["v21", "v22"], "two": ["v21", "v22"]}},
             [
-                "folding.growth_rate_per_s: can't be estimated: the start brain is in none of the series one, two; "
+                "folding.growth_rate_per_s: can't be estimated: the start brain s21 is in none of the series one, two; "
                 "name one under growth.estimated_from"
             ],
         ),
@@ -153,16 +154,25 @@ def test_brains_of_one_week_give_no_growth():
             {"end_week": 24},
             ["growth.brains: found brains of 1 week; a growth rate needs two or more"],
         ),
-        ({"brains": []}, {}, ["growth.brains: found brains of 0 weeks; a growth rate needs two or more"]),
+        ({"brains": []}, {"end_week": 24}, ["growth.brains: found brains of 0 weeks; a growth rate needs two or more"]),
     ],
 )
 def test_brains_that_give_no_growth_rate_are_refused(growth, settings, found):
-    assert growth_problems(BRAINS, growth, "a", {"reference": settings}) == found
+    assert problems({"brains": BRAINS, "start": "a", "growth": growth, "folding": settings}) == found
+
+
+def problems(raw, base_dir="."):
+    """Returns the lines of the message with which a configuration is refused, none where it is not."""
+    try:
+        load(raw, base_dir)
+    except InputError as error:
+        return [line.strip() for line in str(error).splitlines()[1:-1]]
+    return []
 
 
 def test_an_estimate_without_two_weeks_is_refused_where_it_stands():
     reason = "can't be estimated: found brains of 1 week; a growth rate needs two or more"
-    assert growth_problems(BRAINS[:1], None, "a", {"x": ESTIMATED, "y": ESTIMATED}) == [
-        f"folding.growth_rate_per_s: {reason}"
-    ]
-    assert growth_problems(BRAINS[:1], {}, "a", {"x": ESTIMATED, "y": {}}) == [f"runs.x.growth_rate_per_s: {reason}"]
+    alone = {"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 24}}
+    estimated = {"growth_rate_per_s": "estimated"}
+    assert problems(alone | {"runs": {"x": estimated, "y": estimated}}) == [f"folding.growth_rate_per_s: {reason}"]
+    assert problems(alone | {"runs": {"x": estimated, "y": {}}}) == [f"runs.x.growth_rate_per_s: {reason}"]

@@ -4,6 +4,7 @@ import pytest
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.parameters.schemes import SCHEMES, LabelScheme
 
 MINE = {"cerebrum": [1, 2], "cortex": [2], "known": {9: "outer CSF"}}
 
@@ -36,7 +37,7 @@ def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
         "known": {9: "outer CSF"},
     }
     plain = load(study({"phantom": {}}))
-    assert plain.scheme(plain.brains[0]) == {"name": "spina-bifida-atlas"}
+    assert LabelScheme(**plain.scheme(plain.brains[0])) == SCHEMES["spina-bifida-atlas"]
 
 
 def test_all_mistakes_in_schemes_are_named_at_once(folder):
@@ -48,16 +49,16 @@ def test_all_mistakes_in_schemes_are_named_at_once(folder):
         "e": {"cerebrum": []},
     }
     assert problems(study({"labels": "labels.nii.gz", "scheme": "d"}, schemes=schemes), folder) == [
-        "schemes.b.cortx: unknown key; did you mean cortex?",
-        "schemes.c.cerebrum[0]: found 0; it should be greater than or equal to 1",
-        "schemes.c.left[0]: found 'x'; it should be a valid integer, unable to parse string as an integer",
-        "schemes.feta-7: the name is that of a scheme of gyriflow; choose another",
         "schemes.a.cerebrum: found 2 more than once",
         "schemes.a.cortex: found 3; it should have labels of the cerebrum only",
         "schemes.a.right: found 1, which are in left too",
+        "schemes.b.cortx: unknown key; did you mean cortex?",
         "schemes.b.cortex: found all of the cerebrum; the tissue inside the cortex is missing",
-        "schemes.b.right: is missing; hemispheres are told apart by both left and right",
+        "schemes.b.right: is missing; the hemispheres are separated by both left and right",
+        "schemes.c.cerebrum[0]: found 0; it should be greater than or equal to 1",
+        "schemes.c.left[0]: found 'x'; it should be a valid integer, unable to parse string as an integer",
         "schemes.e.cerebrum: found no labels; it should have one or more",
+        "schemes.feta-7: the name is that of a scheme of gyriflow; choose another",
         "brains[0].scheme: found 'd'; expected one of spina-bifida-atlas, dhcp-19, feta-7, binary, a, b, c, e, or a "
         "name of schemes",
     ]
@@ -89,7 +90,7 @@ def test_an_image_with_a_command_or_with_labels_is_a_brain(folder):
         ),
         (
             {"segmentation": {"command": "x {image} {labels}"}, "image": "t2w.nii.gz"},
-            "brains[0].scheme: is missing; it says what the labels of brains[0].segmentation mean",
+            "brains[0].scheme: is missing; it says what the labels mean",
         ),
         ({"segmentation": {}, "image": "t2w.nii.gz", "scheme": "binary"}, "brains[0].segmentation.command: is missing"),
         ({"phantom": {}, "image": "t2w.nii.gz"}, "brains[0].image: has no meaning with phantom"),

@@ -6,10 +6,11 @@ from ellipsoid import RUN, SEMI_AXES
 from shapes import ellipsoid_mesh
 
 from gyriflow.folding.layers import PialSearch, cortical_weight
-from gyriflow.folding.parameters import parameters_from
-from gyriflow.folding.regions import BRIDGE, CORE, CORTEX, LEFT, RIGHT, cell_tags, facet_tags, no_growth_ellipsoid
+from gyriflow.folding.regions import cell_tags, facet_tags, no_growth_ellipsoid
 from gyriflow.folding.zones import inside_ellipsoid, zones_of_run
 from gyriflow.geometry.tetrahedra import signed_volumes
+from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.terms import BRIDGE, CORE, CORTEX, LEFT, RIGHT
 
 
 @pytest.fixture(scope="module")

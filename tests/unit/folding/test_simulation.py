@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from gyriflow.config.folding import output_weeks
 from gyriflow.errors import SolverError
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.ladder import NotConvergedError
-from gyriflow.folding.parameters import parameters_from
 from gyriflow.folding.run import seconds_to, shortened_steps
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
+from gyriflow.parameters.folding import output_weeks
+from gyriflow.parameters.reading import parameters_from
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 

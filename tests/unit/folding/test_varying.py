@@ -4,33 +4,46 @@ import numpy as np
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.folding.parameters import parameters_from, require_maps
-from gyriflow.folding.varying import Varying
+from gyriflow.parameters.reading import parameters_from, require_maps
+from gyriflow.parameters.varying import value_at, value_range
 
 RUN = {"start_week": 21.0, "end_week": 31.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 31.0]}
 MAP = {"thickness_mm": np.array([1.0, 2.0, 4.0])}
 
 
+def value(given):
+    """Returns a parameter as a run has it."""
+    return parameters_from(RUN | {"thickness_mm": given}).thickness_mm
+
+
 def test_a_number_is_the_same_always_and_everywhere():
-    assert Varying.read("2e-7", "rate").at(33.0, {}) == 2e-7
+    assert value_at(value("2e-3"), 33.0, {}) == 2e-3
 
 
 def test_a_curve_is_linear_between_its_weeks_and_constant_beyond():
-    curve = Varying.read({"weeks": {25: 3.0, "21": 1.0}}, "thickness")
-    assert [curve.at(week, {}) for week in (20.0, 21.0, 22.0, 25.0, 40.0)] == [1.0, 1.0, 1.5, 3.0, 3.0]
+    curve = value({"weeks": {25: 3.0, "21": 1.0}})
+    assert [value_at(curve, week, {}) for week in (20.0, 21.0, 22.0, 25.0, 40.0)] == [1.0, 1.0, 1.5, 3.0, 3.0]
 
 
 def test_a_map_is_multiplied_with_the_curve():
-    both = Varying.read({"weeks": {21: 1.0, 31: 2.0}, "map": "thickness_mm"}, "thickness")
-    np.testing.assert_allclose(both.at(26.0, MAP), [1.5, 3.0, 6.0])
-    assert both.range(MAP, 21.0, 40.0) == (1.0, 8.0)
-    assert both.range(MAP, 21.0, 26.0) == (1.0, 6.0)
+    both = value({"weeks": {21: 1.0, 31: 2.0}, "map": "thickness_mm"})
+    np.testing.assert_allclose(value_at(both, 26.0, MAP), [1.5, 3.0, 6.0])
+    assert value_range(both, MAP, 21.0, 40.0) == (1.0, 8.0)
+    assert value_range(both, MAP, 21.0, 26.0) == (1.0, 6.0)
+    np.testing.assert_allclose(value_at(value({"map": "thickness_mm"}), 26.0, MAP), MAP["thickness_mm"])
 
 
-@pytest.mark.parametrize("value", ["thick", True, {}, {"weeks": {}}, {"weeks": [1, 2]}, {"week": {21: 1}}, None])
-def test_what_is_no_number_curve_or_map_is_refused(value):
-    with pytest.raises(InputError, match="rate"):
-        Varying.read(value, "rate")
+@pytest.mark.parametrize(
+    "given", ["thick", True, {}, {"weeks": {}}, {"weeks": [1, 2]}, {"week": {21: 1}}, None, "estimated"]
+)
+def test_what_is_no_number_curve_or_map_is_refused(given):
+    with pytest.raises(InputError, match="thickness_mm"):
+        value(given)
+
+
+def test_an_estimate_is_no_parameter_of_a_run():
+    with pytest.raises(InputError, match="growth_rate_per_s: found 'estimated'"):
+        parameters_from(RUN | {"growth_rate_per_s": "estimated"})
 
 
 def test_thickness_grows_with_time():
@@ -39,14 +52,14 @@ def test_thickness_grows_with_time():
 
 
 def test_values_are_checked_over_all_weeks_and_places():
-    with pytest.raises(InputError, match="thickness_mm must be positive"):
+    with pytest.raises(InputError, match=r"thickness_mm: reaches (0|-.*) mm at (21|31) GW"):
         parameters_from(RUN | {"thickness_mm": 1.5, "thickness_growth_mm_per_gw": -0.15})
     parameters_from(RUN | {"thickness_mm": {"weeks": {21: 1.0, 31: 3.0}}, "thickness_growth_mm_per_gw": -0.15})
-    with pytest.raises(InputError, match="must not be negative"):
+    with pytest.raises(InputError, match=r"growth_rate_per_s: found -.*allow_negative_growth"):
         parameters_from(RUN | {"growth_rate_per_s": {"weeks": {21: 1e-7, 30: -1e-7}}})
     mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
     require_maps(mapped, MAP, 3)
-    with pytest.raises(InputError, match="thickness_mm must be positive"):
+    with pytest.raises(InputError, match=r"thickness_mm: reaches (0|-.*) mm at (21|31) GW"):
         require_maps(mapped, {"thickness_mm": np.array([1.0, 0.0, 1.0])}, 3)
 
 

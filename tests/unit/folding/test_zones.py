@@ -6,16 +6,9 @@ from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.zone_checks import refuse_impossible, zone_report, zone_warnings
-from gyriflow.folding.zones import (
-    BASE,
-    BETWEEN_PLANES,
-    CLAMPED,
-    LEFT_CONTACT,
-    RIGHT_CONTACT,
-    find_zones,
-    inside_ellipsoid,
-)
+from gyriflow.folding.zones import find_zones, inside_ellipsoid
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
+from gyriflow.parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT
 
 OPEN = {"contact": False}
 DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift_y": 0.05, "shift_z": -0.15, "semi_axes": (0.35, 0.40, 0.50)}

@@ -6,8 +6,8 @@ from gyriflow.io.benchmarks import read_benchmarks
 
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 PATTERNS = {
-    "pial_surface": r"results/(?P<brain>a|b)/benchmarks/pial_surface\.tsv$",
-    "simulate": r"results/a/benchmarks/simulate\.(?P<run>one|two)\.tsv$",
+    "pial_from_labels": r"results/brains/(?P<brain>a|b)/benchmarks/pial_from_labels\.tsv$",
+    "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/benchmarks/simulate\.tsv$",
     "study_runs": r"results/study/benchmarks/study_runs\.tsv$",
 }
 
@@ -23,26 +23,27 @@ def line(seconds, memory, cpu):
 
 
 def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
-    write(tmp_path, "a/benchmarks/pial_surface.tsv", line(10.5, 200.25, 9.75))
-    write(tmp_path, "b/benchmarks/pial_surface.tsv", line(11, 210, 10))
-    write(tmp_path, "a/benchmarks/simulate.two.tsv", line("100.00", "1000.00", "190.00"))
+    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(10.5, 200.25, 9.75))
+    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line(11, 210, 10))
+    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", line("100.00", "1000.00", "190.00"))
     # of an earlier configuration
-    write(tmp_path, "c/benchmarks/pial_surface.tsv", line(1, 1, 1))
-    write(tmp_path, "a/benchmarks/simulate.three.tsv", line(1, 1, 1))
+    write(tmp_path, "brains/c/benchmarks/pial_from_labels.tsv", line(1, 1, 1))
+    write(tmp_path, "runs/three/a/benchmarks/simulate.tsv", line(1, 1, 1))
     jobs = read_benchmarks(tmp_path, PATTERNS)
-    assert jobs["rule"].tolist() == ["pial_surface", "pial_surface", "simulate"]
+    assert jobs["rule"].tolist() == ["pial_from_labels", "pial_from_labels", "simulate"]
     assert jobs["run"].isna().tolist() == [True, True, False]
-    assert jobs["run"].iloc[-1] == "two"
+    assert jobs[["run", "brain"]].iloc[-1].tolist() == ["two", "a"]
+    assert jobs["brain"].tolist() == ["a", "b", "a"]
     np.testing.assert_array_equal(
         jobs[["wall_s", "cpu_s", "memory_MiB"]], [[10.5, 9.75, 200.25], [11, 10, 210], [100, 190, 1000]]
     )
 
 
 def test_what_could_not_be_measured_is_nan(tmp_path):
-    write(tmp_path, "a/benchmarks/pial_surface.tsv", line(0.3, "NA", "NA"))
-    write(tmp_path, "b/benchmarks/pial_surface.tsv", line("-", "-", "-"))
-    write(tmp_path, "a/benchmarks/simulate.one.tsv", head="")
-    write(tmp_path, "a/benchmarks/simulate.two.tsv", "5.0\t0:00:05", head="s\th:m:s\n")
+    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(0.3, "NA", "NA"))
+    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line("-", "-", "-"))
+    write(tmp_path, "runs/one/a/benchmarks/simulate.tsv", head="")
+    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", "5.0\t0:00:05", head="s\th:m:s\n")
     write(tmp_path, "study/benchmarks/study_runs.tsv")
     jobs = read_benchmarks(tmp_path, PATTERNS)
     assert len(jobs) == 5

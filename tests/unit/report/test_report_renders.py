@@ -7,9 +7,9 @@ from matplotlib.text import Text
 from shapes import ellipsoid_mesh
 
 from gyriflow.errors import InputError
-from gyriflow.folding.zones import ZONE_NAMES
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.geometry.triangles import TriangleMesh, merged
+from gyriflow.parameters.terms import ZONE_NAMES
 from gyriflow.report.panels import round_length
 from gyriflow.report.renders import displacement_maps, runs_comparison, scalar_maps, weekly_comparison
 from gyriflow.report.scene import VIEWS, render, uniform_colours

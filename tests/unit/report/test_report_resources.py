@@ -83,9 +83,9 @@ def test_a_simulation_has_the_larger_of_what_it_and_snakemake_say():
 @pytest.fixture
 def stages():
     measured = jobs(
-        ["pial_surface", np.nan, 10.0, 8.0, 200.0],
+        ["pial_from_labels", np.nan, 10.0, 8.0, 200.0],
         ["simulate", "a", np.nan, np.nan, np.nan],
-        ["pial_surface", np.nan, 14.0, 20.0, 300.0],
+        ["pial_from_labels", np.nan, 14.0, 20.0, 300.0],
         ["join", "a", 0.25, np.nan, np.nan],
         ["join", "b", np.nan, np.nan, np.nan],
         ["lost", np.nan, np.nan, np.nan, np.nan],
@@ -94,9 +94,9 @@ def stages():
 
 
 def test_a_rule_has_the_sum_of_its_jobs_and_the_memory_of_the_largest(stages):
-    assert stages["stage"].tolist() == ["simulate", "pial_surface", "join", "lost"]
+    assert stages["stage"].tolist() == ["simulate", "pial_from_labels", "join", "lost"]
     assert stages["run"].tolist() == ["a", "", "", ""]
-    row = stages.set_index("stage").loc["pial_surface"]
+    row = stages.set_index("stage").loc["pial_from_labels"]
     assert (row["jobs"], row["wall_s"], row["cpu_s"], row["peak_memory_MiB"]) == (2, 24.0, 28.5, 300.0)
     memory = (10 * 200 + 14 * 300) / GB_IN_MIB * 0.5
     assert row["energy_kWh"] == pytest.approx((28.5 * 10 + memory) / 3600 * 2 / 1000)
@@ -104,7 +104,7 @@ def test_a_rule_has_the_sum_of_its_jobs_and_the_memory_of_the_largest(stages):
 
 def test_jobs_without_measurements_are_counted_and_add_nothing(stages):
     rows = stages.set_index("stage")
-    assert rows["unmeasured"].to_dict() == {"simulate": 0, "pial_surface": 0, "join": 1, "lost": 1}
+    assert rows["unmeasured"].to_dict() == {"simulate": 0, "pial_from_labels": 0, "join": 1, "lost": 1}
     assert (rows.loc["join", "jobs"], rows.loc["join", "wall_s"], rows.loc["join", "cpu_s"]) == (2, 0.25, 0.25)
     assert np.isnan(rows.loc["join", "peak_memory_MiB"])
     assert rows.loc["lost", ["wall_s", "cpu_s", "peak_memory_MiB", "energy_kWh", "co2e_g"]].isna().all()
@@ -112,7 +112,7 @@ def test_jobs_without_measurements_are_counted_and_add_nothing(stages):
 
 def test_the_printed_table_ends_in_the_sum(stages):
     table = resources_table(stages)
-    assert table["stage"].tolist() == ["simulate", "pial surface", "join", "lost", "all"]
+    assert table["stage"].tolist() == ["simulate", "pial from labels", "join", "lost", "all"]
     last = table.iloc[-1]
     assert (last["jobs"], last["wall time (min)"], last["peak memory (MiB)"]) == (6, 60.4, 2000.0)
     assert last["energy (kWh)"] == pytest.approx(stages["energy_kWh"].sum(), rel=5e-3)

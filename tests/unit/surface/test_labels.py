@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.surface.labels import SCHEMES, cerebrum_mask, require_sides
+from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.surface.labels import cerebrum_mask, require_sides
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
 

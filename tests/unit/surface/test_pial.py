@@ -22,10 +22,10 @@ from gyriflow.geometry.triangles import (
 )
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
 from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
-from gyriflow.surface.labels import SCHEMES
 from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial
 from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.repair import pieces

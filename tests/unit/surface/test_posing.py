@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
 from gyriflow.io.surfaces import declared, read_surface, write_surface
+from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
 from gyriflow.surface.halves import about_x, pair_by_shape, pitch_deg
 from gyriflow.surface.hemispheres import least_gap
-from gyriflow.surface.labels import SCHEMES
 from gyriflow.surface.pial import from_hemispheres
 from gyriflow.surface.posing import as_poses, poses
 from gyriflow.surface.repair import pieces

@@ -1,0 +1,1 @@
+"""The vocabulary that configuration, workflow and solver share: settings with units and bounds, names and codes."""

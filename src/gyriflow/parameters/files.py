@@ -1,0 +1,38 @@
+"""Paths of input files in settings."""
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, ValidationInfo
+
+from .settings import refused
+
+
+def _absolute(path: str, info: ValidationInfo) -> str:
+    """Returns the absolute path of a file; refused where there is none.
+
+    With the context `folder`, that of the configuration, where relative paths are looked for before the working
+    directory. `awaited` are files that need not be there yet. Without a context a path stays as it is.
+    """
+    if not info.context:
+        return path
+    places = [Path(info.context["folder"]) / Path(path).expanduser(), Path.cwd() / path]
+    present = [place for place in places if place.is_file()]
+    if not present and path not in info.context.get("awaited", ()):
+        raise refused(f"no such file: {places[0]}{_present_instead(places[0])}")
+    return str((present or places)[0].resolve())
+
+
+InputFile = Annotated[str, AfterValidator(_absolute)]
+"""The path of a file that is read; relative to the configuration file or else to the working directory."""
+
+
+def _present_instead(path: Path) -> str:
+    """Returns the files beside a missing one that differ from it in a number only, such as those of other weeks."""
+    pattern = re.compile(re.sub(r"\d+(\\\.\d+)?", r"[0-9.]+", re.escape(path.name)))
+    try:
+        names = sorted(other.name for other in path.parent.iterdir() if pattern.fullmatch(other.name))
+    except OSError:
+        names = []
+    return f"; there are {', '.join(names)}" if names else ""

@@ -1,0 +1,273 @@
+"""The mechanical model, its parameters and its numerics, as a study gives them and as a run takes them."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
+
+from .settings import Problem, Settings, check, setting, up_to_invalid
+from .terms import FieldName
+from .varying import (
+    Floats,
+    Maps,
+    Varying,
+    VaryingNumber,
+    VaryingOrEstimated,
+    Week,
+    map_of,
+    require_bounds,
+    value_at,
+    value_range,
+    varying,
+    weeks_within,
+)
+
+
+def _memory(value: Any) -> float:
+    """Returns a time in GW from a number or `infinite`."""
+    if value == "infinite":
+        return math.inf
+    try:
+        time = float(value)
+    except (TypeError, ValueError):
+        time = -1.0
+    if not time >= 0 or isinstance(value, bool):
+        raise ValueError("be 0 or more, or 'infinite'")
+    return time
+
+
+Memory = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    BeforeValidator(_memory),
+    PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
+]
+Fraction = Annotated[float, Field(gt=0, le=2)]
+
+
+class Contact(Settings):
+    """Contact between folds, and between the two hemispheres."""
+
+    kind: Literal["global", "planes", "none"] = setting(
+        "global", "",
+        "`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's "
+        "plane, folds run through each other (the paper); `none`: no contact.",
+    )  # fmt: skip
+    distance_mm: float | None = setting(
+        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's mean edge, and "
+        "no more than the smallest gap at the start.",
+        gt=0, le=5,
+    )  # fmt: skip
+    stiffness_pa: float | None = setting(
+        None, "Pa", "With `global`, stiffness of the barrier; null: a tenth of the cortex's largest shear modulus.",
+        gt=0, le=1e9,
+    )  # fmt: skip
+    penalty_pa_per_m: float = setting(5.0e5, "Pa/m", "With `planes`, pressure per depth of penetration.", gt=0, le=1e9)
+    gap_mm: float = setting(
+        2.5, "mm",
+        "Width of the fissure: the planes are a quarter of it off; between them nothing grows. With all kinds but "
+        "`none`.",
+        gt=0, le=20,
+    )  # fmt: skip
+
+
+class NoGrowth(Settings):
+    """The ellipsoid inside which nothing grows, and whose pial facets are clamped with `support: ellipsoid`."""
+
+    kind: Literal["ellipsoid", "none"] = setting(
+        "ellipsoid", "",
+        "`ellipsoid`: nothing grows in it, nor in the bridge between the hemispheres; `none`: all tissue grows.",
+    )  # fmt: skip
+    shift_y: float = setting(0.05, "Y-extent", "Shift of its centre from the middle, to anterior.", ge=-1, le=1)
+    shift_z: float = setting(-0.15, "Z-extent", "Shift of its centre from the middle, to superior.", ge=-1, le=1)
+    semi_axes: tuple[Fraction, Fraction, Fraction] = setting(
+        (0.35, 0.40, 0.50), "extents", "Semi-axes along X, Y, Z, each above 0 and at most 2."
+    )
+
+
+class Solver(Settings):
+    """The nonlinear and the linear solver."""
+
+    newton_tolerance: float = setting(
+        1e-6, "", "Newton ends where the residual has fallen to this fraction of that at u = 0.", gt=0, lt=1
+    )
+    krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
+    max_newton: int = setting(20, "", "Newton iterations before a step is halved.", ge=1, le=200)
+    max_halvings: int = setting(6, "", "Halvings of the time step before the run ends.", ge=0, le=30)
+
+
+class FoldingSettings(Settings):
+    """The mechanical model, its parameters and its numerics; reference values of the paper."""
+
+    end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
+    step_s: float = setting(
+        43200.0, "s", "Time step; the last one before an output is shortened where it does not fit.", gt=0, le=604800
+    )
+    thickness_mm: VaryingNumber = varying(1.5, "mm", "Cortical thickness H, at the start where it grows.", gt=0, le=10)
+    thickness_growth_mm_per_gw: float = setting(
+        0.0, "mm/GW", "Growth of the thickness, H = H₀ + β·t from the start on.", ge=-1, le=1
+    )
+    shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
+    shear_modulus_core_pa: VaryingNumber = varying(300.0, "Pa", "Shear modulus of what lies under it.", gt=0, le=1e7)
+    material: Literal["neo-hookean", "compressible-neo-hookean"] = setting(
+        "neo-hookean", "",
+        "Law of the material: `neo-hookean`, whose shape and volume store energy apart (the paper); "
+        "`compressible-neo-hookean`, whose energy is not split (docs/model.md).",
+    )  # fmt: skip
+    poisson_ratio: float = setting(0.45, "", "Poisson's ratio ν.", ge=0, lt=0.5)
+    growth_rate_per_s: VaryingOrEstimated = varying(
+        2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated`: from the brains' areas.", ge=-1e-5, le=1e-5
+    )
+    radial_growth_rate_per_s: VaryingNumber = varying(
+        0.0, "1/s", "Growth rate along the cortical normal, under the cortex.", ge=-1e-5, le=1e-5
+    )
+    core_growth_rate_per_s: VaryingOrEstimated = varying(
+        0.0, "1/s",
+        "Growth rate in all directions, under the cortex; `estimated`: from the brains' volumes.", ge=-1e-5, le=1e-5,
+    )  # fmt: skip
+    allow_negative_growth: bool = setting(False, "", "Whether the growth rates may be negative (atrophy).")
+    stress_memory_gw: Memory = setting(
+        0.0, "GW",
+        "Time in which elastic stress relaxes: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
+        word="infinite",
+    )  # fmt: skip
+    support: Literal["ellipsoid", "base", "box", "free"] = setting(
+        "ellipsoid", "",
+        "What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth, `base` the flat base, "
+        "`box` too and lets the upright sides slide, `free` nothing (rigid motions are removed).",
+    )  # fmt: skip
+    contact: Contact = setting(Contact(), "", "Contact.")
+    no_growth: NoGrowth = setting(NoGrowth(), "", "Where nothing grows.")
+    output_every_gw: float = setting(
+        1.0, "GW", "Spacing of the output weeks; the start and the end are always among them.", ge=0.01, le=10
+    )
+    fields: tuple[FieldName, ...] = setting(
+        ("displacement", "cortex_weight", "growth"), "", "Fields written for ParaView at each output week."
+    )
+    solver: Solver = setting(Solver(), "", "The solvers.")
+    ranks: int = setting(2, "", "MPI ranks of one simulation.", ge=1, le=4096)
+
+    @field_validator("*")
+    @classmethod
+    def _hold_bounds(cls, value: Any, info: ValidationInfo) -> Any:
+        require_bounds(value, bounds_of(str(info.field_name), cls))
+        return value
+
+
+def bounds_of(parameter: str, settings: type[Settings] = FoldingSettings) -> dict[str, float]:
+    """Returns the bounds (gt, ge, le) of a parameter that may vary, none for other keys."""
+    extra = settings.model_fields[parameter].json_schema_extra
+    bounds: Any = extra.get("bounds", {}) if isinstance(extra, dict) else {}
+    return dict(bounds)
+
+
+VARYING = tuple(name for name in FoldingSettings.model_fields if bounds_of(name))
+"""Parameters that may vary with week and place."""
+GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_s"))
+
+
+def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:
+    """Returns the output weeks of a run: the start, then every `every_gw` weeks, and the end."""
+    steps = int((end_week - start_week) / every_gw + 1e-9)
+    weeks = [round(start_week + n * every_gw, 9) for n in range(steps + 1)]
+    return weeks if end_week - weeks[-1] < 1e-6 else [*weeks, end_week]
+
+
+class FoldingParameters(FoldingSettings):
+    """All that a run needs to know, the content of its `params.yaml`: settings, start, output weeks and fissure.
+
+    A map goes by the name of the parameter that it belongs to.
+    """
+
+    start_week: Week = setting(..., "GW", "Gestational age at the start.")
+    output_weeks: tuple[Week, ...] = setting(..., "GW", "Output weeks, from `start_week` to `end_week`.")
+    fissure_x_mm: float = setting(..., "mm", "Position of the interhemispheric fissure.")
+
+    @property
+    def maps(self) -> set[str]:
+        """The names of the maps that the parameters need."""
+        return {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
+
+    def thickness_at(self, week: float, maps: Maps) -> float | Floats:
+        """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
+        return thickness_at(self, self.start_week, week, maps)
+
+    @check
+    def _output_weeks_ascend(self) -> Iterator[Problem]:
+        weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
+        if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
+            yield Problem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
+
+    @check
+    def _no_estimates_left(self) -> Iterator[Problem]:
+        for key in GROWTH_RATES:
+            if self.has(key) and getattr(self, key) == "estimated":
+                yield Problem("found 'estimated'; it should be the curve of the growth stage", (key,))
+
+    @check
+    def _values_are_possible(self) -> Iterator[Problem]:
+        return value_problems(self, self.start_week, {})
+
+
+def thickness_at(p: FoldingSettings, start_week: float, week: float, maps: Maps) -> float | Floats:
+    """Returns the cortical thickness in mm of a run from a week at another week, at all vertices where it has a map."""
+    return value_at(p.thickness_mm, week, maps) + p.thickness_growth_mm_per_gw * (week - start_week)
+
+
+def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[Problem]:
+    """Yields what is wrong between the settings of a run over all its weeks and places.
+
+    Parameters whose maps are not among `maps`, and estimated ones, are left out.
+
+    Parameters
+    ----------
+    start
+        What the start is called in messages, such as "the week of the start brain a".
+    """
+    for problems in (_week_problems, _thickness_problems, _stiffness_problems, _growth_problems, _step_problems):
+        yield from up_to_invalid(problems(p, start_week, maps, start))
+
+
+def _known(p: FoldingSettings, key: str, maps: Maps) -> Any:
+    """Returns the value of a parameter that may vary, None where it is estimated or its map is not there."""
+    value = getattr(p, key)
+    missing = isinstance(value, Varying) and value.map is not None and value.map not in maps
+    return None if missing or value == "estimated" else value
+
+
+def _week_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+    if p.end_week <= start_week:
+        called = f"{start_week:g}, {start}" if start else f"start_week, {start_week:g}"
+        yield Problem(f"found {p.end_week:g}; it should be above {called}", ("end_week",))
+
+
+def _thickness_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+    value = _known(p, "thickness_mm", maps)
+    for week in weeks_within(value, start_week, p.end_week) if value is not None else ():
+        reached = float(np.min(thickness_at(p, start_week, week, maps)))
+        if reached <= 0:
+            yield Problem(f"reaches {reached:g} mm at {week:g} GW; it should stay above 0", ("thickness_mm",))
+            return
+
+
+def _stiffness_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+    for key in ("shear_modulus_cortex_pa", "shear_modulus_core_pa"):
+        value = _known(p, key, maps)
+        if value is not None and (least := value_range(value, maps, start_week, p.end_week)[0]) <= 0:
+            yield Problem(f"reaches {least:g} Pa; it should stay above 0", (key,))
+
+
+def _growth_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+    for key in () if p.allow_negative_growth else GROWTH_RATES:
+        value = _known(p, key, maps) if p.has(key) else None
+        if value is not None and (least := value_range(value, maps, start_week, p.end_week)[0]) < 0:
+            yield Problem(f"found {least:g}; it should be 0 or more unless allow_negative_growth is true", (key,))
+
+
+def _step_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+    known = [value for key in GROWTH_RATES if (value := _known(p, key, maps)) is not None]
+    growth = p.step_s * sum(max(map(abs, value_range(value, maps, start_week, p.end_week))) for value in known)
+    if growth >= 1:
+        yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))

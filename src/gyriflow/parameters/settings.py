@@ -1,0 +1,162 @@
+"""The base of all settings: each key has its unit, bounds and description, and all problems are reported at once.
+
+Keys by themselves are checked by pydantic. A check across keys is a method with the decorator `check` that yields a
+`Problem` for each thing that is wrong. Checks are made even where other keys are wrong: then the settings hold only
+what is valid, and a check ends at the first key that is not.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_origin
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+PROBLEM = "problem"
+"""Type of the errors whose message is a whole sentence of ours."""
+_NOTHING = object()
+
+
+class NotValidError(AttributeError):
+    """A key that is missing or wrong is asked for by a check."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong, and the path of the key that it is said of, below the settings that are checked."""
+
+    text: str
+    key: tuple[str | int, ...] = ()
+
+
+def check[Check: Callable[[Any], Iterator[Problem]]](method: Check) -> Check:
+    """Makes a method of settings that yields problems a check across their keys."""
+    method.is_check = True  # type: ignore[attr-defined]
+    return method
+
+
+def refused(text: str) -> PydanticCustomError:
+    """Returns the error that a validator of one key raises where `text` is to be said of it as it stands."""
+    return PydanticCustomError(PROBLEM, text)
+
+
+def up_to_invalid(problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Yields problems until one needs a key that is itself missing or wrong."""
+    with suppress(NotValidError):
+        yield from problems
+
+
+class Settings(BaseModel):
+    """Settings that are validated as a whole and cannot change afterwards."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+    checks: ClassVar[tuple[Callable[[Any], Iterator[Problem]], ...]] = ()
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        known = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
+        cls.checks = tuple(value for value in known.values() if getattr(value, "is_check", False))
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _refuse_truth_values_as_numbers(cls, value: Any, info: ValidationInfo) -> Any:
+        # YAML reads `on`, `yes` and the like as true, which would pass as 1.0
+        if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
+            raise ValueError("Input should be a number or text, not true or false")
+        return value
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
+        # a section of which nothing is given, as in `mesh:`
+        raw = {} if raw is None else raw
+        errors: list[InitErrorDetails] = []
+        try:
+            settings = handler(raw)
+        except ValidationError as error:
+            if not isinstance(raw, Mapping):
+                raise
+            errors = [_again(details) for details in error.errors()]
+            settings = cls._valid_part(raw, {str(details["loc"][0]) for details in errors}, info.context)
+        found = [problem for check in cls.checks for problem in up_to_invalid(check(settings))]
+        errors += [InitErrorDetails(type=refused(p.text), loc=p.key, input=None) for p in dict.fromkeys(found)]
+        if errors:
+            raise ValidationError.from_exception_data(cls.__name__, errors)
+        return settings
+
+    @classmethod
+    def _valid_part(cls, raw: Mapping[str, Any], wrong: set[str], context: Any) -> Self:
+        """Returns settings that hold the valid keys of `raw` and defaults, but none of the keys that are `wrong`."""
+        values = {}
+        for name in raw.keys() & cls.model_fields.keys():
+            value = valid_part(cls.model_fields[name].rebuild_annotation(), raw[name], context, whole=name not in wrong)
+            if value is not _NOTHING:
+                values[name] = value
+        settings = cls.model_construct(_fields_set=set(raw) & set(cls.model_fields), **values)
+        for name in raw.keys() - values.keys():
+            settings.__dict__.pop(name, None)
+        return settings
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            if name in type(self).model_fields:
+                raise NotValidError(name)
+            return super().__getattr__(name)
+
+    def has(self, *keys: str) -> bool:
+        """Returns whether the values of all these keys are valid."""
+        return all(hasattr(self, key) for key in keys)
+
+    def gives(self, key: str) -> bool:
+        """Returns whether a key was given, with any value but null, right or wrong."""
+        return key in self.model_fields_set and self.__dict__.get(key, _NOTHING) is not None
+
+
+def setting(default: Any, unit: str, description: str, *, word: str | None = None, **bounds: Any) -> Any:
+    """Returns a pydantic field with its unit; `default` is ... where the user has to give the value.
+
+    `word` may stand in the place of a number. `bounds` are those of pydantic: gt, ge, lt, le, min_length, max_length,
+    pattern.
+    """
+    extra: dict[str, Any] = {"unit": unit} if word is None else {"unit": unit, "word": word}
+    return Field(default, description=description, json_schema_extra=extra, **bounds)
+
+
+def valid_part(kind: Any, raw: Any, context: Any, *, whole: bool) -> Any:
+    """Returns what is valid of a value of the type `kind`: settings, and settings in lists and tables, in part."""
+    if whole:
+        return TypeAdapter(kind).validate_python(raw, context=context)
+    arguments = get_args(kind)
+    if isinstance(kind, type) and issubclass(kind, Settings):
+        given = raw if isinstance(raw, Mapping) else {}
+        try:
+            return kind.model_validate(raw, context=context)
+        except ValidationError as error:
+            wrong = {str(part) for details in error.errors() for part in details["loc"][:1]}
+            return kind._valid_part(given, wrong, context)
+    if get_origin(kind) is tuple and arguments[1:] == (...,) and isinstance(raw, list | tuple):
+        parts = [valid_part(arguments[0], item, context, whole=False) for item in raw]
+        return _NOTHING if _NOTHING in parts else tuple(parts)
+    if get_origin(kind) is dict and isinstance(raw, Mapping):
+        table = {key: valid_part(arguments[1], item, context, whole=False) for key, item in raw.items()}
+        return _NOTHING if _NOTHING in table.values() else table
+    return _NOTHING
+
+
+def _again(details: Any) -> InitErrorDetails:
+    """Returns an error that pydantic has reported in the form in which it can be raised again."""
+    kind = refused(details["msg"]) if details["type"] == PROBLEM else details["type"]
+    return InitErrorDetails(type=kind, loc=details["loc"], input=details["input"], ctx=details.get("ctx", {}))

@@ -1,0 +1,88 @@
+"""Settings of the brains that the workflow makes itself: phantoms and simple shapes."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .settings import Problem, Settings, check, setting
+
+PHANTOM_WEEKS = (21.0, 36.0)
+"""Gestational weeks of which phantoms can be made, the first and the last."""
+
+ShapeKind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
+SHAPE_SIZES: dict[ShapeKind, str] = {
+    "sphere": "radius_mm",
+    "ellipsoid": "semi_axes_mm",
+    "half-ellipsoid": "semi_axes_mm",
+    "slab": "extent_mm",
+}
+"""The key that holds the size of each kind of shape."""
+MOST_UNEQUAL_AXES = 2.0
+"""Longest over shortest semi-axis of a shape: beyond this its ends are too sharp for even triangles."""
+MOST_NOISE = 0.02
+"""Height of the bumps over the smallest size of a shape."""
+
+Length = Annotated[float, Field(ge=5, le=150)]
+
+
+class PhantomSettings(Settings):
+    """A synthetic brain, made for the brain's week."""
+
+    voxel_mm: float = setting(0.8, "mm", "Edge of the isotropic voxels.", ge=0.3, le=2.0)
+    seed: int = setting(0, "", "Seed of the folds' random pattern.", ge=0)
+    cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
+
+
+class ShapeSettings(Settings):
+    """A simple geometry in the place of a brain, for teaching and verification, centred on x = 0 and y = 0."""
+
+    kind: ShapeKind = setting(
+        ..., "",
+        "`sphere`, `ellipsoid` (both centred on z = 0), `half-ellipsoid` (a dome on a flat base at z = 0) or `slab` "
+        "(a box upwards from z = 0).",
+    )  # fmt: skip
+    radius_mm: float = setting(23.0, "mm", "Radius of a sphere.", ge=5, le=150)
+    semi_axes_mm: tuple[Length, Length, Length] = setting(
+        (21.0, 28.0, 22.0), "mm",
+        "Semi-axes along X, Y, Z of an ellipsoid or half-ellipsoid, each 5 to 150; the longest is at most twice the "
+        "shortest.",
+    )  # fmt: skip
+    extent_mm: tuple[Length, Length, Length] = setting(
+        (40.0, 40.0, 12.0), "mm", "Extents of a slab along X, Y, Z, each 5 to 150."
+    )
+    noise_mm: float = setting(
+        0.05, "mm",
+        "Root mean square height of smooth bumps that folding starts from, at most a fiftieth of the smallest size; "
+        "flat bases and a slab's sides stay flat.",
+        ge=0, le=0.5,
+    )  # fmt: skip
+    seed: int = setting(0, "", "Seed of the bumps' random pattern.", ge=0)
+
+    @property
+    def size_mm(self) -> tuple[float, float, float]:
+        """The three semi-axes, or the three extents of a slab."""
+        size = getattr(self, SHAPE_SIZES[self.kind])
+        return (size, size, size) if self.kind == "sphere" else size
+
+    @check
+    def _size_of_its_kind(self) -> Iterator[Problem]:
+        own = SHAPE_SIZES[self.kind]
+        for key in dict.fromkeys(SHAPE_SIZES.values()):
+            if self.gives(key) and key != own:
+                yield Problem(f"has no meaning with kind {self.kind}, whose size is {own}", (key,))
+
+    @check
+    def _even_triangles_fit(self) -> Iterator[Problem]:
+        key, longest, shortest = SHAPE_SIZES[self.kind], max(self.size_mm), min(self.size_mm)
+        if key == "semi_axes_mm" and longest > MOST_UNEQUAL_AXES * shortest:
+            expected = f"at most {MOST_UNEQUAL_AXES:g} times the shortest, {shortest:g}"
+            yield Problem(f"found {longest:g} as the longest; it should be {expected}", (key,))
+
+    @check
+    def _bumps_are_small(self) -> Iterator[Problem]:
+        largest = MOST_NOISE * min(self.size_mm)
+        # the default is right for the default sizes only to begin with
+        if self.gives("noise_mm") and self.noise_mm > largest:
+            expected = f"at most {largest:g}, a fiftieth of the smallest size in {SHAPE_SIZES[self.kind]}"
+            yield Problem(f"found {self.noise_mm:g}; it should be {expected}", ("noise_mm",))

@@ -1,0 +1,39 @@
+"""Names and codes that files, settings and figures share."""
+
+from typing import Literal, get_args
+
+Side = Literal["left", "right"]
+SIDES: tuple[Side, ...] = get_args(Side)
+
+VertexField = Literal[
+    "displacement",
+    "distance",
+    "cortex_weight",
+    "growth",
+    "shear_modulus",
+    "bulk_modulus",
+    "normal",
+    "zones",
+    "contact_pressure",
+]
+"""Fields that a run can write for ParaView with values per vertex."""
+ElementField = Literal["stress", "strain", "volume_ratio"]
+"""Fields with values per element (up to four arrays each)."""
+FieldName = Literal[VertexField, ElementField]
+ELEMENT_FIELDS: tuple[ElementField, ...] = get_args(ElementField)
+REGION_FIELDS: tuple[VertexField, ...] = (
+    *("zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal"),
+)
+"""Fields that are shown with the regions, before the solve."""
+
+FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y = range(8)
+"""Zones of the boundary's facets."""
+ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y")
+"""Their names, by code."""
+FLAT_CUTS = (BASE, SIDE_X, SIDE_Y)
+"""Zones that only simple shapes have: tissue is cut off flat, and there is no cortex."""
+
+LEFT, RIGHT, BRIDGE = 1, 2, 3
+"""Tags of the hemispheres, and of what lies between the planes of contact."""
+CORTEX, CORE = 1, 2
+"""Tags of the layers."""

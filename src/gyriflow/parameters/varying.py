@@ -1,0 +1,161 @@
+"""Parameters that vary: a number, a curve over weeks, a map over the brain, a map times a curve, or an estimate."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Discriminator, Field, Tag, field_validator
+
+from .files import InputFile
+from .settings import Problem, Settings, check, setting
+
+Floats = NDArray[np.float64]
+Maps = Mapping[str, Floats]
+"""Values at the mesh's vertices by parameter name; they move with the tissue."""
+Week = Annotated[float, Field(ge=15, le=45)]
+FileOrPair = Annotated[
+    Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],
+    Discriminator(lambda value: "(pair)" if isinstance(value, list | tuple) else "(file)"),
+]
+
+
+class Varying(Settings):
+    """A parameter that varies: a curve over `weeks`, a `map` over the brain, or both, which are multiplied.
+
+    A map is a GIFTI file with one value per vertex of `surface` (or one such file for each hemisphere), or a NIfTI
+    volume in world coordinates, without `surface`. Maps move with the tissue.
+    """
+
+    weeks: dict[Week, float] | None = setting(
+        None, "GW", "Values by gestational week, as `{21: 1.5, 30: 2.0}`: linear in between, constant beyond."
+    )
+    map: FileOrPair | None = setting(None, "", "File with the values, or the left and the right hemisphere's.")
+    surface: FileOrPair | None = setting(None, "", "Surface file, or the left and the right one, of the map.")
+
+    @field_validator("weeks", mode="before")
+    @classmethod
+    def _numbers_by_week(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            if any(isinstance(number, bool) for number in value.values()):
+                raise ValueError("hold numbers, not true or false")
+            if len({float(week) for week in value}) < len(value):
+                raise ValueError("name each week once")
+        return value
+
+    @field_validator("weeks")
+    @classmethod
+    def _by_week(cls, value: dict[float, float] | None) -> dict[float, float] | None:
+        return None if value is None else dict(sorted(value.items()))
+
+    @check
+    def _has_a_curve_or_a_map(self) -> Iterator[Problem]:
+        if not self.weeks and not self.gives("map"):
+            yield Problem("found no values; it should be a number, or have `weeks` or a `map`")
+
+    @check
+    def _map_and_surface_fit(self) -> Iterator[Problem]:
+        maps, surfaces = (
+            [value] if isinstance(value, str) else list(value or ()) for value in (self.map, self.surface)
+        )
+        if surfaces and not maps:
+            yield Problem("has a `surface` but no `map`", ("surface",))
+        elif surfaces and len(maps) != len(surfaces):
+            yield Problem("should have as many files as `map`", ("surface",))
+        elif surfaces and any(path.endswith((".nii", ".nii.gz")) for path in maps):
+            yield Problem("has no meaning where the map is a volume", ("surface",))
+        elif not surfaces and (len(maps) > 1 or any(path.endswith(".gii") for path in maps)):
+            yield Problem("is missing; it is the surface whose vertices the map belongs to", ("surface",))
+
+
+def files_of(files: str | tuple[str, str] | None) -> list[str]:
+    """Returns the files of a map or of its surface as a list."""
+    return [files] if isinstance(files, str) else list(files or ())
+
+
+Estimated = Literal["estimated"]
+"""A rate that is the curve which the growth stage finds."""
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, dict | Varying):
+        return "(table)"
+    return "(word)" if value == "estimated" else "(number)"
+
+
+VaryingNumber = Annotated[
+    Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")],
+    Discriminator(lambda value: "(table)" if _kind(value) == "(table)" else "(number)"),
+]
+"""A number, or what `Varying` says."""
+
+VaryingOrEstimated = Annotated[
+    Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")] | Annotated[Estimated, Tag("(word)")],
+    Discriminator(_kind),
+]
+
+
+def varying(default: float, unit: str, description: str, **bounds: float) -> Any:
+    """Returns a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
+    return Field(default, description=description, json_schema_extra={"unit": unit, "bounds": dict(bounds)})
+
+
+BOUND_TEXTS = {
+    "gt": ("greater than", lambda value, bound: value > bound),
+    "ge": ("greater than or equal to", lambda value, bound: value >= bound),
+    "le": ("less than or equal to", lambda value, bound: value <= bound),
+}
+
+
+def require_bounds(value: float | Varying | str, bounds: Mapping[str, float]) -> None:
+    """Raises ValueError where a number, or one of a curve without a map, is out of its bounds."""
+    if isinstance(value, str):
+        return
+    if isinstance(value, Varying):
+        numbers = [] if value.map is not None else list((value.weeks or {}).values())
+    else:
+        numbers = [value]
+    for name, bound in bounds.items():
+        text, holds = BOUND_TEXTS[name]
+        if not all(holds(number, bound) for number in numbers):
+            raise ValueError(f"be {text} {bound:g}")
+
+
+def map_of(value: float | Varying | str) -> str | None:
+    """Returns the name of the map of a parameter in a run's parameters, None where it has none."""
+    return value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
+
+
+def weeks_of(value: float | Varying | str) -> dict[float, float]:
+    """Returns the curve of a parameter, {week: value} in ascending order; empty where it has none."""
+    return (value.weeks or {}) if isinstance(value, Varying) else {}
+
+
+def curve_at(value: float | Varying | str, week: float) -> float:
+    """Returns the number, or the curve's value at a week: linear in between, constant beyond, 1 without a curve."""
+    if isinstance(value, str):
+        raise ValueError("an estimated rate has no value before the growth stage has found its curve")
+    if not isinstance(value, Varying):
+        return value
+    curve = weeks_of(value)
+    return float(np.interp(week, list(curve), list(curve.values()))) if curve else 1.0
+
+
+def value_at(value: float | Varying | str, week: float, maps: Maps) -> float | Floats:
+    """Returns a parameter's value at a week: a number, or (n,) values where there is a map."""
+    name = map_of(value)
+    return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
+
+
+def weeks_within(value: float | Varying | str, start: float, end: float) -> list[float]:
+    """Returns start, end, and the weeks of the curve between them: where its extremes lie."""
+    return [start, *(week for week in weeks_of(value) if start < week < end), end]
+
+
+def value_range(value: float | Varying | str, maps: Maps, start: float, end: float) -> tuple[float, float]:
+    """Returns the smallest and the largest value of a parameter from a week to a week, over all places."""
+    name = map_of(value)
+    places = np.ones(1) if name is None else maps[name]
+    curve = [curve_at(value, week) for week in weeks_within(value, start, end)]
+    products = np.outer(curve, [places.min(), places.max()])
+    return float(products.min()), float(products.max())

@@ -1,0 +1,13 @@
+"""The clean pial surface of a brain and of its hemispheres in RAS+ mm, from one closed surface."""
+
+from gyriflow.io.files import write_json
+from gyriflow.io.surfaces import read_surface, write_brain
+from gyriflow.step import step
+from gyriflow.surface.pial import from_pial
+
+file, output, params = snakemake.input[0], snakemake.output, snakemake.params
+with step(snakemake.log[0], file):
+    coordinates = "ras" if params.coordinates == "auto" else params.coordinates
+    surface = from_pial(read_surface(file), week=params.week, coordinates=coordinates, **params.settings)
+    write_brain(output, surface.whole, surface.left, surface.right)
+    write_json(output.report, surface.report)
