@@ -26,7 +26,7 @@ from .domain import Domain
 from .multigrid import OrderHierarchy
 from .points import IntegrationPoints
 from .rigid import FreeOperator, RigidMotions
-from .tangent import SumOperator, Tangent
+from .tangent import NODES_PER_TERM, SumOperator, Tangent
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,7 @@ class Contribution(Protocol):
     def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
         """Returns the energy's second derivative in N/m, or one made positive semidefinite; None where it is zero.
 
-        A sum of terms that couple at most four nodes each. Rows and columns of fixed components need no care.
+        A sum of terms that couple few nodes each (`NODES_PER_TERM`). Rows and columns of fixed components need no care.
         """
 
     def largest_step(self, direction: Floats) -> float:
@@ -109,7 +109,9 @@ class Problem:
         planes = [dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm]
         tags = domain.local_facets(zones.facets, zones.facet_zone)
         names = "quadrature_points", "quadrature_weights"
-        dx = ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, self._rule, strict=True)))
+        # as tuples, since arrays are shortened in the names of compiled forms
+        rule = [tuple(map(tuple, self._rule[0].tolist())), tuple(self._rule[1].tolist())]
+        dx = ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True)))
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
         F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
@@ -246,7 +248,8 @@ class Problem:
             # one object for all iterates, since multigrid keeps the first it is given
             self._sum = SumOperator(products)
             self._sum_matrix = self._sum.as_matrix()
-        return Tangent(matrix, self._sum_matrix, self._further_parts(convex=False))
+        parts = self._further_parts(convex=False)
+        return Tangent(matrix, self._sum_matrix, parts, NODES_PER_TERM[self.domain.order])
 
     def convexify(self, tangent: Tangent) -> None:
         """Takes from the present tangent what is negative of the contributions' terms."""
