@@ -311,9 +311,11 @@ def test_forces_fit_the_energy_and_stiffness_the_forces():
         problem.residual(other)
         other.axpy(-1.0, residual)
         other.axpy(-h, change)
-        errors.append((first, other.norm()))
+        errors.append((first, other.norm() / (h * change.norm())))
     assert contact.pair_count() > 0
-    assert np.log2(np.array(errors[0]) / errors[1]) == pytest.approx([2.0, 2.0], abs=0.15)
+    assert np.log2(errors[0][0] / errors[1][0]) == pytest.approx(2.0, abs=0.1)
+    # the second derivative of the barrier jumps where other parts become the nearest
+    assert errors[1][1] < 2e-3
 
 
 def problem_fixed(problem):
