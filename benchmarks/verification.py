@@ -250,8 +250,9 @@ def parse() -> argparse.Namespace:
 
 def main(arguments: argparse.Namespace) -> None:
     from verification_cases.figures import draw
-    from gyriflow.config.mesh import MeshSettings
     from verification_cases.summary import rounded, summary
+
+    from gyriflow.config.mesh import MeshSettings
 
     found: dict = {}
     for part in arguments.only or PARTS:

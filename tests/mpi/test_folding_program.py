@@ -23,9 +23,9 @@ from gyriflow.folding.ladder import NotConvergedError
 from gyriflow.folding.run import run
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.io.files import read_json
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, is_closed
+from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_cell_field, read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
@@ -116,7 +116,11 @@ def curved_brain(path):
 
 def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp_path, monkeypatch):
     path = curved_brain(tmp_path / "curved.xdmf")
-    settings = {"solver": TIGHT, "stress_memory_gw": 1.0, "fields": ["displacement", "cortex_weight", "stress", "strain"]}
+    settings = {
+        "solver": TIGHT,
+        "stress_memory_gw": 1.0,
+        "fields": ["displacement", "cortex_weight", "stress", "strain"],
+    }
     assert fold(path, tmp_path / "three", 3, **settings).returncode == 0
     mesh, p = read_tetrahedral_mesh(path), parameters_from(WEEK | settings)
     zones = zones_of_run(mesh, p)

@@ -43,7 +43,9 @@ class MeshSettings(Settings):
         ge=0,
         le=20,
     )
-    edge_growth: float = setting(0.5, "mm/mm", "Growth of these distances with depth below that; `pytetwild` only.", gt=0, le=2)
+    edge_growth: float = setting(
+        0.5, "mm/mm", "Growth of these distances with depth below that; `pytetwild` only.", gt=0, le=2
+    )
     envelope_mm: float = setting(
         0.1, "mm", "How far the mesh's surface may leave the pial surface; `pytetwild` only.", gt=0.001, le=2
     )

@@ -11,9 +11,16 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ..geometry.jacobians import coefficients, jacobians, lower_bounds, shape_slopes
 from ..geometry.jacobians import NODES as NODE_PLACES
-from ..geometry.tetrahedra import NODES_OF_ORDER, PIECES_OF_ORDER, TetrahedralMesh, connected_parts, volumes_between, whole_faces
+from ..geometry.jacobians import coefficients, jacobians, lower_bounds, shape_slopes
+from ..geometry.tetrahedra import (
+    NODES_OF_ORDER,
+    PIECES_OF_ORDER,
+    TetrahedralMesh,
+    connected_parts,
+    volumes_between,
+    whole_faces,
+)
 from ..units import M_PER_MM
 
 Floats = NDArray[np.float64]
@@ -92,7 +99,7 @@ class Domain:
         return values
 
     def gathered_cells(self, cell_values: Floats) -> Floats:
-        """Returns on every rank the (m, ...) values of all elements, in the file's order, from the local (c, ...) ones."""
+        """Returns on every rank the (m, ...) values of all elements in the file's order, from local (c, ...) ones."""
         shape = cell_values.shape[1:]
         width = int(np.prod(shape))
         received = np.empty((len(self._tets), width))
@@ -130,7 +137,7 @@ class Domain:
             self._largest_maps = coefficients(node_positions, self.cells).max(axis=1)
 
     def volume_ratios(self, node_positions: Floats) -> Floats:
-        """Returns det F of a move of the local nodes to (k, 3) positions in m: (c, 1), or (c, 10) at quadratic nodes."""
+        """Returns det F of a move of local nodes to (k, 3) positions in m: (c, 1), or (c, 10) at quadratic nodes."""
         if self.order == 1:
             return (self.cell_volumes(node_positions) / self.volumes)[:, None]
         return jacobians(node_positions, self.cells, AT_NODES) / self._maps_at_nodes
@@ -163,7 +170,7 @@ class Domain:
 
         They are given as vertex indices of the file; the triangles of a quadratic element's face have one tag.
         """
-        facets, tags = whole_faces(facets, self.order), tags[:: PIECES_OF_ORDER[self.order]]
+        faces, tags = whole_faces(facets, self.order), tags[:: PIECES_OF_ORDER[self.order]]
         topology = self.mesh.topology
         topology.create_entities(2)
         topology.create_connectivity(2, 3)
@@ -173,7 +180,7 @@ class Domain:
         names = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
         count = len(self.positions)
         weights = np.array([count * count, count, 1], dtype=np.int64)
-        known = np.sort(facets, axis=1) @ weights
+        known = np.sort(faces, axis=1) @ weights
         order = np.argsort(known)
         wanted = names @ weights
         place = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]

@@ -136,7 +136,7 @@ class PialSearch:
         return np.asarray(to_vertex <= np.hypot(reach, longest / np.sqrt(3)))
 
     def _nearest_places(self, points: Floats) -> tuple[Floats, Ints, Floats]:
-        """Returns the distances of (k, 3) points to the triangles, the nearest ones, and barycentric coordinates there."""
+        """Returns distances of (k, 3) points to the triangles, the nearest ones, and barycentric coordinates there."""
         faces = self.surface.faces.astype(np.int32)
         vertices = self.surface.vertices.copy()
         squared, face, place = igl.point_mesh_squared_distance(points, vertices, faces)
@@ -174,8 +174,9 @@ class PialSearch:
 def normals_between(normals: Floats, smooth: Floats, bounded: Floats) -> Floats:
     """Returns the (c, q, 3) unit normals at points inside elements from those (c, k, 3) at their nodes.
 
-    Only the direction of a normal counts, not its sense: walls that face each other have the same. So normals are turned
-    to the side of the first before their mean is taken; where that all but vanishes, the nearest node's stands for it.
+    Only the direction of a normal counts, not its sense: walls that face each other have the same. So normals are
+    turned to the side of the first before their mean is taken; where that all but vanishes, the nearest node's stands
+    for it.
 
     Parameters
     ----------

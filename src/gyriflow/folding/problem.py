@@ -110,7 +110,7 @@ class Problem:
         tags = domain.local_facets(zones.facets, zones.facet_zone)
         names = "quadrature_points", "quadrature_weights"
         # as tuples, since arrays are shortened in the names of compiled forms
-        rule = [tuple(map(tuple, self._rule[0].tolist())), tuple(self._rule[1].tolist())]
+        rule = [tuple(tuple(row) for row in self._rule[0]), tuple(self._rule[1])]
         dx = ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True)))
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
@@ -180,12 +180,13 @@ class Problem:
         return RigidMotions(self.domain, np.zeros_like(self.domain.part)).null_space(self.vector)
 
     def set_layers(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
-        """Sets smooth layers: shear modulus (Pa) and growth increments (k,) at the local nodes, normals (c, 3) of cells."""
-        at_points = (nodal[self.domain.cells] @ self.points.smooth.T for nodal in (mu, dg, dr))
-        self.set_layers_at_points(*at_points, np.repeat(normals[:, None], len(self.points.weights), axis=1))
+        """Sets smooth layers: shear modulus (Pa) and growth (k,) at the local nodes, unit normals (c, 3) of cells."""
+        modulus, along, across = (nodal[self.domain.cells] @ self.points.smooth.T for nodal in (mu, dg, dr))
+        repeated = np.repeat(normals[:, None], len(self.points.weights), axis=1)
+        self.set_layers_at_points(modulus, along, across, repeated)
 
     def set_layers_at_points(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
-        """Sets shear modulus (Pa) and growth increments (c, q), and unit normals (c, q, 3), at the integration points."""
+        """Sets shear modulus (Pa) and growth increments (c, q), and unit normals (c, q, 3), at integration points."""
         for function, values in ((self._mu, mu), (self._dg, dg), (self._dr, dr), (self._N, normals)):
             set_at_points(function, values)
 
@@ -288,7 +289,7 @@ class Problem:
         return self.domain.volume_ratios(self._moved())
 
     def smallest_volume_ratio(self) -> float:
-        """Returns a number that det F is nowhere below: positive only where no element is turned inside out anywhere."""
+        """Returns a number that det F is nowhere below: positive only where no element is inside out anywhere."""
         return self.domain.smallest_volume_ratio(self._moved())
 
     def _moved(self) -> Floats:

@@ -132,10 +132,10 @@ class Folding:
         return mu, dg, dr, np.repeat(normals[:, None], len(points.weights), axis=1)
 
     def _quadratic_layers(self, search: PialSearch, reach: float, week: float, step_s: float) -> AtPoints:
-        """Returns layers that are worked out at the integration points, from the distance that is quadratic between nodes.
+        """Returns layers that are worked out at the integration points, from the distance, quadratic between nodes.
 
-        So the cortical weight may fall from 1 to 0 within an element. What jumps between nodes, growth and maps, is linear
-        between them.
+        So the cortical weight may fall from 1 to 0 within an element. What jumps between nodes, growth and maps, is
+        linear between them.
         """
         nodes, cells, points = self.domain.local(self.domain.positions), self.domain.cells, self.problem.points
         to_pial, at_nodes = search.distance_and_normals(nodes, reach)
@@ -149,7 +149,7 @@ class Folding:
         return layers.mu, layers.dg, layers.dr, normals
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
-        """Returns the (c, q, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
+        """Returns the (c, q, 3, 3) stretch of local elements that is left for a step, None where all is forgotten."""
         if not self._remembers:
             return None
         if state.stretch is None:
@@ -160,7 +160,8 @@ class Folding:
     def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
 
-        They are means over the integration points. Names are those of the parameter `fields`; those of the arrays carry their units. Right after a step only.
+        They are means over the integration points. Names are those of the parameter `fields`; those of the arrays carry
+        their units. Right after a step only.
         """
         domain = self.domain
         fields: dict[str, Floats] = {}

@@ -60,7 +60,11 @@ class Tangent:
     """
 
     def __init__(
-        self, matrix: PETSc.Mat, products: PETSc.Mat, parts: Sequence[PETSc.Mat], nodes_per_term: int = NODES_PER_TERM[1]
+        self,
+        matrix: PETSc.Mat,
+        products: PETSc.Mat,
+        parts: Sequence[PETSc.Mat],
+        nodes_per_term: int = NODES_PER_TERM[1],
     ) -> None:
         self._nodes_per_term = nodes_per_term
         self.products = products

@@ -148,7 +148,7 @@ def find_zones(
 
     def faces_where(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Returns the facets on faces of elements at all of whose vertices something holds."""
-        return on_whole_faces(holds.all(axis=1), mesh.order)
+        return on_whole_faces(np.asarray(holds.all(axis=1)), mesh.order)
 
     zone = np.full(len(facets), FREE)
     if support == "ellipsoid":

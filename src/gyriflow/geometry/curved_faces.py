@@ -1,7 +1,6 @@
 """Curved faces of quadratic elements as finer flat triangles, whose vertices follow the nodes."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from .triangles import Floats, Ints
@@ -14,9 +13,10 @@ LATTICE = np.array([(i, j, PARTS - i - j) for i in range(PARTS + 1) for j in ran
 
 def _lattice_triangles() -> Ints:
     """Returns the (16, 3) triangles of the lattice, all turned alike."""
-    number = {tuple(point): i for i, point in enumerate(LATTICE.tolist())}
+    points = [(int(i), int(j), int(k)) for i, j, k in LATTICE]
+    number = {point: i for i, point in enumerate(points)}
     triangles = []
-    for i, j, k in LATTICE.tolist():
+    for i, j, k in points:
         if k > 0:
             triangles.append((number[i, j, k], number[i + 1, j, k - 1], number[i, j + 1, k - 1]))
         if k > 0 and i > 0:
@@ -25,15 +25,15 @@ def _lattice_triangles() -> Ints:
 
 
 def _node_weights() -> Floats:
-    """Returns the (15, 6) weights of a face's corners a, b, c and its nodes ab, bc, ca at the vertices of the lattice."""
+    """Returns the (15, 6) weights of a face's corners a, b, c and nodes ab, bc, ca at the vertices of the lattice."""
     a, b, c = (LATTICE / PARTS).T
     return np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=1)
 
 
 def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
-    """Returns a finer surface of curved faces: the (t, n) weights of the nodes at its vertices, and its (16 f, 3) faces.
+    """Returns a finer surface of curved faces: weights (t, n) of the nodes at its vertices, and its (16 f, 3) faces.
 
-    The first n vertices are the nodes.
+    Its first n vertices are the nodes.
 
     Parameters
     ----------
@@ -57,9 +57,13 @@ def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     number[~at_node] = count + place.ravel()
     between = np.flatnonzero(~at_node)[first]
     rows = np.repeat(np.arange(count, count + len(between)), 6)
-    entries = (np.concatenate([np.ones(count), weights[between].ravel()]),
-               (np.concatenate([np.arange(count), rows]),
-                np.concatenate([np.arange(count), np.maximum(names[between], 0).ravel()])))
+    entries = (
+        np.concatenate([np.ones(count), weights[between].ravel()]),
+        (
+            np.concatenate([np.arange(count), rows]),
+            np.concatenate([np.arange(count), np.maximum(names[between], 0).ravel()]),
+        ),
+    )
     matrix = sparse.csr_array(sparse.coo_array(entries, shape=(count + len(between), count)))
     faces = number.reshape(-1, len(LATTICE))[:, _lattice_triangles()].reshape(-1, 3)
     return matrix, faces

@@ -1,9 +1,9 @@
 """Where the map of a tetrahedron with ten nodes may fold over: bounds of its Jacobian over the whole element.
 
 The sides of such an element may be curved, so that the determinant of the map from the regular element varies: it is
-a polynomial of third degree in the barycentric coordinates. In Bernstein's form, a mean of its coefficients with weights
-that are positive and sum to 1 everywhere, it lies between the least and the largest of the 20 coefficients (Johnen,
-Remacle and Geuzaine 2013, J. Comput. Phys. 233, 359-372).
+a polynomial of third degree in the barycentric coordinates. In Bernstein's form, a mean of its coefficients with
+weights that are positive and sum to 1 everywhere, it lies between the least and the largest of the 20 coefficients
+(Johnen, Remacle and Geuzaine 2013, J. Comput. Phys. 233, 359-372).
 """
 
 import math
@@ -40,9 +40,7 @@ def shape_values(places: Floats) -> Floats:
 def shape_slopes(places: Floats) -> Floats:
     """Returns the (p, 10, 3) gradients of the shape functions in the regular element."""
     corner = (4 * places - 1)[:, :, None] * SLOPES
-    middle = np.stack(
-        [4 * (places[:, a, None] * SLOPES[b] + places[:, b, None] * SLOPES[a]) for a, b in EDGES], axis=1
-    )
+    middle = np.stack([4 * (places[:, a, None] * SLOPES[b] + places[:, b, None] * SLOPES[a]) for a, b in EDGES], axis=1)
     return np.concatenate([corner, middle], axis=1)
 
 

@@ -60,7 +60,7 @@ def order_of(tets: NDArray[np.integer]) -> int:
 
 
 def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Returns the (m,) volumes of (m, 4) or (m, 10) tetrahedra in cubes of the vertices' unit, negative for inverted ones."""
+    """Returns the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the given unit."""
     if order_of(tets) == 2:
         return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
     a, b, c, d = (np.take(vertices, tets[:, i], axis=0) for i in range(4))
@@ -108,7 +108,8 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
 def faces_of_elements(order: int) -> Ints:
     """Returns the (4, p, 3) places in an element of its faces' triangles, outward; p is `PIECES_OF_ORDER`.
 
-    A face with corners a, b, c and nodes on its edges is split into (a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca).
+    A face with corners a, b, c and nodes on its edges is split into (a, ab, ca), (ab, b, bc), (ca, bc, c) and
+    (ab, bc, ca).
     """
     if order == 1:
         return np.array(FACES)[:, None, :]

@@ -1,8 +1,9 @@
 """The frames of a folding run: one HDF5 file, with an XDMF file beside it that ParaView opens as a time series.
 
-Layout of the HDF5 file: `tets` (m, 4), of quadratic elements (m, 10), once; per output week a group `week_21.00` with `positions` (n, 3) in mm, fields
-at the vertices, and in its group `cell_fields` those of the elements. Positions are in double precision: metrics and
-displacements are computed from them. Fields are in single precision, about seven digits, at half the size.
+Layout of the HDF5 file: `tets` (m, 4), of quadratic elements (m, 10), once; per output week a group `week_21.00` with
+`positions` (n, 3) in mm, fields at the vertices, and in its group `cell_fields` those of the elements. Positions are in
+double precision: metrics and displacements are computed from them. Fields are in single precision, about seven digits,
+at half the size.
 """
 
 from collections.abc import Mapping, Sequence

@@ -31,9 +31,7 @@ def refuse_bad_mesh(
     each other are always refused. `path` is for the message: where the mesh can be looked at.
     """
     faults = [
-        *_bad_elements(
-            mesh, min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3, min_jacobian_ratio
-        ),
+        *_bad_elements(mesh, min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3, min_jacobian_ratio),
         *_departures(summary, max_volume_change, max_surface_distance_mm, min_gap_kept),
     ]
     if faults:

@@ -86,8 +86,8 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     """Returns counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
     `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
-    that of the volume, relative to the one inside it; of quadratic elements both are taken on triangles between the nodes;
-    `gap_mm` holds the gaps of both, and `gap_kept` the share of the
+    that of the volume, relative to the one inside it. Of quadratic elements all of them are taken on the triangles
+    between nodes. `gap_mm` holds the gaps of both, and `gap_kept` the share of the
     given one's gaps that the mesh leaves open, None where it has none (see `fidelity`). `histogram` holds for radius
     ratio, dihedral angles and volume the edges of the classes and the number of elements in each.
     """

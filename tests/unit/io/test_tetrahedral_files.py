@@ -35,7 +35,9 @@ def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path):
 
 def test_quadratic_meshes_come_back_curved_and_positive_readable_by_others(tmp_path):
     mesh = quadratic(box_mesh((2, 2, 2), (2.0, 2.0, 2.0)))
-    mesh = TetrahedralMesh(mesh.vertices + np.random.default_rng(1).uniform(-0.05, 0.05, mesh.vertices.shape), mesh.tets)
+    mesh = TetrahedralMesh(
+        mesh.vertices + np.random.default_rng(1).uniform(-0.05, 0.05, mesh.vertices.shape), mesh.tets
+    )
     write_tetrahedral_mesh(tmp_path / "brain.xdmf", mesh, {"x": mesh.vertices[:, 0]})
     read = read_tetrahedral_mesh(tmp_path / "brain.xdmf")
     np.testing.assert_array_equal(read.tets, mesh.tets)
@@ -52,7 +54,9 @@ def test_frames_of_quadratic_elements_are_read_as_such_by_vtk(tmp_path):
     mesh = quadratic(box_mesh((2, 2, 2), (2.0, 2.0, 2.0)))
     x = mesh.vertices
     for week, size in ((21.0, 1.0), (22.0, 2.0)):
-        write_frame(tmp_path / f"{week}.h5", week, {"positions": size * x, "x": x[:, 0]}, {"v": np.arange(len(mesh.tets))})
+        write_frame(
+            tmp_path / f"{week}.h5", week, {"positions": size * x, "x": x[:, 0]}, {"v": np.arange(len(mesh.tets))}
+        )
     join_frames(tmp_path / "frames.h5", mesh.tets, [tmp_path / "21.0.h5", tmp_path / "22.0.h5"])
     reader = pyvista.get_reader(tmp_path / "frames.xdmf")
     reader.set_active_time_value(22.0)
