@@ -5,6 +5,7 @@ in, and no displacement may cross a pair on its way. Every rank has the whole su
 nothing but owned rows has to be agreed on.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ipctk
@@ -32,6 +33,12 @@ STIFFNESS_PER_MODULUS = 0.1
 them at about half of the distance then; a stiffer barrier takes more iterations and changes nothing else."""
 EDGES_PER_SPACING = {1: 1, 2: 2}
 """Edges of the surface of contact between neighbouring nodes, by the order of the elements."""
+CLOSE, WIDE = 0.1, 0.75
+"""Parts of the distance: where the smallest gap is below the first, the next step's barrier is twice as stiff, and half
+where it is above the second. Stress that is kept presses folds ever harder; a barrier that is too soft for it lets them
+so near that Newton's method creeps. A barrier that changes moves what it holds, so it does so where it must only."""
+STIFFEST = 1024.0
+"""Most that the barrier is made stiffer by."""
 BESIDE = 0.999
 """Part of the smallest gap at the start that contact may begin at."""
 BARRIER = ipctk.TwoStageBarrier()
@@ -45,21 +52,24 @@ N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """The barrier's stiffness in Pa, and the distance d̂ in mm below which parts of the surface repel each other.
+    """The barrier's stiffness in Pa at the start, and the distance d̂ in mm below which parts of the surface repel.
 
-    None takes `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but no more than the smallest gap at
-    the start of the run: what does not grow must stay where it is.
+    With `adaptive` the stiffness follows the gaps from step to step. As a distance, None takes `DISTANCE_PER_EDGE` of
+    the mean edge length at each step's start, but no more than the smallest gap at the start of the run: what does not
+    grow must stay where it is.
     """
 
     stiffness_pa: float
     distance_mm: float | None = None
+    adaptive: bool = False
 
 
 def contact_settings(parameters: FoldingParameters, maps: Maps) -> ContactSettings:
     """Returns the settings of a run: as given, or from the stiffest cortex."""
     p = parameters
     stiffest = value_range(p.shear_modulus_cortex_pa, maps, p.start_week, p.end_week)[1]
-    return ContactSettings(p.contact.stiffness_pa or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm)
+    given = p.contact.stiffness_pa
+    return ContactSettings(given or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm, adaptive=not given)
 
 
 def new_pairs() -> ipctk.NormalCollisions:
@@ -88,8 +98,8 @@ class SelfContact:
 
     Attributes
     ----------
-    distance_mm : float
-        The present distance d̂.
+    distance_mm, stiffness_pa : float
+        The present distance d̂ and stiffness κ.
 
     Raises
     ------
@@ -123,6 +133,7 @@ class SelfContact:
         self._centre: Floats | None = None  # where the candidates hold
         self._reach = 0.0
         self._widest_mm = np.inf
+        self.stiffness_pa = settings.stiffness_pa
         self.mesh_moved()
         if ipctk.has_intersections(self._surface, self._start):
             raise MeshError(
@@ -140,15 +151,26 @@ class SelfContact:
         self._start = np.asfortranarray(self._at_vertices(self.domain.positions[self._vertices]) * MM_PER_M)
         self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
         self.distance_mm = self.settings.distance_mm or min(self._distance_of_edges(), self._widest_mm)
-        self._barrier = ipctk.BarrierPotential(
-            BARRIER, self.distance_mm, self.settings.stiffness_pa, use_physical_barrier=True
-        )
+        self._barrier = ipctk.BarrierPotential(BARRIER, self.distance_mm, self.stiffness_pa, use_physical_barrier=True)
         self._known: Floats | None = None
 
     def _distance_of_edges(self) -> float:
         """Returns the distance in mm that belongs to the present edges, the same whatever a rank's processor rounds."""
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
         return DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
+
+    def adapt(self, rows: Sequence[dict]) -> None:
+        """Sets the stiffness of the next step from the table of the steps so far; call `mesh_moved` after it."""
+        self.stiffness_pa = self.settings.stiffness_pa
+        if not (rows and self.settings.adaptive):
+            return
+        row = rows[-1]
+        part, last = row["min_distance_mm"] / row["contact_distance_mm"], row["contact_stiffness_pa"]
+        if part < CLOSE:
+            last = min(2 * last, STIFFEST * self.settings.stiffness_pa)
+        elif not part <= WIDE:  # also where nothing is near
+            last = max(last / 2, self.settings.stiffness_pa)
+        self.stiffness_pa = last
 
     def _smallest_gap(self) -> float:
         """Returns the smallest distance in mm at the step's start, infinite where no pair is within the present d̂."""

@@ -21,20 +21,23 @@ from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
+from .element_layers import Layered, linear_layers, quadratic_layers
 from .ladder import RUNGS, NotConvergedError
-from .layers import WEIGHT_REACH, PialSearch, layers_at, normals_between
+from .layers import WEIGHT_REACH, PialSearch
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import NewtonSettings, NewtonSolver
 from .output import say
 from .problem import Problem
-from .stress import deformation_gradients, strain_fields, stress_fields, volume_ratio_fields
+from .stress import (
+    deformation_gradients,
+    elastic_strain_fields,
+    stress_fields,
+    total_strain_fields,
+    volume_ratio_fields,
+)
 from .zones import Zones
 
 Floats = NDArray[np.float64]
-AtPoints = tuple[Floats, Floats, Floats, Floats]
-"""Shear modulus in Pa and growth increments, (c, q), and unit normals, (c, q, 3), at the integration points."""
-NO_GROWTH = 1e-10
-"""Growth increment of a step that counts as none, a hundred-millionth of what the cortex grows."""
 STEPS_BEFORE_GROWING = 4
 """Accepted steps after which a halved time step is doubled again."""
 
@@ -95,6 +98,7 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
+        self._step_s = parameters.step_s  # of the last step
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
             centres = nodes[self.domain.corners].mean(axis=1)
@@ -108,45 +112,16 @@ class Folding:
         week = p.start_week + (time_s + step_s / 2) / SECONDS_PER_GW
         reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
         search = PialSearch(domain.positions, self.zones.cortex_facets)
-        at_points = self._linear_layers if domain.order == 1 else self._quadratic_layers
-        self.problem.set_layers_at_points(*at_points(search, reach, week, step_s))
+        at_nodes = domain.local(domain.positions)
+        to_points = linear_layers if domain.order == 1 else quadratic_layers
+        layers = Layered(domain.cells, self.problem.points, self._growth, self._local_maps, p, week, step_s)
+        self.problem.set_layers_at_points(*to_points(layers, search, at_nodes, reach))
         part = domain.part
         if self.contact is not None:
             self.contact.mesh_moved()
             if self.problem.free:
                 part = self.contact.joined(part)
         self.problem.mesh_moved(part)
-
-    def _linear_layers(self, search: PialSearch, reach: float, week: float, step_s: float) -> AtPoints:
-        """Returns layers that are worked out at the nodes, with one normal for each element."""
-        nodes, cells = self.domain.local(self.domain.positions), self.domain.cells
-        to_vertex, nearest = search.nearest(nodes)
-        distance = search.distance(nodes, reach, to_vertex) * MM_PER_M
-        layers = layers_at(distance, self._growth, self.parameters, self._local_maps, week, step_s)
-        # the direction matters only where growth differs along and across it
-        directed = np.abs(layers.dg - layers.dr)[cells].max(axis=1) > NO_GROWTH
-        normals = np.tile([0.0, 0.0, 1.0], (len(cells), 1))
-        normals[directed] = search.normals_from(nodes[cells[directed]].mean(axis=1), nearest[cells[directed]])
-        points = self.problem.points
-        mu, dg, dr = (values[cells] @ points.smooth.T for values in (layers.mu, layers.dg, layers.dr))
-        return mu, dg, dr, np.repeat(normals[:, None], len(points.weights), axis=1)
-
-    def _quadratic_layers(self, search: PialSearch, reach: float, week: float, step_s: float) -> AtPoints:
-        """Returns layers that are worked out at the integration points, from the distance, quadratic between nodes.
-
-        So the cortical weight may fall from 1 to 0 within an element. What jumps between nodes, growth and maps, is
-        linear between them.
-        """
-        nodes, cells, points = self.domain.local(self.domain.positions), self.domain.cells, self.problem.points
-        to_pial, at_nodes = search.distance_and_normals(nodes, reach)
-        distance = np.maximum(to_pial[cells] @ points.smooth.T, 0.0) * MM_PER_M
-        growth = self._growth[cells] @ points.bounded.T
-        maps = {name: values[cells] @ points.bounded.T for name, values in self._local_maps.items()}
-        layers = layers_at(distance, growth, self.parameters, maps, week, step_s)
-        directed = np.abs(layers.dg - layers.dr).max(axis=1) > NO_GROWTH
-        normals = np.tile([0.0, 0.0, 1.0], (*distance.shape, 1))
-        normals[directed] = normals_between(at_nodes[cells[directed]], points.smooth, points.bounded)
-        return layers.mu, layers.dg, layers.dr, normals
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, q, 3, 3) stretch of local elements that is left for a step, None where all is forgotten."""
@@ -161,7 +136,8 @@ class Folding:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
 
         They are means over the integration points. Names are those of the parameter `fields`; those of the arrays carry
-        their units. Right after a step only.
+        their units. Where stress is forgotten, that of a step and its strain are in proportion to the step, and are
+        given per week. Right after a step only.
         """
         domain = self.domain
         fields: dict[str, Floats] = {}
@@ -178,10 +154,10 @@ class Folding:
         # back to where the step began, which its displacement refers to
         domain.place(after - domain.gathered(self.problem.displacement[: domain.owned]))
         if "stress" in wanted:
-            fields |= stress_fields(at_all_points("stress"))
+            fields |= self._per_gw(stress_fields(at_all_points("stress")))
         if "strain" in wanted:
-            normals = np.repeat(self._start_normals, len(slopes), axis=0)
-            fields |= strain_fields(at_all_points("elastic"), total, normals)
+            fields |= self._per_gw(elastic_strain_fields(at_all_points("elastic")))
+            fields |= total_strain_fields(total, np.repeat(self._start_normals, len(slopes), axis=0))
         if "volume_ratio" in wanted:
             fields |= volume_ratio_fields(at_all_points("deformation"), total)
         domain.place(after)
@@ -190,10 +166,19 @@ class Folding:
         return dict(zip(fields, together.T, strict=True))
 
     def contact_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
-        """Returns the contact pressure (n,) in Pa at all vertices if it is among `wanted`. Right after a step only."""
+        """Returns the contact pressure (n,) at all vertices if it is among `wanted`.
+
+        Per week where stress is forgotten. Right after a step only.
+        """
         if self.contact is None or "contact_pressure" not in wanted:
             return {}
-        return {"contact_pressure_pa": self.contact.pressure()}
+        return self._per_gw({"contact_pressure_pa": self.contact.pressure()})
+
+    def _per_gw(self, fields: dict[str, Floats]) -> dict[str, Floats]:
+        """Returns fields of a step as they are where stress is remembered, and else as rates, named so."""
+        if self._remembers:
+            return fields
+        return {f"{name}_per_gw": values * (SECONDS_PER_GW / self._step_s) for name, values in fields.items()}
 
     def _contact_row(self, positions: Floats) -> dict[str, float]:
         """Returns what the step table says of contact right after a solve that led to (n, 3) positions in m."""
@@ -201,7 +186,13 @@ class Folding:
             distance = self.contact.smallest_distance_mm()
             # what is farther apart than the barrier reaches is not looked for
             near = {"min_distance_mm": distance if distance < math.inf else math.nan}
-            return {"contact_distance_mm": self.contact.distance_mm, "contact_pairs": self.contact.pair_count(), **near}
+            contact = self.contact
+            return {
+                "contact_distance_mm": contact.distance_mm,
+                "contact_stiffness_pa": contact.stiffness_pa,
+                "contact_pairs": contact.pair_count(),
+                **near,
+            }
         return {"plane_penetration_mm": self.zones.penetration_mm(positions * MM_PER_M)}
 
     def trouble(self) -> str:
@@ -229,9 +220,11 @@ class Folding:
             Where the step is too large; the mesh is as before.
         """
         began = time.monotonic()
-        domain, problem = self.domain, self.problem
+        domain, problem, self._step_s = self.domain, self.problem, step_s
         if domain.positions is not state.positions:
             domain.place(state.positions)
+        if self.contact is not None:
+            self.contact.adapt(state.rows)
         self.set_layers(state.time_s, step_s)
         kept = self._kept_stretch(state, step_s)
         if kept is not None:
@@ -249,6 +242,7 @@ class Folding:
             "newton": count.newton,
             "krylov": count.krylov,
             "residual": count.residual,
+            "converged": count.converged,
             "energy_J": energy,
             "min_J": domain.minimum(ratios),
             "max_J": -domain.minimum(-ratios),
@@ -296,6 +290,12 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 say(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
             state = replace(state, step_s=half, successes=0)
             continue
+        row = after.rows[-1]
+        if not row["converged"] and folding.domain.comm.rank == 0:
+            say(
+                f"warning: step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
+                f"folding.solver.newton_tolerance: nothing was left to gain but round-off"
+            )
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
