@@ -15,7 +15,7 @@ class MeshSettings(Settings):
         "surface with few elements below it, in a few seconds.",
     )
     order: Literal[1, 2] = setting(
-        1,
+        2,
         "",
         "Order of the elements: 1 linear, 2 quadratic with curved sides. Both have about as many nodes, quadratic "
         "ones an eighth of the elements.",
