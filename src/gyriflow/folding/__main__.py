@@ -24,13 +24,15 @@ from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..parameters.varying import Maps
 from ..step import record_exit_code
 from .output import ZONES, say
+from .points import IntegrationPoints
 from .run import run
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
 from .zones import zones_of_run
 
 PREDICTED_MIB_PER_RANK = 180
-PREDICTED_KIB_PER_TET = 3.0
-"""Memory of a solve, from runs of 60 k to 450 k elements (see summary.json of any run)."""
+PREDICTED_KIB_PER_TET = {1: 3.0, 2: 33.0}
+"""Memory of a solve by the order of its elements, from runs of 60 k to 450 k linear and 27 k quadratic ones (see
+summary.json of any run)."""
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -77,9 +79,10 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
         4 * len(set(ELEMENT_FIELDS) & set(parameters.fields)) * 4,
     )
     frame = per_vertex * len(mesh.vertices) + per_element * len(mesh.tets)
-    stretch = 8 * 6 * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
+    points = len(IntegrationPoints.of_degree(mesh.order).weights)
+    stretch = 8 * 6 * points * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
     checkpoint = 2 * (8 * 9 * len(mesh.vertices) + stretch)
-    needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 16 * len(mesh.tets)
+    needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 4 * mesh.tets.size
     free = shutil.disk_usage(out).free
     if free < needed:
         raise StorageError(
@@ -100,7 +103,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     if comm.rank == 0:
         require_maps(parameters, maps, len(mesh.vertices))
         report = zone_report(mesh, zones, float(np.median(parameters.thickness_at(parameters.start_week, maps))))
-        memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024
+        memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET[mesh.order] * len(mesh.tets) / 1024
         say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")
         for name in ZONE_NAMES:
             zone = report["zones"][name]
