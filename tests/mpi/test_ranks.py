@@ -12,7 +12,8 @@ import pytest
     "cases",
     [
         *("solver_cases.py", "growth_cases.py", "memory_cases.py", "ladder_cases.py", "consistency_cases.py"),
-        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py", "quadratic_cases.py"),
+        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py"),
+        *("leak_cases.py", "rate_cases.py", "quadratic_cases.py"),
     ],
 )
 def test_cases_hold_on(ranks, cases):
@@ -30,6 +31,6 @@ def test_cases_hold_on(ranks, cases):
         "no:cacheprovider",
         str(path),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=150, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == ranks, done.stdout

@@ -25,6 +25,7 @@ from ..parameters.varying import Maps
 from ..step import record_exit_code
 from .output import ZONES, say
 from .points import IntegrationPoints
+from .resolution import stiffness_warning
 from .run import run
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
 from .zones import zones_of_run
@@ -112,7 +113,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         say(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
         through = report["elements_through_cortex"]
         say(f"  elements through the cortex: {through:.1f}")
-        for warning in zone_warnings(report):
+        locking = stiffness_warning(parameters.poisson_ratio) if mesh.order == 1 else ""
+        for warning in filter(None, (*zone_warnings(report), locking)):
             say(f"warning: {warning}")
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)

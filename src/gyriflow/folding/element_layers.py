@@ -45,8 +45,8 @@ class Layered:
     step_s: float
 
 
-def linear_layers(given: Layered, search: PialSearch, nodes: Floats, reach: float) -> AtPoints:
-    """Returns layers that are worked out at the nodes, with one normal for each element.
+def linear_layers(given: Layered, search: PialSearch, nodes: Floats, reach: float) -> tuple[AtPoints, Floats]:
+    """Returns layers that are worked out at the nodes, with one normal for each element, and the nodes' depths in m.
 
     Parameters
     ----------
@@ -59,20 +59,20 @@ def linear_layers(given: Layered, search: PialSearch, nodes: Floats, reach: floa
     """
     cells, points = given.cells, given.points
     to_vertex, nearest = search.nearest(nodes)
-    distance = search.distance(nodes, reach, to_vertex) * MM_PER_M
-    layers = layers_at(distance, given.growth, given.parameters, given.maps, given.week, given.step_s)
+    distance = search.distance(nodes, reach, to_vertex)
+    layers = layers_at(distance * MM_PER_M, given.growth, given.parameters, given.maps, given.week, given.step_s)
     # the direction matters only where growth differs along and across it
     directed = np.abs(layers.dg - layers.dr)[cells].max(axis=1) > NO_GROWTH
     normals = np.tile([0.0, 0.0, 1.0], (len(cells), 1))
     normals[directed] = search.normals_from(nodes[cells[directed]].mean(axis=1), nearest[cells[directed]])
     mu, dg, dr = (values[cells] @ points.smooth.T for values in (layers.mu, layers.dg, layers.dr))
-    return mu, dg, dr, np.repeat(normals[:, None], len(points.weights), axis=1)
+    return (mu, dg, dr, np.repeat(normals[:, None], len(points.weights), axis=1)), distance
 
 
-def quadratic_layers(given: Layered, search: PialSearch, nodes: Floats, reach: float) -> AtPoints:
-    """Returns layers that are worked out at the integration points, from the distance, quadratic between nodes.
+def quadratic_layers(given: Layered, search: PialSearch, nodes: Floats, reach: float) -> tuple[AtPoints, Floats]:
+    """Returns layers that are worked out at the integration points, and the nodes' depths in m.
 
-    So the cortical weight may fall from 1 to 0 within an element. What jumps between nodes, growth and maps, is
+    The depth is quadratic between the nodes, so that the cortical weight may fall from 1 to 0 within an element. What jumps between nodes, growth and maps, is
     linear between them. Parameters are as of `linear_layers`.
     """
     cells, points = given.cells, given.points
@@ -84,4 +84,4 @@ def quadratic_layers(given: Layered, search: PialSearch, nodes: Floats, reach: f
     directed = np.abs(layers.dg - layers.dr).max(axis=1) > NO_GROWTH
     normals = np.tile([0.0, 0.0, 1.0], (*distance.shape, 1))
     normals[directed] = normals_between(at_nodes[cells[directed]], points.smooth, points.bounded)
-    return layers.mu, layers.dg, layers.dr, normals
+    return (layers.mu, layers.dg, layers.dr, normals), to_pial

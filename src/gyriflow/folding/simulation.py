@@ -25,9 +25,11 @@ from .element_layers import Layered, linear_layers, quadratic_layers
 from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
-from .newton import NewtonSettings, NewtonSolver
+from .newton import NewtonSettings, NewtonSolver, StepCount
 from .output import say
 from .problem import Problem
+from .rates import SMALL, RateProblem, rate_step
+from .resolution import elements_through, resolution_warning, worst_quality
 from .stress import (
     deformation_gradients,
     elastic_strain_fields,
@@ -74,7 +76,7 @@ class Folding:
         self.domain = Domain(comm, mesh)
         by_planes = parameters.contact.kind == "planes"
         self._remembers = parameters.stress_memory_gw > 0
-        self.problem = Problem(
+        self.problem = (Problem if parameters.time_scheme == "implicit" else RateProblem)(
             self.domain,
             zones,
             MATERIALS[parameters.material](parameters.poisson_ratio),
@@ -98,6 +100,8 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
+        self._through = math.nan  # elements through the cortex in the last step
+        self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
@@ -106,22 +110,29 @@ class Folding:
         limits = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
         self.solver = NewtonSolver(self.problem, limits, floor)
 
-    def set_layers(self, time_s: float, step_s: float) -> None:
-        """Sets stiffness, growth and normals for a step from a time on, with parameters as in its middle."""
-        p, domain = self.parameters, self.domain
-        week = p.start_week + (time_s + step_s / 2) / SECONDS_PER_GW
-        reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
-        search = PialSearch(domain.positions, self.zones.cortex_facets)
-        at_nodes = domain.local(domain.positions)
-        to_points = linear_layers if domain.order == 1 else quadratic_layers
-        layers = Layered(domain.cells, self.problem.points, self._growth, self._local_maps, p, week, step_s)
-        self.problem.set_layers_at_points(*to_points(layers, search, at_nodes, reach))
-        part = domain.part
+    def set_layers(self, time_s: float, step_s: float, at: float = 0.5) -> None:
+        """Sets stiffness, growth and normals for a step from a time on, with parameters as at a part of it."""
+        self._set_tissue(time_s + at * step_s, step_s)
+        self._part = self.domain.part
         if self.contact is not None:
             self.contact.mesh_moved()
             if self.problem.free:
-                part = self.contact.joined(part)
-        self.problem.mesh_moved(part)
+                self._part = self.contact.joined(self._part)
+        self.problem.mesh_moved(self._part)
+
+    def _set_tissue(self, time_s: float, step_s: float) -> None:
+        """Sets stiffness, normals and the growth of a step, with parameters as at a time."""
+        p, domain = self.parameters, self.domain
+        week = p.start_week + time_s / SECONDS_PER_GW
+        reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
+        search = PialSearch(domain.positions, self.zones.cortex_facets)
+        thickness = float(np.mean(p.thickness_at(week, self.maps)))
+        at_nodes = domain.local(domain.positions)
+        to_points = linear_layers if domain.order == 1 else quadratic_layers
+        given = Layered(domain.cells, self.problem.points, self._growth, self._local_maps, p, week, step_s)
+        layers, distance = to_points(given, search, at_nodes, reach)
+        self.problem.set_layers_at_points(*layers)
+        self._through = elements_through(domain, distance, thickness * M_PER_MM)
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, q, 3, 3) stretch of local elements that is left for a step, None where all is forgotten."""
@@ -148,22 +159,37 @@ class Folding:
         total = deformation_gradients(domain.local(self._start), domain.local(after), domain.cells, slopes)
         total = total.reshape(-1, 3, 3)
 
-        def at_all_points(name: Literal["deformation", "elastic", "stress"]) -> Floats:
-            return self.problem.outcome(name).reshape(-1, 3, 3)
-
         # back to where the step began, which its displacement refers to
-        domain.place(after - domain.gathered(self.problem.displacement[: domain.owned]))
-        if "stress" in wanted:
-            fields |= self._per_gw(stress_fields(at_all_points("stress")))
+        moved = self.problem.displacement.copy()
+        domain.place(after - domain.gathered(moved[: domain.owned]))
+        if isinstance(self.problem, RateProblem):
+            with self.problem.in_small():
+                self.problem.set_displacement(SMALL * self._strained)
+                fields |= self._stress_fields(wanted, 1 / SMALL)
+        else:
+            fields |= self._stress_fields(wanted)
         if "strain" in wanted:
-            fields |= self._per_gw(elastic_strain_fields(at_all_points("elastic")))
             fields |= total_strain_fields(total, np.repeat(self._start_normals, len(slopes), axis=0))
+        self.problem.set_displacement(moved)
         if "volume_ratio" in wanted:
-            fields |= volume_ratio_fields(at_all_points("deformation"), total)
+            fields |= volume_ratio_fields(self._at_all_points("deformation"), total)
         domain.place(after)
         by_cell = [values.reshape(-1, len(slopes)) @ self.problem.points.weights for values in fields.values()]
         together = domain.gathered_cells(np.stack(by_cell, axis=1))
         return dict(zip(fields, together.T, strict=True))
+
+    def _at_all_points(self, name: Literal["deformation", "elastic", "stress"]) -> Floats:
+        """Returns the tensors (c q, 3, 3) at the integration points, one local element after the other."""
+        return self.problem.outcome(name).reshape(-1, 3, 3)
+
+    def _stress_fields(self, wanted: Iterable[str], factor: float = 1.0) -> dict[str, Floats]:
+        """Returns a multiple of the stress and elastic strain (c q,) at integration points, if they are wanted."""
+        fields: dict[str, Floats] = {}
+        if "stress" in wanted:
+            fields |= stress_fields(self._at_all_points("stress"))
+        if "strain" in wanted:
+            fields |= elastic_strain_fields(self._at_all_points("elastic"))
+        return self._per_gw({name: factor * values for name, values in fields.items()})
 
     def contact_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the contact pressure (n,) at all vertices if it is among `wanted`.
@@ -211,6 +237,40 @@ class Folding:
             f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(place, 1).tolist()} mm"
         )
 
+    def _solve(self, state: State, step_s: float) -> tuple[StepCount, Floats | None]:
+        """Leaves the displacement of a step in the problem; returns what it took, and the velocity it began with."""
+        problem = self.problem
+        if not isinstance(problem, RateProblem):
+            self.set_layers(state.time_s, step_s)
+            count = self.solver.solve(self.domain.local(state.predicted(step_s)))
+            self._strained = problem.displacement.copy()
+            return count, None
+
+        def move_aside(positions: Floats, at: float) -> None:
+            self.domain.place(positions)
+            self._set_tissue(state.time_s + at * step_s, step_s)
+            problem.mesh_moved(self._part)
+
+        self.set_layers(state.time_s, step_s, at=0.0)
+        two_stages = self.parameters.time_scheme == "midpoint"
+        try:
+            solved = rate_step(state, step_s, problem, self.solver, two_stages=two_stages, move_aside=move_aside)
+        finally:
+            self.domain.place(state.positions)
+        self._strained = solved.strained
+        return solved.count, solved.rate
+
+    def _energy(self) -> float:
+        """Returns the energy in J of the step that has been solved, contact included."""
+        problem = self.problem
+        if not isinstance(problem, RateProblem):
+            return problem.energy()
+        moved = problem.displacement.copy()
+        problem.set_displacement(self._strained)
+        energy = problem.stored_energy()
+        problem.set_displacement(moved)
+        return energy + sum(part.energy() for part in problem.contributions)
+
     def step(self, state: State, step_s: float) -> State:
         """Returns the state after a step of a given length, the mesh moved along; its last row says what it took.
 
@@ -225,13 +285,12 @@ class Folding:
             domain.place(state.positions)
         if self.contact is not None:
             self.contact.adapt(state.rows)
-        self.set_layers(state.time_s, step_s)
         kept = self._kept_stretch(state, step_s)
         if kept is not None:
             problem.set_stretch(kept)
-        count = self.solver.solve(domain.local(state.predicted(step_s)))
+        count, rate = self._solve(state, step_s)
         ratios = problem.volume_ratios()
-        energy = problem.energy()
+        energy = self._energy()
         u = domain.gathered(problem.displacement[: domain.owned])
         length = np.linalg.norm(u, axis=1) * MM_PER_M
         left = None if kept is None else domain.gathered_cells(packed(left_stretch(problem.outcome("elastic"))))
@@ -251,11 +310,13 @@ class Folding:
             "max_u_pial_mm": float(length[self._pial].max()),
             "mean_u_pial_mm": float(length[self._pial].mean()),
             **self._contact_row(domain.positions + u),
+            "elements_through_cortex": self._through,
             "rung": RUNGS[count.rung],
-            "seconds": time.monotonic() - began,
         }
-        after = state.after(u, step_s, row, left)
+        after = state.after(u, step_s, row, left, rate)
         domain.place(after.positions)
+        row["radius_ratio_01"] = worst_quality(domain)
+        row["seconds"] = time.monotonic() - began
         return after
 
 
@@ -290,12 +351,20 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 say(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
             state = replace(state, step_s=half, successes=0)
             continue
-        row = after.rows[-1]
-        if not row["converged"] and folding.domain.comm.rank == 0:
-            say(
-                f"warning: step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
-                f"folding.solver.newton_tolerance: nothing was left to gain but round-off"
-            )
+        if folding.domain.comm.rank == 0:
+            coarse = resolution_warning(after.rows, folding.domain.order)
+            for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
+                say(f"warning: {warning}")
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
+
+
+def unconverged_warning(row: dict) -> str:
+    """Returns what to say of a step that ended above the tolerance; empty of others."""
+    if row["converged"]:
+        return ""
+    return (
+        f"step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
+        "folding.solver.newton_tolerance: nothing was left to gain but round-off"
+    )

@@ -74,6 +74,23 @@ def signed_volumes(mesh: TetrahedralMesh) -> Floats:
     return volumes_between(mesh.vertices, mesh.tets)
 
 
+def radius_ratios(mesh: TetrahedralMesh) -> Floats:
+    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
+
+    Of quadratic elements they are those of the corners.
+    """
+    a, b, c, d = mesh.vertices[mesh.corners].transpose(1, 0, 2)
+    p, q, r = b - a, c - a, d - a
+    volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
+    surface2 = sum(np.linalg.norm(np.cross(x, y), axis=1) for x, y in ((p, q), (q, r), (r, p), (q - p, r - p)))
+    # circumradius = |p|²(q×r) + |q|²(r×p) + |r|²(p×q)| / (2·6V), inradius = 6V / (sum of twice the face areas)
+    squared = [np.einsum("ij,ij->i", x, x)[:, None] for x in (p, q, r)]
+    numerator = np.linalg.norm(
+        squared[0] * np.cross(q, r) + squared[1] * np.cross(r, p) + squared[2] * np.cross(p, q), axis=1
+    )
+    return 6 * volume6**2 / np.maximum(surface2 * numerator, np.finfo(float).tiny)
+
+
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
     """Returns for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
     pairs = np.stack(np.broadcast_arrays(mesh.tets[:, :1], mesh.tets[:, 1:]), axis=-1).reshape(-1, 2)

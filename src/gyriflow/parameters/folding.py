@@ -94,7 +94,7 @@ class Solver(Settings):
         1e-6, "", "Newton ends where the residual has fallen to this fraction of that at u = 0.", gt=0, lt=1
     )
     krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
-    max_newton: int = setting(20, "", "Newton iterations before a step is halved.", ge=1, le=200)
+    max_newton: int = setting(20, "", "Newton iterations without progress before a step is halved.", ge=1, le=200)
     max_halvings: int = setting(6, "", "Halvings of the time step before the run ends.", ge=0, le=30)
 
 
@@ -132,6 +132,12 @@ class FoldingSettings(Settings):
         0.0, "GW",
         "Time in which elastic stress relaxes: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
         word="infinite",
+    )  # fmt: skip
+    time_scheme: Literal["implicit", "adams-bashforth", "midpoint"] = setting(
+        "implicit", "",
+        "`implicit`: each step is a nonlinear equilibrium, of first order in time (the paper); `adams-bashforth` and "
+        "`midpoint`: of second order, with one and two linear solves a step. These need a model that forgets stress, "
+        "and not contact by planes.",
     )  # fmt: skip
     support: Literal["ellipsoid", "base", "box", "free"] = setting(
         "ellipsoid", "",
@@ -226,7 +232,8 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     start
         What the start is called in messages, such as "the week of the start brain a".
     """
-    for problems in (_week_problems, _thickness_problems, _stiffness_problems, _growth_problems, _step_problems):
+    groups = (_week_problems, _thickness_problems, _stiffness_problems, _growth_problems, _step_problems)
+    for problems in (*groups, _scheme_problems):
         yield from up_to_invalid(problems(p, start_week, maps, start))
 
 
@@ -271,3 +278,12 @@ def _step_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     growth = p.step_s * sum(max(map(abs, value_range(value, maps, start_week, p.end_week))) for value in known)
     if growth >= 1:
         yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
+
+
+def _scheme_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+    if p.time_scheme == "implicit":
+        return
+    if p.stress_memory_gw > 0:
+        yield Problem(f"found {p.time_scheme}; with stress_memory_gw above 0 it should be implicit", ("time_scheme",))
+    if p.contact.kind == "planes":
+        yield Problem(f"found {p.time_scheme}; with contact.kind planes it should be implicit", ("time_scheme",))
