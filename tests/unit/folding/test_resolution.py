@@ -41,11 +41,13 @@ def rows(*through):
 
 
 def test_a_cortex_that_outgrows_its_elements_is_told_once():
-    assert resolution_warning(rows(2.3, 2.1)) == ""
-    assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9))
-    assert resolution_warning(rows(2.3, 1.9, 1.8)) == ""
-    assert "fewer than 2" in resolution_warning(rows(1.5))
-    assert resolution_warning(rows(np.nan)) == ""
+    assert resolution_warning(rows(2.3, 2.1), 1) == ""
+    assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9), 1)
+    assert resolution_warning(rows(2.3, 1.9, 1.8), 1) == ""
+    assert "fewer than 2" in resolution_warning(rows(1.5), 1)
+    assert resolution_warning(rows(1.5), 2) == ""
+    assert "fewer than 1" in resolution_warning(rows(1.2, 0.9), 2)
+    assert resolution_warning(rows(np.nan), 1) == ""
 
 
 def test_nearly_incompressible_tissue_is_told():
