@@ -11,7 +11,7 @@ class MeshSettings(Settings):
     mesher: Literal["pytetwild", "tetgen"] = setting(
         "pytetwild",
         "",
-        "`pytetwild` (fTetWild): the best elements, on a surface of its own within `envelope_mm`; `tetgen`: a finer "
+        "`pytetwild` (fTetWild): the best elements, with its own surface within `envelope_mm`; `tetgen`: a finer "
         "surface with few elements below it, in a few seconds.",
     )
     order: Literal[1, 2] = setting(
@@ -47,7 +47,7 @@ class MeshSettings(Settings):
         0.5, "mm/mm", "Growth of these distances with depth below that; `pytetwild` only.", gt=0, le=2
     )
     envelope_mm: float = setting(
-        0.1, "mm", "How far the mesh's surface may leave the pial surface; `pytetwild` only.", gt=0.001, le=2
+        0.1, "mm", "Largest distance of the mesh's surface from the pial surface; `pytetwild` only.", gt=0.001, le=2
     )
     time_limit_s: float = setting(1800.0, "s", "The mesher is stopped after this time.", gt=0)
     min_radius_ratio: float = setting(
@@ -70,7 +70,7 @@ class MeshSettings(Settings):
     max_volume_change: float = setting(
         0.01,
         "",
-        "Largest accepted difference of the mesh's volume from that inside the pial surface, relative.",
+        "Largest accepted relative difference between the mesh's volume and that inside the pial surface.",
         gt=0,
         lt=1,
     )
@@ -84,8 +84,8 @@ class MeshSettings(Settings):
     min_gap_kept: float = setting(
         0.95,
         "",
-        "Least accepted share of the fissure and of other gaps narrower than 3 mm, by the area of their walls, that "
-        "stays open in the mesh, with half of its width at least.",
+        "Least accepted fraction of the fissure and of other gaps narrower than 3 mm, by area of their walls, that "
+        "stays open to at least half of its width in the mesh.",
         ge=0,
         le=1,
     )
