@@ -33,7 +33,7 @@ from .zones import zones_of_run
 MIB_PER_RANK = 250.0
 KIB_PER_TET = {1: 0.9, 2: 33.0}
 KIB_PER_TET_AND_RANK = {1: 1.6, 2: 0.0}
-"""Peak memory of a solve by the order of its elements: a part of the mesh, and all positions and searches on every rank.
+"""Peak memory of a solve by the order of its elements: a part of the mesh, and positions and searches on every rank.
 From runs of 60 k to 1 M linear elements on one rank and on two (docs/benchmarks.md), which are met within 10 %, and of
 27 k quadratic ones, of which ranks are not told apart yet."""
 GLOBAL_CONTACT = 1.3

@@ -72,8 +72,8 @@ def linear_layers(given: Layered, search: PialSearch, nodes: Floats, reach: floa
 def quadratic_layers(given: Layered, search: PialSearch, nodes: Floats, reach: float) -> tuple[AtPoints, Floats]:
     """Returns layers that are worked out at the integration points, and the nodes' depths in m.
 
-    The depth is quadratic between the nodes, so that the cortical weight may fall from 1 to 0 within an element. What jumps between nodes, growth and maps, is
-    linear between them. Parameters are as of `linear_layers`.
+    The depth is quadratic between the nodes, so that the cortical weight may fall from 1 to 0 within an element. What
+    jumps between nodes, growth and maps, is linear between them. Parameters are as of `linear_layers`.
     """
     cells, points = given.cells, given.points
     to_pial, at_nodes = search.distance_and_normals(nodes, reach)
