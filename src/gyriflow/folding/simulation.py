@@ -102,6 +102,7 @@ class Folding:
         self._start = self.domain.positions
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
+        self._through, self._part = math.nan, self.domain.part  # of its layers
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
             centres = nodes[self.domain.cells].mean(axis=1)
