@@ -103,6 +103,7 @@ class Folding:
         self._through = math.nan  # elements through the cortex in the last step
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
+        self._through, self._part = math.nan, self.domain.part  # of its layers
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
             centres = nodes[self.domain.corners].mean(axis=1)
