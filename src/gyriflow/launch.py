@@ -1,6 +1,6 @@
 """`python -m gyriflow.launch ARG...`: Snakemake with this checkout's workflow, which is what `./run snakemake` calls.
 
-It clears a lock that an interrupted run left (never that of a live run) and ends with the exit code of the first
+It clears a lock that an interrupted run has left (never that of a live run) and ends with the exit code of the first
 failed step. Everything else is Snakemake's own command line.
 """
 
@@ -73,7 +73,7 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
         for lock in stale:
             lock.unlink()
     if stale:
-        print("gyriflow: cleared the lock of an interrupted run; going on where it ended", file=sys.stderr)
+        print("gyriflow: cleared the lock of an interrupted run, which is resumed", file=sys.stderr)
 
 
 def looks_only(arguments: Sequence[str]) -> bool:
@@ -114,8 +114,8 @@ def refuse_bad_configfiles(arguments: Sequence[str]) -> None:
                 raise InputError(f"configuration {error}{remedy}") from error
 
 
-def completed(arguments: Sequence[str]) -> list[str]:
-    """Returns Snakemake's arguments with this checkout's Snakefile where the user named none and none lies here."""
+def add_snakefile(arguments: Sequence[str]) -> list[str]:
+    """Returns Snakemake's arguments, with this checkout's Snakefile if the user names none and none is here."""
     if value_of(arguments, "--snakefile", "-s") is not None or any(Path(name).is_file() for name in SNAKEFILES):
         return list(arguments)
     return ["--snakefile", str(CHECKOUT / "Snakefile"), *arguments]
@@ -140,7 +140,7 @@ def main(arguments: Sequence[str]) -> int:
 
     signal.signal(signal.SIGINT, interrupt)
     try:
-        cli.main(completed(arguments))
+        cli.main(add_snakefile(arguments))
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
@@ -148,7 +148,7 @@ def main(arguments: Sequence[str]) -> int:
     recorded = recorded_exit_code(exit_file)
     exit_file.unlink(missing_ok=True)
     if code and interrupts:
-        print("gyriflow: interrupted; the same command goes on from here", file=sys.stderr)
+        print("gyriflow: interrupted; the same command resumes from here", file=sys.stderr)
         return INTERRUPTED
     return (recorded or code) if code else 0
 

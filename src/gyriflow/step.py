@@ -1,6 +1,6 @@
-"""What every step of the workflow shares: its log, short messages for errors, and the exit code it hands on.
+"""What every step of the workflow shares: its log, short messages for errors, and the exit code it passes on.
 
-`python -m gyriflow.step CODE LOG` ends a shell step that failed: it says what the code means and ends in it.
+`python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the code and exits with it.
 """
 
 import logging

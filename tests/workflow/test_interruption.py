@@ -73,7 +73,7 @@ def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
     os.killpg(process.pid, signal.SIGINT)
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
-    assert "interrupted; the same command goes on from here" in printed
+    assert "interrupted; the same command resumes from here" in printed
     _, alive = psutil.wait_procs(below, timeout=10)
     assert alive == []
     assert list((meshed.directory / "results/runs/reference/a/folding").glob("checkpoint-*/state.h5"))

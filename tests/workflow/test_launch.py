@@ -5,7 +5,7 @@ import subprocess
 import pytest
 
 from gyriflow.errors import StorageError
-from gyriflow.launch import clear_stale_lock, completed, hold_lock, value_of
+from gyriflow.launch import add_snakefile, clear_stale_lock, hold_lock, value_of
 
 from .conftest import SMALL_STUDY
 
@@ -118,7 +118,7 @@ def test_an_option_is_found_however_it_is_written():
 
 def test_the_checkouts_workflow_is_taken_where_none_is_named_or_at_hand(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert completed(["-n"])[0] == "--snakefile"
-    assert completed(["-s", "x", "-n"]) == ["-s", "x", "-n"]
+    assert add_snakefile(["-n"])[0] == "--snakefile"
+    assert add_snakefile(["-s", "x", "-n"]) == ["-s", "x", "-n"]
     (tmp_path / "Snakefile").touch()
-    assert completed(["-n"]) == ["-n"]
+    assert add_snakefile(["-n"]) == ["-n"]

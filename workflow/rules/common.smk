@@ -58,7 +58,7 @@ def surfaces_in(folder):
 
 
 def one_of(names):
-    """Returns a pattern that matches exactly the names; with none, nothing."""
+    """Returns a pattern that matches exactly these names, or nothing if there are none."""
     return "|".join(map(re.escape, names)) or r"(?!)"
 
 
@@ -116,7 +116,7 @@ def figure(path, title, caption, category, **labels):
 
 
 def drawing(*brains):
-    """Returns what all figures are told: their resolution, and whether what they show is synthetic."""
+    """Returns the parameters of all figures: their resolution, and whether they show synthetic brains only."""
     if brains:
         synthetic = all(CONFIG.brain(brain).synthetic for brain in brains)
     else:

@@ -3,12 +3,12 @@ RUNS_WITH_MAPS = [run for run in CONFIG.runs if CONFIG.maps(run)]
 
 
 def maps_of_run(wildcards):
-    """Returns the file with the maps of a run, where it has any."""
+    """Returns the file with the maps of a run, if it has any."""
     return rules.parameter_maps.output[0] if wildcards.run in RUNS_WITH_MAPS else []
 
 
 def rates_of_run(wildcards):
-    """Returns the table of the growth rates where the run takes one of them."""
+    """Returns the table of growth rates if the run uses one of them."""
     settings = CONFIG.parameters(wildcards.run)
     return rules.growth_rates.output.rates if "estimated" in settings.values() else []
 
@@ -63,7 +63,7 @@ rule parameter_maps:
         bounds=lambda wildcards: {
             name: CONFIG.bounds(name) for name in CONFIG.maps(wildcards.run)
         },
-        # files of maps are understood as those of the brain
+        # files of maps are read like those of the brain
         reading=lambda wildcards: CONFIG.brain(wildcards.brain).model_dump(
             include={"coordinates", "affine_from"}
         ),
@@ -102,7 +102,7 @@ rule simulate:
         data=rules.tetrahedralise.output.data,
         params=rules.parameters.output[0],
         maps=maps_of_run,
-        # impossible zones are refused there, before the ranks start
+        # that rule refuses impossible zones, before the ranks start
         regions=rules.regions.output.mesh,
     output:
         steps=f"{RUN}/folding/steps.csv",

@@ -1,6 +1,6 @@
-# Inputs that the workflow makes: synthetic brains, simple shapes, labels of the user's own segmentation.
+# Inputs that the workflow makes: synthetic brains, simple shapes, labels from the user's own segmentation.
 def shape_settings(wildcards):
-    """Returns what a shape depends on; sizes of other kinds are no part of it."""
+    """Returns what a shape depends on, without the sizes of other kinds."""
     shape = CONFIG.brain(wildcards.brain).shape
     return {
         "kind": shape.kind,

@@ -26,7 +26,7 @@ rule tetrahedralise:
     params:
         settings=CONFIG.mesh.model_dump(exclude=set(MESH_GATES)),
         gates=MESH_GATES,
-        # no output: it stays where the rule fails
+        # not an output, so that it stays if the rule fails
         refused=f"{BRAIN}/mesh/refused",
     script:
         "../scripts/tetrahedralise.py"
@@ -63,7 +63,7 @@ rule quality_figure:
         "../scripts/quality_figure.py"
 
 
-# of a mesh that did not pass the gates; made when asked for
+# of a mesh that did not pass the gates; made on request
 use rule quality_figure as refused_quality_figure with:
     input:
         f"{BRAIN}/mesh/refused/quality.json",

@@ -9,7 +9,7 @@ def surface_folder(where):
 
 
 def brain_labels(where):
-    """Returns what stands before every row of a brain's tables: its id, the run ("real" for measured ones), its week."""
+    """Returns the first columns of a brain's tables: its id, the run ("real" for measured brains), its week."""
     match where.split("/"):
         case ["brains", brain, "metrics"]:
             return {"subject": brain, "run": "real", "week": CONFIG.brain(brain).week}
@@ -37,7 +37,7 @@ MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
 SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
 
 
-# Only a common number of modes ties brains to each other: measured ones then wait for all simulations.
+# Only a common number of modes makes brains depend on each other: measured ones then wait for all simulations.
 rule weyl_numbers:
     input:
         left=[

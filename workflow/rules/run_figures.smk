@@ -29,7 +29,7 @@ def measured_surfaces(part):
     ]
 
 
-# what figures that show simulated beside measured brains are told
+# parameters of figures that show simulated beside measured brains
 BESIDE = {
     **drawing(),
     "measured": lambda wildcards: CONFIG.measured_name(beside(wildcards)),

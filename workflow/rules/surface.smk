@@ -1,20 +1,20 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
 from gyriflow.parameters.schemes import LabelScheme
 
-# what is made of every brain, whatever it is given as
+# made for every brain, whatever its source
 PIAL = {
     **surfaces_in(f"{BRAIN}/surface"),
     "stl": f"{BRAIN}/surface/pial.stl",
     "report": f"{BRAIN}/surface/surface.json",
 }
 WITH_LABELS = ("labels", "segmentation", "phantom")
-# brains of which labels of the cortex give its thickness
+# brains whose labels give the cortical thickness
 WITH_CORTEX = [
     brain.id
     for brain in CONFIG.brains
     if brain.source in WITH_LABELS and LabelScheme(**CONFIG.scheme(brain)).cortex
 ]
-# hemispheres whose pose is to be found, for all of a study at once
+# hemispheres whose pose has to be found, for the whole study at once
 TO_POSE = [
     brain
     for brain in CONFIG.brains
@@ -23,7 +23,7 @@ TO_POSE = [
 
 
 def surface_settings(*names):
-    """Returns the settings of the surfaces that matter for a kind of data."""
+    """Returns the surface settings that one kind of data needs."""
     return CONFIG.surface.model_dump(include=set(names))
 
 
@@ -197,7 +197,7 @@ rule pial_from_shape:
         "../scripts/pial_from_shape.py"
 
 
-# brains with an image that their surface can be compared with
+# brains with an image to compare the surface with
 OVERLAID = [brain.id for brain in CONFIG.brains if brain.image]
 
 

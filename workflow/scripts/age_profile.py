@@ -1,4 +1,4 @@
-"""Which week of the reference brains each other brain looks like, and how well that is told of reference brains."""
+"""Apparent ages of all brains from the reference brains, and the error of this estimate on the reference brains."""
 
 from gyriflow.io.files import read_table, write_table
 from gyriflow.metrics.age_profile import age_profile, age_profile_check, week_similarity

@@ -14,7 +14,7 @@ files, reading, maps = snakemake.input, snakemake.params.reading, {}
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
     facets, report = boundary_faces(mesh)[0], read_json(files.surface)
-    # surfaces of the input are turned as the brain was; those that gyriflow made are turned already
+    # surfaces of the input are rotated like the brain; those that gyriflow made already are
     poses = [np.array(report["pose"]) @ (LPS_TO_RAS if reading["coordinates"] == "lps" else np.eye(4)), np.eye(4)]
     for name, source in snakemake.params.maps.items():
         path = ", ".join(source["map"])

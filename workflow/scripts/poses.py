@@ -1,6 +1,6 @@
 """The poses of the hemispheres of a study's brains, each from its files and shape, all with one pitch.
 
-A brain that is refused does not hold up the others: its file says why, and the step that needs its pose ends with that.
+A refused brain does not stop the others: its file holds the reason, and the step that needs its pose ends with it.
 """
 
 import logging

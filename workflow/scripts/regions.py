@@ -1,4 +1,4 @@
-"""Zones, tags and fields of a run on the start mesh, for a look before the solve."""
+"""Zones, tags and fields of a run on the start mesh, for inspection before the solve."""
 
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.regions import cell_tags, facet_tags

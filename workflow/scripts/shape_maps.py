@@ -1,4 +1,4 @@
-"""Maps of the shape index, the curvedness or the sulcal depth on simulated and measured brains, week by week."""
+"""Maps of a shape measure on simulated and measured brains, week by week."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The start brain's pial surface filled with tetrahedra; a mesh that is refused is kept aside, to be looked at."""
+"""The start brain's pial surface filled with tetrahedra; a refused mesh is kept aside for inspection."""
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import boundary_surface

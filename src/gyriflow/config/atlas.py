@@ -260,10 +260,10 @@ def _week_problems(used: UsedAtlas) -> Iterator[str]:
     have = {week for name in used.series for week in (*used.atlas.series[name].weeks, *used.present_weeks(name))}
     lacking = [week for week in sorted(used.settings.weeks or ()) if week not in have]
     if lacking:
-        weeks = f"week{'s' if len(lacking) > 1 else ''} {_listed(lacking)}"
+        weeks = f"week{'s' if len(lacking) > 1 else ''} {_as_text(lacking)}"
         chosen = "" if used.settings.series is None else f" ({', '.join(used.series)})"
         yield (
-            f"weeks: {used.atlas.name}{chosen} has no files of {weeks}; it has {_listed(sorted(have))}. A week is "
+            f"weeks: {used.atlas.name}{chosen} has no files of {weeks}; it has {_as_text(sorted(have))}. A week is "
             "never rounded"
         )
 
@@ -280,7 +280,7 @@ def retrieval_note(used: UsedAtlas) -> str:
     return "\n  ".join([*lines, f"licence: {atlas.licence.name}{address}. {atlas.licence.terms}"])
 
 
-def _listed(weeks: list[float]) -> str:
+def _as_text(weeks: list[float]) -> str:
     """Returns weeks as text, three or more in a row as a range: "21-29, 30.5"."""
     rows: list[list[float]] = []
     for week in weeks:

@@ -67,16 +67,16 @@ def _complete_runs(runs: Any, folding: Any) -> Any:
         return runs
     base = folding if isinstance(folding, dict) else {}
     return {
-        name: _merged(base, override or {}) if isinstance(override, dict | None) else override
+        name: _merge(base, override or {}) if isinstance(override, dict | None) else override
         for name, override in runs.items()
     }
 
 
-def _merged(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
+def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
     both = dict(base)
     for key, value in override.items():
         nested = isinstance(value, dict) and isinstance(base.get(key), dict) and key not in VARYING
-        both[key] = _merged(base[key], value) if nested else value
+        both[key] = _merge(base[key], value) if nested else value
     return both
 
 

@@ -144,7 +144,7 @@ def rate_curve(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Returns the weeks and the values (1/s) of a growth rate over time: each interval's rate stands at its middle.
 
-    In between the rate is meant to be linear, before the first and after the last middle constant.
+    The rate is linear in between and constant outside.
 
     Parameters
     ----------

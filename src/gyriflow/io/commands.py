@@ -43,7 +43,7 @@ def run_command(command: str, files: Mapping[str, AnyPath], made: str, container
     for name, path in paths.items():
         command = command.replace(f"{{{name}}}", shlex.quote(str(path)))
     folders = sorted({str(path.parent) for path in paths.values()})
-    arguments = ["sh", "-c", command] if container is None else _contained(command, container, folders)
+    arguments = ["sh", "-c", command] if container is None else _command_in_container(command, container, folders)
     log.info("running %s", shlex.join(arguments))
     last: deque[str] = deque(maxlen=LINES_SHOWN)
     with subprocess.Popen(
@@ -67,7 +67,7 @@ def run_command(command: str, files: Mapping[str, AnyPath], made: str, container
         )
 
 
-def _contained(command: str, container: str, folders: list[str]) -> list[str]:
+def _command_in_container(command: str, container: str, folders: list[str]) -> list[str]:
     """Returns the arguments that run a shell command in a container with the first program found that can do so."""
     is_file = container.endswith(".sif")
     programs = APPTAINER if is_file else APPTAINER + DOCKER

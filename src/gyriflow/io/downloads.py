@@ -1,6 +1,6 @@
-"""Files fetched from a server: each whole or not there, gone on with where a connection broke, checked.
+"""Downloads: a file is complete and checked or not there, and an interrupted download is resumed.
 
-Bytes are gathered in a hidden file `.part.NAME` beside the file, which outlives a broken connection and the process.
+A hidden file `.part.NAME` collects the bytes. It survives a broken connection and the end of the process.
 """
 
 import fcntl
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import requests
 
 TRIES = 4
-"""Tries that bring not a byte more than those before, after which a file is given up."""
+"""Attempts without a single new byte before a file is given up."""
 FIRST_WAIT_S = 0.5
 """Wait before the second try; it doubles with each."""
 TIMEOUT_S = (15.0, 60.0)

@@ -45,9 +45,9 @@ class SchemeSettings(Settings):
                 continue
             labels = getattr(self, key)
             if twice := sorted({label for label in labels if labels.count(label) > 1}):
-                yield Problem(f"found {_listed(twice)} more than once", (key,))
+                yield Problem(f"found {_as_text(twice)} more than once", (key,))
             if self.has("cerebrum") and (outside := sorted(set(labels) - set(self.cerebrum))):
-                yield Problem(f"found {_listed(outside)}; it should have labels of the cerebrum only", (key,))
+                yield Problem(f"found {_as_text(outside)}; it should have labels of the cerebrum only", (key,))
 
     @check
     def _something_inside_the_cortex(self) -> Iterator[Problem]:
@@ -57,7 +57,7 @@ class SchemeSettings(Settings):
     @check
     def _both_hemispheres_or_none(self) -> Iterator[Problem]:
         if both := sorted(set(self.left) & set(self.right)):
-            yield Problem(f"found {_listed(both)}, which are in left too", ("right",))
+            yield Problem(f"found {_as_text(both)}, which are in left too", ("right",))
         if bool(self.left) != bool(self.right):
             missing = "right" if self.left else "left"
             yield Problem("is missing; the hemispheres are separated by both left and right", (missing,))
@@ -138,5 +138,5 @@ SCHEMES = {
 """The schemes that come with gyriflow, by name; a further one is a further entry here."""
 
 
-def _listed(labels: list[int]) -> str:
+def _as_text(labels: list[int]) -> str:
     return ", ".join(map(str, labels))

@@ -24,7 +24,7 @@ from .style import (
     styled,
     week_axis,
     week_label,
-    wrapped,
+    wrap,
 )
 
 ALL, FREE_OF_SIZE = "all", "all without size"
@@ -106,7 +106,7 @@ def _of_last_week(brains: pd.DataFrame, week: float) -> pd.DataFrame:
 def _errors(left_out: pd.DataFrame, measured: str) -> str:
     means = left_out.groupby("metric")["mean_absolute_error"].first()
     errors = f"mean error {means[ALL]:.2f} GW,\nwithout metrics of size {means[FREE_OF_SIZE]:.2f} GW"
-    return wrapped(f"{measured}, left out:" + (" " if len(measured) < 20 else "\n") + errors, 50)
+    return wrap(f"{measured}, left out:" + (" " if len(measured) < 20 else "\n") + errors, 50)
 
 
 def _marker(flag: str, inside: str) -> str:

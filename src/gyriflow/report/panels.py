@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
 from .scene import View, half_extents, render
-from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note, wrapped
+from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note, wrap
 
 _PIXELS_PER_INCH = 300
 _MARGIN = 1.04
@@ -91,7 +91,7 @@ def panel_grid(
     colour_bars : colour scales and their labels
     legend : entries of a legend
     """
-    rows = [replace(row, label=wrapped(row.label, _LABEL_LETTERS)) for row in rows]
+    rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     shown = [panel for row in rows for panel in row.panels if panel is not None]
     half_width = _MARGIN * max(half_extents(panel.mesh, panel.view)[0] for panel in shown)
     blocks = _blocks(columns, rows)
@@ -105,7 +105,7 @@ def panel_grid(
 
     heading = [line for line in (title, synthetic_note(measured) if synthetic else "") if line]
     # a letter of a column's heading is about 0.055 in wide
-    columns = [wrapped(column, int(panel_in / 0.055)) for column in columns]
+    columns = [wrap(column, int(panel_in / 0.055)) for column in columns]
     blocks = _blocks(columns, rows)
     head_in, caption_line_in = 0.1 + 0.16 * len(heading), 0.13
     block_head_in = 0.2 + 0.12 * max(column.count("\n") for column in columns)

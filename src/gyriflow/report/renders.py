@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from .panels import Panel, Row, panel_grid
-from .scene import colour_scale, named_views, painted, uniform_colours
+from .scene import colour_scale, named_views, paint, uniform_colours
 from .style import (
     PHANTOM,
     REAL_BRAIN,
@@ -137,7 +137,7 @@ def displacement_maps(
         for key in keys:
             mesh, norms = displacements[key]
             caption = f"max {np.nanmax(norms):.2f} mm\nmean {np.nanmean(norms):.2f} mm" if view == seen[-1] else ""
-            panels.append(Panel(mesh, painted(norms, scale), view, caption))
+            panels.append(Panel(mesh, paint(norms, scale), view, caption))
         rows.append(Row(f"{view.name} view", panels))
     return panel_grid(
         [column_label(key) for key in keys],
@@ -201,7 +201,7 @@ def scalar_maps(
     rows = [
         Row(
             f"{group}\n{view.name} view",
-            [Panel(known[key][0], painted(known[key][1], scale), view) if key in known else None for key in keys],
+            [Panel(known[key][0], paint(known[key][1], scale), view) if key in known else None for key in keys],
         )
         for view in named_views(views)
         for group, known in maps.items()

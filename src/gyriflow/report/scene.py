@@ -118,7 +118,7 @@ def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -
     return ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
 
 
-def painted(values: Floats, scale: ScalarMappable) -> Floats:
+def paint(values: Floats, scale: ScalarMappable) -> Floats:
     """Returns the (n, 3) colours of values, grey where they are not finite."""
     colours = np.asarray(scale.to_rgba(np.asarray(values, dtype=float)))
     colours[~np.isfinite(values)] = _UNKNOWN_COLOUR

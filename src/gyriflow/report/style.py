@@ -104,7 +104,7 @@ def all_synthetic(measured: str) -> bool:
     return set(measured.split(" or ")) <= SYNTHETIC_NAMES
 
 
-def wrapped(text: str, letters: int) -> str:
+def wrap(text: str, letters: int) -> str:
     """Returns text with each of its lines broken between words so that it has about so many letters at most."""
     return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.split("\n"))
 

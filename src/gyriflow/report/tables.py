@@ -114,7 +114,7 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     parameters : {run: {name: value}}
         Values may be mappings themselves; their names are joined by dots.
     """
-    flat = pd.DataFrame({run: pd.Series(_flattened(values), dtype=object) for run, values in parameters.items()})
+    flat = pd.DataFrame({run: pd.Series(_flatten(values), dtype=object) for run, values in parameters.items()})
     shown = flat.map(_shown)
     differs = shown.ne(shown.iloc[:, 0], axis=0).any(axis=1)
     shown.insert(0, "differs", differs.map({True: "yes", False: ""}))
@@ -153,11 +153,11 @@ _LOOK: list = [
 ]
 
 
-def _flattened(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
+def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
     flat: dict[str, object] = {}
     for name, value in values.items():
         if isinstance(value, Mapping):
-            flat.update(_flattened(value, f"{prefix}{name}."))
+            flat.update(_flatten(value, f"{prefix}{name}."))
         else:
             flat[f"{prefix}{name}"] = value
     return flat

@@ -24,7 +24,7 @@ from ..parameters.terms import (
 )
 from ..units import CM2_PER_MM2
 from .panels import Panel, Row, panel_grid
-from .scene import colour_scale, named_views, painted, restricted
+from .scene import colour_scale, named_views, paint, restricted
 from .style import styled
 
 ZONE_VIEWS = ("left", "bottom", "left medial", "right medial")
@@ -106,7 +106,7 @@ def field_picture(
         Name and unit, for example "growth weight" or "tangential growth increment (10⁻³)".
     """
     scale = colour_scale("viridis", float(np.nanmin(values)), float(np.nanmax(values)))
-    columns, rows = _one_row(mesh, painted(values, scale), views, fissure_x_mm)
+    columns, rows = _one_row(mesh, paint(values, scale), views, fissure_x_mm)
     return panel_grid(columns, rows, title=title, synthetic=synthetic, colour_bars=[(scale, label)])
 
 
