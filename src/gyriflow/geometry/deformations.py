@@ -44,9 +44,7 @@ def moved(points: Floats, matrix: Floats) -> Floats:
 def displacement_at(deformation: Deformation, points: Floats) -> Floats:
     """Returns the (n, 3) displacement u in mm at points in mm."""
     index = moved(points, np.linalg.inv(deformation.affine)).T
-    parts = [
-        map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)
-    ]
+    parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
     return np.stack(parts, axis=1).astype(np.float64)
 
 

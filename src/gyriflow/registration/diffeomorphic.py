@@ -71,9 +71,7 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     greedy fails; whether the result is good is for `quality.judged` to say.
     """
     began = time.perf_counter()
-    names = tuple(
-        name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None
-    )
+    names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
     turn, start = _started(earlier, later, names)
     images = {f"fixed_{name}": _image(getattr(earlier, name), earlier.affine) for name in names}
     # greedy begins at the identity, so the later brain is handed over where the start puts it
@@ -85,9 +83,7 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     greedy = Greedy3D()
     said = io.StringIO()
     try:
-        greedy.execute(
-            f"{AFFINE} {common} {pairs} -ia-identity -o found", out=said, err=said, found=None, **images
-        )
+        greedy.execute(f"{AFFINE} {common} {pairs} -ia-identity -o found", out=said, err=said, found=None, **images)
         greedy.execute(f"{DEFORMABLE} {common} {pairs} -gm where -it found -o warp", out=said, err=said, warp=None)
     except RuntimeError as error:
         raise InputError(
