@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-import SimpleITK as sitk
+import SimpleITK
 from numpy.typing import NDArray
 from picsl_greedy import Greedy3D
 from scipy.ndimage import binary_dilation, map_coordinates
@@ -93,7 +93,7 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
         ) from error
     matrix = start @ MIRROR @ np.asarray(greedy["found"], dtype=float) @ MIRROR
     # images hold their axes the other way round in SimpleITK's arrays
-    warp = sitk.GetArrayFromImage(greedy["warp"]).transpose(2, 1, 0, 3).astype(np.float32)
+    warp = SimpleITK.GetArrayFromImage(greedy["warp"]).transpose(2, 1, 0, 3).astype(np.float32)
     seconds = time.perf_counter() - began
     log.info("registered by %s in %.0f s", ", ".join(names), seconds)
     return Registration(
@@ -104,9 +104,9 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     )
 
 
-def _image(values: NDArray[np.float32], affine: Floats) -> sitk.Image:
+def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
     """Returns a volume for greedy, with RAS+ mm in the place of its LPS mm: turned alike for both brains."""
-    image = sitk.GetImageFromArray(np.ascontiguousarray(values.transpose(2, 1, 0)))
+    image = SimpleITK.GetImageFromArray(np.ascontiguousarray(values.transpose(2, 1, 0)))
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     image.SetSpacing(spacing.tolist())
     image.SetDirection((affine[:3, :3] / spacing).ravel().tolist())

@@ -126,7 +126,7 @@ def test_a_map_that_folds_is_refused(pair, found):
 
 def test_a_cerebrum_at_the_edge_of_the_volume_is_refused():
     affine = centred()
-    with pytest.raises(InputError, match="cut by the edge of the volume.*i = 0"):
+    with pytest.raises(InputError, match=r"cut by the edge of the volume.*i = 0"):
         channels(volume(affine, later=False)[14:], affine, cerebrum=(WHITE, CORTEX))
 
 
