@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from .triangles import Floats, frozen
@@ -36,9 +37,9 @@ class Deformation:
             raise ValueError(f"expected an (i, j, k, 3) displacement, found shape {self.displacement.shape}")
 
 
-def moved(points: Floats, matrix: Floats) -> Floats:
+def moved(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
     """Returns (n, 3) points under a (4, 4) affine map."""
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
 
 
 def displacement_at(deformation: Deformation, points: Floats) -> Floats:
@@ -71,7 +72,7 @@ def carried_back(deformation: Deformation, points: Floats) -> Floats:
         best[nearer], left[nearer] = found[nearer], away[nearer]
         if not (left > INVERTED_MM).any():
             break
-        share = np.where(nearer, share, 0.5 * share)
+        share[~nearer] *= 0.5
         found = np.where(nearer[:, None], found + share[:, None] * missing, 0.5 * (found + best))
     return best
 

@@ -16,14 +16,14 @@ STEPS = 8
 def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
     """Returns the (m,) areas in mm² of (m, 3) triangles, or signed volumes in mm³ of (m, 4) tetrahedra."""
     if cells.shape[1] == 3:
-        return face_areas(TriangleMesh(vertices, cells))
+        return face_areas(TriangleMesh(vertices, cells.astype(np.int64)))
     return volumes_between(vertices, cells)
 
 
 def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
     """Returns the (n,) areas or volumes that belong to the vertices: equal parts of the cells around."""
     share = np.repeat(cell_sizes(vertices, cells) / cells.shape[1], cells.shape[1])
-    return np.bincount(cells.ravel(), share, minlength=len(vertices))
+    return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
 
 
 def diffused(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:

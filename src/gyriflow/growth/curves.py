@@ -29,6 +29,9 @@ LEAST_SCATTER = 0.005
 TUKEY = 4.685
 """Residual over scatter beyond which a week does not count (Beaton and Tukey 1974)."""
 
+TELLING = 2.0
+"""Weeks per degree of freedom from which on the others tell that one leaps."""
+
 ROUNDS = 50
 KNOT_INTERVALS = 12
 CERTAIN = 1.96
@@ -116,9 +119,9 @@ def fitted(
 
     The rate of growth of the logarithm is a quadratic spline with a penalty on its second differences (on its first
     ones below three degrees of freedom, P-splines of Eilers and Marx 1996), not negative unless `may_shrink`. The
-    penalty is that which leaves `degrees_of_freedom`, at most one less than there are weeks. Weeks far from it lose
-    their weight (Tukey's biweight, begun from least absolute deviations). The standard deviation is Bayesian (Wahba
-    1983), with the scatter of the weeks about the curve.
+    penalty is that which leaves `degrees_of_freedom`, at most one less than there are weeks. Where there are twice as
+    many weeks, those far from the curve lose their weight (Tukey's biweight, begun from least absolute deviations).
+    The standard deviation is Bayesian (Wahba 1983), with the scatter of the weeks about the curve.
 
     Parameters
     ----------
@@ -239,9 +242,9 @@ def _robust_weights(
 ) -> Floats:
     """Returns the (n,) weights of the weeks: least absolute deviations first, then Tukey's biweight."""
     count = len(logs)
-    if count <= degrees + 1:
-        return np.ones(count)
     weights = np.ones(count)
+    if count < TELLING * degrees:
+        return weights
     for _ in range(ROUNDS):
         residuals = logs - design @ _solved(design, logs, weights, strength * penalty, may_shrink)
         weights = 1.0 / np.maximum(np.abs(residuals), LEAST_SCATTER)

@@ -43,7 +43,7 @@ def local_growth(positions: Floats, cells: NDArray[np.integer], weeks: Sequence[
     for first, second, duration in zip(range(len(weeks) - 1), range(1, len(weeks)), np.diff(weeks), strict=True):
         scale = (sizes[first].sum() / sizes[0].sum()) ** (1 / dimension)
         smooth = diffused(positions[0], cells, relative[[first, second]].T, sigma_mm / scale)
-        bad = (smooth <= 0).any(axis=1)
+        bad = np.asarray(smooth.min(axis=1) <= 0)
         if bad.any():
             raise InputError(
                 f"local growth from week {weeks[first]:g} to {weeks[second]:g} has no logarithm",
