@@ -10,7 +10,10 @@ import yaml
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
-ROOMS = {"config", "io", "phantom", "surface", "growth", "mesh", "mechanics", "folding", "metrics", "report"}
+ROOMS = {
+    *("config", "io", "phantom", "surface", "mesh", "registration", "growth", "mechanics", "folding", "metrics"),
+    *("validation", "report"),
+}
 PLAIN = {"geometry", "parameters", "units", "errors"}
 EXCEPTIONS = {"folding": {"mechanics", "io"}}
 """What a room may import besides itself and the plain modules: the solve is a program of its own."""

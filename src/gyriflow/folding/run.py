@@ -58,7 +58,7 @@ def run(
             contact, elements = folding.contact_fields(asked), folding.element_fields(asked)
             if comm.rank == 0:
                 if arrived:
-                    save_frame(folder, week, state.positions, start, zones, parameters, maps, contact, elements)
+                    save_frame(folder, week, state.positions, start, zones, folding.present, maps, contact, elements)
                 write_checkpoint(folder / "state.h5", key, state)
                 rate = (time.monotonic() - resumed) / (len(state.rows) - first)
                 steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s

@@ -20,6 +20,7 @@ from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
+from .following import following_step, size_of
 from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch, layers_at
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
@@ -92,6 +93,8 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
+        self._start_size = size_of(mesh.vertices, zones)
+        self.present = parameters  # those of the last step, with its rates of growth
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
             centres = nodes[self.domain.cells].mean(axis=1)
@@ -99,9 +102,9 @@ class Folding:
         limits = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
         self.solver = NewtonSolver(self.problem, limits, floor)
 
-    def set_layers(self, time_s: float, step_s: float) -> None:
+    def set_layers(self, p: FoldingParameters, time_s: float, step_s: float) -> None:
         """Sets stiffness, growth and normals for a step from a time on, with parameters as in its middle."""
-        p, domain = self.parameters, self.domain
+        domain = self.domain
         week = p.start_week + (time_s + step_s / 2) / SECONDS_PER_GW
         reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
         search = PialSearch(domain.positions, self.zones.cortex_facets)
@@ -193,7 +196,10 @@ class Folding:
         domain, problem = self.domain, self.problem
         if domain.positions is not state.positions:
             domain.place(state.positions)
-        self.set_layers(state.time_s, step_s)
+        last = state.rows[-1] if state.rows else {}
+        before = size_of(state.positions * MM_PER_M, self.zones)
+        growth = following_step(self.parameters, self._start_size, before, state.time_s, step_s, last, self.maps)
+        self.set_layers(growth.parameters, state.time_s, step_s)
         kept = self._kept_stretch(state, step_s)
         if kept is not None:
             problem.set_stretch(kept)
@@ -218,10 +224,12 @@ class Folding:
             "max_u_pial_mm": float(length[self._pial].max()),
             "mean_u_pial_mm": float(length[self._pial].mean()),
             **self._contact_row(domain.positions + u),
+            **growth.row(size_of((domain.positions + u) * MM_PER_M, self.zones), step_s),
             "rung": RUNGS[count.rung],
             "seconds": time.monotonic() - began,
         }
         after = state.after(u, step_s, row, left)
+        self.present = growth.parameters
         domain.place(after.positions)
         return after
 
