@@ -21,7 +21,7 @@ report: "workflow/report/workflow.rst"
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/download.smk"
+include: "workflow/rules/retrieve.smk"
 include: "workflow/rules/input.smk"
 include: "workflow/rules/surface.smk"
 include: "workflow/rules/mesh.smk"
@@ -36,7 +36,8 @@ include: "workflow/rules/report.smk"
 
 localrules:
     all,
-    download,
+    atlas_file,
+    retrieve,
     surface,
     mesh,
     growth,

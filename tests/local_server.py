@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
+import nibabel as nib
+import numpy as np
+
 
 @dataclass
 class Server:
@@ -71,11 +74,13 @@ def serving(server: Server) -> Iterator[Server]:
 
 
 def packed(size: int, seed: int = 0) -> bytes:
-    """Returns a gzip file of about so many bytes that do not shrink."""
-    block = b"".join(hashlib.sha256(f"{seed} {number}".encode()).digest() for number in range(size // 32))
-    return gzip.compress(block, mtime=0)
+    """Returns a NIfTI file (.nii.gz) of about so many bytes that do not shrink."""
+    values = np.random.default_rng(seed).integers(0, 2**15, size // 200 * 100, dtype=np.int16)
+    return gzip.compress(nib.Nifti1Image(values.reshape(-1, 100, 1), np.eye(4)).to_bytes(), mtime=0)
 
 
-def gifti(text: str = "") -> bytes:
-    """Returns what passes for a whole GIFTI file."""
-    return f'<?xml version="1.0"?>\n<GIFTI Version="1.0">{text}</GIFTI>\n'.encode()
+def gifti(seed: int = 0) -> bytes:
+    """Returns a GIFTI file of one triangle."""
+    points = np.random.default_rng(seed).random((3, 3)).astype(np.float32)
+    arrays = [(points, "NIFTI_INTENT_POINTSET"), (np.array([[0, 1, 2]], np.int32), "NIFTI_INTENT_TRIANGLE")]
+    return nib.GiftiImage(darrays=[nib.gifti.GiftiDataArray(data, intent) for data, intent in arrays]).to_bytes()

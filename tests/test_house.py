@@ -15,8 +15,9 @@ ROOMS = {
     *("validation", "report"),
 }
 PLAIN = {"geometry", "parameters", "units", "errors"}
-EXCEPTIONS = {"folding": {"mechanics", "io"}}
-"""What a room may import besides itself and the plain modules: the solve is a program of its own."""
+EXCEPTIONS = {"folding": {"mechanics", "io"}, "config": {"io"}}
+"""What a room may import besides itself and the plain modules: the solve is a program of its own, and a configuration
+names atlases that are described in files."""
 PROGRAMS = {"launch", "step", "provenance"}
 """The shell around the rooms: how a workflow starts, how a step ends, what code it depends on."""
 

@@ -21,7 +21,9 @@ def test_every_rule_has_a_log_a_benchmark_and_an_environment():
         f"{name}: {keyword}"
         for name, body in working.items()
         for keyword in ("log", "benchmark", "conda")
-        if not re.search(rf"^    {keyword}:", body, flags=re.MULTILINE)
+        # a download's time is the network's; with a benchmark, the table of resources would depend on what is missing
+        if (name, keyword) != ("atlas_file", "benchmark")
+        and not re.search(rf"^    {keyword}:", body, flags=re.MULTILINE)
     ]
     assert missing == []
 

@@ -70,9 +70,10 @@ class Waved:
         """Returns the parameters of the run."""
         memory_gw = self.memory / RATE_PER_S / SECONDS_PER_GW
         values = {
-            "start_week": 0.0,
-            "end_week": 1e3,
-            "output_weeks": [0.0, 1e3],
+            # no parameter depends on the week
+            "start_week": 15.0,
+            "end_week": 45.0,
+            "output_weeks": [15.0, 45.0],
             "fissure_x_mm": self.width_mm / 2,
             "thickness_mm": 1.0,
             "shear_modulus_core_pa": 300.0,

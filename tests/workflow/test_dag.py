@@ -1,20 +1,18 @@
 """Which jobs the workflow plans, for whole studies and after one parameter changed."""
 
 import copy
-import os
-from pathlib import Path
 
 import pytest
+import yaml
 
 from .conftest import CHECKOUT, SMALL_STUDY
-
-ATLAS = Path(os.environ.get("GYRIFLOW_DATA", CHECKOUT.parent / "shared" / "data")) / "spina_bifida_atlas"
 
 
 def test_the_demo_is_planned_from_any_folder(workflow):
     jobs = workflow.jobs()
-    assert jobs["pial_from_labels"] == jobs["phantom"] == jobs["cortical_thickness"] > 1
-    assert jobs["measure"] > jobs["phantom"]
+    assert jobs["pial_from_labels"] == jobs["cortical_thickness"] == 5
+    assert jobs["measure"] > 5
+    assert not {"phantom", "atlas_file"} & set(jobs)
     assert jobs["simulate"] >= 1
     assert jobs["html_report"] == 1
 
@@ -37,14 +35,49 @@ def test_a_stage_is_a_target_and_plans_no_later_stage(workflow, target, present,
     assert absent not in jobs
 
 
-@pytest.mark.skipif(not ATLAS.is_dir(), reason=f"no atlas in {ATLAS}")
-def test_the_atlas_example_is_planned(workflow):
-    text = (CHECKOUT / "config" / "examples" / "spina-bifida-atlas.yaml").read_text()
-    text = text.replace("../../../shared/data/spina_bifida_atlas", str(ATLAS))
-    (workflow.directory / "atlas.yaml").write_text(text)
-    jobs = workflow.jobs("--configfile", "atlas.yaml")
-    assert "phantom" not in jobs
-    assert (jobs["pial_from_labels"], jobs["simulate"], jobs["measure"], jobs["similarity"]) == (9, 1, 18, 8)
+@pytest.mark.parametrize(
+    ("example", "expected"),
+    [
+        # ten brains, of which nine are of an output week after the start
+        ("spina-bifida-atlas", {"pial_from_labels": 10, "simulate": 1, "measure": 19, "similarity": 9}),
+        ("phantoms", {"phantom": 6, "pial_from_labels": 6, "simulate": 2, "measure": 18}),
+        ("simple-shapes", {"shape": 1, "pial_from_shape": 1, "simulate": 2}),
+    ],
+)
+def test_examples_are_planned_from_the_checkout_alone(workflow, example, expected):
+    jobs = workflow.jobs("--configfile", str(workflow.checkout / "config" / "examples" / f"{example}.yaml"))
+    assert {rule: jobs.get(rule) for rule in expected} == expected
+    assert "atlas_file" not in jobs
+
+
+@pytest.mark.parametrize(
+    ("example", "expected"),
+    [
+        ("crl-atlas", {"atlas_file": 9, "pial_from_labels": 9}),
+        ("dhcp-atlas", {"atlas_file": 48, "pial_from_labels": 16, "pial_from_hemispheres": 16}),
+    ],
+)
+def test_examples_of_narrow_licences_are_planned_once_these_are_accepted(workflow, example, expected):
+    text = (CHECKOUT / "config" / "examples" / f"{example}.yaml").read_text()
+    (workflow.directory / "study.yaml").write_text(text)
+    refused = workflow.run("-n", "--configfile", "study.yaml")
+    assert refused.returncode == 2
+    assert "accept_licence: found false" in refused.stderr
+    (workflow.directory / "study.yaml").write_text(text.replace("accept_licence: false", "accept_licence: true"))
+    jobs = workflow.jobs("--configfile", "study.yaml")
+    assert {rule: jobs.get(rule) for rule in expected} == expected
+
+
+def test_the_example_of_labels_and_hemispheres_is_planned_once_these_are_made(workflow):
+    example = CHECKOUT / "config" / "examples" / "labels-and-hemispheres.yaml"
+    for brain in yaml.safe_load(example.read_text())["brains"]:
+        for file in brain["hemispheres"].values():
+            (workflow.directory / file).parent.mkdir(parents=True, exist_ok=True)
+            (workflow.directory / file).touch()
+    jobs = workflow.jobs("growth", "figures", "--configfile", str(example))
+    assert jobs["growth_figure"] == 1
+    # the T2-weighted volumes of the overlays
+    assert jobs["atlas_file"] == jobs["overlay_figure"] == 5
 
 
 def test_one_brain_alone_is_folded_without_growth_rates(workflow):

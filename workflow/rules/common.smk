@@ -14,10 +14,6 @@ shell.prefix(
 )
 
 
-# Snakemake tells a Snakefile nothing of its targets; jobs of their own are asked for as NAME:
-DOWNLOADING = not {"download", "download:"}.isdisjoint(sys.argv)
-
-
 def validated_config():
     """Returns the configuration as models; ends with a message and exit code 2 where it is not valid."""
     from gyriflow.config import load
@@ -31,7 +27,7 @@ def validated_config():
             content = read_yaml(file)
             if isinstance(content, dict) and {"brains", "atlas"} & set(content):
                 base = file.resolve().parent
-        return load(config, base, downloading=DOWNLOADING)
+        return load(config, base)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)

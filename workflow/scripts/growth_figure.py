@@ -4,14 +4,14 @@ from gyriflow.growth.rates import FOLDING_RATES, rate_curve
 from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_table
 from gyriflow.report.growth import growth_chart
-from gyriflow.report.style import REAL_BRAIN
+from gyriflow.report.style import all_synthetic
 from gyriflow.report.tables import agreement_table, growth_table, html_table, sizes_table
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     areas, rates, agreement = (read_table(file) for file in (files.areas, files.rates, files.agreement))
-    shown = {"measured": params.measured, "synthetic": REAL_BRAIN not in params.measured}
+    shown = {"measured": params.measured, "synthetic": all_synthetic(params.measured)}
     rate = params.folding_rate_per_s
     if rate == "estimated":
         chosen = rates[rates["series"] == params.estimated_from]

@@ -1,209 +1,283 @@
-"""The dHCP fetal atlases as a source: where their files lie, here and on the server, and the brains they stand for."""
+"""Atlases in a study: which weeks of which series are used, where their files are, and the brains they stand for."""
 
+import difflib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from string import Formatter
+from typing import Any
 
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
+from ..io.downloads import sha256_of
 from ..parameters.settings import Settings, setting
 from ..parameters.varying import Week
+from .atlas_description import ATLASES, Atlas, AtlasFileRecord, FileKey, shipped_atlases
 
-PUBLISHED_WEEKS = tuple(float(week) for week in range(21, 37))
-"""Gestational weeks that the atlases have; others are used where a folder has files of them."""
-
-URL = "{server}/{repository}/raw/master/{path}"
-"""Where the server has a file of a repository."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """One atlas: its repository and, by key of a brain, the paths in it, with {} for the week in its format."""
-
-    repository: str
-    week_format: str
-    paths: dict[str, str]
-    needed: tuple[str, ...]
-
-
-# the layout of the repositories in 2023-24 as they and programs that read them show it; files on disk go by name alone
-LAYOUTS = {
-    "surface": Layout(
-        "kcl_cdb/dhcp_fetal_brain_surface_atlas",
-        "g",
-        {side: f"atlas/fetal.week{{}}.{side}.pial.surf.gii" for side in ("left", "right")},
-        ("left", "right"),
-    ),
-    "volume": Layout(
-        "kcl_cdb/fetal_brain_mri_atlas",
-        "05.2f",
-        {"labels": "parcellations/tissue-t{}_dhcp-19.nii.gz", "image": "structural/t2-t{}.nii.gz"},
-        ("labels",),
-    ),
-}
-"""The two atlases."""
+DOWNLOADS = Path("resources", "atlases")
+"""Folder in the working directory for the files of atlases whose section names no other."""
 
 
 class AtlasSettings(Settings):
-    """The dHCP fetal atlases; each week of a source becomes a brain with the id `surface-week21` or `volume-week21`.
+    """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` where it has one series).
 
-    Surfaces are the pial ones of both hemispheres, posed automatically; volumes are tissue labels of scheme `dhcp-19`,
-    with the T2-weighted `image` where it is there. Files are found by their names anywhere in the folder; what is not
-    there, `./run snakemake --cores 1 download` fetches.
+    `atlas: NAME` and `atlas: FILE.yaml` are short for a section with nothing but `name` or `file`; a list of names,
+    files and sections stands for several. Files that are not there are fetched when a stage needs them, and all of
+    them by `./run snakemake --cores 1 retrieve`; a file that exists is never replaced or deleted.
     """
 
-    source: Literal["surface", "volume", "both"] = setting(
-        "both", "", "The atlas of hemisphere surfaces, that of label volumes, or both."
+    name: str | None = setting(None, "", "An atlas that comes with gyriflow: the name of a folder in `atlases`.")
+    file: str | None = setting(None, "", "The `atlas.yaml` of an atlas of your own, in the place of `name`.")
+    series: str | tuple[str, ...] | None = setting(None, "", "Series that are used; `null`: all.")
+    weeks: tuple[Week, ...] | None = setting(
+        None, "GW", "Weeks that are used, each exactly as the files name it; `null`: all that the series have."
     )
-    folder: str = setting(..., "", "Folder with the files, or where `download` is to put them.")
-    weeks: tuple[Week, ...] = setting(
-        PUBLISHED_WEEKS, "GW", "Weeks that are used; each needs files of exactly that week."
+    images: bool = setting(False, "", "Whether T2-weighted volumes are used, which are shown under surfaces' outlines.")
+    folder: str | None = setting(
+        None, "",
+        "Folder with files of the atlas, found by their names anywhere in it, into which missing ones are put; `null`: "
+        "`resources/atlases/NAME` in the working directory.",
+    )  # fmt: skip
+    url: str | None = setting(None, "", "A mirror with the same paths, in the place of the atlas's own address.")
+    accept_licence: bool = setting(
+        False, "", "That you accept the licence; needed where the `atlas.yaml` says so, as with research-only data."
     )
-    url: str = setting(
-        "https://gin.g-node.org", "", "Server that has the repositories, or a mirror with the same paths."
-    )
+
+    @model_validator(mode="after")
+    def _name_or_file(self) -> "AtlasSettings":
+        if (self.name is None) == (self.file is None):
+            raise ValueError("have either a `name` or a `file`")
+        return self
 
     @field_validator("weeks")
     @classmethod
-    def _some_weeks(cls, weeks: tuple[float, ...]) -> tuple[float, ...]:
-        if not weeks:
+    def _some_weeks_once(cls, weeks: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if weeks is not None and not weeks:
             raise ValueError("have one week or more")
+        if weeks is not None and len(set(weeks)) < len(weeks):
+            raise ValueError("name each week once")
         return weeks
 
     @field_validator("url")
     @classmethod
-    def _web_address(cls, url: str) -> str:
-        if not url.startswith(("http://", "https://")):
+    def _web_address(cls, url: str | None) -> str | None:
+        if url is not None and not url.startswith(("http://", "https://")):
             raise ValueError("begin with https:// or http://")
         return url
 
     @property
-    def sources(self) -> tuple[str, ...]:
-        """The atlases that are used."""
-        return tuple(LAYOUTS) if self.source == "both" else (self.source,)
+    def description(self) -> Path:
+        """The `atlas.yaml`."""
+        return Path(self.file) if self.file is not None else ATLASES / str(self.name) / "atlas.yaml"
+
+    def located(self, base_dir: Path) -> "AtlasSettings":
+        """Returns the section with `file` and `folder` as absolute paths."""
+
+        def absolute(path: str | None) -> str | None:
+            if path is None:
+                return None
+            places = [base_dir / Path(path).expanduser(), Path.cwd() / path]
+            return str(next((place for place in places if place.exists()), places[0]).resolve())
+
+        return self.model_copy(update={"file": absolute(self.file), "folder": absolute(self.folder)})
 
 
 @dataclass(frozen=True)
 class AtlasFile:
-    """A file of the atlas: what it is, where it lies or would be downloaded to, and from where."""
+    """A file of an atlas: what it is, where it lies or is to be put, and what is known of it."""
 
-    source: str
+    series: str
     week: float
-    key: str
+    key: FileKey
     path: Path
-    url: str
+    url: str | None
+    record: AtlasFileRecord
     copies: tuple[Path, ...]
-    """The files of that name in the folder: none where it is missing, several where it is not clear which counts."""
+    """The files of that name: none where it is missing, several where it is not clear which counts."""
+
+
+@dataclass(frozen=True)
+class UsedAtlas:
+    """An atlas with the settings by which a study uses it."""
+
+    settings: AtlasSettings
+    atlas: Atlas
 
     @property
-    def present(self) -> bool:
-        return bool(self.copies)
+    def series(self) -> list[str]:
+        """The names of the series that are used."""
+        given = self.settings.series
+        return list(self.atlas.series) if given is None else [given] if isinstance(given, str) else list(given)
 
     @property
-    def needed(self) -> bool:
-        """Whether the brain can't be used without it."""
-        return self.key in LAYOUTS[self.source].needed
+    def folder(self) -> Path:
+        """Where missing files are put."""
+        return Path(self.settings.folder or Path.cwd() / DOWNLOADS / self.atlas.name)
+
+    @cached_property
+    def files(self) -> list[AtlasFile]:
+        """The files that the study uses, by series and week."""
+        return [file for name in self.series if name in self.atlas.series for file in self._files_of(name)]
+
+    @property
+    def missing(self) -> list[AtlasFile]:
+        """Those that are to be fetched."""
+        return [file for file in self.files if not file.copies]
+
+    def _files_of(self, name: str) -> Iterator[AtlasFile]:
+        series = self.atlas.series[name]
+        keys = list(series.files) if self.settings.images else series.needed
+        for week in self._weeks_of(name):
+            for key in keys:
+                path = series.files[key].format(week=int(week) if week == int(week) else week)
+                root = (self.settings.url or self.atlas.url or "").rstrip("/")
+                copies = self._in_folder[series.files[key]].get(week) or self._shipped(path)
+                yield AtlasFile(
+                    series=name,
+                    week=week,
+                    key=key,
+                    path=copies[0] if copies else self.folder / path,
+                    # what is not published has no address
+                    url=f"{root}/{path}" if root and week in series.weeks else None,
+                    record=series.weeks.get(week, {}).get(key, AtlasFileRecord()),
+                    copies=tuple(copies),
+                )
+
+    def _weeks_of(self, name: str) -> list[float]:
+        """Returns the weeks of a series that are used: published ones, and others of which the folder has files."""
+        published = set(self.atlas.series[name].weeks)
+        if self.settings.weeks is None:
+            return sorted(published)
+        known = published | self.present_weeks(name)
+        return [week for week in sorted(self.settings.weeks) if week in known]
+
+    def present_weeks(self, name: str) -> set[float]:
+        """Returns the weeks of which the folder has all that a brain needs."""
+        series = self.atlas.series[name]
+        return set.intersection(*(set(self._in_folder[series.files[key]]) for key in series.needed))
+
+    @cached_property
+    def _in_folder(self) -> dict[str, dict[float, list[Path]]]:
+        """The files of each pattern in the folder."""
+        patterns = {pattern for series in self.atlas.series.values() for pattern in series.files.values()}
+        return {pattern: self._copies(pattern) for pattern in patterns}
+
+    def _copies(self, pattern: str) -> dict[float, list[Path]]:
+        """Returns the files of a pattern anywhere in the folder by week, told by the part of the path with the week."""
+        parts = pattern.split("/")
+        tail = "/".join(parts[max(number for number, part in enumerate(parts) if "{week" in part) :])
+        pieces = list(Formatter().parse(tail))
+        name = "".join(re.escape(text) + (r"(\d+(?:\.\d+)?)" if field else "") for text, field, *_ in pieces)
+        found: dict[float, list[Path]] = {}
+        for path in sorted(self.folder.rglob("".join(text + ("*" if field else "") for text, field, *_ in pieces))):
+            match = re.fullmatch(f"(?:.*/)?{name}", path.as_posix())
+            if match and path.is_file():
+                found.setdefault(float(match[1]), []).append(path)
+        return found
+
+    def _shipped(self, path: str) -> list[Path]:
+        """Returns the file that comes with the atlas, if it does."""
+        if self.atlas.folder is None:
+            return []
+        place = (self.settings.description.parent / self.atlas.folder / path).resolve()
+        return [place] if place.is_file() else []
 
 
-def atlas_files(atlas: AtlasSettings) -> list[AtlasFile]:
-    """Returns all files that the atlas section names, by source and week."""
-    found = _in_folder(Path(atlas.folder))
-    files = []
-    for source in atlas.sources:
-        layout = LAYOUTS[source]
-        for week in sorted(set(atlas.weeks)):
-            for key, template in layout.paths.items():
-                path = template.format(format(week, layout.week_format))
-                place = Path(atlas.folder, layout.repository.rpartition("/")[2], path)
-                copies = found.get((source, key), {}).get(week, [])
-                url = URL.format(server=atlas.url.rstrip("/"), repository=layout.repository, path=path)
-                files.append(AtlasFile(source, week, key, copies[0] if copies else place, url, tuple(copies)))
-    return files
+def atlas_sections(raw: Any) -> list[tuple[tuple[str | int, ...], Any]]:
+    """Returns the entries of `atlas` as given (raw) with the keys that lead to them, names and files as sections."""
+    several = isinstance(raw, list | tuple)
+    entries = raw if several else [] if raw is None else [raw]
+    return [(("atlas", number) if several else ("atlas",), _section(entry)) for number, entry in enumerate(entries)]
 
 
-def atlas_brains(files: list[AtlasFile]) -> list[dict[str, Any]]:
-    """Returns the entries of `brains` that the atlas section stands for, whether their files are there or not."""
-    entries: dict[tuple[str, float], dict[str, Any]] = {}
-    for file in files:
-        entry = entries.setdefault(
-            (file.source, file.week), {"id": f"{file.source}-week{file.week:g}", "week": file.week}
-        )
-        if file.source == "surface":
+def _section(entry: Any) -> Any:
+    if isinstance(entry, str):
+        return {"file" if entry.endswith((".yaml", ".yml")) else "name": entry}
+    return entry
+
+
+def unknown_atlas(settings: AtlasSettings) -> str | None:
+    """Returns what is wrong with the name of an atlas, None where there is one of that name."""
+    known = shipped_atlases()
+    if settings.name is None or settings.name in known:
+        return None
+    nearest = difflib.get_close_matches(settings.name, known, n=1, cutoff=0.5)
+    hint = f"did you mean {nearest[0]}?" if nearest else f"known are {', '.join(known)}"
+    return f"name: found {settings.name!r}; {hint} An atlas.yaml of your own goes under file"
+
+
+def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
+    """Returns the entries of `brains` that an atlas stands for, whether their files are there or to be fetched."""
+    entries: dict[str, dict[str, Any]] = {}
+    for file in used.files:
+        series, name = used.atlas.series[file.series], used.atlas.brain_id(file.series, file.week)
+        entry = entries.setdefault(name, {"id": name, "week": file.week, "population": series.population})
+        if file.key in ("left", "right"):
             entry.setdefault("hemispheres", {})[file.key] = str(file.path)
-        elif file.needed or file.present:
-            entry |= {file.key: str(file.path), "scheme": "dhcp-19"}
+        else:
+            entry[file.key] = str(file.path)
+        if "labels" in series.files:
+            entry |= {"scheme": series.scheme, "affine_from": series.affine_from}
+        else:
+            entry["coordinates"] = series.coordinates
     return list(entries.values())
 
 
-def atlas_problems(atlas: AtlasSettings, files: list[AtlasFile], *, downloading: bool) -> list[str]:
-    """Returns what is wrong between the atlas section and its folder.
-
-    Parameters
-    ----------
-    files
-        Those of `atlas_files`.
-    downloading
-        Whether missing files are about to be fetched; else they are problems.
-    """
-    folder = Path(atlas.folder)
-    if folder.exists() and not folder.is_dir():
-        return [f"atlas.folder: {folder} is a file; it should be a folder"]
-    twice = sorted({week for week in atlas.weeks if atlas.weeks.count(week) > 1})
-    problems = [f"atlas.weeks: found {_listed(twice)} more than once"] if twice else []
-    problems += [
-        f"atlas.folder: found {' and '.join(map(str, file.copies))}; keep one of them"
-        for file in files
-        if len(file.copies) > 1
-    ]
-    there = _in_folder(folder)
-    for source in atlas.sources:
-        missing = [file for file in files if file.source == source and file.needed and not file.present]
-        needed = [set(there.get((source, key), {})) for key in LAYOUTS[source].needed]
-        problems += _missing_problems(missing, source, folder, set.intersection(*needed), downloading)
-    return problems
-
-
-def _missing_problems(
-    missing: list[AtlasFile], source: str, folder: Path, present: set[float], downloading: bool
-) -> Iterator[str]:
-    """Yields what is to be said of the missing files of one source: weeks to download, and weeks that can't be."""
-    have = f"present: {_listed(sorted(present))}" if present else "none is there"
-    weeks = sorted({file.week for file in missing})
-    unpublished = [week for week in weeks if week not in PUBLISHED_WEEKS]
-    if unpublished:
+def atlas_problems(used: UsedAtlas) -> Iterator[str]:
+    """Yields what is wrong between a section, its atlas and its folder, each with its key in front."""
+    atlas, settings = used.atlas, used.settings
+    unknown = [name for name in used.series if name not in atlas.series]
+    if unknown:
+        yield f"series: found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}"
+        return
+    if used.folder.exists() and not used.folder.is_dir():
+        yield f"folder: {used.folder} is a file; it should be a folder"
+        return
+    licence = atlas.licence
+    if licence.accept and not settings.accept_licence:
         yield (
-            f"atlas.weeks: {folder} has no {source} files of {_named(unpublished)}; {have}. The published atlas has "
-            f"whole weeks {PUBLISHED_WEEKS[0]:g} to {PUBLISHED_WEEKS[-1]:g}; a week is never rounded"
+            f"accept_licence: found false; the licence of {atlas.name} ({licence.name}"
+            + (f", {licence.url}" if licence.url else "")
+            + f") is to be accepted: {licence.terms} Write `accept_licence: true` if you do"
         )
-    fetched = [week for week in weeks if week in PUBLISHED_WEEKS]
-    if fetched and not downloading:
-        first = next(file for file in missing if file.week in fetched)
+    yield from _week_problems(used)
+    for file in used.files:
+        if len(file.copies) > 1:
+            yield f"folder: found {' and '.join(map(str, file.copies))}; keep one of them"
+        elif not file.copies and file.url is None:
+            yield f"weeks: {file.path} is missing and cannot be fetched, as {atlas.name} has no url for it"
+        elif file.copies and file.record.sha256 not in (None, sha256_of(file.path)):
+            yield (
+                f"folder: {file.path} is not the file of {atlas.name}: its SHA-256 is not {file.record.sha256}. Delete "
+                "it, and it is fetched; or give a changed file as a brain of your own under brains"
+            )
+
+
+def _week_problems(used: UsedAtlas) -> Iterator[str]:
+    """Yields the weeks that none of the series has."""
+    have = {week for name in used.series for week in (*used.atlas.series[name].weeks, *used.present_weeks(name))}
+    lacking = [week for week in sorted(used.settings.weeks or ()) if week not in have]
+    if lacking:
+        weeks = f"week{'s' if len(lacking) > 1 else ''} {_listed(lacking)}"
+        chosen = "" if used.settings.series is None else f" ({', '.join(used.series)})"
         yield (
-            f"atlas.weeks: {folder} lacks the {source} files of {_named(fetched)}, such as {first.path.name}; {have}. "
-            "`./run snakemake --cores 1 download` with this configuration fetches them; or take the weeks out"
+            f"weeks: {used.atlas.name}{chosen} has no files of {weeks}; it has {_listed(sorted(have))}. A week is "
+            "never rounded"
         )
 
 
-def _in_folder(folder: Path) -> dict[tuple[str, str], dict[float, list[Path]]]:
-    """Returns the atlas files anywhere in a folder, by source and key, then by week."""
-    patterns = {
-        (source, key): re.compile(re.escape(Path(path).name).replace(r"\{\}", r"(\d+(?:\.\d+)?)"))
-        for source, layout in LAYOUTS.items()
-        for key, path in layout.paths.items()
-    }
-    found: dict[tuple[str, str], dict[float, list[Path]]] = {}
-    for path in sorted(folder.rglob("*.gii")) + sorted(folder.rglob("*.nii.gz")):
-        for place, pattern in patterns.items():
-            match = pattern.fullmatch(path.name)
-            if match and path.is_file():
-                found.setdefault(place, {}).setdefault(float(match[1]), []).append(path)
-    return found
-
-
-def _named(weeks: list[float]) -> str:
-    return f"week{'s' if len(weeks) > 1 else ''} {_listed(weeks)}"
+def retrieval_note(used: UsedAtlas) -> str:
+    """Returns what a user is told before missing files of an atlas are fetched: how much, from whom, on which terms."""
+    atlas, sizes = used.atlas, [file.record.bytes for file in used.missing]
+    size = f" ({sum(size or 0 for size in sizes) / 1e6:.1f} MB)" if all(sizes) else ""
+    checks = "" if all(file.record.sha256 for file in used.missing) else "; no checksums are known"
+    count = f"{len(sizes)} file{'s' if len(sizes) > 1 else ''}"
+    lines = [f"{atlas.name}: {count}{size} to fetch into {used.folder} where a stage needs them{checks}"]
+    lines += [f"cite: {atlas.reference.text}"] if atlas.reference else []
+    address = f" ({atlas.licence.url})" if atlas.licence.url else ""
+    return "\n  ".join([*lines, f"licence: {atlas.licence.name}{address}. {atlas.licence.terms}"])
 
 
 def _listed(weeks: list[float]) -> str:

@@ -24,7 +24,11 @@ KINDS = {
 
 VOLUMES = ("labels", "segmentation")
 """Sources that give a label volume."""
-MEANINGS = {"scheme": VOLUMES, "image": VOLUMES, "affine_from": VOLUMES, "coordinates": ("hemispheres", "pial")}
+MEANINGS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("scheme", "image", "affine_from"), VOLUMES),
+    "coordinates": ("hemispheres", "pial"),
+    "population": tuple(source for source in SOURCES if source not in ("phantom", "shape")),
+}
 """Keys that belong to some sources only."""
 PLACEHOLDERS = ("{image}", "{labels}")
 """What stands for the two files in a command that segments."""
@@ -69,6 +73,10 @@ class Brain(Settings):
         ..., "", "Name in result paths and tables: letters, digits, - _ .", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
     )
     week: Week = setting(..., "GW", "Gestational age.")
+    population: str | None = setting(
+        None, "", "What figures and tables call the brain, as `spina bifida aperta, unoperated`; `null`: real brain.",
+        min_length=1,
+    )  # fmt: skip
     labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI).")
     image: InputFile | None = setting(
         None, "", "T2-weighted volume (NIfTI): what `segmentation` works on; with `labels`, for a figure only."

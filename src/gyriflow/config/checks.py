@@ -132,7 +132,12 @@ def growth_problems(
     for name, chosen in lists.items():
         if (reason := _too_few_weeks(chosen, weeks)) is not None:
             yield Problem(reason, paths[name])
-    series = growth_series({brain.id: KINDS[brain.source] for brain in brains}, weeks, given)
+    populations = {brain.id: brain.population if brain.has("population") else None for brain in brains}
+    for name, chosen in lists.items() if isinstance(given, Mapping) else ():
+        mixed = sorted({populations[brain] or "of no known population" for brain in chosen})
+        if len(mixed) > 1:
+            yield Problem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", paths[name])
+    series = growth_series({brain.id: KINDS[brain.source] for brain in brains}, weeks, given, populations)
     wanted = growth.estimated_from if growth.has("estimated_from") else None
     if wanted is not None and series and wanted not in series:
         yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))

@@ -7,15 +7,17 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
+from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING
-from ..parameters.messages import line, messages
-from .atlas import AtlasSettings, atlas_brains, atlas_files, atlas_problems
+from ..parameters.messages import dotted, line, messages
+from .atlas import AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections, unknown_atlas
+from .atlas_description import Atlas
 from .root import Config
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
 
 
-def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: bool = False) -> Config:
+def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
     """Returns the validated configuration, with input files as absolute paths.
 
     Parameters
@@ -24,8 +26,6 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: boo
         The configuration as read from YAML.
     base_dir
         Folder of the configuration file, for relative paths.
-    downloading
-        Whether the files of the atlas are about to be fetched, so that they need not be there yet.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, downloading: boo
     """
     plain = {"folding": {}} | _plain(raw)
     plain["runs"] = _complete_runs(plain.get("runs"), plain.get("folding"))
-    plain["atlas"], of_atlas, problems = _atlas(plain.get("atlas"), Path(base_dir), downloading=downloading)
+    plain["atlas"], of_atlas, problems = _atlases(plain.get("atlas"), Path(base_dir))
     if of_atlas:
         plain["brains"] = [*(plain.get("brains") or ()), *of_atlas]
     awaited = [path for entry in of_atlas for path in _texts(entry)]
@@ -80,19 +80,46 @@ def _merged(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
     return both
 
 
-def _atlas(raw: Any, base_dir: Path, *, downloading: bool) -> tuple[Any, list[dict[str, Any]], list[str]]:
-    """Returns the atlas section with its folder as an absolute path, the brains that it stands for, and problems."""
+def _atlases(raw: Any, base_dir: Path) -> tuple[Any, list[dict[str, Any]], list[str]]:
+    """Returns the sections of `atlas` with absolute paths, the brains that they stand for, and problems.
+
+    Where one is wrong, so that its brains are not known, there are no sections (None).
+    """
+    sections: list[AtlasSettings] = []
+    entries: list[dict[str, Any]] = []
+    problems: list[str] = []
+    for path, section in atlas_sections(raw):
+        where = dotted(path)
+        try:
+            settings = AtlasSettings.model_validate(section).located(base_dir)
+        except ValidationError as error:
+            problems += [line((*path, *place), text) for place, text in messages(error, AtlasSettings)]
+            continue
+        atlas = _description(settings, where, problems)
+        if atlas is None:
+            continue
+        used = UsedAtlas(settings, atlas)
+        found = [f"{where}.{problem}" for problem in atlas_problems(used)]
+        problems += found
+        if not found:
+            sections.append(settings)
+            entries += atlas_brains(used)
+    # no valid value: checks that need the ids of all brains then know that these are not all
+    return None if problems else sections, entries, problems
+
+
+def _description(settings: AtlasSettings, where: str, problems: list[str]) -> Atlas | None:
+    """Returns what the `atlas.yaml` of a section says, or adds what is wrong with it to `problems`."""
+    if (unknown := unknown_atlas(settings)) is not None:
+        problems.append(f"{where}.{unknown}")
+        return None
     try:
-        atlas = None if raw is None else AtlasSettings.model_validate(raw)
-    except ValidationError:
-        return raw, [], []
-    if atlas is None:
-        return None, [], []
-    places = [base_dir / Path(atlas.folder).expanduser(), Path.cwd() / atlas.folder]
-    folder = next((place for place in places if place.exists()), places[0])
-    atlas = atlas.model_copy(update={"folder": str(folder.resolve())})
-    files = atlas_files(atlas)
-    return atlas, atlas_brains(files), atlas_problems(atlas, files, downloading=downloading)
+        return Atlas.model_validate(read_yaml(settings.description))
+    except InputError as error:
+        problems.append(f"{where}.file: {error}")
+    except ValidationError as error:
+        problems += [f"{settings.description}: {line(place, text)}" for place, text in messages(error, Atlas)]
+    return None
 
 
 def _texts(value: Any) -> list[str]:
@@ -103,7 +130,7 @@ def _texts(value: Any) -> list[str]:
 
 
 def _lines(error: ValidationError) -> list[str]:
-    """Returns the problems as lines; what a run has from `folding` is said there only."""
-    found = dict.fromkeys(messages(error, Config))
+    """Returns the problems as lines but those of atlases; what a run has from `folding` is said there only."""
+    found = [(path, text) for path, text in dict.fromkeys(messages(error, Config)) if path[0] != "atlas"]
     of_folding = {(path[1:], text) for path, text in found if path[0] == "folding"}
     return [line(path, text) for path, text in found if path[0] != "runs" or (path[2:], text) not in of_folding]

@@ -42,13 +42,18 @@ class MetricsSettings(Settings):
     age_reference: tuple[str, ...] | None = setting(
         None, "",
         "Ids of the measured brains from which the apparent age of a surface is estimated, of five weeks or more. "
-        "`null`: all that are not synthetic, or all phantoms where there are no others; no age profile with fewer "
-        "than five weeks.",
+        "`null`: all that are not synthetic (of several populations, that of the start brain), or all phantoms where "
+        "there are no others; no age profile with fewer than five weeks.",
     )  # fmt: skip
 
 
-def age_reference(brains: Sequence[Brain], given: tuple[str, ...] | None) -> list[str]:
-    """Returns the ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
+def age_reference(brains: Sequence[Brain], given: tuple[str, ...] | None, population: str | None = None) -> list[str]:
+    """Returns the ids of the brains from which apparent ages are estimated; none where they are of too few weeks.
+
+    Where none are `given` and the real ones are of several populations, those of `population` are taken.
+    """
     real = [brain for brain in brains if not brain.synthetic] or [b for b in brains if b.source == "phantom"]
+    if len({brain.population for brain in real}) > 1:
+        real = [brain for brain in real if brain.population == population]
     chosen = real if given is None else [brain for brain in brains if brain.id in given]
     return [brain.id for brain in chosen] if len({brain.week for brain in chosen}) >= LEAST_AGE_WEEKS else []

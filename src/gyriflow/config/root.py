@@ -5,12 +5,14 @@ from typing import Any
 
 from pydantic import field_validator
 
+from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING, FoldingSettings, bounds_of, output_weeks
 from ..parameters.schemes import SCHEMES, LabelScheme, SchemeSettings
 from ..parameters.settings import Problem, Settings, check, refused, setting
 from ..parameters.varying import Varying, files_of
 from . import checks
-from .atlas import AtlasFile, AtlasSettings, atlas_files
+from .atlas import AtlasSettings, UsedAtlas
+from .atlas_description import Atlas
 from .brains import KINDS, Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
@@ -19,6 +21,8 @@ from .report import ReportSettings
 from .runs import Run, Start, start_ids
 from .surface import SurfaceSettings
 
+REAL_BRAIN = "real brain"
+"""What a measured brain is called whose population is not known."""
 PHANTOM_SCHEME = "spina-bifida-atlas"
 """Phantoms have the labels of this atlas."""
 
@@ -30,7 +34,11 @@ class Config(Settings):
         (), "", "The brains: those that are folded, others to compare with and to estimate growth from. Needed without "
         "`atlas`.",
     )  # fmt: skip
-    atlas: AtlasSettings | None = setting(None, "", "The dHCP atlases as further brains.")
+    atlas: tuple[AtlasSettings, ...] = setting(
+        (), "",
+        "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of "
+        "these.",
+    )  # fmt: skip
     schemes: dict[str, SchemeSettings] = setting(
         {}, "", "Label schemes by name, beside those that gyriflow has; for the brains' `scheme`."
     )
@@ -64,7 +72,7 @@ class Config(Settings):
 
     @check
     def _some_brains(self) -> Iterator[Problem]:
-        if not self.brains and self.atlas is None:
+        if not self.brains and self.has("atlas") and not self.atlas:
             text = "found nothing; expected a list of brains, each with id, week and a source"
             yield Problem(text, ("brains",))
 
@@ -106,18 +114,24 @@ class Config(Settings):
         raise KeyError(name)
 
     def measured_name(self, brains: Iterable[str]) -> str:
-        """Returns what measured brains of these ids are called in figures: real ones only where one is among them.
+        """Returns what measured brains of these ids are called in figures and tables: their populations where known.
 
-        Shapes go by their kind where all are of one.
+        Several populations have their weeks with them. Real brains of no known population are a "real brain"; shapes go
+        by their kind where all are of one.
         """
         chosen = [self.brain(name) for name in brains]
+        populations: dict[str, list[float]] = {}
+        for brain in chosen:
+            if not brain.synthetic:
+                populations.setdefault(brain.population or REAL_BRAIN, []).append(brain.week)
+        several = len(populations) > 1
         kinds = sorted({brain.shape.kind for brain in chosen if brain.shape is not None})
         names = [
-            "real brain" if not all(brain.synthetic for brain in chosen) else "",
+            *(f"{name} ({_span(weeks)} GW)" if several else name for name, weeks in populations.items()),
             "phantom" if any(brain.source == "phantom" for brain in chosen) else "",
             (kinds[0] if len(kinds) == 1 else "simple shape") if kinds else "",
         ]
-        return " or ".join(name for name in names if name) or "real brain"
+        return " or ".join(name for name in names if name) or REAL_BRAIN
 
     def scheme(self, brain: Brain) -> dict[str, Any]:
         """Returns the scheme of a brain's labels, the fields of a `LabelScheme`; for a phantom too."""
@@ -127,20 +141,9 @@ class Config(Settings):
         return scheme.model_dump()
 
     @property
-    def downloads(self) -> dict[str, str]:
-        """The URL of each file of the atlas, by its path in the atlas folder."""
-        return {name: file.url for name, file in self._atlas_files.items()}
-
-    @property
-    def optional_downloads(self) -> list[str]:
-        """The files among `downloads` that no brain needs."""
-        return [name for name, file in self._atlas_files.items() if not file.needed]
-
-    @property
-    def _atlas_files(self) -> dict[str, AtlasFile]:
-        if self.atlas is None:
-            return {}
-        return {str(file.path.relative_to(self.atlas.folder)): file for file in atlas_files(self.atlas)}
+    def atlases(self) -> list[UsedAtlas]:
+        """The atlases with what their descriptions say, as the files lie at this moment."""
+        return [UsedAtlas(section, Atlas(**read_yaml(section.description))) for section in self.atlas]
 
     def run(self, name: str) -> FoldingSettings:
         """Returns the complete settings of a run."""
@@ -171,7 +174,9 @@ class Config(Settings):
     def growth_series(self) -> dict[str, list[str]]:
         """The ids of the brains of each series of growth rates, by its name; none where they are all of one week."""
         kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
-        return growth_series(kinds, {brain.id: brain.week for brain in self.brains}, self.growth.brains)
+        populations = {brain.id: brain.population for brain in self.brains}
+        weeks = {brain.id: brain.week for brain in self.brains}
+        return growth_series(kinds, weeks, self.growth.brains, populations)
 
     def estimated_from(self, brain: str) -> str | None:
         """Returns the series that `estimated` rates are taken from where a brain is the start; None without one."""
@@ -180,7 +185,7 @@ class Config(Settings):
     @property
     def age_reference(self) -> list[str]:
         """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
-        return age_reference(self.brains, self.metrics.age_reference)
+        return age_reference(self.brains, self.metrics.age_reference, self.brain(self.start_brains[0]).population)
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.
@@ -209,3 +214,8 @@ class Config(Settings):
         """Returns the parameters of a run that are curves or maps."""
         values = {name: getattr(self.runs[run], name) for name in VARYING}
         return {name: value for name, value in values.items() if isinstance(value, Varying)}
+
+
+def _span(weeks: list[float]) -> str:
+    first, last = min(weeks), max(weeks)
+    return f"{first:g}" if first == last else f"{first:g}–{last:g}"

@@ -1,27 +1,26 @@
-"""Files fetched from a server into a folder: each whole or not there, gone on with where a connection broke, checked.
+"""Files fetched from a server: each whole or not there, gone on with where a connection broke, checked.
 
-The SHA-256 of each file is recorded on first use in `checksums.txt` of the folder, a registry in pooch's format.
+Bytes are gathered in a hidden file `.part.NAME` beside the file, which outlives a broken connection and the process.
 """
 
 import fcntl
 import gzip
-import os
-import shlex
+import hashlib
+import shutil
 import time
 import zlib
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from gyriflow.errors import StorageError
-from gyriflow.io.files import AnyPath, replaced
+from gyriflow.io.files import AnyPath
 
 if TYPE_CHECKING:
     import requests
 
-CHECKSUMS = "checksums.txt"
 TRIES = 4
 """Tries that bring not a byte more than those before, after which a file is given up."""
 FIRST_WAIT_S = 0.5
@@ -32,126 +31,91 @@ LINE_EVERY_S = 5.0
 """How often a long download says how far it is."""
 CHUNK_BYTES = 1 << 16
 BYTES_PER_MB = 1e6
+PART = ".part."
+"""What the name of a half file begins with; its end is that of the file, by which readers know its kind."""
 
 Say = Callable[[str], None]
 
 
-def fetch(folder: AnyPath, urls: Mapping[str, str], say: Say, optional: Collection[str] = ()) -> list[str]:
-    """Fetches the files that a folder lacks and checks those that it has; returns the names of those fetched.
+def sha256_of(path: AnyPath) -> str:
+    """Returns the SHA-256 of a file; StorageError where it cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise StorageError("cannot be read", path=path, found=error.strerror or error) from error
+
+
+def fetch(path: AnyPath, url: str, say: Say, *, sha256: str | None = None, size: int | None = None) -> None:
+    """Fetches a file, or checks the one that is there, which is never replaced.
 
     Parameters
     ----------
-    folder
-        Made where it is missing.
-    urls
-        Where each file is to be had, by its path in the folder.
+    path
+        Where the file is put, whole and checked; missing folders are made.
+    url
+        Where it is to be had.
     say
         Is called with a line of progress.
-    optional
-        Files among them that the server may lack.
+    sha256
+        Its checksum; where there is none, the file has to be a GIFTI or NIfTI file that can be read to its end.
+    size
+        Its size in bytes, for which there has to be room.
 
     Raises
     ------
     StorageError
-        Where files are torn or not those recorded on first use (all of them named), the server cannot be reached, lacks
-        files (named after all others are there) or sends something else, or the folder cannot be written. Files fetched
-        before stay. What came of a broken one lies in a hidden `.NAME.part`, with which the next call goes on.
+        Where the server cannot be reached, lacks the file or sends something else, the file that is there is another
+        one, another process fetches it, or the folder cannot be written. Nothing is left under `path` then; what came
+        of a broken download lies in `.part.NAME`, with which the next call goes on.
     """
     import pooch
 
-    folder = Path(folder)
+    path = Path(path)
     pooch.get_logger().setLevel("WARNING")
-    with _alone_in(folder):
-        store = pooch.create(path=folder, base_url="", urls=dict(urls))
-        if (folder / CHECKSUMS).is_file():
-            with _refused(folder / CHECKSUMS):
-                store.load_registry(folder / CHECKSUMS)
-        present = [name for name in urls if (folder / name).is_file()]
-        missing = [name for name in urls if name not in present]
-        sums = _checked(folder, present, store.registry)
-        if present:
-            new = sum(name not in store.registry for name in present)
-            say(f"{len(present)} of {len(urls)} files are there: {len(present) - new} as recorded, {new} recorded now")
-        _record(folder, sums)
-        absent = []
-        for number, name in enumerate(missing, 1):
-            say(f"{number} of {len(missing)}: {name}")
-            store.registry.setdefault(name, None)
-            part = (folder / name).with_name(f".{Path(name).name}.part")
-            with _refused(folder / name, urls[name]):
-                try:
-                    store.fetch(name, downloader=partial(_download, part=part, say=say))
-                except FileNotFoundError:
-                    absent.append(name)
-                    continue
-            sums[name] = pooch.file_hash(str(folder / name))
-            _record(folder, sums)
-    lacking = [name for name in absent if name in optional]
-    if lacking:
-        say(f"the server has no {', '.join(lacking)}: not needed")
-        missing = [name for name in missing if name not in lacking]
-        absent = [name for name in absent if name not in lacking]
-    if absent:
-        raise StorageError(
-            f"the server has no such file: {', '.join(urls[name] for name in absent)}",
-            path=folder,
-            remedy="All others are there. Take those out of the configuration, or give the address of another server.",
-        )
-    return missing
+    with _refused(path, url):
+        if path.exists():
+            _check(path, path.name, sha256)
+            say(f"{path} is there already")
+            return
+        path.parent.mkdir(parents=True, exist_ok=True)
+        free = shutil.disk_usage(path.parent).free
+        if size is not None and free < size:
+            raise StorageError(f"no room for {size} bytes; {free} are free", path=path.parent)
+        part = path.with_name(PART + path.name)
+        with _alone_with(part) as file:
+            pooch.retrieve(
+                url,
+                known_hash=None if sha256 is None else f"sha256:{sha256}",
+                fname=path.name,
+                path=path.parent,
+                downloader=partial(_download, part=part, file=file, say=say, sha256=sha256),
+            )
+    say(f"{path}: SHA-256 {sha256_of(path)}" + ("" if sha256 else ", as it came; no checksum is known"))
 
 
 @contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Makes a folder and holds it, so that no two downloads write the same file."""
-    with _refused(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        handle = os.open(folder, os.O_RDONLY)
-    try:
+def _alone_with(part: Path) -> Iterator[IO[bytes]]:
+    """Opens a half file, made where it is missing, and holds it, so that no two downloads write it."""
+    with part.open("ab") as file:
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise StorageError("another download into this folder is running", path=folder) from None
+            raise StorageError("another download of this file is running", path=part) from None
         except OSError:  # a file system without locks, as some networks have
             pass
-        yield
-    finally:
-        os.close(handle)
+        try:
+            yield file
+        finally:
+            if part.exists() and not part.stat().st_size:
+                part.unlink()
+                _version_file(part).unlink(missing_ok=True)
 
 
-def _checked(folder: Path, names: Sequence[str], recorded: Mapping[str, str]) -> dict[str, str]:
-    """Returns the checksums by name, those of new files added; StorageError names all that are changed or torn."""
-    import pooch
-
-    sums = {name: pooch.file_hash(str(folder / name)) for name in names}
-    changed = [name for name in names if name in recorded and recorded[name] != sums[name]]
-    torn = [name for name in names if name not in recorded and _what_is_wrong(folder / name)]
-    if changed or torn:
-        parts = [
-            f"not as recorded on first use: {', '.join(changed)}" if changed else "",
-            f"torn or something else: {', '.join(torn)}" if torn else "",
-        ]
-        raise StorageError(
-            f"holds {len(changed + torn)} damaged or changed files",
-            path=folder,
-            found="; ".join(part for part in parts if part),
-            expected=f"the checksums in {CHECKSUMS}" if changed else "whole GIFTI and NIfTI files",
-            remedy="Delete the damaged ones and download again; where a change is meant, delete the file's line in "
-            f"{CHECKSUMS}.",
-        )
-    return dict(recorded) | sums
-
-
-def _record(folder: Path, sums: Mapping[str, str]) -> None:
-    if sums:
-        with replaced(folder / CHECKSUMS) as part:
-            part.write_text("".join(f"{shlex.quote(name)} {sums[name]}\n" for name in sorted(sums)), encoding="utf-8")
-
-
-def _download(url: str, output_file: str, _pooch: object, *, part: Path, say: Say) -> None:
-    """Makes a file of a URL, as pooch asks its downloaders to; FileNotFoundError where the server has none.
-
-    Bytes are gathered in `part`, which outlives a broken connection and this process.
-    """
+def _download(
+    url: str, output_file: str, _pooch: object, *, part: Path, file: IO[bytes], say: Say, sha256: str | None
+) -> None:
+    """Makes a file of a URL, as pooch asks its downloaders to, out of what is gathered in `part`."""
     import requests
     import urllib3
 
@@ -160,34 +124,33 @@ def _download(url: str, output_file: str, _pooch: object, *, part: Path, say: Sa
     tries, most = TRIES, 0
     while True:
         try:
-            _go_on(url, part, say)
+            _go_on(url, part, file, say)
             break
         except (requests.RequestException, urllib3.exceptions.HTTPError) as error:
             response = getattr(error, "response", None)
             status = 0 if response is None else response.status_code
-            if status in (404, 410):
-                raise FileNotFoundError(url) from error
-            size = part.stat().st_size if part.exists() else 0
+            size = part.stat().st_size
             tries = TRIES - 1 if size > most else tries - 1
             most = max(most, size)
             # 4xx is an answer that stays the same, but for a server that is asked too often
             if not tries or (400 <= status < 500 and status != 429):
                 raise
             time.sleep(FIRST_WAIT_S * 2 ** (TRIES - 1 - tries))
-    wrong = _what_is_wrong(part, name=Path(url).name)
-    if wrong:
-        _drop(part)
-        raise ValueError(wrong)
+    try:
+        _check(part, part.name.removeprefix(PART), sha256)
+    except ValueError:
+        _empty(part, file)
+        raise
     part.replace(output_file)
-    _drop(part)
+    _version_file(part).unlink(missing_ok=True)
 
 
-def _go_on(url: str, part: Path, say: Say) -> None:
+def _go_on(url: str, part: Path, file: IO[bytes], say: Say) -> None:
     """Adds to a half file what it lacks, where the server can send that and has the same version still; else all."""
     import requests
 
     version = _version_file(part)
-    have = part.stat().st_size if part.exists() and version.exists() else 0
+    have = part.stat().st_size if version.exists() else 0
     # without compression on the way, positions in the file are those in the answer
     headers = {"Accept-Encoding": "identity"}
     if have:
@@ -195,26 +158,31 @@ def _go_on(url: str, part: Path, say: Say) -> None:
     with requests.get(url, stream=True, headers=headers, timeout=TIMEOUT_S) as response:
         resumed = response.status_code == 206 and response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
         if response.status_code == 416 or (response.status_code == 206 and not resumed):
-            _drop(part)
-            raise requests.RequestException("the server sent another part of the file than the one asked for")
+            _empty(part, file)
+            raise requests.ConnectionError("the server sent another part of the file than the one asked for")
         response.raise_for_status()
         if not resumed:
-            _drop(part)
+            _empty(part, file)
             have = 0
             if mark := _version_of(response):
                 version.write_text(mark)
         length = response.headers.get("Content-Length")
         total = have + int(length) if length else None
         told = time.monotonic()
-        with part.open("ab") as file:
-            for chunk in response.raw.stream(CHUNK_BYTES, decode_content=False):
-                file.write(chunk)
-                have += len(chunk)
-                if time.monotonic() - told > LINE_EVERY_S:
-                    told = time.monotonic()
-                    say(f"  {have / BYTES_PER_MB:.1f} MB" + (f" of {total / BYTES_PER_MB:.1f}" if total else ""))
+        for chunk in response.raw.stream(CHUNK_BYTES, decode_content=False):
+            file.write(chunk)
+            file.flush()
+            have += len(chunk)
+            if time.monotonic() - told > LINE_EVERY_S:
+                told = time.monotonic()
+                say(f"  {have / BYTES_PER_MB:.1f} MB" + (f" of {total / BYTES_PER_MB:.1f}" if total else ""))
     if total is not None and have != total:
         raise requests.ConnectionError(f"the connection broke after {have} of {total} bytes")
+
+
+def _empty(part: Path, file: IO[bytes]) -> None:
+    file.truncate(0)
+    _version_file(part).unlink(missing_ok=True)
 
 
 def _version_file(part: Path) -> Path:
@@ -228,14 +196,28 @@ def _version_of(response: "requests.Response") -> str | None:
     return tag if tag and not tag.startswith("W/") else response.headers.get("Last-Modified")
 
 
-def _drop(part: Path) -> None:
-    part.unlink(missing_ok=True)
-    _version_file(part).unlink(missing_ok=True)
+def _check(path: Path, name: str, sha256: str | None) -> None:
+    """Raises ValueError where a file is not the one of a checksum or, where none is known, no whole one of its kind."""
+    kind = _what_is_wrong(path, name)
+    if kind:
+        raise ValueError(kind)
+    if sha256 is not None and (found := sha256_of(path)) != sha256:
+        raise ValueError(f"the SHA-256 {found} instead of {sha256}")
+    if sha256 is None and name.endswith((".nii", ".nii.gz", ".gii")):
+        import nibabel as nib
+        import numpy as np
+
+        try:
+            image = nib.load(path)
+            # a GIFTI file is read at once, a NIfTI file lazily
+            if isinstance(image, nib.Nifti1Image):
+                np.asanyarray(image.dataobj)
+        except Exception as error:
+            raise ValueError(f"a file that cannot be read: {error}") from error
 
 
-def _what_is_wrong(path: Path, name: str | None = None) -> str | None:
+def _what_is_wrong(path: Path, name: str) -> str | None:
     """Returns what shows that a file is not a whole one of the kind its name says; None for a good or unknown one."""
-    name = name or path.name
     with path.open("rb") as file:
         start = file.read(1024)
     if name.endswith(".gz"):
@@ -251,7 +233,7 @@ def _what_is_wrong(path: Path, name: str | None = None) -> str | None:
 
 
 @contextmanager
-def _refused(path: Path, url: str | None = None) -> Iterator[None]:
+def _refused(path: Path, url: str) -> Iterator[None]:
     """Turns what goes wrong with a file, or on the way from its URL, into a StorageError."""
     import requests
     import urllib3
@@ -263,19 +245,23 @@ def _refused(path: Path, url: str | None = None) -> Iterator[None]:
             "cannot be fetched",
             path=url,
             found=_cause(error),
-            remedy="Check the network, and HTTPS_PROXY where there is a proxy. The same command goes on with what is "
-            f"missing; files may also be copied into {path.parent} by hand.",
+            remedy="Check the address, the network, and HTTPS_PROXY where there is a proxy. The same command goes on "
+            f"with what is missing; the file may also be put into {path.parent} by hand.",
         ) from error
     except ValueError as error:
-        known = "SHA256" in str(error)
+        if path.exists():
+            raise StorageError(
+                "is not the file of the atlas",
+                path=path,
+                found=error,
+                remedy="It was left as it is. Move it away, and the file is fetched.",
+            ) from error
         raise StorageError(
-            "the server's file is not the one recorded on first use" if known else "the server sent something else",
+            "the server sent something else than the file",
             path=url,
             found=error,
-            expected=f"the checksum in {CHECKSUMS}" if known else f"the file {path.name}",
-            remedy=f"It was not kept. If the atlas has a new version, delete the file's line in {CHECKSUMS}."
-            if known
-            else "It was not kept. Check the address, and whether the network asks for a login.",
+            expected=path.name,
+            remedy="It was not kept. Check the address, and whether the network asks for a login.",
         ) from error
     except OSError as error:
         raise StorageError(

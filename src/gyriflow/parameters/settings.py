@@ -138,7 +138,10 @@ def setting(default: Any, unit: str, description: str, *, word: str | None = Non
 def valid_part(kind: Any, raw: Any, context: Any, *, whole: bool) -> Any:
     """Returns what is valid of a value of the type `kind`: settings, and settings in lists and tables, in part."""
     if whole:
-        return TypeAdapter(kind).validate_python(raw, context=context)
+        try:
+            return TypeAdapter(kind).validate_python(raw, context=context)
+        except ValidationError:  # of a value that a validator of its field makes valid
+            return _NOTHING
     arguments = get_args(kind)
     if isinstance(kind, type) and issubclass(kind, Settings):
         given = raw if isinstance(raw, Mapping) else {}

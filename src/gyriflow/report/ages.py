@@ -24,6 +24,7 @@ from .style import (
     styled,
     week_axis,
     week_label,
+    wrapped,
 )
 
 ALL, FREE_OF_SIZE = "all", "all without size"
@@ -96,9 +97,8 @@ def _of_last_week(brains: pd.DataFrame, week: float) -> pd.DataFrame:
 
 def _errors(left_out: pd.DataFrame, measured: str) -> str:
     means = left_out.groupby("metric")["mean_absolute_error"].first()
-    return (
-        f"{measured}, left out: mean error {means[ALL]:.2f} GW,\nwithout metrics of size {means[FREE_OF_SIZE]:.2f} GW"
-    )
+    errors = f"mean error {means[ALL]:.2f} GW,\nwithout metrics of size {means[FREE_OF_SIZE]:.2f} GW"
+    return wrapped(f"{measured}, left out:" + (" " if len(measured) < 20 else "\n") + errors, 50)
 
 
 def _marker(flag: str, inside: str) -> str:

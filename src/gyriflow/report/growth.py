@@ -20,6 +20,7 @@ from .style import (
     new_figure,
     styled,
     week_axis,
+    wrapped,
 )
 
 PANEL_HEIGHT_IN = 2.6
@@ -64,7 +65,7 @@ def growth_chart(
     drawn: list[Axes] = []
     for name, colour in colours.items():
         axes = next(panels)
-        heading = "tangential growth rate" if len(names) == 1 else f"tangential growth rate: {name}"
+        heading = "tangential growth rate" if len(names) == 1 else wrapped(f"tangential growth rate: {name}", 50)
         _rates_panel(axes, rates[rates["series"] == name], colour, heading, folding_rate_per_s)
         drawn.append(axes)
     limits = np.array([axes.get_ylim() for axes in drawn])
@@ -93,7 +94,7 @@ def _sizes_panel(axes: Axes, areas: pd.DataFrame, colours: Mapping[str, str], me
         from_zero(each)
     week_axis(axes, areas["week"])
     light_grid(axes)
-    axes.set_title(f"{measured}: area and volume")
+    axes.set_title(wrapped(f"{measured}: area and volume", 50))
     if not alone:
         handles = [Line2D([], [], color=colour, linewidth=4, label=name) for name, colour in colours.items()]
         handles.append(Line2D([], [], color="black", linestyle="-", marker="o", label="area"))

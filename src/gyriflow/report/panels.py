@@ -1,7 +1,7 @@
 """Pictures of surfaces side by side at one scale, with views, scale bar and colour bar."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -10,12 +10,13 @@ from matplotlib.patches import Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
 from .scene import View, half_extents, render
-from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note
+from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note, wrapped
 
 _PIXELS_PER_INCH = 300
 _MARGIN = 1.04
 _MAX_COLUMNS = 8
 _EDGE_IN = 0.1
+_LABEL_LETTERS = 26
 # part of the width that the scale bar may take; colour bars follow
 _SCALE_SHARE = 0.36
 _END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
@@ -90,18 +91,24 @@ def panel_grid(
     colour_bars : colour scales and their labels
     legend : entries of a legend
     """
+    rows = [replace(row, label=wrapped(row.label, _LABEL_LETTERS)) for row in rows]
     shown = [panel for row in rows for panel in row.panels if panel is not None]
     half_width = _MARGIN * max(half_extents(panel.mesh, panel.view)[0] for panel in shown)
     blocks = _blocks(columns, rows)
     most = max(len(heads) for heads, _ in blocks)
-    label_in = 0.42 if any("\n" in row.label for row in rows) else 0.24
+    lines = max(row.label.count("\n") for row in rows)
+    label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
     panel_in = min(1.75, (FULL_WIDTH_IN - label_in) / most)
     width = max(SINGLE_COLUMN_IN, label_in + most * panel_in)
     left_in = label_in + (width - label_in - most * panel_in) / 2
     layout = _Layout(width, left_in, panel_in, 0.66 if colour_bars or legend else 0.46, half_width)
 
     heading = [line for line in (title, synthetic_note(measured) if synthetic else "") if line]
-    head_in, block_head_in, caption_line_in = 0.1 + 0.16 * len(heading), 0.2, 0.13
+    # a letter of a column's heading is about 0.055 in wide
+    columns = [wrapped(column, int(panel_in / 0.055)) for column in columns]
+    blocks = _blocks(columns, rows)
+    head_in, caption_line_in = 0.1 + 0.16 * len(heading), 0.13
+    block_head_in = 0.2 + 0.12 * max(column.count("\n") for column in columns)
     heights = {id(row): _row_height_in(row, layout) for _, part in blocks for row in part}
     captions = {
         id(row): caption_line_in * max((len(p.caption.splitlines()) for p in row.panels if p), default=0)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
+from ..parameters.terms import BRIDGE, LEFT, RIGHT
 from .style import FULL_WIDTH_IN, RUN_COLOURS, new_figure, styled
 
 PLANES = {
@@ -27,7 +28,7 @@ PLANES = {
 }
 AXIS_NAMES = ("x: left − to right + (mm)", "y: posterior − to anterior + (mm)", "z: inferior − to superior + (mm)")
 SHOWN = ("coronal", "axial")
-HEMISPHERES = {1: ("left", "#0072B2"), 2: ("right", "#F0E442"), 3: ("between the planes", "#CC79A7")}
+HEMISPHERES = {LEFT: ("left", "#0072B2"), RIGHT: ("right", "#F0E442"), BRIDGE: ("between the planes", "#CC79A7")}
 GROWING = {1: ("growing", "#D55E00"), 0: ("no growth", "#56B4E9")}
 """Codes of the elements' tags, their names and colours, those of the boundary's zones, near the paper's."""
 GROWTH, STIFFNESS = "tangential growth per step (10⁻³)", "shear modulus (Pa)"

@@ -1,6 +1,7 @@
 """The look that all figures share: sizes for print, fonts, colour-blind-safe colours, headings."""
 
 import math
+import textwrap
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from functools import wraps
@@ -28,7 +29,9 @@ REAL_SURFACE_COLOUR = "#EBD6B4"
 MEASURED = "real"
 """The run name of measured brains."""
 REAL_BRAIN, PHANTOM = "real brain", "phantom"
-"""What brains that were not simulated are called."""
+"""What brains that were not simulated are called where their population is not known."""
+SYNTHETIC_NAMES = frozenset((PHANTOM, "simple shape", "sphere", "ellipsoid", "half-ellipsoid", "slab"))
+"""What brains are called that the workflow made itself."""
 _UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
 
 _SETTINGS: dict[Any, Any] = {
@@ -93,7 +96,17 @@ def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool
 
 def synthetic_note(measured: str = PHANTOM) -> str:
     """Returns the words under which a synthetic brain is shown, alone or beside brains that are called `measured`."""
-    return "simulated from a synthetic phantom" if REAL_BRAIN in measured else "synthetic phantom, not a real brain"
+    return "synthetic phantom, not a real brain" if all_synthetic(measured) else "simulated from a synthetic phantom"
+
+
+def all_synthetic(measured: str) -> bool:
+    """Returns whether brains called `measured`, several names joined by "or", were all made by the workflow."""
+    return set(measured.split(" or ")) <= SYNTHETIC_NAMES
+
+
+def wrapped(text: str, letters: int) -> str:
+    """Returns text with each of its lines broken between words so that it has about so many letters at most."""
+    return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.split("\n"))
 
 
 def shown_unit(unit: object) -> str:

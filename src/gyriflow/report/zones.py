@@ -10,25 +10,37 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, face_areas
+from ..parameters.terms import (
+    BASE,
+    BETWEEN_PLANES,
+    CLAMPED,
+    FLAT_CUTS,
+    FREE,
+    LEFT_CONTACT,
+    RIGHT_CONTACT,
+    SIDE_X,
+    SIDE_Y,
+    ZONE_NAMES,
+)
 from ..units import CM2_PER_MM2
 from .panels import Panel, Row, panel_grid
 from .scene import colour_scale, named_views, painted, restricted
 from .style import styled
 
 ZONE_VIEWS = ("left", "bottom", "left medial", "right medial")
-ZONES: Mapping[int, tuple[str, str]] = {
-    0: ("free", "#D55E00"),
-    1: ("clamped", "#009E73"),
-    2: ("left contact", "#0072B2"),
-    3: ("right contact", "#F0E442"),
-    4: ("between planes", "#CC79A7"),
-    5: ("base", "#999999"),
-    6: ("side x", "#56B4E9"),
-    7: ("side y", "#E69F00"),
+COLOURS = {
+    FREE: "#D55E00",
+    CLAMPED: "#009E73",
+    LEFT_CONTACT: "#0072B2",
+    RIGHT_CONTACT: "#F0E442",
+    BETWEEN_PLANES: "#CC79A7",
+    BASE: "#999999",
+    SIDE_X: "#56B4E9",
+    SIDE_Y: "#E69F00",
 }
-"""Codes of the boundary's zones, their names and colours (near the paper's red, green, blue, yellow and purple)."""
-FLAT_CUTS = (5, 6, 7)
-"""Codes of zones that only simple shapes have."""
+"""Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
+ZONES: Mapping[int, tuple[str, str]] = {code: (ZONE_NAMES[code], colour) for code, colour in COLOURS.items()}
+"""Their names and colours by code."""
 
 
 @styled

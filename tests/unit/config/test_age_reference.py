@@ -1,4 +1,4 @@
-"""Which brains ages are told from."""
+"""From which brains the apparent age is estimated."""
 
 import pytest
 

@@ -1,174 +1,347 @@
-"""The atlas section: which brains it stands for, and what is said of weeks that its folder lacks."""
+"""Atlases: what an atlas.yaml may say, the brains that a section stands for, and what is said of files and weeks."""
+
+from pathlib import Path
 
 import pytest
+import yaml
 
 from gyriflow.config import load
-from gyriflow.config.atlas import LAYOUTS, AtlasSettings, atlas_files
+from gyriflow.config.atlas import retrieval_note
+from gyriflow.config.atlas_description import ATLASES, Atlas, shipped_atlases
 from gyriflow.errors import InputError
+from gyriflow.io.downloads import sha256_of
+from gyriflow.io.yaml_files import read_yaml
 
-SURFACE = "dhcp_fetal_brain_surface_atlas/atlas"
-VOLUME = "fetal_brain_mri_atlas"
+UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, operated"
+SURFACES = "atlas/fetal.week{}.{}.pial.surf.gii"
 
 
-def put(folder, *names):
+def put(folder, *names, content=b""):
     for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).touch()
+        (folder / name).write_bytes(content)
 
 
-def surfaces(*weeks, inside=SURFACE):
-    return [f"{inside}/fetal.week{week}.{side}.pial.surf.gii" for week in weeks for side in ("left", "right")]
+def surfaces(*weeks, inside=""):
+    return [inside + SURFACES.format(week, side) for week in weeks for side in ("left", "right")]
 
 
-def labels(*weeks, inside=f"{VOLUME}/parcellations"):
-    return [f"{inside}/tissue-t{week}_dhcp-19.nii.gz" for week in weeks]
+def study(atlas, start, **changes):
+    return {"atlas": atlas, "start": start, "folding": {"end_week": 26}} | changes
 
 
-def study(atlas, **changes):
-    return {"atlas": {"folder": "atlas"} | atlas, "start": "surface-week21", "folding": {"end_week": 23}} | changes
-
-
-def problems(raw, base_dir, **options):
+def problems(raw, base_dir):
     with pytest.raises(InputError) as caught:
-        load(raw, base_dir, **options)
+        load(raw, base_dir)
     return [line.strip() for line in str(caught.value).splitlines()[1:-1]]
 
 
-def test_each_week_of_a_source_is_a_brain(tmp_path):
-    put(tmp_path / "atlas", *surfaces(21, 22), *labels("21.00", "22.00"), f"{VOLUME}/structural/t2-t22.00.nii.gz")
-    config = load(study({"weeks": [22, 21]}), tmp_path)
-    folder = tmp_path / "atlas"
-    assert [(brain.id, brain.week) for brain in config.brains] == [
-        *(("surface-week21", 21), ("surface-week22", 22)),
-        *(("volume-week21", 21), ("volume-week22", 22)),
-    ]
-    surface, volume = config.brain("surface-week21"), config.brain("volume-week22")
-    assert (surface.source, surface.coordinates) == ("hemispheres", "auto")
-    assert surface.files == [str(folder / name) for name in surfaces(21)]
-    assert (volume.source, volume.scheme) == ("labels", "dhcp-19")
-    assert volume.files == [str(folder / name) for name in labels("22.00")]
-    assert volume.image == str(folder / VOLUME / "structural/t2-t22.00.nii.gz")
-    # the image is for a figure only
-    assert config.brain("volume-week21").image is None
-
-
-def test_explicit_brains_stand_beside_those_of_the_atlas_and_may_be_the_start(tmp_path):
-    put(tmp_path / "atlas", *surfaces(21, 22))
-    own = [{"id": "own", "week": 21, "phantom": {}}]
-    config = load(study({"source": "surface", "weeks": [21, 22]}, brains=own, start="own"), tmp_path)
-    assert [brain.id for brain in config.brains] == ["own", "surface-week21", "surface-week22"]
-    twice = [{"id": "surface-week21", "week": 21, "phantom": {}}]
-    found = problems(study({"source": "surface", "weeks": [21, 22]}, brains=twice), tmp_path)
-    assert found == ["brains: 2 brains have the id surface-week21; ids are unique"]
-
-
-def test_files_are_found_by_name_wherever_they_lie(tmp_path):
-    put(tmp_path / "atlas", *surfaces(21, inside="some/where"), *labels("21.00", inside="."))
-    config = load(study({"weeks": [21]}), tmp_path)
-    assert config.brain("surface-week21").hemispheres.left == str(
-        tmp_path / "atlas/some/where/fetal.week21.left.pial.surf.gii"
-    )
-    assert config.brain("volume-week21").labels == str(tmp_path / "atlas/tissue-t21.00_dhcp-19.nii.gz")
-
-
-def test_two_files_of_one_name_are_refused(tmp_path):
-    put(tmp_path / "atlas", *surfaces(21), surfaces(21, inside="copy")[0])
-    (found,) = problems(study({"source": "surface", "weeks": [21]}), tmp_path)
-    name = "fetal.week21.left.pial.surf.gii"
-    assert (
-        found
-        == f"atlas.folder: found {tmp_path}/atlas/copy/{name} and {tmp_path}/atlas/{SURFACE}/{name}; keep one of them"
-    )
-
-
-def test_weeks_that_the_folder_lacks_are_named_with_those_present(tmp_path):
-    put(tmp_path / "atlas", *surfaces(*range(21, 30), 32), surfaces(31)[0], *labels("21.00", "22.00", "25.00"))
-    found = problems(study({"weeks": list(range(21, 33))}), tmp_path)
-    remedy = "`./run snakemake --cores 1 download` with this configuration fetches them; or take the weeks out"
-    lacks = f"atlas.weeks: {tmp_path}/atlas lacks"
-    assert found == [
-        f"{lacks} the surface files of weeks 30, 31, such as fetal.week30.left.pial.surf.gii; present: 21-29, 32. "
-        + remedy,
-        f"{lacks} the volume files of weeks 23, 24, 26-32, such as tissue-t23.00_dhcp-19.nii.gz; present: 21, 22, 25. "
-        + remedy,
-    ]
-
-
-def test_a_folder_that_is_not_there_is_named_with_the_way_to_fill_it(tmp_path):
-    (found,) = problems(study({"source": "surface", "weeks": [21, 22]}), tmp_path)
-    assert found.startswith(f"atlas.weeks: {tmp_path}/atlas lacks the surface files of weeks 21, 22")
-    assert "none is there. `./run snakemake --cores 1 download`" in found
-    put(tmp_path, "atlas")
-    assert problems(study({"weeks": [21]}), tmp_path) == [
-        f"atlas.folder: {tmp_path}/atlas is a file; it should be a folder"
-    ]
-
-
-@pytest.mark.parametrize("downloading", [False, True])
-def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path, downloading):
-    put(tmp_path / "atlas", *surfaces(21, 22), *labels("21.00", "21.50", "22.00"))
-    volumes = study({"source": "volume", "weeks": [21.5]}, start="volume-week21.5")
-    config = load(volumes, tmp_path, downloading=downloading)
-    assert config.brain("volume-week21.5").week == 21.5
-    assert config.brain("volume-week21.5").labels.endswith("tissue-t21.50_dhcp-19.nii.gz")
-    for week in (21.5, 21.004, 37):
-        source = {"source": "surface" if week == 21.5 else "volume", "weeks": [week]}
-        (found,) = problems(study(source, start=f"{source['source']}-week{week:g}", folding={"end_week": 40}), tmp_path)
-        assert f"atlas has no {source['source']} files of week {week:g}; present: 21" in found
-        assert "whole weeks 21 to 36; a week is never rounded" in found
-
-
-def test_what_is_to_be_downloaded_need_not_be_there(tmp_path):
-    put(tmp_path / "atlas", *surfaces(21, inside="own"))
-    config = load(study({"weeks": [21, 22], "url": "http://mirror/"}), tmp_path, downloading=True)
-    root = "http://mirror/kcl_cdb"
-    assert config.downloads == {
-        name: f"{root}/dhcp_fetal_brain_surface_atlas/raw/master/atlas/{name.rpartition('/')[2]}"
-        for name in [*surfaces(21, inside="own"), *surfaces(22)]
-    } | {
-        f"{VOLUME}/{name}": f"{root}/{VOLUME}/raw/master/{name}"
-        for week in (21, 22)
-        for name in (f"parcellations/tissue-t{week}.00_dhcp-19.nii.gz", f"structural/t2-t{week}.00.nii.gz")
+def own_atlas(folder, **changes):
+    """Writes an atlas of two weeks and returns its description."""
+    series = {
+        "population": "sheep",
+        "scheme": "binary",
+        "files": {"labels": "w{week}.nii.gz"},
+        "weeks": [21, 22],
     }
+    content = {
+        "name": "mine",
+        "title": "An atlas",
+        "licence": {"name": "own", "terms": "Mine."},
+        "folder": ".",
+        "series": {"all": series | changes.pop("series", {})},
+    }
+    (folder / "atlas.yaml").write_text(yaml.safe_dump(content | changes))
+    return folder / "atlas.yaml"
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+# what comes with gyriflow
+
+
+@pytest.mark.parametrize("name", shipped_atlases())
+def test_shipped_atlases_are_valid_and_named_after_their_folder(name):
+    atlas = Atlas(**read_yaml(ATLASES / name / "atlas.yaml"))
+    assert atlas.name == name
+    assert atlas.reference is not None
+    assert atlas.url.startswith("https://")
+
+
+def test_the_atlases_are_those_that_are_promised():
+    assert shipped_atlases() == ["chinese", "crl", "dhcp-surface", "dhcp-volume", "spina-bifida"]
+    accepted = {name for name in shipped_atlases() if read_yaml(ATLASES / name / "atlas.yaml")["licence"].get("accept")}
+    assert accepted == {"chinese", "crl", "dhcp-volume"}
+
+
+def test_labels_of_spina_bifida_lie_in_the_checkout_as_published(tmp_path):
+    config = load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path)
+    weeks = {"unoperated": range(21, 26), "operated": range(25, 35)}
+    assert [brain.id for brain in config.brains] == [
+        f"spina-bifida-{series}-{week}" for series, of in weeks.items() for week in of
+    ]
+    (used,) = config.atlases
+    assert used.missing == []
+    assert all(sha256_of(file.path) == file.record.sha256 for file in used.files)
+    assert all(file.path.stat().st_size == file.record.bytes for file in used.files)
+    assert all(brain.image is None and Path(brain.labels).is_relative_to(ATLASES) for brain in config.brains)
+    assert (ATLASES / "spina-bifida" / "LICENSE.txt").is_file()
+
+
+def test_images_are_fetched_where_they_are_wanted(tmp_path):
+    section = {"name": "spina-bifida", "series": "operated", "weeks": [26], "images": True}
+    config = load(study(section, "spina-bifida-operated-26", folding={"end_week": 27}), tmp_path)
+    (used,) = config.atlases
+    (image,) = used.missing
+    place = "fetal_SB_atlas_GA26_operated/srr.nii.gz"
+    assert image.url == f"{used.atlas.url}/{place}"
+    assert config.brains[0].image == str(image.path) == f"{tmp_path}/resources/atlases/spina-bifida/{place}"
+    assert image.record.bytes == 912290
+
+
+# the brains and their populations
+
+
+def test_populations_are_named_and_never_share_a_curve(tmp_path):
+    config = load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path)
+    unoperated = [f"spina-bifida-unoperated-{week}" for week in range(21, 26)]
+    operated = [f"spina-bifida-operated-{week}" for week in range(25, 35)]
+    assert config.measured_name(unoperated) == UNOPERATED
+    assert config.measured_name(operated[:1]) == OPERATED
+    both = f"{UNOPERATED} (21–25 GW) or {OPERATED} (25 GW)"
+    assert config.measured_name([*unoperated, operated[0]]) == both
+    assert config.growth_series == {UNOPERATED: unoperated, OPERATED: operated}
+    assert config.estimated_from("spina-bifida-unoperated-21") == UNOPERATED
+    assert config.age_reference == unoperated
+
+
+def test_a_growth_curve_across_populations_is_refused(tmp_path):
+    mixed = ["spina-bifida-unoperated-21", "spina-bifida-operated-34"]
+    found = problems(study("spina-bifida", mixed[0], growth={"brains": {"mixed": mixed}}), tmp_path)
+    assert found == [
+        f"growth.brains.mixed: found brains {OPERATED} and {UNOPERATED}; a growth curve is of one population"
+    ]
+    # without a name the two are series of one week each, which is none
+    assert load(study("spina-bifida", mixed[0], growth={"brains": mixed}), tmp_path).growth_series == {}
+
+
+def test_a_population_of_a_brain_of_ones_own(tmp_path):
+    put(tmp_path, "a.stl", "b.stl")
+    brains = [
+        {"id": "a", "week": 21, "pial": "a.stl", "population": "sheep"},
+        {"id": "b", "week": 22, "pial": "b.stl"},
+        {"id": "c", "week": 22, "phantom": {}},
+    ]
+    raw = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
+    config = load(raw, tmp_path)
+    assert config.measured_name(["a"]) == "sheep"
+    assert config.measured_name(["a", "b", "c"]) == "sheep (21 GW) or real brain (22 GW) or phantom"
+    brains[2]["population"] = "sheep"
+    assert problems(raw, tmp_path) == [
+        "brains[2].population: has no meaning with phantom; only with labels or segmentation or hemispheres or pial"
+    ]
+
+
+def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_path):
+    own = [{"id": "own", "week": 21, "phantom": {}}]
+    atlas = [{"name": "spina-bifida", "series": "unoperated", "weeks": [22, 21]}, "dhcp-surface"]
+    config = load(study(atlas, "own", brains=own), tmp_path)
+    dhcp = [f"dhcp-surface-{week}" for week in range(21, 37)]
+    assert [brain.id for brain in config.brains] == [
+        "own",
+        "spina-bifida-unoperated-21",
+        "spina-bifida-unoperated-22",
+        *dhcp,
+    ]
+    twice = problems(study([*atlas, "dhcp-surface"], "own", brains=own), tmp_path)
+    assert twice == [f"brains: 2 brains have the id {name}; ids are unique" for name in dhcp]
+
+
+def test_surfaces_of_hemispheres_and_labels(tmp_path):
+    sections = [{"name": "dhcp-surface", "weeks": [21]}, {"name": "dhcp-volume", "weeks": [21], "accept_licence": True}]
+    surface, volume = load(study(sections, "dhcp-surface-21"), tmp_path).brains
+    root = f"{tmp_path}/resources/atlases"
+    assert (surface.source, surface.coordinates) == ("hemispheres", "auto")
+    assert surface.hemispheres.right == f"{root}/dhcp-surface/atlas/fetal.week21.right.pial.surf.gii"
+    assert (volume.source, volume.scheme) == ("labels", "dhcp-19")
+    assert volume.labels == f"{root}/dhcp-volume/parcellations/tissue-t21.00_dhcp-19.nii.gz"
 
 
 def test_a_dump_has_the_brains_in_the_place_of_the_atlas(tmp_path):
-    put(tmp_path / "atlas", *surfaces(21, 22), *labels("21.00", "22.00"))
-    config = load(study({"weeks": [21, 22]}, growth={"estimated_from": "volume"}), tmp_path)
+    config = load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path)
     again = load(config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}))
-    assert (again.brains, again.growth_series) == (config.brains, config.growth_series)
-    assert (again.atlas, again.estimated_from("volume-week21")) == (None, "volume")
+    assert (again.brains, again.growth_series, again.atlas) == (config.brains, config.growth_series, ())
 
 
-def test_all_published_weeks_are_the_default(tmp_path):
-    atlas = AtlasSettings(folder=str(tmp_path))
-    assert len(atlas_files(atlas)) == 16 * sum(len(layout.paths) for layout in LAYOUTS.values()) == 64
+# files in a folder
+
+
+def test_files_are_found_by_name_wherever_they_lie_and_others_are_put_beside(tmp_path):
+    put(tmp_path / "mine", *surfaces(21, inside="some/where/"), "clone/atlas/fetal.week22.left.pial.surf.gii")
+    section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 22], "url": "http://mirror/a/"}
+    config = load(study(section, "dhcp-surface-21"), tmp_path)
+    assert config.brains[0].hemispheres.left == f"{tmp_path}/mine/some/where/{SURFACES.format(21, 'left')}"
+    assert config.brains[1].hemispheres.left == f"{tmp_path}/mine/clone/atlas/fetal.week22.left.pial.surf.gii"
+    (missing,) = config.atlases[0].missing
+    assert missing.path == tmp_path / "mine" / SURFACES.format(22, "right")
+    assert missing.url == "http://mirror/a/" + SURFACES.format(22, "right")
+
+
+def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
+    known = read_yaml(ATLASES / "crl" / "atlas.yaml")["series"]["normative"]["weeks"]
+    section = {"name": "crl", "folder": "mine", "weeks": [21, 22], "accept_licence": True}
+    put(tmp_path / "mine", "Other21_Study1/parcellation.nii.gz", "x/HarvardSTA22_Study1/parcellation.nii.gz")
+    (found,) = problems(study(section, "crl-21"), tmp_path)
+    assert found == (
+        f"atlas.folder: {tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz is not the file of crl: its SHA-256 "
+        f"is not {known[22]['labels']['sha256']}. Delete it, and it is fetched; or give a changed file as a brain of "
+        "your own under brains"
+    )
+
+
+def test_two_files_of_one_name_and_a_file_in_the_place_of_the_folder_are_refused(tmp_path):
+    put(tmp_path / "mine", *surfaces(21), surfaces(21, inside="copy/")[0])
+    section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21]}
+    (found,) = problems(study(section, "dhcp-surface-21"), tmp_path)
+    name = SURFACES.format(21, "left")
+    assert found == f"atlas.folder: found {tmp_path}/mine/{name} and {tmp_path}/mine/copy/{name}; keep one of them"
+    put(tmp_path, "file")
+    found = problems(study(section | {"folder": "file"}, "dhcp-surface-21"), tmp_path)
+    assert found == [f"atlas.folder: {tmp_path}/file is a file; it should be a folder"]
+
+
+def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
+    put(tmp_path / "mine", *surfaces("21.5"))
+    section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 21.5]}
+    config = load(study(section, "dhcp-surface-21.5"), tmp_path)
+    assert [(brain.id, brain.week) for brain in config.brains] == [("dhcp-surface-21", 21), ("dhcp-surface-21.5", 21.5)]
+    assert config.brains[1].hemispheres.left.endswith("fetal.week21.5.left.pial.surf.gii")
+    for week in (21.004, 37):
+        (found,) = problems(study(section | {"weeks": [week]}, "a"), tmp_path)
+        assert found == (
+            f"atlas.weeks: dhcp-surface has no files of week {week:g}; it has 21, 21.5, 22-36. A week is never rounded"
+        )
+
+
+# an atlas of one's own
+
+
+def test_an_atlas_of_ones_own_is_one_file(tmp_path):
+    put(tmp_path / "mine", "w21.nii.gz", "w22.nii.gz")
+    file = own_atlas(tmp_path / "mine")
+    for given in ("mine/atlas.yaml", str(file), {"file": "mine/atlas.yaml", "series": ["all"]}):
+        config = load(study(given, "mine-21", folding={"end_week": 22}), tmp_path)
+        assert [(brain.id, brain.population) for brain in config.brains] == [("mine-21", "sheep"), ("mine-22", "sheep")]
+        assert config.brains[1].labels == str(tmp_path / "mine" / "w22.nii.gz")
+
+
+def test_a_file_that_neither_lies_there_nor_has_an_address_is_named(tmp_path):
+    put(tmp_path, "w21.nii.gz")
+    own_atlas(tmp_path)
+    assert problems(study("atlas.yaml", "mine-21"), tmp_path) == [
+        f"atlas.weeks: {tmp_path}/resources/atlases/mine/w22.nii.gz is missing and cannot be fetched, as mine has no "
+        "url for it"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "found"),
+    [
+        ({"nam": "x"}, "nam: unknown key; did you mean name?"),
+        ({"licence": {"name": "x"}}, "licence.terms: is missing"),
+        ({"url": "ftp://x"}, "url: found 'ftp://x'; it should "),
+        ({"series": {"scheme": None}}, "have a `scheme`, which says what the labels mean"),
+        ({"series": {"weeks": []}}, "series.all.weeks: found []; it should have one week or more"),
+        ({"series": {"weeks": [21, 21]}}, "series.all.weeks: found [21, 21]; it should name each week once"),
+        ({"series": {"files": {"labels": "a.nii.gz"}}}, "have {week} in each path, for the gestational week"),
+        ({"series": {"files": {"labels": "{week}{b}.nii"}}}, "have {week} in each path, for the gestational week"),
+        ({"series": {"files": {"labels": "../{week}.nii"}}}, "be paths below the folder of the atlas"),
+        ({"series": {"files": {"left": "{week}.gii"}}}, "have labels (and perhaps image), or left and right, or pial"),
+        ({"series": {"weeks": {21: {"labels": {"sha256": "abc"}}}}}, "should match pattern '^[0-9a-f]{64}$'"),
+    ],
+)
+def test_mistakes_in_a_description_are_named_with_its_file(tmp_path, changes, found):
+    put(tmp_path, "w21.nii.gz", "w22.nii.gz")
+    file = own_atlas(tmp_path, **changes)
+    (named,) = problems(study("atlas.yaml", "mine-21"), tmp_path)
+    assert named.startswith(f"{file}: ")
+    assert found in named
+
+
+def test_a_scheme_that_is_not_known_is_named_and_one_of_the_configuration_is_used(tmp_path):
+    put(tmp_path, "w21.nii.gz", "w22.nii.gz")
+    own_atlas(tmp_path, series={"scheme": "sheep"})
+    raw = study("atlas.yaml", "mine-21", folding={"end_week": 22})
+    first, _ = problems(raw, tmp_path)
+    assert first.startswith("brains[0].scheme: found 'sheep'; expected one of ")
+    assert load(raw | {"schemes": {"sheep": {"cerebrum": [1]}}}, tmp_path).brains[0].scheme == "sheep"
+
+
+# licences and mistakes
+
+
+def test_a_narrow_licence_has_to_be_accepted_and_is_told(tmp_path):
+    (found,) = problems(study({"name": "crl", "weeks": [21]}, "crl-21"), tmp_path)
+    assert found.startswith("atlas.accept_licence: found false; the licence of crl (CRL licence agreement, https://")
+    assert "non-commercial education and research only" in found
+    config = load(study({"name": "crl", "weeks": [21, 22], "accept_licence": True}, "crl-21"), tmp_path)
+    note = retrieval_note(config.atlases[0])
+    assert note.startswith(f"crl: 2 files (0.1 MB) to fetch into {tmp_path}/resources/atlases/crl")
+    assert "Gholipour" in note
+    assert "non-commercial education and research only" in note
+    assert "checksums" not in note
+
+
+def test_files_without_known_checksums_are_said(tmp_path):
+    config = load(study({"name": "dhcp-surface", "weeks": [21]}, "dhcp-surface-21"), tmp_path)
+    assert "2 files to fetch into" in retrieval_note(config.atlases[0])
+    assert "; no checksums are known" in retrieval_note(config.atlases[0])
 
 
 @pytest.mark.parametrize(
     ("atlas", "found"),
     [
-        ({"sources": "surface"}, ["atlas.sources: unknown key; did you mean source?"]),
+        ({"name": "crl", "sources": "x"}, ["atlas.sources: unknown key; did you mean series?"]),
         (
-            {"source": "surfaces", "weeks": [], "url": "gin.g-node.org"},
+            {"name": "spina-bifida", "weeks": [], "url": "gin.g-node.org"},
             [
-                "atlas.source: found 'surfaces'; it should be 'surface', 'volume' or 'both'",
                 "atlas.weeks: found []; it should have one week or more",
                 "atlas.url: found 'gin.g-node.org'; it should begin with https:// or http://",
             ],
         ),
-        ({"folder": None}, ["atlas.folder: found None; it should be a valid string"]),
+        ({"name": "spina-bifida", "weeks": [21, 21]}, ["atlas.weeks: found [21, 21]; it should name each week once"]),
+        (
+            ["spina-bifda", {"name": "spina-bifida", "series": "operatd"}],
+            [
+                "atlas[0].name: found 'spina-bifda'; did you mean spina-bifida? An atlas.yaml of your own goes under "
+                "file",
+                "atlas[1].series: found operatd; spina-bifida has unoperated, operated",
+            ],
+        ),
+        ({"name": "spina-bifida", "series": "operated", "weeks": [24]}, ["it has 25-34. A week is never rounded"]),
+        ({"weeks": [21]}, ["atlas: found {'weeks': [21]}; it should have either a `name` or a `file`"]),
+        ("none.yaml", ["atlas.file: {folder}/none.yaml: cannot be read"]),
+        (7, ["atlas: found 7; it should hold keys and values"]),
     ],
 )
-def test_mistakes_in_the_section_are_named_at_once(tmp_path, atlas, found):
-    named = problems(study(atlas, folding={"end_weak": 23}), tmp_path)
-    assert named == [*found, "folding.end_week: is missing", "folding.end_weak: unknown key; did you mean end_week?"]
+def test_mistakes_in_a_section_are_named_at_once(tmp_path, atlas, found):
+    named = problems(study(atlas, "x", folding={"end_weak": 23}), tmp_path)
+    assert len(named) == len(found) + 2
+    for expected, line in zip(found, named, strict=False):
+        assert expected.format(folder=tmp_path) in line if "{folder}" in expected else expected in line
+    assert named[-2:] == ["folding.end_week: is missing", "folding.end_weak: unknown key; did you mean end_week?"]
 
 
-def test_a_week_twice_and_an_unknown_start_are_named(tmp_path):
-    put(tmp_path / "atlas", *surfaces(21))
-    found = problems(study({"source": "surface", "weeks": [21, 21]}, start="week21"), tmp_path)
-    assert found == [
-        "atlas.weeks: found 21 more than once",
-        "start: found 'week21'; expected the id of a brain: surface-week21",
-    ]
+def test_checksums_of_the_descriptions_have_no_twins():
+    seen: dict[str, str] = {}
+    for name in shipped_atlases():
+        for series in Atlas(**read_yaml(ATLASES / name / "atlas.yaml")).series.values():
+            for week, records in series.weeks.items():
+                for key, record in records.items():
+                    if record.sha256:
+                        place = f"{name} {week:g} {key}"
+                        assert seen.setdefault(record.sha256, place) == place
+    assert len(seen) == 18 * 2 + 14 * 2 - 1 + 15 * 2

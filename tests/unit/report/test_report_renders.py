@@ -276,8 +276,9 @@ def test_contact_pressure_is_scaled_by_what_touches():
     assert ends == pytest.approx([np.percentile([100.0, 300.0], 98), 1.0])
 
 
-def test_zones_have_the_codes_and_names_of_the_folding():
-    assert {code: name for code, (name, _) in ZONES.items()} == dict(enumerate(ZONE_NAMES))
+def test_every_zone_has_its_own_colour():
+    assert [name for name, _ in ZONES.values()] == list(ZONE_NAMES)
+    assert len({colour for _, colour in ZONES.values()}) == len(ZONE_NAMES)
 
 
 @pytest.mark.parametrize(("limit", "length"), [(55, 50), (50, 50), (49, 20), (0.7, 0.5), (9.9, 5)])

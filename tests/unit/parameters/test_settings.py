@@ -1,0 +1,80 @@
+"""Settings report all that is wrong with them at once, with the path of each key."""
+
+from collections.abc import Iterator
+
+import pytest
+from pydantic import ValidationError
+
+from gyriflow.parameters.messages import dotted, messages
+from gyriflow.parameters.settings import Problem, Settings, check, setting
+
+
+class Layer(Settings):
+    """Bounds of a layer."""
+
+    top: float = setting(0.0, "mm", "Its top.", ge=0)
+    bottom: float = setting(1.0, "mm", "Its bottom.", ge=0)
+    name: str = setting(..., "", "Its name.")
+
+    @check
+    def _bottom_below_top(self) -> Iterator[Problem]:
+        if self.bottom <= self.top:
+            yield Problem(f"found {self.bottom:g}; it should be above {self.top:g}", ("bottom",))
+
+    @check
+    def _short_name(self) -> Iterator[Problem]:
+        if len(self.name) > 3:
+            yield Problem("is too {long}", ("name",))
+
+
+class Stack(Settings):
+    """Layers with a total."""
+
+    layers: tuple[Layer, ...] = setting((), "", "The layers.")
+    named: dict[str, Layer] = setting({}, "", "Others.")
+    total: float = setting(10.0, "mm", "Their height.", gt=0)
+
+    @check
+    def _total(self) -> Iterator[Problem]:
+        depth = max((layer.bottom for layer in self.layers if layer.has("bottom")), default=0.0)
+        if depth > self.total:
+            yield Problem(f"found {self.total:g}; the layers reach {depth:g}", ("total",))
+
+
+def found(kind, raw):
+    with pytest.raises(ValidationError) as caught:
+        kind.model_validate(raw)
+    return {dotted(path): text for path, text in messages(caught.value, kind)}
+
+
+def test_a_check_is_made_although_another_key_is_wrong():
+    assert found(Layer, {"top": 2, "bottom": 1, "naem": "x"}) == {
+        "name": "is missing",
+        "naem": "unknown key; did you mean name?",
+        "bottom": "found 1; it should be above 2",
+    }
+
+
+def test_a_check_of_a_wrong_key_is_left_out_and_defaults_count():
+    assert found(Layer, {"top": -1, "bottom": 0, "name": "long"}) == {
+        "top": "found -1; it should be greater than or equal to 0",
+        "name": "is too {long}",
+    }
+    assert found(Layer, {"bottom": 0, "name": "a"}) == {"bottom": "found 0; it should be above 0"}
+
+
+def test_checks_across_lists_and_tables_use_what_is_valid_in_them():
+    wrong = {"layers": [{"name": "a", "bottom": 20}, {"name": 1, "bottom": 30}, 7], "named": {"x": {"top": 3}}}
+    assert found(Stack, wrong) == {
+        "layers[1].name": "found 1; it should be a valid string",
+        "layers[2]": "found 7; it should hold keys and values",
+        "named.x.name": "is missing",
+        "named.x.bottom": "found 1; it should be above 3",
+        "total": "found 10; the layers reach 30",
+    }
+    assert found(Stack, wrong | {"total": 0})["total"] == "found 0; it should be greater than 0"
+
+
+def test_nothing_given_is_all_defaults_and_truth_values_are_no_numbers():
+    assert Stack.model_validate({"layers": []}) == Stack() == Stack.model_validate(None)
+    assert found(Stack, {"total": True}) == {"total": "found True; it should be a number or text, not true or false"}

@@ -1,0 +1,200 @@
+"""Missing files of atlases, fetched by the workflow from a server on this machine; what is there is left alone."""
+
+import hashlib
+import socket
+from pathlib import Path
+
+import pytest
+import yaml
+from local_server import Server, packed, serving
+
+WEEKS = (21, 22)
+FILES = {f"w{week}/labels.nii.gz": packed(100_000, week) for week in WEEKS}
+
+
+@pytest.fixture(autouse=True)
+def no_proxy(monkeypatch):
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+
+
+@pytest.fixture
+def server():
+    with serving(Server(dict(FILES))) as running:
+        yield running
+
+
+def study(folder: Path, url: str, **changes) -> dict:
+    """Writes an atlas whose files are at a server into a folder and returns a study of it."""
+    atlas = {
+        "name": "far",
+        "title": "An atlas elsewhere",
+        "licence": {"name": "CC0", "terms": "Do what you like."},
+        "url": url,
+        "series": {
+            "all": {
+                "population": "sheep",
+                "scheme": "binary",
+                "files": {"labels": "w{week}/labels.nii.gz"},
+                "weeks": {
+                    week: {"labels": {"sha256": hashlib.sha256(FILES[f"w{week}/labels.nii.gz"]).hexdigest()}}
+                    for week in WEEKS
+                },
+            }
+        },
+    }
+    (folder / "atlas.yaml").write_text(yaml.safe_dump(atlas | changes))
+    return {"atlas": "atlas.yaml", "start": "far-21", "folding": {"end_week": 22}}
+
+
+def files_in(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workflow, server):
+    name = workflow.write("study.yaml", study(workflow.directory, server.url))
+    folder = workflow.directory / "resources" / "atlases" / "far"
+    planned = workflow.run("-n", "growth", "--configfile", name)
+    assert planned.returncode == 0, planned.stderr
+    assert f"gyriflow: far: 2 files to fetch into {folder} where a stage needs them" in planned.stderr
+    assert "licence: CC0. Do what you like." in planned.stderr
+    assert workflow.jobs("growth", "--configfile", name)["atlas_file"] == 2
+    assert server.asked == []
+
+    long = "w21/labels.nii.gz"
+    server.broken_after[long] = [60_000]
+    # a surface needs the file of its own week only
+    target = f"{folder}/{long}"
+    first = workflow.run(target, "--cores", "1", "--configfile", name)
+    assert first.returncode == 0, first.stderr
+    assert first.stderr.count("licence: CC0") == 1
+    assert files_in(folder) == {long: FILES[long]}
+    assert [asked for path, asked in server.asked if path == long] == [None, "bytes=60000-"]
+
+    second = workflow.run("retrieve", "--cores", "2", "--configfile", name)
+    assert second.returncode == 0, second.stderr
+    assert files_in(folder) == FILES
+    assert len(server.asked) == 3
+
+    # then there is nothing to fetch and nothing to tell, whatever is forced
+    server.asked.clear()
+    jobs = workflow.jobs("growth", "--configfile", name, "--forceall")
+    assert "atlas_file" not in jobs
+    assert jobs["pial_surface_alone"] == 2
+    last = workflow.run("retrieve", "--cores", "1", "--configfile", name, "--forceall")
+    assert last.returncode == 0, last.stderr
+    assert "licence" not in last.stderr
+    deleted = workflow.run("--delete-all-output", "--cores", "1", "--configfile", name)
+    assert deleted.returncode == 0, deleted.stderr
+    assert files_in(folder) == FILES
+    assert server.asked == []
+
+
+def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
+    raw = study(workflow.directory, server.url)
+    raw["atlas"] = {"file": "atlas.yaml", "folder": "mine"}
+    name = workflow.write("study.yaml", raw)
+    own = workflow.directory / "mine" / "old" / "w21" / "labels.nii.gz"
+    own.parent.mkdir(parents=True)
+    own.write_bytes(FILES["w21/labels.nii.gz"])
+    before = own.stat()
+    # the other file never comes whole
+    server.files["w22/labels.nii.gz"] = FILES["w22/labels.nii.gz"][:-20]
+    failed = workflow.run("retrieve", "--cores", "1", "--configfile", name)
+    assert failed.returncode == 5
+    assert files_in(workflow.directory / "mine") == {"old/w21/labels.nii.gz": FILES["w21/labels.nii.gz"]}
+    after = own.stat()
+    assert (after.st_mtime_ns, after.st_ino) == (before.st_mtime_ns, before.st_ino)
+
+    # a changed copy is named and left to the user
+    own.write_bytes(packed(1000))
+    refused = workflow.run("retrieve", "--cores", "1", "--configfile", name)
+    assert refused.returncode == 2
+    assert f"atlas.folder: {own} is not the file of far: its SHA-256 is not " in refused.stderr
+    assert own.read_bytes() == packed(1000)
+
+
+def test_a_file_that_appears_meanwhile_is_checked_and_not_deleted(workflow, server):
+    """What a user puts there between planning and fetching is found by the job, as Snakemake keeps it."""
+    raw = study(workflow.directory, server.url)
+    name = workflow.write("study.yaml", raw)
+    place = workflow.directory / "resources" / "atlases" / "far" / "w21" / "labels.nii.gz"
+    # the first file is fetched while the second appears: the server puts it there
+    other = place.parent.parent / "w22" / "labels.nii.gz"
+
+    class Filling(dict):
+        def __getitem__(self, path):
+            for target in (place, other):
+                if not target.exists() and target.parent.name not in path:
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    target.write_bytes(packed(1000))
+            return super().__getitem__(path)
+
+    server.files = Filling(server.files)
+    outcome = workflow.run("retrieve", "--cores", "1", "--keep-going", "--configfile", name)
+    assert outcome.returncode == 5
+    assert "is not the file of the atlas" in outcome.stderr
+    left = {path.read_bytes() for path in (place, other)}
+    assert packed(1000) in left
+
+
+@pytest.mark.parametrize("fault", ["checksum", "half", "page", "lacking"])
+def test_what_is_not_the_file_is_refused_and_not_kept(workflow, server, fault):
+    path = "w21/labels.nii.gz"
+    match fault:
+        case "checksum":
+            server.files[path] = packed(100_000, seed=7)
+        case "half":
+            server.files[path] = FILES[path][:50_000]
+        case "page":
+            server.files[path] = b"<html>log in</html>"
+        case "lacking":
+            del server.files[path]
+    name = workflow.write("study.yaml", study(workflow.directory, server.url))
+    outcome = workflow.run("retrieve", "--cores", "1", "--keep-going", "--configfile", name)
+    assert outcome.returncode == 5
+    assert "Traceback" not in outcome.stderr
+    said = {
+        "checksum": "the server sent something else than the file; found the SHA-256",
+        "half": "the server sent something else than the file; found no whole gzip file",
+        "page": "found no whole gzip file; it begins with b'<html>log in</html>'",
+        "lacking": "cannot be fetched; found 404",
+    }[fault]
+    assert f"gyriflow: {server.url}/{path}: " in outcome.stderr
+    assert said in outcome.stderr
+    # what was good stays, and nothing torn
+    good = {"w22/labels.nii.gz": FILES["w22/labels.nii.gz"]}
+    assert files_in(workflow.directory / "resources" / "atlases" / "far") == good
+
+
+def test_no_network_ends_in_5_with_one_message_a_file_and_nothing_torn(workflow):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        raw = study(workflow.directory, f"http://127.0.0.1:{free.getsockname()[1]}")
+        name = workflow.write("study.yaml", raw)
+        assert workflow.run("-n", "--configfile", name).returncode == 0
+        outcome = workflow.run("retrieve", "--cores", "1", "--configfile", name)
+    assert outcome.returncode == 5
+    assert "Traceback" not in outcome.stderr
+    assert outcome.stderr.count("gyriflow: http://") == 1
+    assert "cannot be fetched; found" in outcome.stderr
+    assert "Connection refused" in outcome.stderr
+    assert files_in(workflow.directory / "resources") == {}
+
+
+def test_a_narrow_licence_is_accepted_before_anything_is_planned(workflow, server):
+    raw = study(workflow.directory, server.url, licence={"name": "own", "terms": "Ask me.", "accept": True})
+    refused = workflow.run("retrieve", "--cores", "1", "--configfile", workflow.write("study.yaml", raw))
+    assert refused.returncode == 2
+    assert (
+        "the licence of far (own) is to be accepted: Ask me. Write `accept_licence: true` if you do" in refused.stderr
+    )
+    assert server.asked == []
+    raw["atlas"] = {"file": "atlas.yaml", "accept_licence": True}
+    assert workflow.run("-n", "--configfile", workflow.write("study.yaml", raw)).returncode == 0
+
+
+def test_without_an_atlas_there_is_nothing_to_retrieve(workflow):
+    name = workflow.write(
+        "study.yaml", {"brains": [{"id": "a", "week": 21, "phantom": {}}], "start": "a"} | {"folding": {"end_week": 22}}
+    )
+    assert workflow.jobs("retrieve", "--configfile", name).get("atlas_file", 0) == 0

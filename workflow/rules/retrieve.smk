@@ -1,0 +1,40 @@
+# Files of atlases that are not there yet. A file that exists is an input like any other: no rule makes it, so that no
+# copy of a user's own is ever deleted or replaced.
+from gyriflow.config.atlas import retrieval_note
+
+ATLAS_FILES = {
+    str(file.path).removeprefix("/"): file
+    for atlas in CONFIG.atlases
+    for file in atlas.missing
+}
+
+if workflow.is_main_process:
+    for atlas in CONFIG.atlases:
+        if atlas.missing:
+            print(f"gyriflow: {retrieval_note(atlas)}", file=sys.stderr)
+
+
+rule atlas_file:
+    output:
+        # a file that appeared meanwhile is not deleted before the job, but checked by it
+        update("/{file}"),
+    log:
+        "results/study/logs/atlas_file/{file}.log",
+    wildcard_constraints:
+        file=one_of(ATLAS_FILES),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=500,
+        runtime=60,
+    params:
+        url=lambda wildcards: ATLAS_FILES[wildcards.file].url,
+        sha256=lambda wildcards: ATLAS_FILES[wildcards.file].record.sha256,
+        size=lambda wildcards: ATLAS_FILES[wildcards.file].record.bytes,
+    script:
+        "../scripts/retrieve.py"
+
+
+rule retrieve:
+    input:
+        [f"/{file}" for file in ATLAS_FILES],

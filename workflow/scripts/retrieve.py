@@ -1,0 +1,10 @@
+"""One file of an atlas, fetched and checked."""
+
+import logging
+
+from gyriflow.io.downloads import fetch
+from gyriflow.step import step
+
+params = snakemake.params
+with step(snakemake.log[0]):
+    fetch(snakemake.output[0], params.url, logging.info, sha256=params.sha256, size=params.size)
