@@ -81,7 +81,8 @@ def main() -> None:
             if not path.exists():
                 found = register(brains[first], brains[second], threads=arguments.threads)
                 quality = judged(brains[first], brains[second], found.deformation)
-                report = {"seconds": found.seconds, "channels": list(found.channels), **asdict(quality)}
+                times = {"seconds": found.seconds, "cpu_seconds": found.cpu_seconds}
+                report = {**times, "channels": list(found.channels), **asdict(quality)}
                 try:
                     require_good(quality, pair=f"{first}-{second}")
                     report["refused"] = ""
@@ -100,7 +101,7 @@ def main() -> None:
             rates = local_growth(positions, mesh.tets, weeks, sigma)
             whole = np.average(rates, axis=1, weights=sizes)
             sd = np.sqrt(np.average((rates - whole[:, None]) ** 2, axis=1, weights=sizes))
-            for week, rate, spread in zip(weeks[:-1], whole, sd, strict=True):
+            for week, rate, spread in zip(weeks[:-1], np.diff(np.log(volumes.sum(axis=1))), sd, strict=True):
                 growth.append({"population": population, "week": week, "sigma_mm": sigma, "rate": rate, "sd": spread})
         moves = np.linalg.norm(weekly_displacements(positions, weeks, sizes), axis=2)
         true = [np.count_nonzero(brain.tissue & 1) * brain.voxel_mm**3 for brain in brains.values()]
@@ -114,7 +115,7 @@ def main() -> None:
         }
     table, spread = pd.DataFrame(pairs), pd.DataFrame(growth)
     shown = ["population", "from", "to", "dice_cerebrum", "dice_cortex", "least_determinant", "folded_share"]
-    shown += ["log_growth_sd", "rim_mm", "inside_mm", "seconds"]
+    shown += ["log_growth_sd", "rim_mm", "inside_mm", "seconds", "cpu_seconds"]
     print(table[shown].to_string(index=False, float_format="%.3f"))
     print(
         spread.pivot_table(index=["population", "week", "rate"], columns="sigma_mm", values="sd").to_string(
@@ -128,6 +129,7 @@ def main() -> None:
             "dice_cortex": [rows["dice_cortex"].min(), rows["dice_cortex"].max()],
             "least_determinant": rows["least_determinant"].min(),
             "most_seconds": rows["seconds"].max(),
+            "most_cpu_seconds": rows["cpu_seconds"].max(),
             "growth_sd_at_6_mm": spread.query("population == @population and sigma_mm == 6")["sd"].mean(),
         }
     print(json.dumps(summary))

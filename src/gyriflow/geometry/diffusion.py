@@ -1,4 +1,4 @@
-"""Values smoothed along a surface or inside a tetrahedral mesh by diffusion, not across a sulcus or fissure."""
+"""Values smoothed or continued along a surface or inside a solid mesh, not across a sulcus or fissure."""
 
 import igl
 import numpy as np
@@ -42,8 +42,7 @@ def diffused(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma
     mass = vertex_sizes(vertices, cells)
     used = mass > 0
     step = sigma_mm**2 / 2 / STEPS
-    stiffness = -igl.cotmatrix(np.ascontiguousarray(vertices), np.ascontiguousarray(cells, dtype=np.int64))
-    matrix = sparse.csr_matrix(sparse.diags(np.where(used, mass, 1.0)) + step * stiffness)
+    matrix = sparse.csr_matrix(sparse.diags(np.where(used, mass, 1.0)) + step * _stiffness(vertices, cells))
     inverse = 1.0 / matrix.diagonal()
     nearly = LinearOperator(matrix.shape, matvec=lambda x: inverse * x.ravel(), dtype=float)
     columns = values.reshape(len(values), -1).T.astype(float)
@@ -55,3 +54,26 @@ def diffused(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma
                 raise ValueError(f"diffusion by {sigma_mm:g} mm does not converge: the mesh has degenerate cells")
         smooth.append(column)
     return np.stack(smooth, axis=1).reshape(values.shape)
+
+
+def harmonic(vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats) -> Floats:
+    """Returns (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
+    stiffness = _stiffness(vertices, cells)
+    unknown = np.setdiff1d(np.unique(cells), known)
+    found = np.zeros((len(vertices), values.shape[1]))
+    found[known] = values
+    rows = stiffness[unknown]
+    matrix, right = rows[:, unknown], -(rows[:, known] @ values)
+    inverse = 1.0 / matrix.diagonal()
+    nearly = LinearOperator(matrix.shape, matvec=lambda x: inverse * x.ravel(), dtype=float)
+    for column in range(values.shape[1]):
+        found[unknown, column], failed = cg(matrix, right[:, column], M=nearly, rtol=1e-8, maxiter=10000)
+        if failed:
+            raise ValueError("the harmonic continuation does not converge: the mesh has degenerate cells")
+    return found
+
+
+def _stiffness(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:
+    """Returns the (n, n) stiffness matrix of linear finite elements, positive semidefinite."""
+    cotangents = igl.cotmatrix(np.ascontiguousarray(vertices), np.ascontiguousarray(cells, dtype=np.int64))
+    return sparse.csr_matrix(-cotangents)

@@ -14,7 +14,7 @@ from ..geometry.triangles import Floats
 SMOOTHING_MM = 0.8
 """Standard deviation of the Gaussian that both masks are smoothed with."""
 
-MARGIN_MM = 10.0
+MARGIN_MM = 6.0
 """Room round the cerebrum."""
 
 CEREBRUM, CORTEX = 1, 2

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.diffusion import diffused, vertex_sizes
+from ..geometry.motion import without_rigid_motion
 from ..geometry.triangles import Floats
 
 
@@ -72,8 +72,8 @@ def with_amplitude(rates: Floats, sizes: Floats, amplitude: float) -> Floats:
 def weekly_displacements(positions: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
     """Returns the (w − 1, n, 3) displacements in mm per week of the vertices, without their common rigid motion.
 
-    The rigid motion that is taken out of each interval is that of least weighted squares (Kabsch 1976, doi
-    10.1107/S0567739476001873), with the (n,) `sizes` of the vertices as weights.
+    The rigid motion that is taken out of each interval is that of least squares, with the (n,) `sizes` of the vertices
+    as weights.
     """
     _require_ascending(positions, weeks)
     return np.stack(
@@ -82,13 +82,6 @@ def weekly_displacements(positions: Floats, weeks: Sequence[float], sizes: Float
             for first, second, duration in zip(positions[:-1], positions[1:], np.diff(weeks), strict=True)
         ]
     )
-
-
-def without_rigid_motion(first: Floats, second: Floats, sizes: Floats) -> Floats:
-    """Returns the (n, 3) displacement from `first` to `second`, the latter moved rigidly onto the former."""
-    centre, other = (np.average(points, axis=0, weights=sizes) for points in (first, second))
-    turn, _ = Rotation.align_vectors(first - centre, second - other, weights=sizes)
-    return np.asarray(turn.apply(second - other) + centre - first)
 
 
 def _require_ascending(positions: Floats, weeks: Sequence[float]) -> None:

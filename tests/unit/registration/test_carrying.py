@@ -5,10 +5,11 @@ from shapes import ellipsoid_mesh
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import Deformation, moved
+from gyriflow.geometry.motion import without_rigid_motion
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.registration.carrying import back_over_weeks, carried_map, carried_regions, over_weeks
-from gyriflow.registration.growth import local_growth, weekly_displacements, with_amplitude, without_rigid_motion
+from gyriflow.registration.growth import local_growth, weekly_displacements, with_amplitude
 
 GRID = np.diag([4.0, 4.0, 4.0, 1.0])
 GRID[:3, 3] = -30.0
