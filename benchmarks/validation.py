@@ -3,7 +3,7 @@
     ./run python benchmarks/validation.py STUDY_FOLDER
 
 STUDY_FOLDER is where the study ran (with `results/study/` in it), its `results`, or `results/study` itself. The tables
-`validation.csv` and `displacement.csv` there are read. The last line is one JSON object: for each run by its name
+`validation.csv` and `displacement_agreement.csv` there are read. The last line is one JSON object: for each run by its name
 `worst_area_error`, `worst_volume_error`, `skill_shape_index`, `skill_mean_curvature`, `curvature_rms_ratio`,
 `displacement_r`, `displacement_slope` and the skill by horizon.
 """
@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("study", type=Path)
     folder = tables(parser.parse_args().study)
     validation = read_table(folder / "validation.csv")
-    moves = folder / "displacement.csv"
+    moves = folder / "displacement_agreement.csv"
     displacement = read_table(moves) if moves.exists() else pd.DataFrame()
     shown = ["run", "kind", "start_week", "week", "seed", "area_error", "volume_error", "r_shape_index"]
     shown += ["r_start_shape_index", "r_adjacent_shape_index", "gain_low_shape_index", "gain_high_shape_index"]
