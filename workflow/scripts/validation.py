@@ -20,17 +20,18 @@ def shape(mesh, real):
     return Shape(even, bend.mean, bend.shape_index)
 
 
+def followed_at(sizes, week):
+    """Returns the size that growth followed at a week."""
+    return float(value(tabulated(list(sizes), list(sizes.values()), may_shrink=True), week))
+
+
 with step(snakemake.log[0]):
     follow, start, rows = read_yaml(files.params).get("follow"), read_surface(files.start), []
     for week, *paths in zip(params.weeks, files.simulated, files.real, files.adjacent, strict=True):
         simulated, real, adjacent = map(read_surface, paths)
         curve = None
         if follow is not None:
-            sizes = (
-                tabulated(*zip(*follow[name].items(), strict=True), may_shrink=True)
-                for name in ("area_cm2", "volume_ml")
-            )
-            area, volume = (float(value(curve, week)) for curve in sizes)
+            area, volume = (followed_at(follow[name], week) for name in ("area_cm2", "volume_ml"))
             curve = area / CM2_PER_MM2, volume / ML_PER_MM3
         shapes = {name: shape(mesh, real) for name, mesh in (("run", simulated), ("real", real), ("start", start))}
         shapes["adjacent"] = shape(adjacent, real)
