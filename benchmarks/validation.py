@@ -3,8 +3,8 @@
     ./run python benchmarks/validation.py STUDY_FOLDER
 
 STUDY_FOLDER is where the study ran (with `results/study/` in it), its `results`, or `results/study` itself. The tables
-`validation.csv` and `displacement_agreement.csv` there are read. The last line is one JSON object: for each run
-by its name `worst_area_error`, `worst_volume_error`, `skill_shape_index`, `skill_mean_curvature`, `curvature_rms_ratio`,
+`validation.csv` and `displacement_agreement.csv` there are read. The last line is one JSON object: for each run by its
+name `worst_area_error`, `worst_volume_error`, `skill_shape_index`, `skill_mean_curvature`, `curvature_rms_ratio`,
 `displacement_r`, `displacement_slope` and the skill by horizon.
 """
 
