@@ -22,13 +22,14 @@ from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
 from gyriflow.parameters.reading import parameters_from
 from gyriflow.parameters.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
-from gyriflow.units import M_PER_MM, MM_PER_M
+from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.mirrored import folded, hemisphere
 
 HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2
 MU, NU = 1000.0, MATERIAL.poisson_ratio
+GROWTH = 2e-7
 
 
 def two_blocks(cells=(5, 5, 3), other=(5, 5, 3), gap=GAP_MM):
@@ -309,3 +310,96 @@ def test_hemispheres_that_press_on_each_other_stay_mirror_images():
     state, found = folded(hemisphere(6), 5, COMM, core_growth_rate_per_s=2e-7, **changes)
     assert state.rows[-1]["contact_pairs"] > 0
     assert found.relative <= 1e-8
+
+
+def free_blocks(gap, **changes):
+    """Returns what folds two free blocks whose meshes match across a gap, and the state at the start."""
+    mesh = two_blocks(gap=gap)
+    facets, _ = boundary_faces(mesh)
+    zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-0.5, 0.5), free=True)
+    values = {"start_week": 21.0, "end_week": 30.0, "output_weeks": [21.0, 30.0], "fissure_x_mm": 0.0}
+    p = parameters_from(values | {"support": "free", "no_growth": {"kind": "none"}} | changes)
+    return Folding(COMM, mesh, zones, p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+
+
+@pytest.mark.parametrize("support", ["free", "box"])
+def test_blocks_near_each_other_that_do_not_grow_do_not_move(support):
+    # the gap is a third of the distance that contact would begin at with this mesh
+    folding, state = free_blocks(0.1, growth_rate_per_s=0.0)
+    if support == "box":
+        mesh = two_blocks(gap=0.1)
+        folding = Folding(COMM, mesh, in_a_tube(mesh), folding.parameters)
+    assert folding.contact.distance_mm < 0.1
+    after = folding.step(state, state.step_s)
+    assert (after.positions == state.positions).all()
+    assert after.rows[-1]["newton"] == 0
+
+
+def test_parts_that_touch_move_as_one():
+    # one part grows towards the other, which has to give way: only the whole has no motion of its own
+    folding, state = free_blocks(0.1, growth_rate_per_s=1e-6, core_growth_rate_per_s=1e-6, contact={"distance_mm": 0.2})
+    domain = folding.domain
+    low = domain.part == domain.part[np.argmin(state.positions[:, 2])]
+    folding._growth = domain.local(low.astype(float))
+    after = folding.step(state, state.step_s)
+    u = after.last
+    assert np.abs(u.mean(axis=0)).max() <= 1e-12 * np.abs(u).max()
+    # by parts, the one that does not grow would keep its place
+    assert u[~low, 2].mean() > 0.1 * np.abs(u).max()
+    assert after.rows[-1]["contact_pairs"] > 0
+
+
+def test_parts_that_do_not_touch_keep_their_own_places():
+    folding, state = free_blocks(2.0, growth_rate_per_s=1e-6)
+    domain = folding.domain
+    folding._growth = domain.local((state.positions[:, 2] < 0).astype(float))
+    u = folding.step(state, state.step_s).last
+    for part in (0, 1):
+        assert np.abs(u[domain.part == part].mean(axis=0)).max() <= 1e-9 * np.abs(u).max()
+
+
+def pressed(step_s, days=4, **changes):
+    """Returns what has folded two blocks that grow evenly against each other in a tube, and the last state."""
+    mesh = two_blocks(other=(4, 3, 3))
+    values = {"start_week": 21.0, "end_week": 30.0, "output_weeks": [21.0, 30.0], "fissure_x_mm": 0.0}
+    values |= {"no_growth": {"kind": "none"}, "support": "box", "step_s": step_s, "fields": ["stress", "strain"]}
+    folding = Folding(COMM, mesh, in_a_tube(mesh), parameters_from(values | changes))
+    state, problem = State.at_start(mesh.vertices * M_PER_MM, step_s), folding.problem
+    honest, ones = folding.set_layers, np.ones(len(folding.domain.vertex_of_node))
+
+    def evenly(time_s, step_s):
+        honest(time_s, step_s)
+        normals = np.tile([0.0, 0.0, 1.0], (len(folding.domain.cells), 1))
+        problem.set_layers(MU * ones, GROWTH * step_s * ones, GROWTH * step_s * ones, normals)
+
+    folding.set_layers = evenly
+    for _ in range(round(days * 86400 / step_s)):
+        state = folding.step(state, step_s)
+    return folding, state
+
+
+def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_the_step():
+    rates = []
+    for step_s in (86400.0, 43200.0, 21600.0):
+        folding, state = pressed(step_s)
+        fields = folding.element_fields(["stress", "strain"]) | folding.contact_fields(["contact_pressure"])
+        at = two_blocks(other=(4, 3, 3)).vertices
+        inside = np.isclose(np.abs(at[:, 2]), GAP_MM / 2) & (np.abs(at[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
+        contact = fields["contact_pressure_pa_per_gw"][inside].mean()
+        inner = [np.median(fields[name]) for name in ("pressure_pa_per_gw", "elastic_volume_strain_per_gw")]
+        rates.append([*inner, contact])
+        assert state.rows[-1]["contact_pairs"] > 0
+    # held all around: -ln Je = 3 γ t and p = K times that; of first order in the step
+    strain = 3 * GROWTH * SECONDS_PER_GW
+    bulk = 2 * MU * (1 + NU) / (3 * (1 - 2 * NU))
+    errors = np.abs(np.array(rates) / [bulk * strain, -strain, bulk * strain] - 1)
+    assert (errors[2] < 0.03).all()
+    assert errors[1:, 2] / errors[:-1, 2] == pytest.approx([0.5, 0.5], abs=0.1)
+
+
+def test_stress_that_is_remembered_is_written_as_it_is():
+    pressures = []
+    for step_s in (86400.0, 43200.0):
+        folding, _ = pressed(step_s, stress_memory_gw=2.0)
+        pressures.append(np.median(folding.element_fields(["stress"])["pressure_pa"]))
+    assert pressures[0] == pytest.approx(pressures[1], rel=0.03)

@@ -94,6 +94,12 @@ rule contact_maps:
     conda:
         ENVIRONMENT
     params:
+        # stress that each step forgets is written per week
+        quantity=lambda wildcards: (
+            "contact_pressure_pa"
+            if CONFIG.runs[wildcards.run].stress_memory_gw
+            else "contact_pressure_pa_per_gw"
+        ),
         **drawing(),
     script:
         "../scripts/contact_maps.py"

@@ -10,10 +10,10 @@ frames, params, run = snakemake.input[0], snakemake.params, snakemake.wildcards.
 with step(snakemake.log[0]):
     start, *weeks = read_weeks(frames)
     surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, start), read_tets(frames)))
-    maps = {week: (surface, read_field(frames, week, "contact_pressure_pa")[pial]) for week in weeks}
+    maps = {week: (surface, read_field(frames, week, params.quantity)[pial]) for week in weeks}
     figure = scalar_maps(
         {f"run {run}": maps},
-        quantity="contact_pressure_pa",
+        quantity=params.quantity,
         views=("left", "right", "top", "bottom"),
         synthetic=params.synthetic,
     )

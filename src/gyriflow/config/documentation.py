@@ -10,6 +10,7 @@ from pydantic_core import PydanticUndefined
 
 from ..parameters.settings import Settings
 from ..parameters.varying import Varying
+from .atlas_description import Atlas
 from .root import Config
 
 INTRODUCTION = """\
@@ -43,7 +44,8 @@ BOUNDS = {"gt": "> {}", "ge": "≥ {}", "lt": "< {}", "le": "≤ {}"}
 def documentation() -> str:
     """Returns the page config/README.md."""
     sections = [_section(name, model) for name, model in _sections(Config, "")]
-    return "\n".join([INTRODUCTION, *sections, _section("varying", Varying)])
+    described = [_section(name, model) for name, model in _sections(Atlas, "atlas.yaml")]
+    return "\n".join([INTRODUCTION, *sections, _section("varying", Varying), *described])
 
 
 def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:

@@ -5,6 +5,7 @@ in, and no displacement may cross a pair on its way. Every rank has the whole su
 nothing but owned rows has to be agreed on.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ipctk
@@ -13,6 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError
 from ..geometry.triangles import TriangleMesh, edges, mean_length
@@ -28,6 +30,14 @@ As the surface grows, its edges do; a distance that stayed behind would only mak
 STIFFNESS_PER_MODULUS = 0.1
 """The barrier's stiffness in shear moduli of the cortex. The pressure between folds, some tenths of the modulus, holds
 them at about half of the distance then; a stiffer barrier takes more iterations and changes nothing else."""
+CLOSE, WIDE = 0.1, 0.75
+"""Parts of the distance: where the smallest gap is below the first, the next step's barrier is twice as stiff, and half
+where it is above the second. Stress that is kept presses folds ever harder; a barrier that is too soft for it lets them
+so near that Newton's method creeps. A barrier that changes moves what it holds, so it does so where it must only."""
+STIFFEST = 1024.0
+"""Most that the barrier is made stiffer by."""
+BESIDE = 0.999
+"""Part of the smallest gap at the start that contact may begin at."""
 BARRIER = ipctk.TwoStageBarrier()
 MARGIN_MM = 0.05
 """How far the surface may move before pairs that can come near are looked for anew."""
@@ -39,20 +49,31 @@ N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """The barrier's stiffness in Pa, and the distance d̂ in mm below which parts of the surface repel each other.
+    """The barrier's stiffness in Pa at the start, and the distance d̂ in mm below which parts of the surface repel.
 
-    None takes `DISTANCE_PER_EDGE` of the mean edge length at each step's start.
+    With `adaptive` the stiffness follows the gaps from step to step. As a distance, None takes `DISTANCE_PER_EDGE` of
+    the mean edge length at each step's start, but no more than the smallest gap at the start of the run: what does not
+    grow must stay where it is.
     """
 
     stiffness_pa: float
     distance_mm: float | None = None
+    adaptive: bool = False
 
 
 def contact_settings(parameters: FoldingParameters, maps: Maps) -> ContactSettings:
     """Returns the settings of a run: as given, or from the stiffest cortex."""
     p = parameters
     stiffest = value_range(p.shear_modulus_cortex_pa, maps, p.start_week, p.end_week)[1]
-    return ContactSettings(p.contact.stiffness_pa or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm)
+    given = p.contact.stiffness_pa
+    return ContactSettings(given or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm, adaptive=not given)
+
+
+def new_pairs() -> ipctk.NormalCollisions:
+    """Returns a set of pairs whose energies are weighted by areas, still empty."""
+    pairs = ipctk.NormalCollisions()
+    pairs.use_area_weighting = True
+    return pairs
 
 
 class SelfContact:
@@ -71,8 +92,8 @@ class SelfContact:
 
     Attributes
     ----------
-    distance_mm : float
-        The present distance d̂.
+    distance_mm, stiffness_pa : float
+        The present distance d̂ and stiffness κ.
 
     Raises
     ------
@@ -101,6 +122,8 @@ class SelfContact:
         self._candidates = ipctk.Candidates()
         self._centre: Floats | None = None  # where the candidates hold
         self._reach = 0.0
+        self._widest_mm = np.inf
+        self.stiffness_pa = settings.stiffness_pa
         self.mesh_moved()
         if ipctk.has_intersections(self._surface, self._start):
             raise MeshError(
@@ -109,20 +132,43 @@ class SelfContact:
                 remedy="Repair the surface, mesh with a smaller mesh.envelope_mm, or choose another "
                 "folding.contact.kind.",
             )
+        if settings.distance_mm is None:
+            self._widest_mm = self._smallest_gap()
+            self.mesh_moved()
 
     def mesh_moved(self) -> None:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
         self._start = np.asfortranarray(self.domain.positions[self._vertices] * MM_PER_M)
         self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
-        self.distance_mm = self.settings.distance_mm or self._distance_of_edges()
-        self._barrier = ipctk.BarrierPotential(
-            BARRIER, self.distance_mm, self.settings.stiffness_pa, use_physical_barrier=True
-        )
+        self.distance_mm = self.settings.distance_mm or min(self._distance_of_edges(), self._widest_mm)
+        self._barrier = ipctk.BarrierPotential(BARRIER, self.distance_mm, self.stiffness_pa, use_physical_barrier=True)
         self._known: Floats | None = None
 
     def _distance_of_edges(self) -> float:
         """Returns the distance in mm that belongs to the present edges, the same whatever a rank's processor rounds."""
         return DISTANCE_PER_EDGE * self.domain.comm.bcast(mean_length(self._start, self._edges), root=0)
+
+    def adapt(self, rows: Sequence[dict]) -> None:
+        """Sets the stiffness of the next step from the table of the steps so far; call `mesh_moved` after it."""
+        self.stiffness_pa = self.settings.stiffness_pa
+        if not (rows and self.settings.adaptive):
+            return
+        row = rows[-1]
+        part, last = row["min_distance_mm"] / row["contact_distance_mm"], row["contact_stiffness_pa"]
+        if part < CLOSE:
+            last = min(2 * last, STIFFEST * self.settings.stiffness_pa)
+        elif not part <= WIDE:  # also where nothing is near
+            last = max(last / 2, self.settings.stiffness_pa)
+        self.stiffness_pa = last
+
+    def _smallest_gap(self) -> float:
+        """Returns the smallest distance in mm at the step's start, infinite where no pair is within the present d̂."""
+        pairs = self._pairs_near(self._start, self.distance_mm)
+        gap = np.inf
+        if len(pairs):
+            # rounding must not make a pair of what is just at the limit
+            gap = BESIDE * float(np.sqrt(pairs.compute_minimum_distance(self._surface, self._start)))
+        return self.domain.comm.bcast(gap, root=0)
 
     def _on_surface(self, local: Floats) -> Floats:
         """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""
@@ -142,15 +188,36 @@ class SelfContact:
             if not self._within_reach(self._positions):
                 self._centre, self._reach = self._positions, self.distance_mm / 2 + MARGIN_MM
                 self._candidates.build(self._surface, self._positions, self._reach, self._search)
-            self._pairs = ipctk.NormalCollisions()
-            self._pairs.use_area_weighting = True
+            self._pairs = new_pairs()
             self._pairs.build(self._candidates, self._surface, self._positions, self.distance_mm)
         return self._positions, self._pairs
+
+    def _pairs_near(self, positions: Floats, distance_mm: float) -> ipctk.NormalCollisions:
+        """Returns the pairs within a distance at (s, 3) positions in mm, found anew."""
+        pairs = new_pairs()
+        pairs.build(self._surface, positions, distance_mm, broad_phase=self._search)
+        return pairs
+
+    def joined(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Returns the numbers (n,) of parts of the mesh, those of parts that touch at the step's start made one."""
+        if part.max() == 0:
+            return part
+        pairs = self._pairs_near(self._start, self.distance_mm)
+        near = [pairs[i].vertex_ids(self._edges, self._faces) for i in range(len(pairs))]
+        of_vertex = part[self._vertices]
+        # the numbers below 0 stand for no vertex
+        ends = [of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in near]
+        links = np.array([[two.min(), two.max()] for two in ends]).reshape(-1, 2)
+        count = int(part.max()) + 1
+        graph = sparse.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
+        return connected_components(graph, directed=False)[1][part].astype(np.int64)
 
     def energy(self) -> float:
         """Returns the barrier's energy in J."""
         positions, pairs = self._state()
-        return float(self._barrier(pairs, self._surface, positions)) * J_PER_PA_MM3
+        own = float(self._barrier(pairs, self._surface, positions)) * J_PER_PA_MM3
+        # ranks on different processors may round differently, but all have to decide alike
+        return self.domain.comm.bcast(own, root=0)
 
     def forces(self) -> Floats:
         """Returns the (s, 3) derivative of the energy in N at the surface's vertices."""

@@ -64,14 +64,15 @@ def layers_at(
     """
     p = parameters
     w = cortical_weight(distance_mm, p.thickness_at(week, maps))
-    tangential = value_at(p.growth_rate_per_s, week, maps)
-    radial = value_at(p.radial_growth_rate_per_s, week, maps)
-    core = value_at(p.core_growth_rate_per_s, week, maps)
+    tangential, radial, core = (
+        value_at(rate, week, maps)
+        for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
+    )
     dg, dr = growth_increments(w, growth, tangential, radial, core, step_s)
-    stiff, soft = value_at(p.shear_modulus_cortex_pa, week, maps), value_at(p.shear_modulus_core_pa, week, maps)
     return Layers(
         weight=w,
-        mu=soft * (1 - w) + stiff * w,
+        mu=value_at(p.shear_modulus_core_pa, week, maps) * (1 - w)
+        + value_at(p.shear_modulus_cortex_pa, week, maps) * w,
         dg=dg,
         dr=dr,
     )

@@ -38,12 +38,25 @@ class NewtonSettings:
 
 @dataclass
 class StepCount:
-    """What a step took."""
+    """What a step took.
+
+    Attributes
+    ----------
+    newton, krylov
+        Iterations, the latter in all.
+    rung
+        The furthest one of the linear ladder.
+    residual
+        What is left, relative to that at u = 0.
+    converged
+        Whether that is below the tolerance: not where nothing but the energy's round-off was left to gain.
+    """
 
     newton: int = 0
     krylov: int = 0
     rung: int = KEPT
     residual: float = np.inf
+    converged: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,6 +146,7 @@ class NewtonSolver:
                 self._first_left = iterate.norm / norm
             before = norm
         count.residual = iterate.norm / at_rest if at_rest > 0 else 0.0
+        count.converged = iterate.norm <= tolerance
         return count
 
     def _residual_at(self, displacement: NDArray[np.float64]) -> float:

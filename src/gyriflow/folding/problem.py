@@ -136,11 +136,19 @@ class Problem:
         self._sum: SumOperator | None = None
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
-        self.mesh_moved()
+        self._motions: RigidMotions | None = None
+        self._free_operator = FreeOperator(self.vector) if self.free else None
+        self.mesh_moved(domain.part)
 
-    def mesh_moved(self) -> None:
-        """Takes note of a mesh that has been placed anew."""
-        self._motions = RigidMotions(self.domain, self.domain.part) if self.free else None
+    def mesh_moved(self, part: NDArray[np.int64]) -> None:
+        """Takes note of a mesh that has been placed anew.
+
+        Where nothing holds the body, the rigid motions are taken out of each of the parts that the (n,) numbers of
+        all vertices name.
+        """
+        if self._free_operator is not None:
+            self._motions = RigidMotions(self.domain, part)
+            self._free_operator.set_motions(self._motions)
 
     def admissible(self, values: Floats) -> Floats:
         """Returns (k, 3) displacements of the local nodes in m less the rigid motions of a body that nothing holds."""
@@ -211,14 +219,14 @@ class Problem:
 
     def tangent(self) -> Tangent:
         """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed."""
+        # petsc4py keeps what several ranks share until all of them agree to let go of it
+        PETSc.garbage_cleanup(self.domain.comm)
         blocks = self._blocks.blocks
         blocks.set_value(0.0)
         dolfinx.fem.assemble_matrix(blocks, self._tangent)
         matrix, products = self._blocks.assembled(), self._blocks.for_products()
         if not self.contributions:
             return Tangent(matrix, products, ())
-        # petsc4py keeps what several ranks share until all of them agree to let go of it
-        PETSc.garbage_cleanup(self.domain.comm)
         if self._sum is None:
             # one object for all iterates, since multigrid keeps the first it is given
             self._sum = SumOperator(products)
@@ -244,7 +252,10 @@ class Problem:
 
     def operator(self, tangent: PETSc.Mat) -> PETSc.Mat:
         """Returns what a tangent does to admissible displacements: for a free body, without rigid motions."""
-        return tangent if self._motions is None else FreeOperator(tangent, self._motions).as_matrix()
+        if self._free_operator is None:
+            return tangent
+        self._free_operator.set_tangent(tangent)
+        return self._free_operator.matrix
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""

@@ -55,21 +55,37 @@ class RigidMotions:
 
 
 class FreeOperator:
-    """The action of a tangent on displacements without rigid motions, for a PETSc matrix of type python."""
+    """The action of a tangent on displacements without rigid motions, as a PETSc matrix of type python.
 
-    def __init__(self, tangent: PETSc.Mat, motions: RigidMotions) -> None:
-        self.tangent = tangent
+    Parameters
+    ----------
+    like
+        A vector of the tangents' layout.
+
+    Attributes
+    ----------
+    matrix : PETSc.Mat
+        The matrix: one for all tangents and meshes, symmetric and with the rigid motions as its null space.
+    """
+
+    def __init__(self, like: PETSc.Vec) -> None:
+        self._like = like
+        sizes = like.getSizes()
+        self.matrix = PETSc.Mat().createPython((sizes, sizes), context=self, comm=like.comm)
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self.matrix.setUp()
+
+    def set_motions(self, motions: RigidMotions) -> None:
+        """Sets the motions that are taken out."""
         self.motions = motions
+        self.matrix.setNullSpace(motions.null_space(self._like))
+
+    def set_tangent(self, tangent: PETSc.Mat) -> None:
+        """Sets the tangent that acts."""
+        self.tangent = tangent
+        self.matrix.stateIncrease()
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Sets y to the tangent's product with x, less its rigid part."""
         self.tangent.mult(x, y)
         self.motions.remove(y.array_w)
-
-    def as_matrix(self) -> PETSc.Mat:
-        """Returns the PETSc matrix that acts like this, symmetric and with the rigid motions as its null space."""
-        matrix = PETSc.Mat().createPython(self.tangent.getSizes(), context=self, comm=self.tangent.comm)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setNullSpace(self.motions.null_space(self.tangent.createVecRight()))
-        matrix.setUp()
-        return matrix

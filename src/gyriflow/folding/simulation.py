@@ -27,7 +27,13 @@ from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import NewtonSettings, NewtonSolver
 from .output import say
 from .problem import Problem
-from .stress import deformation_gradients, strain_fields, stress_fields, volume_ratio_fields
+from .stress import (
+    deformation_gradients,
+    elastic_strain_fields,
+    stress_fields,
+    total_strain_fields,
+    volume_ratio_fields,
+)
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -93,8 +99,12 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
+<<<<<<< HEAD
         self._start_size = size_of(mesh.vertices, zones)
         self.present = parameters  # those of the last step, with its rates of growth
+=======
+        self._step_s = parameters.step_s  # of the last step
+>>>>>>> main
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
             centres = nodes[self.domain.cells].mean(axis=1)
@@ -118,9 +128,12 @@ class Folding:
         cells = domain.cells[directed]
         normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
         self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
-        self.problem.mesh_moved()
+        part = domain.part
         if self.contact is not None:
             self.contact.mesh_moved()
+            if self.problem.free:
+                part = self.contact.joined(part)
+        self.problem.mesh_moved(part)
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
@@ -134,7 +147,8 @@ class Folding:
     def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
 
-        Names are those of the parameter `fields`; those of the arrays carry their units. Right after a step only.
+        Names are those of the parameter `fields`; those of the arrays carry their units. Where stress is forgotten,
+        that of a step and its strain are in proportion to the step, and are given per week. Right after a step only.
         """
         domain = self.domain
         fields: dict[str, Floats] = {}
@@ -145,9 +159,10 @@ class Folding:
         # back to where the step began, which its displacement refers to
         domain.place(after - domain.gathered(self.problem.displacement[: domain.owned]))
         if "stress" in wanted:
-            fields |= stress_fields(self.problem.outcome("stress"))
+            fields |= self._per_gw(stress_fields(self.problem.outcome("stress")))
         if "strain" in wanted:
-            fields |= strain_fields(self.problem.outcome("elastic"), total, self._start_normals)
+            fields |= self._per_gw(elastic_strain_fields(self.problem.outcome("elastic")))
+            fields |= total_strain_fields(total, self._start_normals)
         if "volume_ratio" in wanted:
             fields |= volume_ratio_fields(self.problem.outcome("deformation"), total)
         domain.place(after)
@@ -155,10 +170,19 @@ class Folding:
         return dict(zip(fields, together.T, strict=True))
 
     def contact_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
-        """Returns the contact pressure (n,) in Pa at all vertices if it is among `wanted`. Right after a step only."""
+        """Returns the contact pressure (n,) at all vertices if it is among `wanted`.
+
+        Per week where stress is forgotten. Right after a step only.
+        """
         if self.contact is None or "contact_pressure" not in wanted:
             return {}
-        return {"contact_pressure_pa": self.contact.pressure()}
+        return self._per_gw({"contact_pressure_pa": self.contact.pressure()})
+
+    def _per_gw(self, fields: dict[str, Floats]) -> dict[str, Floats]:
+        """Returns fields of a step as they are where stress is remembered, and else as rates, named so."""
+        if self._remembers:
+            return fields
+        return {f"{name}_per_gw": values * (SECONDS_PER_GW / self._step_s) for name, values in fields.items()}
 
     def _contact_row(self, positions: Floats) -> dict[str, float]:
         """Returns what the step table says of contact right after a solve that led to (n, 3) positions in m."""
@@ -166,7 +190,13 @@ class Folding:
             distance = self.contact.smallest_distance_mm()
             # what is farther apart than the barrier reaches is not looked for
             near = {"min_distance_mm": distance if distance < math.inf else math.nan}
-            return {"contact_distance_mm": self.contact.distance_mm, "contact_pairs": self.contact.pair_count(), **near}
+            contact = self.contact
+            return {
+                "contact_distance_mm": contact.distance_mm,
+                "contact_stiffness_pa": contact.stiffness_pa,
+                "contact_pairs": contact.pair_count(),
+                **near,
+            }
         return {"plane_penetration_mm": self.zones.penetration_mm(positions * MM_PER_M)}
 
     def trouble(self) -> str:
@@ -193,13 +223,19 @@ class Folding:
             Where the step is too large; the mesh is as before.
         """
         began = time.monotonic()
-        domain, problem = self.domain, self.problem
+        domain, problem, self._step_s = self.domain, self.problem, step_s
         if domain.positions is not state.positions:
             domain.place(state.positions)
+<<<<<<< HEAD
         last = state.rows[-1] if state.rows else {}
         before = size_of(state.positions * MM_PER_M, self.zones)
         growth = following_step(self.parameters, self._start_size, before, state.time_s, step_s, last, self.maps)
         self.set_layers(growth.parameters, state.time_s, step_s)
+=======
+        if self.contact is not None:
+            self.contact.adapt(state.rows)
+        self.set_layers(state.time_s, step_s)
+>>>>>>> main
         kept = self._kept_stretch(state, step_s)
         if kept is not None:
             problem.set_stretch(kept)
@@ -216,6 +252,7 @@ class Folding:
             "newton": count.newton,
             "krylov": count.krylov,
             "residual": count.residual,
+            "converged": count.converged,
             "energy_J": energy,
             "min_J": domain.minimum(ratios),
             "max_J": -domain.minimum(-ratios),
@@ -265,6 +302,12 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 say(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
             state = replace(state, step_s=half, successes=0)
             continue
+        row = after.rows[-1]
+        if not row["converged"] and folding.domain.comm.rank == 0:
+            say(
+                f"warning: step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
+                f"folding.solver.newton_tolerance: nothing was left to gain but round-off"
+            )
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after

@@ -83,29 +83,34 @@ def stress_fields(stress: Floats) -> dict[str, Floats]:
     return {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
 
 
-def strain_fields(Fe: Floats, F_total: Floats, start_normals: Floats) -> dict[str, Floats]:
-    """Returns measures of strain per element, (c,), without unit.
+def elastic_strain_fields(Fe: Floats) -> dict[str, Floats]:
+    """Returns measures per element, (c,), of elastic parts (c, 3, 3) of the deformation: what growth has not made.
+
+    `elastic_strain` is the equivalent Hencky strain, `elastic_volume_strain` ln Je.
+    """
+    return {
+        "elastic_strain": hencky_equivalent(principal_stretches(Fe)),
+        "elastic_volume_strain": np.log(np.linalg.det(Fe)),
+    }
+
+
+def total_strain_fields(F_total: Floats, start_normals: Floats) -> dict[str, Floats]:
+    """Returns measures per element, (c,), of the deformation since the start, growth included.
 
     Parameters
     ----------
-    Fe
-        Elastic parts after the last step.
     F_total
-        Deformation gradients from the start mesh to the present shape, growth included.
+        Deformation gradients from the start mesh to the present shape.
     start_normals : (c, 3) float
         Unit normals of the nearest pial surface in the start mesh.
 
     Returns
     -------
     dict with
-        `elastic_strain` (equivalent Hencky strain), `elastic_volume_strain` (ln Je), `total_strain` (largest principal
-        value of the Green-Lagrange strain), `area_stretch` (along the pial surface)
+        `total_strain` (largest principal value of the Green-Lagrange strain), `area_stretch` (along the pial surface)
     """
-    elastic, total = principal_stretches(Fe), principal_stretches(F_total)
     return {
-        "elastic_strain": hencky_equivalent(elastic),
-        "elastic_volume_strain": np.log(np.linalg.det(Fe)),
-        "total_strain": green_lagrange_maximum(total),
+        "total_strain": green_lagrange_maximum(principal_stretches(F_total)),
         "area_stretch": areal_stretch(F_total, start_normals),
     }
 

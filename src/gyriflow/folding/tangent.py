@@ -91,13 +91,16 @@ class Tangent:
             return
         matrix = self.whole()
         diagonal = matrix.getDiagonal()
-        size = diagonal.copy()
-        size.abs()
-        matrix.setDiagonal(diagonal + part * size)
+        raised = diagonal.copy()
+        raised.abs()
+        raised.aypx(part, diagonal)
+        matrix.setDiagonal(raised)
+        raised.destroy()
         try:
             yield
         finally:
             matrix.setDiagonal(diagonal)
+            diagonal.destroy()
 
 
 def block_diagonal(matrix: PETSc.Mat) -> tuple[np.ndarray, np.ndarray]:

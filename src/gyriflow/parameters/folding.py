@@ -56,7 +56,8 @@ class Contact(Settings):
         "plane, folds run through each other (the paper); `none`: no contact.",
     )  # fmt: skip
     distance_mm: float | None = setting(
-        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's mean edge.",
+        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's mean edge, and "
+        "no more than the smallest gap at the start.",
         gt=0, le=5,
     )  # fmt: skip
     stiffness_pa: float | None = setting(
@@ -133,6 +134,12 @@ class Follow(Settings):
 class FoldingSettings(Settings):
     """The mechanical model, its parameters and its numerics; reference values of the paper."""
 
+    preset: Literal["fetalfoldsim", "measured"] | None = setting(
+        None, "",
+        "Parameters to start from; other keys come on top. `fetalfoldsim`: those of the paper; `measured`: growth that "
+        "follows the brains' areas and volumes, regional as registration measures it. All values stand in "
+        "`params.yaml`.",
+    )  # fmt: skip
     end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
     step_s: float = setting(
         43200.0, "s", "Time step; the last one before an output is shortened where it does not fit.", gt=0, le=604800

@@ -14,12 +14,13 @@ from gyriflow.folding.problem import Problem
 from gyriflow.folding.stress import (
     areal_stretch,
     deformation_gradients,
+    elastic_strain_fields,
     green_lagrange_maximum,
     hencky_equivalent,
     pressure,
     principal_stretches,
-    strain_fields,
     stress_fields,
+    total_strain_fields,
     volume_ratio_fields,
     von_mises,
 )
@@ -97,7 +98,8 @@ def test_a_free_body_that_grows_as_it_likes_has_no_stress(law, dr):
     F = rotation([1, 2, 3], 0.7) @ Fg
     growth = {"law": law, "dg": 0.2, "dr": dr, "normal": normal}
     Fe, stress = outcomes(F, "elastic", **growth), outcomes(F, "stress", **growth)
-    fields = stress_fields(stress) | strain_fields(Fe, F[None], normal[None]) | volume_ratio_fields(F[None], F[None])
+    fields = stress_fields(stress) | elastic_strain_fields(Fe)
+    fields |= total_strain_fields(F[None], normal[None]) | volume_ratio_fields(F[None], F[None])
     for name in ("von_mises_pa", "pressure_pa", "elastic_strain", "elastic_volume_strain"):
         assert fields[name] == pytest.approx(0, abs=1e-12 * K), name
     assert fields["volume_ratio"] == pytest.approx(1.44 * (1 + dr))
@@ -195,7 +197,8 @@ def test_fields_tell_elastic_from_total_deformation():
     total = np.diag([layer, layer, 1.2])[None]
     normal = np.array([[0.0, 0.0, 1.0]])
     Fe = outcomes(total[0], "elastic", dg=grown - 1)
-    fields = strain_fields(Fe, total, normal) | volume_ratio_fields(np.diag([1.0, 1.0, 1.1])[None], total)
+    fields = elastic_strain_fields(Fe) | total_strain_fields(total, normal)
+    fields |= volume_ratio_fields(np.diag([1.0, 1.0, 1.1])[None], total)
     assert fields["elastic_volume_strain"] == pytest.approx(np.log(0.75 * 1.2))
     assert fields["elastic_strain"] == pytest.approx(2 / 3 * (np.log(1.2) - np.log(layer / grown)))
     assert fields["total_strain"] == pytest.approx((1.5 - 1) / 2)

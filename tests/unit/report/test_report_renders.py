@@ -266,13 +266,16 @@ def test_curvedness_and_depth_go_from_zero_to_where_few_vertices_are_above(quant
     assert bar.get_xlim() == pytest.approx((0.0, np.percentile(values, 98)))
 
 
-def test_contact_pressure_is_scaled_by_what_touches():
+@pytest.mark.parametrize(
+    ("quantity", "unit"), [("contact_pressure_pa", "(Pa)"), ("contact_pressure_pa_per_gw", "(Pa/GW)")]
+)
+def test_contact_pressure_is_scaled_by_what_touches(quantity, unit):
     mesh = box((20, 30, 20))
     figures = [
-        scalar_maps({"run": {28.0: (mesh, values)}}, quantity="contact_pressure_pa", views=("left",))
+        scalar_maps({"run": {28.0: (mesh, values)}}, quantity=quantity, views=("left",))
         for values in (np.array([0.0] * 6 + [100.0, 300.0]), np.zeros(8))
     ]
-    ends = [next(axes for axes in figure.axes if "(Pa)" in axes.get_xlabel()).get_xlim()[1] for figure in figures]
+    ends = [next(axes for axes in figure.axes if unit in axes.get_xlabel()).get_xlim()[1] for figure in figures]
     assert ends == pytest.approx([np.percentile([100.0, 300.0], 98), 1.0])
 
 

@@ -1,0 +1,52 @@
+"""PETSc's objects do not add up over steps, whatever holds the body and whatever solves it."""
+
+import gc
+import re
+
+import pytest
+from boxes import COMM
+from contact_cases import closing_sulcus
+from petsc4py import PETSc
+
+PETSc.Log.begin()
+COUNTED = ("Vector", "Matrix", "Matrix Null Space", "Index Set")
+SPARE = 2
+"""Objects that are there between two iterations or not."""
+
+
+def alive(path):
+    """Returns how many objects of each class PETSc has made and not destroyed."""
+    gc.collect()
+    viewer = PETSc.Viewer().createASCII(str(path), comm=COMM)
+    PETSc.Log.view(viewer)
+    viewer.destroy()
+    COMM.barrier()
+    rows = re.findall(r"^\s*([A-Z][\w ]+?)\s+(\d+)\s+(\d+)\s*$", path.read_text(), flags=re.MULTILINE)
+    found = {name: int(made) - int(gone) for name, made, gone in rows}
+    return [found[name] for name in COUNTED if name in found]
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        ("none", {}),
+        ("planes", {}),
+        ("global", {}),
+        ("none", {"support": "free"}),
+        # the tangent has to be raised in every step
+        ("none", {"stress_memory_gw": "infinite"}),
+    ],
+)
+def test_objects_do_not_add_up(kind, changes, tmp_path_factory):
+    folding, state = closing_sulcus(kind, **changes)
+    path = COMM.bcast(tmp_path_factory.mktemp("log") / "log.txt")
+    counts = []
+    for step in range(9):
+        state = folding.step(state, state.step_s)
+        if step in (5, 8):
+            counts.append(alive(path))
+    if "stress_memory_gw" in changes:
+        assert sum("shifted" in row["rung"] for row in state.rows) >= 2
+    assert sum(row["newton"] for row in state.rows[6:]) >= 6
+    for before, after in zip(*counts, strict=True):
+        assert after <= before + SPARE
