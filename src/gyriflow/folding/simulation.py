@@ -99,12 +99,9 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
-<<<<<<< HEAD
         self._start_size = size_of(mesh.vertices, zones)
         self.present = parameters  # those of the last step, with its rates of growth
-=======
         self._step_s = parameters.step_s  # of the last step
->>>>>>> main
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
             centres = nodes[self.domain.cells].mean(axis=1)
@@ -226,16 +223,12 @@ class Folding:
         domain, problem, self._step_s = self.domain, self.problem, step_s
         if domain.positions is not state.positions:
             domain.place(state.positions)
-<<<<<<< HEAD
+        if self.contact is not None:
+            self.contact.adapt(state.rows)
         last = state.rows[-1] if state.rows else {}
         before = size_of(state.positions * MM_PER_M, self.zones)
         growth = following_step(self.parameters, self._start_size, before, state.time_s, step_s, last, self.maps)
         self.set_layers(growth.parameters, state.time_s, step_s)
-=======
-        if self.contact is not None:
-            self.contact.adapt(state.rows)
-        self.set_layers(state.time_s, step_s)
->>>>>>> main
         kept = self._kept_stretch(state, step_s)
         if kept is not None:
             problem.set_stretch(kept)
