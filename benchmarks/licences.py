@@ -56,10 +56,9 @@ def stated(distribution: metadata.Distribution) -> str:
     if not text and first:
         text = next((name for start, name in TEXTS.items() if first.startswith(start)), first[:60])
     if not text:
-        named = re.compile(r"LICEN[CS]E|COPYING", re.IGNORECASE)
-        files = [file for file in distribution.files or [] if named.search(file.name)]
+        files = [file for file in distribution.files or [] if re.search(r"(?i)licen[cs]e|copying", file.name)]
         starts = [file.read_text(encoding="utf-8").strip() for file in files]
-        text = "; ".join(name for start, name in TEXTS.items() if any(text.startswith(start) for text in starts))
+        text = "; ".join(name for start, name in TEXTS.items() if any(found.startswith(start) for found in starts))
     return text or "not stated"
 
 
