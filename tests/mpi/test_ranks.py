@@ -12,7 +12,7 @@ import pytest
     "cases",
     [
         *("solver_cases.py", "growth_cases.py", "memory_cases.py", "ladder_cases.py", "consistency_cases.py"),
-        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py"),
+        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py", "following_cases.py"),
     ],
 )
 def test_cases_hold_on(ranks, cases):

@@ -21,6 +21,8 @@ JOINING_GW = 1.0
 """Time in which a brain that does not start on its curves comes onto them."""
 FASTEST_PER_S = 1e-5
 """Largest rate that is set, the bound of the prescribed ones."""
+FOLLOWED = 0.005
+"""Part of a curve's value within which it counts as followed."""
 MOST_CORTEX = 0.8
 """Part of the volume that at most counts as cortex, so that the core has something to grow."""
 
@@ -77,6 +79,17 @@ class Step:
             "realised_share": share,
             "growth_limited": int(self.rates.limited),
         }
+
+
+def missed_curves(row: Mapping[str, Any]) -> str:
+    """Returns what to say of a step that is more than `FOLLOWED` off a curve; empty where it is not."""
+    parts = []
+    for name, unit in (("area", "cm2"), ("volume", "ml")):
+        if (aim := row.get(f"{name}_aim_{unit}")) is not None:
+            error = row[f"{name}_{unit}"] / aim - 1
+            if abs(error) > FOLLOWED:
+                parts.append(f"{name} {100 * error:+.1f} % off its curve")
+    return f"at GW {row['week']:g} the brain is {' and '.join(parts)}" if parts else ""
 
 
 def size_of(positions_mm: Floats, zones: Zones) -> Size:
