@@ -65,7 +65,8 @@ def weekly(out: Path):
     from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
     from gyriflow.geometry.triangles import area, signed_volume
     from gyriflow.io.frames import read_positions, read_tets, read_weeks
-    from gyriflow.metrics.gyrification import convex_hull, envelope, gyrification_index
+    from gyriflow.metrics.depth import convex_hull
+    from gyriflow.metrics.gyrification import envelope, gyrification_index, pieces_over
 
     tets, steps = read_tets(out / "frames.h5"), pd.read_csv(out / "steps.csv")
     surfaces, rows = {}, []
@@ -77,8 +78,10 @@ def weekly(out: Path):
             "week": week,
             "area_cm2": area(surfaces[week]) / 100,
             "volume_mL": signed_volume(surfaces[week]) / 1000,
-            "gi_hull": gyrification_index(surfaces[week], convex_hull(surfaces[week])),
-            "gi_envelope": gyrification_index(surfaces[week], envelope(surfaces[week])),
+            "gi_hull": gyrification_index([surfaces[week]], [pieces_over(convex_hull(surfaces[week]), surfaces[week])]),
+            "gi_envelope": gyrification_index(
+                [surfaces[week]], [pieces_over(envelope(surfaces[week]), surfaces[week])]
+            ),
             "crossing_faces": crossing_faces(surfaces[week]),
             "inverted": int((signed_volumes(brain) <= 0).sum()),
             "seconds": during["seconds"].sum(),

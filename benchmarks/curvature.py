@@ -20,7 +20,6 @@ from gyriflow.geometry.remeshing import remeshed
 from gyriflow.geometry.triangles import Floats, TriangleMesh, mean_edge_length, vertex_areas
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import RADIUS_MM, Curvature, curvature
-from gyriflow.metrics.gyrification import envelope, gyrification_index, sulcal_depth
 
 SURFACES = {
     "sphere": Ellipsoid((20.0, 20.0, 20.0)),
@@ -195,25 +194,11 @@ def real_table(surface: TriangleMesh) -> list[str]:
         "The same surface remeshed; means are weighted by area.",
         "",
     ]
-    lines += heading(
-        "mean edge",
-        [
-            "vertices",
-            "shape index",
-            "curvedness (1/mm)",
-            "sulcal share",
-            "GI, envelope",
-            "mean depth (mm)",
-            "depth, 95 %",
-        ],
-    )
+    lines += heading("mean edge", ["vertices", "shape index", "curvedness (1/mm)", "sulcal share"])
     for mesh in (surface, *(remeshed(surface, edge) for edge in REAL_EDGES_MM)):
-        found, outside, weights = curvature(mesh), envelope(mesh), vertex_areas(mesh)
-        depth = sulcal_depth(mesh, outside)
+        found, weights = curvature(mesh), vertex_areas(mesh)
         means = [np.average(values, weights=weights) for values in (found.shape_index, found.curvedness)]
-        share = np.average(found.shape_index < 0, weights=weights)
-        deep = np.quantile(depth, 0.95, weights=weights, method="inverted_cdf")
-        values = [*means, share, gyrification_index(mesh, outside), np.average(depth, weights=weights), deep]
+        values = [*means, np.average(found.shape_index < 0, weights=weights)]
         cells = " | ".join(f"{value:.4g}" for value in values)
         lines.append(f"| {mean_edge_length(mesh):.2f} mm | {len(mesh.vertices)} | {cells} |")
     return lines

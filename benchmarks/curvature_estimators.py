@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 
 import igl
 import numpy as np
-import pymeshlab
 import pyvista as pv
 
+from gyriflow.geometry.meshlab import pymeshlab
 from gyriflow.geometry.remeshing import in_meshlab
 from gyriflow.geometry.triangles import Floats, TriangleMesh, mean_edge_length
 from gyriflow.metrics.curvature import RADIUS_MM, curvature

@@ -102,7 +102,7 @@ def measure(arguments: argparse.Namespace) -> None:
     for step in range(min(arguments.paper_steps, arguments.steps) + 1):
         comm.barrier()
         began = time.perf_counter()
-        paper.set_layers(p, states[len(paper_seconds)].time_s, p.step_s)
+        paper.set_layers(states[len(paper_seconds)].time_s, p.step_s)
         iterations = relaxed_lu_step(paper.problem, solver, residual, direction, start)
         start = paper.problem.displacement.copy()
         domain.place(domain.positions + domain.gathered(start[: domain.owned]))

@@ -1,9 +1,9 @@
 """Times the Laplace-Beltrami modes of a surface against a single call of ARPACK: one JSON line.
 
-    ./run python benchmarks/spectra.py SURFACE --modes 2000 --threads 2
+    ./run python benchmarks/spectra.py SURFACE --modes 2000
 
-`seconds` is the wall time of `lowest_modes`, `cpu_seconds` the CPU time of all its threads, `peak_memory_MiB` the most
-memory of the process up to its end. `missing` is the number of eigenvalues below the middle of the largest gap among
+`seconds` is the wall time of `lowest_modes`, `cpu_seconds` its CPU time, `peak_memory_MiB` the most memory of the
+process up to its end. `missing` is the number of eigenvalues below the middle of the largest gap among
 the last ten found, by the inertia of K − λM there, less the number found there.
 
 `arpack_seconds` is the time of one shift-invert call for the same modes, which `--no-arpack` leaves out; for
@@ -26,13 +26,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("surface", help="a closed surface in mm (.surf.gii, .stl, .ply, .obj)")
     parser.add_argument("--modes", type=int, default=2000)
-    parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--no-arpack", action="store_true", help="leave the single call of ARPACK out")
     options = parser.parse_args()
 
     stiffness, mass = laplacian(read_surface(options.surface))
     clock, cpu = time.perf_counter(), time.process_time()
-    values = lowest_modes(stiffness, mass, options.modes, threads=options.threads).eigenvalues
+    values = lowest_modes(stiffness, mass, options.modes).eigenvalues
     seconds, cpu_seconds = time.perf_counter() - clock, time.process_time() - cpu
     memory_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
@@ -42,7 +41,6 @@ def main() -> None:
     result = {
         "vertices": stiffness.shape[0],
         "modes": len(values),
-        "threads": options.threads,
         "seconds": round(seconds, 2),
         "cpu_seconds": round(cpu_seconds, 2),
         "arpack_seconds": None,

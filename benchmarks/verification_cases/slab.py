@@ -48,6 +48,7 @@ class Waved:
     growth: float
     steps: int
     memory: float = 0.0
+    scheme: str = "implicit"
 
     @property
     def width_mm(self) -> float:
@@ -64,7 +65,7 @@ class Waved:
 
     def expected(self) -> Floats:
         """Returns the (steps + 1, waves) heights over those at the start, from `modes`."""
-        return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps)
+        return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps, self.scheme)
 
     def parameters(self) -> FoldingParameters:
         """Returns the parameters of the run."""
@@ -81,6 +82,7 @@ class Waved:
             "growth_rate_per_s": RATE_PER_S,
             "step_s": self.growth / RATE_PER_S,
             "stress_memory_gw": "infinite" if np.isinf(memory_gw) else memory_gw,
+            "time_scheme": self.scheme,
             "support": "box",
             "contact": {"kind": "none"},
             "no_growth": {"kind": "none"},

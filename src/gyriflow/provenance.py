@@ -49,6 +49,11 @@ def imported_modules(source: Path) -> frozenset[Path]:
     return frozenset(file for name in names for file in _files_of(name))
 
 
+def room_of(module: Path) -> str:
+    """Returns the room that a source file belongs to: the folder, or the single module, directly under the package."""
+    return module.resolve().relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
 def _files_of(name: str) -> list[Path]:
     """Returns the file of a module and those of the packages around it; none for other packages' modules."""
     package, *parts = name.split(".")

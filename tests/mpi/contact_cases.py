@@ -272,7 +272,7 @@ def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
 
 
 def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
-    mesh = two_blocks()
+    mesh = two_blocks(gap=0.5)
     _, contact = problem_with_contact(mesh, in_a_tube(mesh), None)
     before = contact.distance_mm
     assert before == pytest.approx(0.2 * 1.4, rel=0.15)

@@ -63,7 +63,7 @@ def test_a_run_has_the_material_that_it_names(material):
     values = {"start_week": 21.0, "end_week": 22.0, "output_weeks": [21.0, 22.0], "fissure_x_mm": 0.0}
     values |= {"shear_modulus_cortex_pa": 1000, "shear_modulus_core_pa": 1000, "growth_rate_per_s": 0}
     folding = Folding(COMM, mesh, zones_of(mesh), parameters_from(values | {"material": material}))
-    folding.set_layers(folding.parameters, 0.0, 43200.0)
+    folding.set_layers(0.0, 43200.0)
     problem = folding.problem
     problem.set_displacement(problem.domain.local(problem.domain.positions) * [0.2, 0.0, 0.0])
     bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)

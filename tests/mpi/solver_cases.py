@@ -223,3 +223,13 @@ def test_the_tangent_for_products_is_the_tangent():
         tangent.products.mult(x, other)
         other.axpy(-1.0, one)
         assert other.norm() <= 1e-13 * one.norm()
+
+
+def test_a_step_that_ends_above_its_tolerance_says_so():
+    problem = growing_problem(contact=True)
+    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-18, krylov_tolerance=1e-8), residual_floor=0.0)
+    count = solver.solve(np.zeros_like(problem.displacement))
+    assert count.residual > 1e-18
+    assert not count.converged
+    solver = NewtonSolver(growing_problem(), NewtonSettings(newton_tolerance=1e-8), residual_floor=0.0)
+    assert solver.solve(np.zeros_like(problem.displacement)).converged

@@ -5,9 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from shapes import ellipsoid_mesh
 
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+
+pytestmark = pytest.mark.slow
 
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "folding_step.py"
 KEYS = (

@@ -5,10 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 import yaml
 from shapes import ellipsoid_mesh
 
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+
+pytestmark = pytest.mark.slow
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "contact.py"
 

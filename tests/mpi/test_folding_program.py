@@ -28,6 +28,8 @@ from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.parameters.reading import parameters_from
 
+pytestmark = pytest.mark.slow
+
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
 WEEK = {
     "start_week": 21.0,

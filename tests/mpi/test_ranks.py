@@ -6,13 +6,16 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 @pytest.mark.parametrize(
     "cases",
     [
         *("solver_cases.py", "growth_cases.py", "memory_cases.py", "ladder_cases.py", "consistency_cases.py"),
-        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py", "following_cases.py"),
+        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py"),
+        *("leak_cases.py", "rate_cases.py", "following_cases.py"),
     ],
 )
 def test_cases_hold_on(ranks, cases):
@@ -30,6 +33,6 @@ def test_cases_hold_on(ranks, cases):
         "no:cacheprovider",
         str(path),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=150, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == ranks, done.stdout

@@ -14,6 +14,8 @@ from gyriflow.geometry.tetrahedra import boundary_surface, signed_volumes
 from gyriflow.geometry.triangles import euler_number, face_components, is_closed
 from gyriflow.mesh.quality import radius_ratios
 
+pytestmark = pytest.mark.slow
+
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 KEYS = (
     "sizes unknowns min_radius_ratio elements_through_cortex steps repeats seconds_1 seconds_2 speedup_2_ranks "

@@ -13,6 +13,8 @@ from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
 
 from .conftest import Workflow
 
+pytestmark = pytest.mark.slow
+
 LEFT, RIGHT = hemisphere(-1), hemisphere(1)
 
 

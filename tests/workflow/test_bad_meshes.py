@@ -13,6 +13,8 @@ from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 
 from .conftest import Workflow
 
+pytestmark = pytest.mark.slow
+
 VOLUME_ML = 4 / 3 * np.pi * HALF_AXES.prod() / 1e3
 LEFT, RIGHT = hemisphere(-1), hemisphere(1)
 # mm between the hemispheres, which are 3 mm apart, once the right one was moved

@@ -16,6 +16,8 @@ from gyriflow.surface.repair import pieces
 
 from .conftest import Workflow
 
+pytestmark = pytest.mark.slow
+
 VOLUME_ML = 4 / 3 * np.pi * HALF_AXES.prod() / 1e3
 BALL = trimesh.creation.icosphere(subdivisions=4)
 LEFT, RIGHT = hemisphere(-1), hemisphere(1)

@@ -13,6 +13,8 @@ from gyriflow.phantom.brain import phantom_labels
 
 from .conftest import Workflow
 
+pytestmark = pytest.mark.slow
+
 LABELS, AFFINE = phantom_labels(21.0, voxel_mm=2.0)
 
 

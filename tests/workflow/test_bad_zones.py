@@ -11,6 +11,8 @@ from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
 from .conftest import Workflow
 
+pytestmark = pytest.mark.slow
+
 
 def files_in(folder):
     return [path for path in folder.rglob("*") if path.is_file()]

@@ -165,6 +165,7 @@ def test_runs_that_write_contact_pressure_have_a_figure_of_it(workflow):
         assert jobs.get("contact_maps", 0) == expected
 
 
+@pytest.mark.slow
 def test_nothing_is_to_be_done_after_all_was_made(finished):
     assert finished.jobs("--configfile", "study.yaml") == {}
 
@@ -188,6 +189,7 @@ FIGURES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "values", "expected"),
     [
@@ -225,6 +227,7 @@ def test_exactly_what_depends_on_a_changed_parameter_runs_again(finished, sectio
     assert finished.jobs("--configfile", name) == expected
 
 
+@pytest.mark.slow
 def test_a_change_of_a_rooms_code_reruns_what_uses_it(finished):
     source = finished.checkout / "src" / "gyriflow" / "metrics" / "similarity.py"
     before = source.read_bytes()

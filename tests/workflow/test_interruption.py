@@ -16,6 +16,8 @@ from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
 from .conftest import SMALL_STUDY
 
+pytestmark = pytest.mark.slow
+
 STUDY = SMALL_STUDY | {
     "brains": SMALL_STUDY["brains"][:1],
     # so many steps that the folding does not end before the signal arrives

@@ -8,6 +8,8 @@ import pytest
 import yaml
 from local_server import Server, packed, serving
 
+pytestmark = pytest.mark.slow
+
 WEEKS = (21, 22)
 FILES = {f"w{week}/labels.nii.gz": packed(100_000, week) for week in WEEKS}
 

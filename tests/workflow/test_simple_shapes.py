@@ -13,6 +13,7 @@ STUDY = {
 TARGET = "results/brains/dome/surface/pial.surf.gii"
 
 
+@pytest.mark.slow
 def test_a_shape_is_made_and_takes_the_path_of_a_brain(workflow):
     jobs = workflow.jobs("--configfile", workflow.write("study.yaml", STUDY))
     assert (jobs["shape"], jobs["pial_from_shape"], jobs["phantom"], jobs["pial_from_labels"]) == (1, 1, 1, 1)
@@ -36,6 +37,7 @@ def made(workflow):
     return workflow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "expected"),
     [

@@ -168,6 +168,7 @@ rule folded_surface:
         data=rules.regions.output.data,
     output:
         **surfaces_in(f"{RUN}/surfaces/week-{{week}}"),
+        thickness=f"{RUN}/surfaces/week-{{week}}/thickness.shape.gii",
     log:
         f"{RUN}/logs/folded_surface.week-{{week}}.log",
     benchmark:

@@ -21,6 +21,17 @@ def brain_labels(where):
             }
 
 
+def thickness_of(wildcards):
+    """Returns the file with the thickness of a brain's cortex, where it is known."""
+    folder = f"results/{surface_folder(wildcards.where)}"
+    match wildcards.where.split("/"):
+        case ["brains", brain, "metrics"] if brain in WITH_CORTEX:
+            return f"{folder}/measured_thickness.shape.gii"
+        case ["runs", *_]:
+            return f"{folder}/thickness.shape.gii"
+    return []
+
+
 # where the metrics of a brain lie under results
 MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
 SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
@@ -59,6 +70,7 @@ rule measure:
         unpack(
             lambda wildcards: surfaces_in(f"results/{surface_folder(wildcards.where)}")
         ),
+        thickness=thickness_of,
         mode_numbers=(
             rules.weyl_numbers.output[0]
             if CONFIG.metrics.spangy_modes == "common"

@@ -52,7 +52,7 @@ rule weekly_figure:
         simulated=run_surfaces("whole"),
         real=measured_surfaces("whole"),
     output:
-        **run_figure("weekly", "simulated beside measured brains", "weekly.rst"),
+        **run_figure("weekly", "simulated beside measured brains", "figure.rst"),
     log:
         f"{RUN}/logs/weekly_figure.log",
     benchmark:
@@ -61,6 +61,11 @@ rule weekly_figure:
         ENVIRONMENT
     params:
         **BESIDE,
+        caption=(
+            "Simulated brain of run *{run}* (blue) beside the measured brain of the same week "
+            "(beige), all at one scale. At the first week the simulation is the start brain as it was "
+            "meshed."
+        ),
     script:
         "../scripts/weekly_figure.py"
 
@@ -69,7 +74,7 @@ rule displacement_maps:
     input:
         rules.simulate.output.frames,
     output:
-        **run_figure("displacement_maps", "displacement maps", "displacement_maps.rst"),
+        **run_figure("displacement_maps", "displacement maps", "figure.rst"),
     log:
         f"{RUN}/logs/displacement_maps.log",
     benchmark:
@@ -78,6 +83,10 @@ rule displacement_maps:
         ENVIRONMENT
     params:
         **drawing(),
+        caption=(
+            "Norm of the displacement between output weeks on the pial surface of run *{run}*, on one "
+            "scale."
+        ),
     script:
         "../scripts/displacement_maps.py"
 
@@ -94,13 +103,13 @@ rule contact_maps:
     conda:
         ENVIRONMENT
     params:
+        **drawing(),
         # stress that each step forgets is written per week
         quantity=lambda wildcards: (
             "contact_pressure_pa"
             if CONFIG.runs[wildcards.run].stress_memory_gw
             else "contact_pressure_pa_per_gw"
         ),
-        **drawing(),
     script:
         "../scripts/contact_maps.py"
 
@@ -123,7 +132,7 @@ rule shape_maps:
             for brain in beside(wildcards)
         ],
     output:
-        **run_figure("{measure}", "{measure} maps", "shape_maps.rst", "Metrics"),
+        **run_figure("{measure}", "{measure} maps", "figure.rst", "Metrics"),
     log:
         f"{RUN}/logs/shape_maps.{{measure}}.log",
     benchmark:
@@ -134,6 +143,10 @@ rule shape_maps:
         ENVIRONMENT
     params:
         **BESIDE,
+        caption=lambda wildcards: (
+            f"{SHAPE_MEASURES[wildcards.measure].caption} on the pial surfaces of run *{wildcards.run}* and of the "
+            "measured brains of the same weeks."
+        ),
     script:
         "../scripts/shape_maps.py"
 
@@ -144,7 +157,7 @@ rule zones_figure:
         data=rules.tetrahedralise.output.data,
         params=rules.parameters.output[0],
     output:
-        **run_figure("zones", "zones of the boundary", "zones.rst"),
+        **run_figure("zones", "zones of the boundary", "figure.rst"),
     log:
         f"{RUN}/logs/zones_figure.log",
     benchmark:
@@ -153,6 +166,12 @@ rule zones_figure:
         ENVIRONMENT
     params:
         **drawing(),
+        caption=(
+            "Zones of the boundary at the start of run *{run}*: free, clamped (inside the ellipsoid "
+            "of no growth), the facets of each hemisphere that may come into contact at the fissure, "
+            "and those between the contact planes. In medial views the tissue that joins the "
+            "hemispheres is left open: grey is the inside of the surface behind it."
+        ),
     script:
         "../scripts/zones_figure.py"
 
@@ -169,7 +188,7 @@ rule growth_zone_figure:
     input:
         **REGIONS,
     output:
-        **run_figure("growth_zone", "growth on the surface", "growth_zone.rst"),
+        **run_figure("growth_zone", "growth on the surface", "figure.rst"),
     log:
         f"{RUN}/logs/growth_zone_figure.log",
     benchmark:
@@ -178,6 +197,11 @@ rule growth_zone_figure:
         ENVIRONMENT
     params:
         **drawing(),
+        caption=(
+            "Tangential growth of the pial surface in one time step of run *{run}*, at the start. "
+            "Nothing grows inside the ellipsoid of no growth, nor where tissue bridges the two planes "
+            "at the fissure."
+        ),
     script:
         "../scripts/growth_zone_figure.py"
 
@@ -186,7 +210,7 @@ rule layers_figure:
     input:
         **REGIONS,
     output:
-        **run_figure("layers", "regions and growth in sections", "layers.rst"),
+        **run_figure("layers", "regions and growth in sections", "figure.rst"),
     log:
         f"{RUN}/logs/layers_figure.log",
     benchmark:
@@ -195,6 +219,12 @@ rule layers_figure:
         ENVIRONMENT
     params:
         **drawing(),
+        caption=(
+            "Regions of the start brain of run *{run}* in sections through its middle: elements by "
+            "hemisphere (between the contact planes they belong to neither), whether they grow, "
+            "tangential growth in one time step, and shear modulus. Dashed: the ellipsoid of no "
+            "growth, where there is one."
+        ),
     script:
         "../scripts/layers_figure.py"
 
@@ -203,7 +233,7 @@ rule normals_figure:
     input:
         **REGIONS,
     output:
-        **run_figure("normals", "pial normals in sections", "normals.rst"),
+        **run_figure("normals", "pial normals in sections", "figure.rst"),
     log:
         f"{RUN}/logs/normals_figure.log",
     benchmark:
@@ -212,6 +242,13 @@ rule normals_figure:
         ENVIRONMENT
     params:
         **drawing(),
+        caption=(
+            "Normals that orient growth in run *{run}* at the start, for a sample of vertices within "
+            "about two millimetres of the sections. An inner vertex has the normal of the nearest "
+            "pial vertex. Arrows show the component within the section, so those that cross it look "
+            "short. Growth is tangential to the pial surface, across these arrows. The normals are "
+            "computed again in every step."
+        ),
     script:
         "../scripts/normals_figure.py"
 
@@ -220,7 +257,7 @@ rule steps_figure:
     input:
         rules.simulate.output.steps,
     output:
-        **run_figure("steps", "steps of the solver", "steps.rst"),
+        **run_figure("steps", "steps of the solver", "figure.rst"),
     log:
         f"{RUN}/logs/steps_figure.log",
     benchmark:
@@ -229,5 +266,29 @@ rule steps_figure:
         ENVIRONMENT
     params:
         **drawing(),
+        caption=(
+            "Solver of run *{run}*: iterations, smallest det F (an element would be inverted at 0), "
+            "displacement and time of each step."
+        ),
     script:
         "../scripts/steps_figure.py"
+
+
+# figures of every run; those for a paper first
+PAPER_FIGURES_OF_RUNS = [
+    rules.weekly_figure,
+    rules.displacement_maps,
+    rules.shape_maps,
+    rules.zones_figure,
+    rules.growth_zone_figure,
+    rules.layers_figure,
+    rules.normals_figure,
+]
+FIGURES_OF_RUNS = [*PAPER_FIGURES_OF_RUNS, rules.steps_figure]
+# runs that write the contact pressure
+PRESSED = [
+    pair
+    for pair in FOLDED
+    if "contact_pressure" in CONFIG.run(pair[0]).fields
+    and CONFIG.run(pair[0]).contact.kind == "global"
+]

@@ -13,7 +13,7 @@ rule displacement_figure:
         **figure(
             f"{FIGURES}/displacement",
             "displacement per week",
-            "displacement.rst",
+            "figure.rst",
             "Folding",
         ),
         table=report(
@@ -30,6 +30,11 @@ rule displacement_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        caption=(
+            "Largest and mean norm of the displacement between output weeks, over all nodes, beside "
+            "the values that the FetalFoldSim paper reports for its simulation and for real brains. "
+            "Those are other brains: compare orders of magnitude only."
+        ),
     script:
         "../scripts/displacement_figure.py"
 
@@ -39,7 +44,7 @@ rule metrics_figure:
         f"{STUDY}/metrics.csv",
     output:
         **figure(
-            f"{FIGURES}/metrics", "metrics over the weeks", "metrics.rst", "Metrics"
+            f"{FIGURES}/metrics", "metrics over the weeks", "figure.rst", "Metrics"
         ),
         table=report(
             f"{STUDY}/metrics_table.html",
@@ -55,6 +60,11 @@ rule metrics_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        caption=(
+            "Metrics over the weeks: runs as lines, measured brains as stars. The gyrification index "
+            "is the pial area divided by that of the convex hull, or by that of a tighter envelope. "
+            "Shape index: −1 is a cup, +1 a cap, so gyri are positive."
+        ),
         measured=CONFIG.measured_name(BRAINS),
     script:
         "../scripts/metrics_figure.py"
@@ -67,7 +77,7 @@ rule spectra_figure:
         **figure(
             f"{FIGURES}/spectra",
             "SpAnGy bands B4-B6 over the weeks",
-            "spectra.rst",
+            "figure.rst",
             "Metrics",
         ),
     log:
@@ -78,6 +88,11 @@ rule spectra_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        caption=(
+            "Relative power of the shape measure's spectrum in the bands B4, B5 and B6 (primary, "
+            "secondary and tertiary folds) over the weeks, per hemisphere (SpAnGy, Germanaud et al. "
+            "2012). Open marks: the band is cut off, or finer than the surface resolves."
+        ),
         measured=CONFIG.measured_name(BRAINS),
     script:
         "../scripts/spectra_figure.py"
@@ -152,33 +167,15 @@ rule runs_figure:
         "../scripts/runs_figure.py"
 
 
-# runs that write the pressure between their folds
-PRESSED = [
-    pair
-    for pair in FOLDED
-    if "contact_pressure" in CONFIG.run(pair[0]).fields
-    and CONFIG.run(pair[0]).contact.kind == "global"
-]
 OF_THE_LAST_WEEK = [
     rules.bands_figure.output if LAST_WEEK else [],
     rules.runs_figure.output if LAST_WEEK and len(FOLDED) > 1 else [],
-]
-# figures of a run that belong into a paper
-PRINTED = [
-    rules.weekly_figure,
-    rules.displacement_maps,
-    rules.shape_maps,
-    rules.zones_figure,
-    rules.growth_zone_figure,
-    rules.layers_figure,
-    rules.normals_figure,
 ]
 
 
 rule figures:
     input:
-        [of_runs(rule.output, measure=SHAPE_MEASURES) for rule in PRINTED],
-        of_runs(rules.steps_figure.output),
+        [of_runs(rule.output, measure=SHAPE_MEASURES) for rule in FIGURES_OF_RUNS],
         [
             expand(rules.contact_maps.output, run=run, brain=brain)
             for run, brain in PRESSED
@@ -196,7 +193,7 @@ rule figures:
 # the figures and tables of the paper that this study's data allow
 rule paper:
     input:
-        [of_runs(rule.output, measure=SHAPE_MEASURES) for rule in PRINTED],
+        [of_runs(rule.output, measure=SHAPE_MEASURES) for rule in PAPER_FIGURES_OF_RUNS],
         rules.displacement_figure.output,
         rules.spectra_figure.output,
         OF_THE_LAST_WEEK,

@@ -83,6 +83,8 @@ rule cortical_thickness:
         report=rules.pial_from_labels.output.report,
     output:
         thickness=f"{BRAIN}/surface/thickness.shape.gii",
+        # not a number where it could not be measured
+        measured=f"{BRAIN}/surface/measured_thickness.shape.gii",
         report=f"{BRAIN}/surface/thickness.json",
     log:
         f"{BRAIN}/logs/cortical_thickness.log",
@@ -212,7 +214,7 @@ rule overlay_figure:
         **figure(
             f"{BRAIN}/figures/overlay",
             "surface over the image",
-            "overlay.rst",
+            "figure.rst",
             "Brains and growth",
             brain="{brain}",
         ),
@@ -225,6 +227,11 @@ rule overlay_figure:
     conda:
         ENVIRONMENT
     params:
+        caption=(
+            "Outline of the pial surface of *{brain}* over the image that its labels belong to, in a "
+            "coronal and an axial plane through the middle and a sagittal plane through the right "
+            "hemisphere."
+        ),
         dpi=CONFIG.report.dpi,
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
         title=lambda wildcards: f"{wildcards.brain}, {CONFIG.brain(wildcards.brain).week:g} GW",

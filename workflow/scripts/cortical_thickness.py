@@ -15,4 +15,5 @@ with step(snakemake.log[0], files.labels):
     surface, pose = read_surface(files.surface), np.array(read_json(files.report)["pose"])
     thickness = thickness_from_labels(volume.labels, volume.affine, scheme, surface, pose, **params.settings)
     write_vertex_maps(snakemake.output.thickness, {"cortical thickness (mm)": thickness.values_mm})
+    write_vertex_maps(snakemake.output.measured, {"thickness_mm": thickness.measured_mm})
     write_json(snakemake.output.report, thickness.report)

@@ -1,9 +1,10 @@
-"""The pial surface of a folding run at a week, and its hemispheres: the facets that were theirs at the start."""
+"""The pial surface of a folding run at a week, its hemispheres (the facets that were theirs) and its thickness."""
 
 from gyriflow.geometry.triangles import TriangleMesh, submesh
 from gyriflow.io.frames import read_positions
 from gyriflow.io.regions import read_regions
-from gyriflow.io.surfaces import write_brain
+from gyriflow.io.surfaces import write_brain, write_vertex_maps
+from gyriflow.metrics.thickness import depth_of_weight, simulated_thickness
 from gyriflow.parameters.terms import LEFT
 from gyriflow.step import step
 
@@ -13,3 +14,6 @@ with step(snakemake.log[0]):
     surface, on_left = TriangleMesh(positions, regions.facets), regions.facet_tags["hemisphere"] == LEFT
     whole, left, right = (submesh(surface, part)[0] for part in (on_left | ~on_left, on_left, ~on_left))
     write_brain(snakemake.output, whole, left, right)
+    depth = depth_of_weight(regions.fields["cortex_weight"])
+    thickness = simulated_thickness(regions.mesh, depth, positions, whole)
+    write_vertex_maps(snakemake.output.thickness, {"thickness_mm": thickness})

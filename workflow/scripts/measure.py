@@ -1,7 +1,7 @@
 """The metrics of one brain, measured or simulated, at one week."""
 
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.surfaces import read_surface, write_vertex_maps
+from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.metrics.mode_numbers import common_modes
 from gyriflow.step import step
@@ -11,6 +11,8 @@ settings = dict(params.settings, threads=snakemake.threads)
 with step(snakemake.log[0]):
     if files.mode_numbers:
         settings["spangy_modes"] = common_modes(read_table(files.mode_numbers))
+    if files.get("thickness"):
+        (settings["thickness_mm"],) = read_vertex_maps(files.thickness).values()
     brain = measure_brain(*map(read_surface, (files.whole, files.left, files.right)), **settings)
     for name, table in (("metrics", brain.table), ("spectra", brain.spectra), ("coefficients", brain.coefficients)):
         write_table(output[name], table.assign(**params.labels)[[*params.labels, *table.columns]])

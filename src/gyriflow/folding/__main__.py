@@ -24,6 +24,7 @@ from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..parameters.varying import Maps
 from ..step import record_exit_code
 from .output import ZONES, say
+from .resolution import stiffness_warning
 from .run import run
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
 from .zones import zones_of_run
@@ -109,7 +110,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         say(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
         through = report["elements_through_cortex"]
         say(f"  elements through the cortex: {through:.1f}")
-        for warning in zone_warnings(report):
+        for warning in filter(None, (*zone_warnings(report), stiffness_warning(parameters.poisson_ratio))):
             say(f"warning: {warning}")
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)

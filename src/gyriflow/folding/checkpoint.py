@@ -19,7 +19,7 @@ from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
 
 Floats = NDArray[np.float64]
-ARRAYS = ("positions", "last", "before_last", "stretch")
+ARRAYS = ("positions", "last", "before_last", "stretch", "rate", "before_rate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,8 @@ class State:
         Steps since the last halving.
     stretch : (m, 6) float or None
         Elastic stretch of the elements that the next step starts with, where stress is remembered (see `memory`).
+    rate, before_rate : (n, 3) float or None
+        Velocities in m/s at the start of the two last steps, without contact, where steps are made of velocities.
     rows : tuple of dict
         The step table so far.
     """
@@ -55,6 +57,8 @@ class State:
     before_last_s: float = 0.0
     successes: int = 0
     stretch: Floats | None = None
+    rate: Floats | None = None
+    before_rate: Floats | None = None
     rows: tuple[dict, ...] = field(default=())
 
     @classmethod
@@ -72,8 +76,26 @@ class State:
         slope = (rate - self.before_last / self.before_last_s) / ((self.last_s + self.before_last_s) / 2)
         return (rate + slope * (self.last_s + step_s) / 2) * step_s
 
-    def after(self, displacement: Floats, step_s: float, row: dict, stretch: Floats | None = None) -> "State":
-        """Returns the state after an accepted step with its (n, 3) displacement in m and the (m, 6) stretch it left."""
+    def predicted_rate(self) -> Floats:
+        """Returns the (n, 3) velocities in m/s to begin with at this state: those of the two last steps, extended."""
+        if self.rate is None:
+            return np.zeros_like(self.last)
+        if self.before_rate is None:
+            return self.rate
+        return self.rate + (self.rate - self.before_rate) * (self.last_s / self.before_last_s)
+
+    def after(
+        self,
+        displacement: Floats,
+        step_s: float,
+        row: dict,
+        stretch: Floats | None = None,
+        rate: Floats | None = None,
+    ) -> "State":
+        """Returns the state after an accepted step with its (n, 3) displacement in m and the (m, 6) stretch it left.
+
+        `rate` is the velocity at its start, where it was made of velocities.
+        """
         return replace(
             self,
             positions=self.positions + displacement,
@@ -84,6 +106,8 @@ class State:
             before_last_s=self.last_s,
             successes=self.successes + 1,
             stretch=stretch,
+            rate=rate,
+            before_rate=self.rate,
             rows=(*self.rows, row),
         )
 
@@ -124,7 +148,8 @@ def write_checkpoint(path: Path, key: str, state: State) -> None:
     """Writes the state of the run `key`; StorageError where the disk is full or the folder cannot be written."""
     values = dict(vars(state))
     arrays = {name: values.pop(name) for name in ARRAYS if values[name] is not None}
-    values.pop("stretch", None)
+    for name in ARRAYS:
+        values.pop(name, None)
     scalars = json.dumps({**values, "key": key}, sort_keys=True)
     with new_hdf5(path) as file:
         for name, array in arrays.items():

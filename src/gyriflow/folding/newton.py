@@ -13,6 +13,10 @@ ROUND_OFF = 1e-12
 """Relative error of an energy, a sum over elements."""
 UNRESOLVED = 1e-6
 """Relative change of an energy that strains of a ten-thousandth leave uncertain."""
+GAIN = 1e-6
+"""Relative fall of the energy from which an iteration counts as progress, and not towards their limit."""
+PATIENCE = 10
+"""Most iterations, progress or not, over their limit."""
 NEAR = 100.0
 """Multiple of the tolerance below which the tangent of the iteration before is as good as a new one."""
 SLOW = 1e3
@@ -69,12 +73,15 @@ class Iterate:
         Norm of the residual in N.
     energy
         In J, where it is known.
+    gain
+        Relative fall of the energy that led here, 0 where it was not asked for.
     exhausted
         Whether nothing is left to gain but round-off.
     """
 
     norm: float
     energy: float | None = None
+    gain: float = 0.0
     exhausted: bool = False
 
 
@@ -124,10 +131,11 @@ class NewtonSolver:
             raise NotConvergedError("the forces without any displacement are not finite")
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
         iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(start, at_rest))
-        tangent, before = None, np.inf
+        tangent, before, stalled = None, np.inf, 0
         while iterate.norm > tolerance and not iterate.exhausted:
             norm = iterate.norm
-            if count.newton >= self.settings.max_newton:
+            # where folds snap or slide past each other, the energy falls far before the residual does
+            if max(stalled, count.newton / PATIENCE) >= self.settings.max_newton:
                 raise NotConvergedError(
                     "Newton's method did not converge",
                     found=f"residual {norm:.2e} N after {count.newton} iterations",
@@ -142,6 +150,7 @@ class NewtonSolver:
             count.krylov += linear.iterations
             count.rung = max(count.rung, linear.rung)
             iterate = self._advance(iterate, convex=linear.convex)
+            stalled += iterate.gain < GAIN
             if count.newton == 1:
                 self._first_left = iterate.norm / norm
             before = norm
@@ -166,11 +175,13 @@ class NewtonSolver:
     def _reduction(self, norm: float, before: float, tolerance: float) -> float:
         """Returns the part of the residual that the linear solve may leave."""
         floor = self.settings.krylov_tolerance
+        enough = 0.4 * tolerance / norm
+        if self.problem.quadratic:
+            return min(enough, floor)
         if self.problem.contributions:
             # while contact changes from one iterate to the next, a direction need not be better than the last was
             left = norm / before if np.isfinite(before) else self._first_left
             floor = max(floor, min(LOOSE, left**2))
-        enough = 0.4 * tolerance / norm
         return enough if enough >= 0.1 * floor else floor
 
     def _advance(self, iterate: Iterate, *, convex: bool) -> Iterate:
@@ -205,7 +216,7 @@ class NewtonSolver:
                 lower = np.isfinite(trial) and energy <= before + 1e-4 * length * slope
                 # what is left to gain is below the energy's round-off: the residual decides
                 if lower or (trial < norm and abs(energy - before) <= ROUND_OFF * abs(before)):
-                    return self._accept(trial, energy)
+                    return self._accept(trial, energy, (before - energy) / max(abs(before), np.finfo(float).tiny))
             else:
                 self.inverting = problem.volume_ratios()
             length /= 2
@@ -214,6 +225,6 @@ class NewtonSolver:
             return Iterate(norm, before, exhausted=True)
         raise NotConvergedError("the line search found no step that lowers the energy")
 
-    def _accept(self, norm: float, energy: float | None = None) -> Iterate:
+    def _accept(self, norm: float, energy: float | None = None, gain: float = 0.0) -> Iterate:
         self._residual, self._trial = self._trial, self._residual
-        return Iterate(norm, energy)
+        return Iterate(norm, energy, gain)

@@ -76,6 +76,9 @@ class Problem:
         Whether nothing holds the body.
     """
 
+    summed = False
+    """Whether products are those of a sum also while there are no contributions."""
+
     def __init__(
         self,
         domain: Domain,
@@ -140,6 +143,11 @@ class Problem:
         self._free_operator = FreeOperator(self.vector) if self.free else None
         self.mesh_moved(domain.part)
 
+    @property
+    def quadratic(self) -> bool:
+        """Whether the energy is quadratic, so that a linear solve ends a step."""
+        return False
+
     def mesh_moved(self, part: NDArray[np.int64]) -> None:
         """Takes note of a mesh that has been placed anew.
 
@@ -200,16 +208,16 @@ class Problem:
 
     def energy(self) -> float:
         """Returns the total energy in J, contact included."""
+        return self.elastic_energy() + sum(part.energy() for part in self.contributions)
+
+    def elastic_energy(self) -> float:
+        """Returns the energy in J of all but the contributions."""
         local = dolfinx.fem.assemble_scalar(self._energy)
-        total = float(np.real(self.domain.comm.allreduce(local)))
-        return total + sum(part.energy() for part in self.contributions)
+        return float(np.real(self.domain.comm.allreduce(local)))
 
     def residual(self, out: PETSc.Vec) -> float:
         """Assembles the residual in N into `out`, zero where the displacement is fixed, and returns its norm."""
-        with out.localForm() as local:
-            local.set(0.0)
-        dolfinx.fem.petsc.assemble_vector(out, self._residual)
-        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self._elastic_residual(out)
         for part in self.contributions:
             part.add_residual(out)
         out.array[self._fixed_owned] = 0.0
@@ -217,21 +225,32 @@ class Problem:
             self._motions.remove(out.array_w)
         return out.norm()
 
+    def _elastic_residual(self, out: PETSc.Vec) -> None:
+        """Assembles the residual of all but the contributions."""
+        with out.localForm() as local:
+            local.set(0.0)
+        dolfinx.fem.petsc.assemble_vector(out, self._residual)
+        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
     def tangent(self) -> Tangent:
         """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed."""
         # petsc4py keeps what several ranks share until all of them agree to let go of it
         PETSc.garbage_cleanup(self.domain.comm)
-        blocks = self._blocks.blocks
-        blocks.set_value(0.0)
-        dolfinx.fem.assemble_matrix(blocks, self._tangent)
-        matrix, products = self._blocks.assembled(), self._blocks.for_products()
-        if not self.contributions:
+        matrix, products = self._elastic_tangent()
+        if not (self.contributions or self.summed):
             return Tangent(matrix, products, ())
         if self._sum is None:
             # one object for all iterates, since multigrid keeps the first it is given
             self._sum = SumOperator(products)
             self._sum_matrix = self._sum.as_matrix()
         return Tangent(matrix, self._sum_matrix, self._further_parts(convex=False))
+
+    def _elastic_tangent(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Returns the tangent of all but the contributions, as a whole and for products."""
+        blocks = self._blocks.blocks
+        blocks.set_value(0.0)
+        dolfinx.fem.assemble_matrix(blocks, self._tangent)
+        return self._blocks.assembled(), self._blocks.for_products()
 
     def convexify(self, tangent: Tangent) -> None:
         """Takes from the present tangent what is negative of the contributions' terms."""

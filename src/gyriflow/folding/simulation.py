@@ -24,9 +24,11 @@ from .following import following_step, size_of
 from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch, layers_at
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
-from .newton import NewtonSettings, NewtonSolver
+from .newton import NewtonSettings, NewtonSolver, StepCount
 from .output import say
 from .problem import Problem
+from .rates import SMALL, RateProblem, rate_step
+from .resolution import elements_through, resolution_warning, worst_quality
 from .stress import (
     deformation_gradients,
     elastic_strain_fields,
@@ -75,7 +77,7 @@ class Folding:
         self.domain = Domain(comm, mesh)
         by_planes = parameters.contact.kind == "planes"
         self._remembers = parameters.stress_memory_gw > 0
-        self.problem = Problem(
+        self.problem = (Problem if parameters.time_scheme == "implicit" else RateProblem)(
             self.domain,
             zones,
             MATERIALS[parameters.material](parameters.poisson_ratio),
@@ -101,6 +103,7 @@ class Folding:
         self._start = self.domain.positions
         self._start_size = size_of(mesh.vertices, zones)
         self.present = parameters  # those of the last step, with its rates of growth
+        self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
@@ -109,28 +112,34 @@ class Folding:
         limits = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
         self.solver = NewtonSolver(self.problem, limits, floor)
 
-    def set_layers(self, p: FoldingParameters, time_s: float, step_s: float) -> None:
-        """Sets stiffness, growth and normals for a step from a time on, with parameters as in its middle."""
-        domain = self.domain
-        week = p.start_week + (time_s + step_s / 2) / SECONDS_PER_GW
+    def set_layers(self, time_s: float, step_s: float, at: float = 0.5) -> None:
+        """Sets stiffness, growth and normals for a step from a time on, with parameters as at a part of it."""
+        self._set_tissue(time_s + at * step_s, step_s)
+        self._part = self.domain.part
+        if self.contact is not None:
+            self.contact.mesh_moved()
+            if self.problem.free:
+                self._part = self.contact.joined(self._part)
+        self.problem.mesh_moved(self._part)
+
+    def _set_tissue(self, time_s: float, step_s: float) -> None:
+        """Sets stiffness, normals and the growth of a step, with parameters as at a time."""
+        p, domain = self.present, self.domain
+        week = p.start_week + time_s / SECONDS_PER_GW
         reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
         search = PialSearch(domain.positions, self.zones.cortex_facets)
         nodes = domain.local(domain.positions)
+        thickness = float(np.mean(p.thickness_at(week, self.maps)))
         to_vertex, nearest = search.nearest(nodes)
         distance = search.distance(nodes, reach, to_vertex) * MM_PER_M
         layers = layers_at(distance, self._growth, p, self._local_maps, week, step_s)
+        self._through = elements_through(domain, distance * M_PER_MM, thickness * M_PER_MM)
         # the direction matters only where growth differs along and across it
         directed = np.abs(layers.dg - layers.dr)[domain.cells].max(axis=1) > NO_GROWTH
         normals = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
         cells = domain.cells[directed]
         normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
         self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
-        part = domain.part
-        if self.contact is not None:
-            self.contact.mesh_moved()
-            if self.problem.free:
-                part = self.contact.joined(part)
-        self.problem.mesh_moved(part)
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
         """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
@@ -154,17 +163,31 @@ class Folding:
         after = domain.positions
         total = deformation_gradients(domain.local(self._start), domain.local(after), domain.cells)
         # back to where the step began, which its displacement refers to
-        domain.place(after - domain.gathered(self.problem.displacement[: domain.owned]))
-        if "stress" in wanted:
-            fields |= self._per_gw(stress_fields(self.problem.outcome("stress")))
+        moved = self.problem.displacement.copy()
+        domain.place(after - domain.gathered(moved[: domain.owned]))
+        if isinstance(self.problem, RateProblem):
+            with self.problem.in_small():
+                self.problem.set_displacement(SMALL * self._strained)
+                fields |= self._stress_fields(wanted, 1 / SMALL)
+        else:
+            fields |= self._stress_fields(wanted)
         if "strain" in wanted:
-            fields |= self._per_gw(elastic_strain_fields(self.problem.outcome("elastic")))
             fields |= total_strain_fields(total, self._start_normals)
+        self.problem.set_displacement(moved)
         if "volume_ratio" in wanted:
             fields |= volume_ratio_fields(self.problem.outcome("deformation"), total)
         domain.place(after)
         together = domain.gathered_cells(np.stack(list(fields.values()), axis=1))
         return dict(zip(fields, together.T, strict=True))
+
+    def _stress_fields(self, wanted: Iterable[str], factor: float = 1.0) -> dict[str, Floats]:
+        """Returns a multiple of the stress and elastic strain (c,) in the local elements, as far as they are wanted."""
+        fields: dict[str, Floats] = {}
+        if "stress" in wanted:
+            fields |= stress_fields(self.problem.outcome("stress"))
+        if "strain" in wanted:
+            fields |= elastic_strain_fields(self.problem.outcome("elastic"))
+        return self._per_gw({name: factor * values for name, values in fields.items()})
 
     def contact_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the contact pressure (n,) at all vertices if it is among `wanted`.
@@ -211,6 +234,40 @@ class Folding:
             f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(place, 1).tolist()} mm"
         )
 
+    def _solve(self, state: State, step_s: float) -> tuple[StepCount, Floats | None]:
+        """Leaves the displacement of a step in the problem; returns what it took, and the velocity it began with."""
+        problem = self.problem
+        if not isinstance(problem, RateProblem):
+            self.set_layers(state.time_s, step_s)
+            count = self.solver.solve(self.domain.local(state.predicted(step_s)))
+            self._strained = problem.displacement.copy()
+            return count, None
+
+        def move_aside(positions: Floats, at: float) -> None:
+            self.domain.place(positions)
+            self._set_tissue(state.time_s + at * step_s, step_s)
+            problem.mesh_moved(self._part)
+
+        self.set_layers(state.time_s, step_s, at=0.0)
+        two_stages = self.parameters.time_scheme == "midpoint"
+        try:
+            solved = rate_step(state, step_s, problem, self.solver, two_stages=two_stages, move_aside=move_aside)
+        finally:
+            self.domain.place(state.positions)
+        self._strained = solved.strained
+        return solved.count, solved.rate
+
+    def _energy(self) -> float:
+        """Returns the energy in J of the step that has been solved, contact included."""
+        problem = self.problem
+        if not isinstance(problem, RateProblem):
+            return problem.energy()
+        moved = problem.displacement.copy()
+        problem.set_displacement(self._strained)
+        energy = problem.stored_energy()
+        problem.set_displacement(moved)
+        return energy + sum(part.energy() for part in problem.contributions)
+
     def step(self, state: State, step_s: float) -> State:
         """Returns the state after a step of a given length, the mesh moved along; its last row says what it took.
 
@@ -228,13 +285,13 @@ class Folding:
         last = state.rows[-1] if state.rows else {}
         before = size_of(state.positions * MM_PER_M, self.zones)
         growth = following_step(self.parameters, self._start_size, before, state.time_s, step_s, last, self.maps)
-        self.set_layers(growth.parameters, state.time_s, step_s)
+        self.present = growth.parameters
         kept = self._kept_stretch(state, step_s)
         if kept is not None:
             problem.set_stretch(kept)
-        count = self.solver.solve(domain.local(state.predicted(step_s)))
+        count, rate = self._solve(state, step_s)
         ratios = problem.volume_ratios()
-        energy = problem.energy()
+        energy = self._energy()
         u = domain.gathered(problem.displacement[: domain.owned])
         length = np.linalg.norm(u, axis=1) * MM_PER_M
         left = None if kept is None else domain.gathered_cells(packed(left_stretch(problem.outcome("elastic"))))
@@ -255,12 +312,13 @@ class Folding:
             "mean_u_pial_mm": float(length[self._pial].mean()),
             **self._contact_row(domain.positions + u),
             **growth.row(size_of((domain.positions + u) * MM_PER_M, self.zones), step_s),
+            "elements_through_cortex": self._through,
             "rung": RUNGS[count.rung],
-            "seconds": time.monotonic() - began,
         }
-        after = state.after(u, step_s, row, left)
-        self.present = growth.parameters
+        after = state.after(u, step_s, row, left, rate)
         domain.place(after.positions)
+        row["radius_ratio_01"] = worst_quality(domain)
+        row["seconds"] = time.monotonic() - began
         return after
 
 
@@ -295,12 +353,19 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 say(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
             state = replace(state, step_s=half, successes=0)
             continue
-        row = after.rows[-1]
-        if not row["converged"] and folding.domain.comm.rank == 0:
-            say(
-                f"warning: step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
-                f"folding.solver.newton_tolerance: nothing was left to gain but round-off"
-            )
+        if folding.domain.comm.rank == 0:
+            for warning in filter(None, (unconverged_warning(after.rows[-1]), resolution_warning(after.rows))):
+                say(f"warning: {warning}")
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
+
+
+def unconverged_warning(row: dict) -> str:
+    """Returns what to say of a step that ended above the tolerance; empty of others."""
+    if row["converged"]:
+        return ""
+    return (
+        f"step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
+        "folding.solver.newton_tolerance: nothing was left to gain but round-off"
+    )

@@ -1,9 +1,9 @@
 """Surfaces remeshed with even triangles and freed of self-intersections, by MeshLab's filters."""
 
 import numpy as np
-import pymeshlab
 from numpy.typing import NDArray
 
+from .meshlab import pymeshlab
 from .triangles import TriangleMesh
 
 REMESHING_ROUNDS = 5

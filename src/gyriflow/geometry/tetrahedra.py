@@ -49,6 +49,20 @@ def signed_volumes(mesh: TetrahedralMesh) -> Floats:
     return volumes_between(mesh.vertices, mesh.tets)
 
 
+def radius_ratios(mesh: TetrahedralMesh) -> Floats:
+    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one."""
+    a, b, c, d = mesh.vertices[mesh.tets].transpose(1, 0, 2)
+    p, q, r = b - a, c - a, d - a
+    volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
+    surface2 = sum(np.linalg.norm(np.cross(x, y), axis=1) for x, y in ((p, q), (q, r), (r, p), (q - p, r - p)))
+    # circumradius = |p|²(q×r) + |q|²(r×p) + |r|²(p×q)| / (2·6V), inradius = 6V / (sum of twice the face areas)
+    squared = [np.einsum("ij,ij->i", x, x)[:, None] for x in (p, q, r)]
+    numerator = np.linalg.norm(
+        squared[0] * np.cross(q, r) + squared[1] * np.cross(r, p) + squared[2] * np.cross(p, q), axis=1
+    )
+    return 6 * volume6**2 / np.maximum(surface2 * numerator, np.finfo(float).tiny)
+
+
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
     """Returns for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
     pairs = mesh.tets[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)

@@ -8,26 +8,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.crossings import crossing_faces
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, radius_ratios, signed_volumes
 from ..geometry.triangles import TriangleMesh, area, face_areas, mean_edge_length, signed_volume
 from .fidelity import gap_kept, gap_summary, gap_walls, surface_distance
 
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
-
-
-def radius_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one."""
-    a, b, c, d = mesh.vertices[mesh.tets].transpose(1, 0, 2)
-    p, q, r = b - a, c - a, d - a
-    volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
-    surface2 = sum(np.linalg.norm(np.cross(x, y), axis=1) for x, y in ((p, q), (q, r), (r, p), (q - p, r - p)))
-    # circumradius = |p|²(q×r) + |q|²(r×p) + |r|²(p×q)| / (2·6V), inradius = 6V / (sum of twice the face areas)
-    squared = [np.einsum("ij,ij->i", x, x)[:, None] for x in (p, q, r)]
-    numerator = np.linalg.norm(
-        squared[0] * np.cross(q, r) + squared[1] * np.cross(r, p) + squared[2] * np.cross(p, q), axis=1
-    )
-    return 6 * volume6**2 / np.maximum(surface2 * numerator, np.finfo(float).tiny)
 
 
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:

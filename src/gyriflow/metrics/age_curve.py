@@ -1,10 +1,12 @@
 """Age from one metric: a monotone curve over gestational weeks, and the week at which it takes a value."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import nnls
+from scipy.special import polygamma
 
 from ..geometry.triangles import Floats
 
@@ -42,12 +44,23 @@ class AgeCurve:
 
 @dataclass(frozen=True)
 class AgeEstimate:
-    """A gestational age in GW, its range, and "younger" or "older" where it lies outside the curve's weeks."""
+    """A gestational age in GW as told from a curve.
+
+    Attributes
+    ----------
+    week, low, high
+        The age and its range in GW, none beyond the curve's ends.
+    outside
+        "younger" or "older" where the value lies beyond an end of the curve by more than the noise, else empty.
+    clipped
+        Whether the age or its range would go on beyond an end: the range is then too short.
+    """
 
     week: float
     low: float
     high: float
     outside: str
+    clipped: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,21 +70,45 @@ class LeftOut:
     Attributes
     ----------
     error_gw : float
-        Mean absolute error over brains with younger and older ones beside them.
+        Root mean square error over brains with younger and older ones beside them, at least `LEAST_ERROR_GW`.
     guess_gw : float
         The same for the middle of the other brains' weeks, a guess that knows no metric.
     noise : float
         Root mean square difference between these brains' values and the curves without them.
+    number : int
+        How many brains that is.
     """
 
     error_gw: float
     guess_gw: float
     noise: float
+    number: int
 
     @property
-    def weight(self) -> float:
-        """The precision beyond guessing in GW⁻²; 0 for a metric that says nothing about age."""
-        return max(0.0, max(self.error_gw, LEAST_ERROR_GW) ** -2 - self.guess_gw**-2)
+    def tells_age(self) -> bool:
+        """Whether the metric tells the age better than guessing."""
+        return self.error_gw < self.guess_gw
+
+
+def weights(skills: Sequence[LeftOut]) -> Floats:
+    """Returns the (n,) weights of metrics in GW⁻²: the precision beyond guessing, of errors that are shrunk.
+
+    An error from a few brains is mostly luck. Over metrics of equal skill, its logarithm has the variance ψ′(d/2) of
+    that of χ² over its d degrees of freedom. Logarithms of squared errors are drawn to their mean by the share of their
+    variance that this explains, all of it where they scatter no more than luck would (moderated variances: Smyth 2004,
+    Stat. Appl. Genet. Mol. Biol. 3, 3). Metrics that are no better than the guess have no weight.
+    """
+    found = np.zeros(len(skills))
+    telling = [i for i, skill in enumerate(skills) if skill.tells_age]
+    if not telling:
+        return found
+    logs = np.log([skills[i].error_gw ** 2 for i in telling])
+    luck = float(polygamma(1, 0.5 * np.mean([skills[i].number for i in telling])))
+    real = max(0.0, 1.0 - luck / logs.var(ddof=1)) if len(logs) > 1 and logs.var() > 0 else 0.0
+    squares = np.exp(logs.mean() + real * (logs - logs.mean()))
+    for i, square in zip(telling, squares, strict=True):
+        found[i] = max(0.0, 1.0 / square - skills[i].guess_gw ** -2)
+    return found
 
 
 def age_curve(weeks: Floats, values: Floats) -> AgeCurve:
@@ -111,13 +148,16 @@ def estimated_age(curve: AgeCurve, value: float, noise: float) -> AgeEstimate:
     its week is that of the end. All is NaN for a value that is NaN.
     """
     if np.isnan(value):
-        return AgeEstimate(np.nan, np.nan, np.nan, "")
+        return AgeEstimate(np.nan, np.nan, np.nan, "", False)
     risen = curve.sign * value
     low, _ = _level_part(curve, risen - noise)
     first, last = _level_part(curve, risen)
     _, high = _level_part(curve, risen + noise)
     below, above = risen < curve.values[0] - noise, risen > curve.values[-1] + noise
-    return AgeEstimate(0.5 * (first + last), low, high, "younger" if below else "older" if above else "")
+    slack = ROUNDING * float(np.abs(curve.values).max())
+    clipped = risen - noise < curve.values[0] - slack or risen + noise > curve.values[-1] + slack
+    outside = "younger" if below else "older" if above else ""
+    return AgeEstimate(0.5 * (first + last), low, high, outside, bool(clipped))
 
 
 def _level_part(curve: AgeCurve, risen: float) -> tuple[float, float]:
@@ -143,7 +183,8 @@ def leave_one_week_out(weeks: Floats, values: Floats) -> LeftOut:
             guesses.append(0.5 * (curve.weeks[0] + curve.weeks[-1]) - week)
             differences.append(value - expected)
     return LeftOut(
-        error_gw=float(np.mean(np.abs(errors))),
-        guess_gw=max(float(np.mean(np.abs(guesses))), LEAST_ERROR_GW),
+        error_gw=max(float(np.sqrt(np.mean(np.square(errors)))), LEAST_ERROR_GW),
+        guess_gw=max(float(np.sqrt(np.mean(np.square(guesses)))), LEAST_ERROR_GW),
         noise=float(np.sqrt(np.mean(np.square(differences)))),
+        number=len(errors),
     )

@@ -15,8 +15,26 @@ BRAIN = ["subject", "run", "week"]
 MEASURED = "real"
 """The run of measured brains."""
 
-OF_THE_ANALYSIS = ("crossing_faces", "curvature_radius", "spangy_modes", "spangy_captured_share", "weyl_number")
+OF_THE_ANALYSIS = (
+    *("crossing_faces", "curvature_radius", "spangy_modes", "spangy_captured_share", "weyl_number"),
+    "thickness_measured_share",
+)
 """Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
+
+FAMILIES = {
+    "size": ("volume", "area"),
+    "gyrification": ("gyrification_",),
+    "depth": ("mean_sulcal_depth", "sulcal_depth_"),
+    "thickness": ("mean_thickness", "thickness_"),
+    "spectrum": ("spangy_",),
+}
+"""Families of metrics by how their names begin; all others are of curvature. One says much of what the others say."""
+
+
+def family(metric: str) -> str:
+    """Returns the family of a metric."""
+    return next((name for name, starts in FAMILIES.items() if metric.startswith(starts)), "curvature")
+
 
 DIMENSIONS = {"mm": 1, "cm": 1, "mm2": 2, "cm2": 2, "mm3": 3, "mL": 3, "1/mm": -1, "1/mm2": -2, "1": 0, "deg": 0}
 """The power of length in each unit. A metric is free of size where it is 0: a brain scaled up keeps it."""

@@ -1,14 +1,16 @@
-"""Hulls and envelopes of pial surfaces: gyrification indices and sulcal depth."""
+"""Envelopes of pial surfaces, and gyrification indices of hemispheres, of brains and at each vertex."""
+
+from dataclasses import dataclass
 
 import igl
 import numpy as np
-import pymeshlab
 import trimesh
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import cKDTree
 
 from ..errors import MeshError
+from ..geometry.meshlab import pymeshlab
 from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, vertex_normals
 
 ENVELOPE_RADIUS_MM = 5.0
@@ -17,8 +19,11 @@ ENVELOPE_RADIUS_MM = 5.0
 ENVELOPE_OFFSET_MM = 0.1
 """Distance at which the envelope is first wrapped round the surface."""
 
-CAP_RESOLUTION_MM = 2.0
+PIECE_MM = 2.0
 """Size of the pieces that are told apart as lying over the cut or over the pial surface."""
+
+LOCAL_RADIUS_MM = 10.0
+"""Radius of the patches of the local index: two of the widest sulci that the envelope bridges."""
 
 
 def capped(mesh: TriangleMesh) -> TriangleMesh:
@@ -44,20 +49,6 @@ def capped(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(np.concatenate([mesh.vertices, centres]), np.concatenate([mesh.faces, fan]))
 
 
-def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns the convex hull, its faces outward; MeshError for a flat surface."""
-    try:
-        hull = ConvexHull(mesh.vertices)
-    except QhullError as error:
-        raise MeshError("the surface has no convex hull", remedy="It has to enclose a volume") from error
-    faces = np.asarray(hull.simplices, dtype=np.int64)
-    a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    used, local = np.unique(faces, return_inverse=True)
-    return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3))
-
-
 def envelope(mesh: TriangleMesh, *, radius_mm: float = ENVELOPE_RADIUS_MM) -> TriangleMesh:
     """Returns a closed surface that follows the outer folds and bridges sulci narrower than twice `radius_mm`.
 
@@ -73,29 +64,59 @@ def envelope(mesh: TriangleMesh, *, radius_mm: float = ENVELOPE_RADIUS_MM) -> Tr
     return TriangleMesh(outside.vertices - ENVELOPE_OFFSET_MM * vertex_normals(outside), outside.faces)
 
 
-def area_over(surface: TriangleMesh, mesh: TriangleMesh) -> float:
-    """Returns the area in mm² of a surface around `mesh` without what lies over the cuts that `mesh` is open at.
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A surface around a pial surface in small pieces, without those that lie over a cut.
 
-    A piece of the surface is left out where its nearest point of the capped mesh is on a cap.
+    Attributes
+    ----------
+    centres : (k, 3) float
+        In mm.
+    areas : (k,) float
+        In mm².
     """
+
+    centres: Floats
+    areas: Floats
+
+
+def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
+    """Returns a surface around `mesh` in pieces of 2 mm, without what lies over the cuts that `mesh` is open at.
+
+    A piece is left out where its nearest point of the capped mesh is on a cap.
+    """
+    vertices, faces = trimesh.remesh.subdivide_to_size(surface.vertices, surface.faces, PIECE_MM, max_iter=20)
+    small = TriangleMesh(vertices, faces)
+    centres, areas = corners(small).mean(axis=1), face_areas(small)
     closed = capped(mesh)
     if len(closed.faces) == len(mesh.faces):
-        return area(surface)
-    vertices, faces = trimesh.remesh.subdivide_to_size(surface.vertices, surface.faces, CAP_RESOLUTION_MM, max_iter=20)
-    pieces = TriangleMesh(vertices, faces)
-    centres = corners(pieces).mean(axis=1)
+        return Pieces(centres, areas)
     _, nearest, _ = igl.point_mesh_squared_distance(centres, closed.vertices, closed.faces)
-    return float(face_areas(pieces)[nearest < len(mesh.faces)].sum())
+    kept = nearest < len(mesh.faces)
+    return Pieces(centres[kept], areas[kept])
 
 
-def gyrification_index(mesh: TriangleMesh, around: TriangleMesh) -> float:
-    """Returns the area of the surface over that of the hull or envelope around it, cuts left out of both."""
-    return area(mesh) / area_over(around, mesh)
+def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> float:
+    """Returns the area of surfaces over that of the hulls or envelopes around them, cuts left out of both.
+
+    The index of a brain is that of its two hemispheres, each in its own hull: a hull around both would bridge the
+    fissure between them and count it as folding.
+    """
+    return sum(map(area, meshes)) / sum(float(pieces.areas.sum()) for pieces in around)
 
 
-def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
-    """Returns the (n,) straight distance in mm from each vertex outwards to the envelope; 0 on it and outside it."""
-    signed, *_ = igl.signed_distance(
-        mesh.vertices, around.vertices, around.faces, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-    )
-    return np.maximum(-signed, 0.0)
+def local_gyrification_index(mesh: TriangleMesh, around: Pieces, *, radius_mm: float = LOCAL_RADIUS_MM) -> Floats:
+    """Returns the (n,) area of the pial surface over that of the envelope, round each vertex.
+
+    As Schaer et al. 2008 (IEEE Trans. Med. Imaging 27, 161-170), a patch of the envelope, here all within `radius_mm`
+    of the point nearest to the vertex, is compared with the pial surface that belongs to it: what is nearest to that
+    patch. Patches of 25 mm, as for adults, would hold half a fetal hemisphere.
+    """
+    tree = cKDTree(around.centres)
+    _, home = tree.query(corners(mesh).mean(axis=1))
+    pial = np.bincount(home, face_areas(mesh), len(around.centres))
+    _, own = tree.query(mesh.vertices)
+    used, back = np.unique(own, return_inverse=True)
+    near = tree.sparse_distance_matrix(cKDTree(around.centres[used]), radius_mm, output_type="ndarray")
+    sums = [np.bincount(near["j"], values[near["i"]], len(used)) for values in (pial, around.areas)]
+    return (sums[0] / sums[1])[back]

@@ -1,26 +1,22 @@
 """Modes of the Laplace-Beltrami operator of a triangle surface, K φ = λ M φ, with a count that none is missing."""
 
 import logging
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from lapy import Solver, TriaMesh
 from scipy import linalg, sparse
-from scipy.linalg import blas
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import MeshError, SolverError
-from ..geometry.triangles import Floats, Ints, TriangleMesh
+from ..geometry.triangles import Floats, TriangleMesh
 
-MODES_PER_SLICE = 170
-"""With fewer, factorising takes longer; with more, keeping the basis orthonormal. From 100 to 200 it matters little."""
+TOLERANCE = 1e-8
+"""Of the residual of a mode, relative to its eigenvalue."""
 
-BLOCK = 4
-"""Vectors per solve. One costs twice as much per vector; with 8, the basis has to grow a fifth larger."""
-
-TOLERANCE = 1e-10
-"""Of the residual of a mode in (K − σM)⁻¹M, relative to its eigenvalue there."""
+MODES_PER_SLICE = 100
+"""Eigenvalues that SLEPc looks for round each shift; from 60 to 200 it matters little."""
 
 DENSE_VERTICES = 600
 DENSE_VERTICES_MANY_MODES = 3000
@@ -56,13 +52,10 @@ def laplacian(mesh: TriangleMesh) -> tuple[sparse.csc_matrix, sparse.csc_matrix]
     return sparse.csc_matrix(solver.stiffness), sparse.csc_matrix(solver.mass)
 
 
-def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int, *, threads: int = 1) -> Modes:
-    """Returns the `count` lowest modes of K φ = λ M φ.
+def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int) -> Modes:
+    """Returns the `count` lowest modes of K φ = λ M φ, by `modes_below` a limit that has at least as many below it.
 
-    The spectrum is cut into slices. The inertia of K − λM at each cut says how many eigenvalues lie below it
-    (Sylvester's law), so the number in each slice is known, and none can be missing. Each slice is solved by itself, up
-    to `threads` at a time, by shifted block Lanczos (Grimes, Lewis and Simon 1994, SIAM J. Matrix Anal. Appl. 15,
-    228-272). SolverError if a mode that is there is not found.
+    SolverError for a count that the surface does not have, and where a mode that is there is not found.
     """
     size = stiffness.shape[0]
     largest = size if size <= DENSE_VERTICES_MANY_MODES else size // 2
@@ -71,18 +64,90 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     if size <= DENSE_VERTICES or (size <= DENSE_VERTICES_MANY_MODES and count > size // 3):
         values, functions = linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1))
         return Modes(values, functions)
+    wanted, top = count + 2, (count + 6) * _spacing(mass)
+    while (most := count_below(stiffness, mass, top)) < count:
+        top *= 1.01 * wanted / max(most, wanted // 4)
+    modes = modes_below(stiffness, mass, top)
+    return Modes(modes.eigenvalues[:count], modes.functions[:, :count])
 
-    with ThreadPoolExecutor(threads) as pool:
-        cuts, below = _cuts(stiffness, mass, count, pool)
-        values, functions = np.empty(below[-1]), np.empty((size, below[-1]), order="F")
 
-        def solve(number: int) -> None:
-            inside = slice(below[number], below[number + 1])
-            low, high = cuts[number : number + 2]
-            values[inside] = _modes_between(stiffness, mass, low, high, functions[:, inside])
+def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> Modes:
+    """Returns all modes of K φ = λ M φ with λ below `value` (mm⁻²).
 
-        list(pool.map(solve, range(len(below) - 1)))
-    return Modes(values[:count], functions[:, :count])
+    SLEPc's spectrum slicing with shift-and-invert Krylov-Schur (Campos and Roman 2012, Numer. Algorithms 60, 279-295):
+    the inertia of K − σM at each shift tells how many eigenvalues lie between shifts, so that none can be missing.
+    SolverError where one that is there is not found.
+    """
+    size = stiffness.shape[0]
+    if size <= DENSE_VERTICES:
+        values, functions = linalg.eigh(stiffness.toarray(), mass.toarray())
+        number = int(np.searchsorted(values, value))
+        return Modes(values[:number], functions[:, :number])
+    # starts MPI, which must not happen before hemispheres are measured in processes of their own
+    from petsc4py import PETSc
+    from slepc4py import SLEPc
+
+    operators = [_petsc(matrix) for matrix in (stiffness, mass)]
+    solver = SLEPc.EPS().create(PETSc.COMM_SELF)
+    try:
+        solver.setOperators(*operators)
+        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+        solver.setInterval(-_spacing(mass), value)
+        solver.setTolerances(TOLERANCE)
+        solver.setKrylovSchurDimensions(nev=min(MODES_PER_SLICE, size // 4))
+        transform = solver.getST()
+        transform.setType(SLEPc.ST.Type.SINVERT)
+        factors = transform.getKSP()
+        factors.setType(PETSc.KSP.Type.PREONLY)
+        factors.getPC().setType(PETSc.PC.Type.CHOLESKY)
+        factors.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        solver.solve()
+        return _found(solver, operators[0], count_below(stiffness, mass, value))
+    except PETSc.Error as error:
+        raise SolverError(
+            f"the modes up to λ = {value:g} mm⁻² could not be found",
+            found=f"SLEPc's error {error.ierr}",
+            remedy="Remesh the surface: slivers make its spectrum inexact",
+        ) from error
+    finally:
+        for thing in (solver, *operators):
+            thing.destroy()
+
+
+def _found(solver: Any, operator: Any, number: int) -> Modes:
+    """Returns the modes that a solver has found; SolverError where they are not the number that there is."""
+    if (found := solver.getConverged()) != number:
+        raise SolverError(
+            "the number of modes is wrong",
+            found=found,
+            expected=number,
+            remedy="Remesh the surface: slivers make its spectrum inexact",
+        )
+    vector, _ = operator.createVecs()
+    values, functions = np.empty(number), np.empty((vector.getSize(), number), order="F")
+    for i in range(number):
+        values[i] = solver.getEigenpair(i, vector).real
+        functions[:, i] = vector.getArray()
+    vector.destroy()
+    order = np.argsort(values)
+    return Modes(values[order], functions[:, order])
+
+
+def _petsc(matrix: sparse.csc_matrix) -> Any:
+    """Returns a symmetric matrix as PETSc's, on this process alone."""
+    from petsc4py import PETSc
+
+    rows = matrix.tocsr()
+    csr = rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
+    result = PETSc.Mat().createAIJ(rows.shape, csr=csr, comm=PETSc.COMM_SELF)
+    result.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return result
+
+
+def _spacing(mass: sparse.csc_matrix) -> float:
+    """Returns the mean distance between eigenvalues in mm⁻² by Weyl's law."""
+    return float(4.0 * np.pi / mass.sum())
 
 
 def count_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> int:
@@ -104,80 +169,3 @@ def _factorise(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: flo
     if not np.array_equal(factors.perm_r, factors.perm_c):
         raise SolverError("no inertia: a pivot off the diagonal was taken", found=f"shift {shift:g} mm⁻²")
     return factors, int(np.count_nonzero(factors.U.diagonal() < 0))
-
-
-def _cuts(
-    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int, pool: ThreadPoolExecutor
-) -> tuple[list[float], list[int]]:
-    """Returns where the spectrum is cut, and the numbers of eigenvalues below; `count` or more below the last."""
-    spacing = 4.0 * np.pi / mass.sum()  # mean distance between eigenvalues by Weyl's law
-    wanted, top = count + 2, (count + 6) * spacing
-    while (most := count_below(stiffness, mass, top)) < count:
-        top *= 1.01 * wanted / max(most, wanted // 4)
-    slices = max(1, round(most / MODES_PER_SLICE))
-    cuts = [-spacing, *(top * np.arange(1, slices) / slices)]
-    return [*cuts, top], [0, *pool.map(lambda cut: count_below(stiffness, mass, cut), cuts[1:]), most]
-
-
-def _modes_between(
-    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: float, high: float, functions: Floats
-) -> Floats:
-    """Returns the eigenvalues between `low` and `high`, ascending; their functions fill the columns of `functions`.
-
-    Lanczos' method on (K − σM)⁻¹M from the middle σ, without restarts, with all of the basis kept M-orthonormal.
-    """
-    size, number = functions.shape
-    if number == 0:
-        return np.empty(0)
-    shift = 0.5 * (low + high)
-    factors, _ = _factorise(stiffness, mass, shift)
-    mass = mass.tocsr()
-    margin = np.sqrt(number * BLOCK)  # the basis grows to about `number` and 9 times this
-    limit = min(int(3 * number + 30 * margin), size - BLOCK) // BLOCK * BLOCK
-    basis = np.empty((size, limit + BLOCK), order="F")
-    projected = np.zeros((limit, limit))
-    start = np.random.default_rng(0).standard_normal((BLOCK, size)).T
-    basis[:, :BLOCK], _ = _orthonormal(mass, start)
-    check = number + 7 * margin
-    found: Ints = np.empty(0, dtype=np.int64)
-    for end in range(BLOCK, limit + 1, BLOCK):
-        begin = end - BLOCK
-        block = factors.solve(np.asfortranarray(mass @ basis[:, begin:end]))
-        # by theory only the last two blocks have a share in it; the others' is what rounding lets back in
-        for first in (max(0, begin - BLOCK), 0):
-            known = basis[:, first:end]
-            shares = known.T @ (mass @ block)
-            block -= (shares.T @ known.T).T  # known @ shares as BLAS likes it, twice as fast
-            projected[first:end, begin:end] += shares
-        block, rest = _orthonormal(mass, block)
-        basis[:, end : end + BLOCK] = block
-        if end < check:
-            continue
-        check = end + number // 20
-        inverses, mixes = np.linalg.eigh(projected[:end, :end], UPLO="U")  # SciPy's would hold up the other threads
-        values = shift + 1.0 / inverses
-        error = np.linalg.norm(rest @ mixes[begin:end], axis=0)
-        found = np.flatnonzero((values > low) & (values < high) & (error <= TOLERANCE * np.abs(inverses)))
-        if len(found) >= number:
-            break
-    if len(found) != number:
-        raise SolverError(
-            f"the number of modes is wrong between λ = {low:g} and {high:g} mm⁻²",
-            found=len(found),
-            expected=number,
-            remedy="Remesh the surface: slivers make its spectrum inexact",
-        )
-    found = found[np.argsort(values[found])]
-    np.matmul(basis[:, :end], mixes[:, found], out=functions)
-    return values[found]
-
-
-def _orthonormal(mass: sparse.csr_matrix, block: Floats) -> tuple[Floats, Floats]:
-    """Returns Q and R with QR = block and QᵀMQ = 1; by Cholesky, twice, as once is inexact for nearly equal columns."""
-    total = np.eye(block.shape[1])
-    for _ in range(2):
-        gram = block.T @ (mass @ block)
-        triangle = linalg.cholesky(gram)
-        block = blas.dtrsm(1.0, triangle, block, side=1)
-        total = triangle @ total
-    return block, total

@@ -1,4 +1,4 @@
-"""How many modes the spectra of brains are made of, so that they can be compared."""
+"""Which modes the spectra of brains are made of, so that they can be compared."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -7,7 +7,7 @@ import pandas as pd
 from scipy import sparse
 
 from ..geometry.triangles import TriangleMesh, area
-from .laplace_beltrami import count_below, laplacian
+from .laplace_beltrami import Modes, count_below, laplacian, lowest_modes, modes_below
 from .spangy import WeylFormula, band_limits, first_eigenvalue, weyl_number
 
 LastBand = Literal["B4", "B5", "B6"]
@@ -28,7 +28,7 @@ def common_modes(numbers: pd.DataFrame) -> dict[str, int]:
     return {str(name): int(number) for name, number in numbers.groupby("hemisphere")["weyl_number"].max().items()}
 
 
-def modes_wanted(
+def modes_of(
     choice: SpangyModes,
     hemisphere: str,
     mesh: TriangleMesh,
@@ -36,20 +36,23 @@ def modes_wanted(
     mass: sparse.csc_matrix,
     first: float,
     formula: WeylFormula,
-) -> int:
-    """Returns the number of modes for a hemisphere.
+) -> tuple[Modes, float]:
+    """Returns the modes that a hemisphere's spectrum is made of, and the λ in mm⁻² below which none is missing.
 
-    The name of a band stands for all modes up to its end, counted by inertia, and the next one. "own" is Weyl's number,
-    a mapping gives the number per hemisphere. All these are at most half as many as there are vertices. A number is
-    taken as it is.
+    The name of a band stands for all modes up to its end; that none is missing there is known by inertia, so that no
+    mode of the next band is needed to show it. "own" is Weyl's number, a mapping gives the number per hemisphere. All
+    these are at most half as many as there are vertices. A number is taken as it is.
     """
-    if isinstance(choice, int):
-        return choice
-    if isinstance(choice, Mapping):
-        number = choice[hemisphere]
-    elif choice == "own":
-        number = weyl_number(area(mesh), first, formula)
+    most = len(mesh.vertices) // 2
+    if isinstance(choice, str) and choice != "own":
+        end = float(band_limits(first)[int(choice.removeprefix("B"))])
+        if count_below(stiffness, mass, end) <= most:
+            return modes_below(stiffness, mass, end), end
+        number = most
+    elif isinstance(choice, int):
+        number = choice
     else:
-        end = band_limits(first)[int(choice.removeprefix("B"))]
-        number = count_below(stiffness, mass, float(end)) + 1
-    return max(2, min(number, len(mesh.vertices) // 2))
+        wanted = choice[hemisphere] if isinstance(choice, Mapping) else weyl_number(area(mesh), first, formula)
+        number = max(2, min(wanted, most))
+    modes = lowest_modes(stiffness, mass, number)
+    return modes, float(modes.eigenvalues[-1])

@@ -48,7 +48,9 @@ def surface_distance(a: TriangleMesh, b: TriangleMesh, *, name: str = "surface")
         log.warning("%s: the pose is doubtful, another has %.2f times the distance", name, alignment.margin)
     return {
         "symmetric_mean_mm": float(np.mean([np.average(way, weights=areas) for way, areas in ways])),
-        "hausdorff95_mm": max(_weighted_quantile(way, areas, 0.95) for way, areas in ways),
+        "hausdorff95_mm": max(
+            float(np.quantile(way, 0.95, weights=areas, method="inverted_cdf")) for way, areas in ways
+        ),
         "rotation_deg": alignment.rotation_deg,
         "shift_mm": float(np.linalg.norm(centroid(moved) - centroid(a))),
         "pose_margin_1": alignment.margin,
@@ -59,9 +61,3 @@ def distances(points_of: TriangleMesh, mesh: TriangleMesh) -> Floats:
     """Returns the (n,) distances in mm from the vertices of one surface to the other surface."""
     squared, _, _ = igl.point_mesh_squared_distance(points_of.vertices, mesh.vertices, mesh.faces)
     return np.sqrt(squared)
-
-
-def _weighted_quantile(values: Floats, weights: Floats, share: float) -> float:
-    order = np.argsort(values)
-    cumulative = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(cumulative, share * cumulative[-1])])

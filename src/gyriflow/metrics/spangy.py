@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import MeshError
@@ -17,6 +16,9 @@ from .laplace_beltrami import Modes, lowest_modes
 
 BANDS = 6
 """The bands are B0 to B6; B4, B5 and B6 go with primary, secondary and tertiary folds."""
+
+ROUNDING = 1e-9
+"""Limits of bands that differ by less, relative to their size, are equal."""
 
 EDGES_PER_WAVELENGTH = 6
 """A band whose shortest wavelength spans fewer edges is not resolved by the mesh."""
@@ -38,10 +40,11 @@ class Spectrum:
         The band of each mode; −1 beyond the last band.
     bands : DataFrame
         Per band: band, wavelength_min_mm, wavelength_max_mm, modes, power (unit of the proxy squared times mm²; NaN
-        without modes), relative_power (share of B1 to B6; NaN for B0), complete (the modes reach the band's upper
-        limit), resolved (the shortest wavelength spans at least 6 edges).
+        without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0), complete (the modes
+        reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are), resolved
+        (the shortest wavelength spans at least 6 edges).
     dominant_band : (n,) int
-        Signed dominant band per vertex, −6 to 6.
+        Signed dominant band per vertex, −6 to 6, among the complete bands; 0 where none is.
     captured : float
         Share of fᵀMf that the modes hold; 1 would be all (Parseval).
     """
@@ -88,8 +91,12 @@ def bands_of_modes(eigenvalues: Floats) -> Ints:
     return band
 
 
-def spectrum(proxy: Floats, modes: Modes, mass: sparse.csc_matrix, *, edge_length_mm: float) -> Spectrum:
+def spectrum(
+    proxy: Floats, modes: Modes, mass: sparse.csc_matrix, *, edge_length_mm: float, reach: float | None = None
+) -> Spectrum:
     """Returns the band spectrum of a folding proxy, (n,) values per vertex.
+
+    `reach` is the λ in mm⁻² below which no mode is missing; that of the highest mode where it is not given.
 
     The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by itself: a vertex where the
     proxy is positive belongs to the band that adds most, another to the band that takes most away, with a minus sign.
@@ -97,21 +104,26 @@ def spectrum(proxy: Floats, modes: Modes, mass: sparse.csc_matrix, *, edge_lengt
     coefficients = modes.functions.T @ (mass @ proxy)
     band = bands_of_modes(modes.eigenvalues)
     power = np.array([np.sum(coefficients[band == k] ** 2) for k in range(BANDS + 1)])
+    reach = float(modes.eigenvalues[-1]) if reach is None else reach
+    bands = _band_table(modes.eigenvalues, band, power, edge_length_mm, reach)
     return Spectrum(
         eigenvalues=modes.eigenvalues,
         coefficients=coefficients,
         band=band,
-        bands=_band_table(modes.eigenvalues, band, power, edge_length_mm),
-        dominant_band=_dominant_band(proxy, coefficients, band, modes.functions),
+        bands=bands,
+        dominant_band=_dominant_band(
+            proxy, coefficients, band, modes.functions, bands["band"].to_numpy()[1:][bands["complete"][1:]]
+        ),
         captured=float(np.sum(coefficients**2) / (proxy @ (mass @ proxy))) if proxy.any() else 1.0,
     )
 
 
-def _band_table(eigenvalues: Floats, band: Ints, power: Floats, edge_length_mm: float) -> pd.DataFrame:
+def _band_table(eigenvalues: Floats, band: Ints, power: Floats, edge_length_mm: float, reach: float) -> pd.DataFrame:
     limits = band_limits(eigenvalues[1])
     numbers = np.array([np.count_nonzero(band == k) for k in range(BANDS + 1)])
     wavelengths = 2.0 * np.pi / np.sqrt(limits)
     total = power[1:].sum()
+    complete = np.concatenate([[True], limits[1:] <= reach * (1.0 + ROUNDING)])
     return pd.DataFrame(
         {
             "band": np.arange(BANDS + 1),
@@ -122,15 +134,15 @@ def _band_table(eigenvalues: Floats, band: Ints, power: Floats, edge_length_mm: 
             "relative_power": np.concatenate(
                 [[np.nan], np.where(numbers[1:] > 0, power[1:] / total if total > 0 else 0.0, np.nan)]
             ),
-            "complete": np.concatenate([[True], limits[1:] <= eigenvalues[-1]]),
+            "complete": complete,
+            "denominator_complete": bool(complete[numbers > 0].all()),
             "resolved": np.concatenate([[True], wavelengths[1:] >= EDGES_PER_WAVELENGTH * edge_length_mm]),
         }
     )
 
 
-def _dominant_band(proxy: Floats, coefficients: Floats, band: Ints, functions: Floats) -> Ints:
-    present = [k for k in range(1, BANDS + 1) if (band == k).any()]
-    parts = np.stack([functions[:, band == k] @ coefficients[band == k] for k in present])
-    raised: NDArray[np.int64] = np.array(present)[parts.argmax(axis=0)]
-    lowered: NDArray[np.int64] = np.array(present)[parts.argmin(axis=0)]
-    return np.where(proxy > 0, raised, -lowered)
+def _dominant_band(proxy: Floats, coefficients: Floats, band: Ints, functions: Floats, bands: Ints) -> Ints:
+    if not len(bands):
+        return np.zeros(len(proxy), dtype=np.int64)
+    parts = np.stack([functions[:, band == k] @ coefficients[band == k] for k in bands])
+    return np.where(proxy > 0, bands[parts.argmax(axis=0)], -bands[parts.argmin(axis=0)])

@@ -94,7 +94,7 @@ class Solver(Settings):
         1e-6, "", "Newton ends where the residual has fallen to this fraction of that at u = 0.", gt=0, lt=1
     )
     krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
-    max_newton: int = setting(20, "", "Newton iterations before a step is halved.", ge=1, le=200)
+    max_newton: int = setting(20, "", "Newton iterations without progress before a step is halved.", ge=1, le=200)
     max_halvings: int = setting(6, "", "Halvings of the time step before the run ends.", ge=0, le=30)
 
 
@@ -151,10 +151,8 @@ class FoldingSettings(Settings):
     shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
     shear_modulus_core_pa: VaryingNumber = varying(300.0, "Pa", "Shear modulus of what lies under it.", gt=0, le=1e7)
     material: MaterialName = setting(
-        "neo-hookean", "",
-        "Law of the material: `neo-hookean`, whose shape and volume store energy apart (the paper); "
-        "`compressible-neo-hookean`, whose energy is not split (docs/model.md).",
-    )  # fmt: skip
+        "neo-hookean", "", "Constitutive law; docs/model.md gives the energy of each. The paper's is `neo-hookean`."
+    )
     poisson_ratio: float = setting(0.45, "", "Poisson's ratio ν.", ge=0, lt=0.5)
     growth_rate_per_s: VaryingOrEstimated = varying(
         2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated`: from the brains' areas.", ge=-1e-5, le=1e-5
@@ -174,6 +172,12 @@ class FoldingSettings(Settings):
         0.0, "GW",
         "Time in which elastic stress relaxes: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
         word="infinite",
+    )  # fmt: skip
+    time_scheme: Literal["implicit", "adams-bashforth", "midpoint"] = setting(
+        "implicit", "",
+        "`implicit`: each step is a nonlinear equilibrium, of first order in time (the paper); `adams-bashforth` and "
+        "`midpoint`: of second order, with one and two linear solves a step. These need a model that forgets stress, "
+        "and not contact by planes.",
     )  # fmt: skip
     support: Literal["ellipsoid", "base", "box", "free"] = setting(
         "ellipsoid", "",
@@ -280,7 +284,8 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     start
         What the start is called in messages, such as "the week of the start brain a".
     """
-    for problems in (_week_problems, _thickness_problems, _stiffness_problems, _growth_problems, _step_problems):
+    groups = (_week_problems, _thickness_problems, _stiffness_problems, _growth_problems, _step_problems)
+    for problems in (*groups, _scheme_problems):
         yield from up_to_invalid(problems(p, start_week, maps, start))
 
 
@@ -325,3 +330,12 @@ def _step_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     growth = p.step_s * sum(max(map(abs, value_range(value, maps, start_week, p.end_week))) for value in known)
     if growth >= 1:
         yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
+
+
+def _scheme_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+    if p.time_scheme == "implicit":
+        return
+    if p.stress_memory_gw > 0:
+        yield Problem(f"found {p.time_scheme}; with stress_memory_gw above 0 it should be implicit", ("time_scheme",))
+    if p.contact.kind == "planes":
+        yield Problem(f"found {p.time_scheme}; with contact.kind planes it should be implicit", ("time_scheme",))

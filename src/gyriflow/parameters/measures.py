@@ -1,8 +1,45 @@
-"""What is measured at each vertex of a brain's surface and drawn as a map: names and what figures call them."""
+"""What is measured at each vertex of a brain's surface and drawn as a map."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class VertexMeasure:
+    """How a map per vertex is drawn and described.
+
+    Attributes
+    ----------
+    label
+        Label of the colour bar, with the unit.
+    caption
+        What the map shows, as the beginning of a sentence in the report.
+    colours
+        Name of a Matplotlib colour map.
+    limits
+        Ends of the colour scale; None: 0 and the 98th percentile of all surfaces.
+    """
+
+    label: str
+    caption: str
+    colours: str = "viridis"
+    limits: tuple[float, float] | None = None
+
 
 SHAPE_MEASURES = {
-    "shape_index": "shape index (sulci −1, gyri +1)",
-    "curvedness": "curvedness (mm⁻¹)",
-    "sulcal_depth_mm": "sulcal depth (mm)",
+    "shape_index": VertexMeasure(
+        "shape index (sulci −1, gyri +1)",
+        "Shape index, from −1 in sulci (blue) to +1 on gyri (red),",
+        colours="RdBu_r",
+        limits=(-1.0, 1.0),
+    ),
+    "curvedness": VertexMeasure(
+        "curvedness (mm⁻¹)", "Curvedness, √((κ₁² + κ₂²)/2), which tells how sharply the surface is bent,"
+    ),
+    "sulcal_depth_mm": VertexMeasure(
+        "sulcal depth (mm)",
+        "Sulcal depth, the straight distance to the envelope of each hemisphere, which bridges sulci narrower than "
+        "10 mm,",
+        colours="YlGnBu",
+    ),
 }
-"""Arrays per vertex that the metrics of a brain give, with their labels in figures."""
+"""The arrays per vertex of a brain's metrics that are drawn as maps, by name."""

@@ -4,12 +4,12 @@ All stand in RAS+ with x = 0 as their middle.
 """
 
 import numpy as np
-import pymeshlab
 import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.meshlab import pymeshlab
 from gyriflow.geometry.triangles import TriangleMesh, edges, submesh, unit
 from gyriflow.parameters.synthetic import ShapeKind, ShapeSettings
 

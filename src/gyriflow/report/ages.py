@@ -32,6 +32,9 @@ MOST_METRICS = 14
 """Metrics in the lower panel: those with most weight."""
 LEAST_WEIGHT = 0.005
 """Metrics with a smaller share of the weight are left out there."""
+ONE_A_WEEK = (
+    "one reference brain a week: how fetuses of one age differ is not known, and no single fetus can be dated by this"
+)
 _GAP_GW = 0.1
 """How far points of one week stand from each other."""
 
@@ -43,13 +46,14 @@ def age_profile_chart(
     """Returns the ages that whole brains look like over their own, and each metric's age at the last simulated week.
 
     The upper left panel has the simulated brains, the upper right one the reference brains, each left out of its own
-    reference. Large marks are all metrics together, filled, and without those of size, open, with their spread; dots
-    are single metrics; triangles are ages outside the reference.
+    reference. Large marks are all metrics together, filled, and without those of size, open; bars are ± the error of
+    reference brains left out (left) and the spread of the metrics (right); dots are single metrics; triangles are ages
+    outside the reference. Where the reference has one brain a week, the figure says that it can date no single fetus.
 
     Parameters
     ----------
     profile, check : columns run, week, hemisphere, metric, kind, estimated_week, low, high, weight, flag
-        `check` has mean_absolute_error, too.
+        `profile` has brains_per_week, `check` mean_absolute_error, too.
 
     Raises
     ------
@@ -76,6 +80,8 @@ def age_profile_chart(
     panels[0].set_title("simulated")
     panels[1].set_title(_errors(left_out, measured))
     _metric_panel(figure.add_subplot(grid[1, :]), rows, colours, last)
+    if (profile["brains_per_week"] < 2).all():
+        figure.supxlabel(ONE_A_WEEK, fontsize=6.5, color=MUTED_COLOUR)
     dots: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
     extra = [
         Line2D([], [], markersize=5, label="all metrics", **dots),
@@ -90,7 +96,9 @@ def age_profile_chart(
 def _of_last_week(brains: pd.DataFrame, week: float) -> pd.DataFrame:
     """Returns the rows of simulated brains of a week: the metrics with most weight, those first."""
     rows = brains[(brains["run"] != MEASURED) & (brains["week"] == week) & (brains["kind"] != "together")]
-    rows = rows[(rows["weight"] > LEAST_WEIGHT) & rows["estimated_week"].notna()]
+    rows = rows[
+        (rows["weight"] > LEAST_WEIGHT) & rows["estimated_week"].notna() & (rows["flag"] != "growth follows it")
+    ]
     order = rows.groupby("metric")["weight"].max().sort_values(ascending=False).index[:MOST_METRICS]
     return rows[rows["metric"].isin(order)].sort_values("weight", ascending=False, kind="stable")
 
@@ -111,7 +119,7 @@ def _age_panel(axes: Axes, table: pd.DataFrame, colours: Mapping[str, Any]) -> N
     for index, run in enumerate(runs):
         own, colour = table[table["run"] == run], colours[run]
         shift = _GAP_GW * (index - (len(runs) - 1) / 2)
-        single = own[(own["kind"] != "together") & (own["weight"] > 0)]
+        single = own[(own["kind"] != "together") & (own["weight"] > 0) & (own["flag"] != "growth follows it")]
         for flag, rows in single.groupby("flag"):
             axes.plot(
                 rows["week"] + 2 * shift,

@@ -30,13 +30,18 @@ from .style import (
     week_axis,
 )
 
+TWO_ELEMENTS = 2.0
+"""Elements through the cortex below which folds are the mesh's."""
 METRIC_TITLES = {
     "volume": "volume",
     "area": "pial area",
-    "gyrification_index": "gyrification index, convex hull",
-    "gyrification_index_envelope": "gyrification index, envelope",
+    "gyrification_index": "gyrification index, hemispheres' hulls",
+    "gyrification_index_envelope": "gyrification index, envelopes",
     "mean_curvedness": "mean curvedness",
     "mean_shape_index": "mean shape index",
+    "mean_sulcal_depth": "mean depth below the hull",
+    "folding_index": "folding index",
+    "mean_thickness": "mean cortical thickness",
 }
 """The metrics of the overview and their titles."""
 HEMISPHERE_LINES: Mapping[str, Literal["-", "--", ":"]] = {"whole": "-", "left": "--", "right": ":"}
@@ -138,15 +143,16 @@ def metrics_chart(
 
 @styled
 def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False) -> Figure:
-    """Returns what a folding solve did over its steps: iterations, smallest det F, displacement and time.
+    """Returns what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
 
     Parameters
     ----------
-    steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, rung, seconds
+    steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, elements_through_cortex, radius_ratio_01, rung,
+        seconds
         One row per accepted step. Steps on another rung than the most frequent one are marked.
     """
-    figure = new_figure(SINGLE_COLUMN_IN, 6.2, title=title, synthetic=synthetic)
-    panels = figure.subplots(5, 1, sharex=True)
+    figure = new_figure(SINGLE_COLUMN_IN, 8.4, title=title, synthetic=synthetic)
+    panels = figure.subplots(7, 1, sharex=True)
     week = steps["week"]
     dots = {"markersize": 2.0, "linewidth": 0.8, "marker": "o"}
     series: list[tuple[str, list[tuple[str, str]]]] = [
@@ -154,6 +160,8 @@ def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False
         ("CG iterations", [("krylov", "")]),
         ("smallest\ndet F", [("min_J", "")]),
         ("|u| per step\n(mm)", [("max_u_mm", "max"), ("mean_u_mm", "mean")]),
+        ("elements through\nthe cortex", [("elements_through_cortex", "")]),
+        ("radius ratio,\n1 % quantile", [("radius_ratio_01", "")]),
         ("time per step\n(s)", [("seconds", "")]),
     ]
     for axes, (label, columns) in zip(panels, series, strict=True):
@@ -168,9 +176,11 @@ def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False
         from_zero(axes)
         axes.yaxis.get_major_locator().set_params(integer=True, nbins=5)
     panels[2].axhline(0, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
-    from_zero(panels[4])
+    panels[4].axhline(TWO_ELEMENTS, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
+    for axes in panels[4:]:
+        from_zero(axes)
     figure.align_ylabels(panels)
-    week_axis(panels[4], week)
+    week_axis(panels[-1], week)
     unusual = steps[steps["rung"] != steps["rung"].mode().iloc[0]]
     for colour, (rung, rows) in zip(RUN_COLOURS[1:], unusual.groupby("rung", sort=False), strict=False):
         panels[0].plot(rows["week"], rows["newton"], "D", color=colour, markersize=3.5, label=f"rung: {rung}")

@@ -152,19 +152,19 @@ PRESSURES = {
     "contact_pressure_pa": "contact pressure (Pa)",
     "contact_pressure_pa_per_gw": "contact pressure built up in a week (Pa/GW)",
 }
-LABELS = {**SHAPE_MEASURES, **PRESSURES}
-"""What maps can be drawn of, with the labels of their scales."""
+LABELS = {name: measure.label for name, measure in SHAPE_MEASURES.items()} | PRESSURES
+"""The quantities that can be drawn as maps, with the labels of their colour bars."""
 
 
 def _scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Returns the colours of a quantity; all but the shape index end at a percentile, past a few sharp vertices."""
-    if quantity == "shape_index":
-        return colour_scale("RdBu_r", -1.0, 1.0)
+    """Returns the colour scale of a quantity; without limits it ends below a few sharp vertices."""
     if quantity in PRESSURES:
         touching = values[values > 0]
         return colour_scale("YlOrRd", 0.0, float(np.percentile(touching, 98)) if len(touching) else 1.0, cut=True)
-    colours = "YlGnBu" if quantity == "sulcal_depth_mm" else "viridis"
-    return colour_scale(colours, 0.0, float(np.nanpercentile(values, 98)), cut=True)
+    measure = SHAPE_MEASURES[quantity]
+    if measure.limits is not None:
+        return colour_scale(measure.colours, *measure.limits)
+    return colour_scale(measure.colours, 0.0, float(np.nanpercentile(values, 98)), cut=True)
 
 
 @styled
@@ -184,8 +184,7 @@ def scalar_maps(
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
     quantity
-        "shape_index" (−1 to 1, gyri red, sulci blue), "curvedness" (1/mm), "sulcal_depth_mm" or one of `PRESSURES`;
-        all but the first from 0 to the 98th percentile of all surfaces (of pressure, where there is any).
+        A name of `SHAPE_MEASURES`, or one of `PRESSURES` (up to the 98th percentile where there is contact).
     measured
         What the measured brains are called, where there are any.
 

@@ -37,7 +37,8 @@ _INCOMPLETE_HATCH = "//////"
 def _with_band_numbers(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
     """Returns the rows of the bands, written as 4 or "B4", with whole numbers and a column `trusted`."""
     numbers = spectra["band"].astype(str).str.removeprefix("B").astype(int)
-    chosen = spectra.assign(band=numbers, trusted=spectra["complete"] & spectra["resolved"])
+    trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
+    chosen = spectra.assign(band=numbers, trusted=trusted)
     return chosen[numbers.isin(bands)]
 
 
@@ -55,7 +56,7 @@ def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: f
 def _untrusted_legend(*, bars: bool = False, points: bool = False, stars: bool = False) -> list[Artist]:
     """Returns the entries of the legend for what is drawn of bands that are cut off or not resolved."""
     entries: list[Artist] = []
-    label = "band cut off or not resolved"
+    label = "cut off, a share of what is, or not resolved"
     if bars:
         entries.append(Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label=label))
     for marker, size, drawn, colour in (("o", 5, points, MUTED_COLOUR), ("*", 8, stars, REAL_COLOUR)):
@@ -78,12 +79,12 @@ def spectra_chart(
 ) -> Figure:
     """Returns the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
 
-    Bars of bands that are cut off or not resolved by the surface are hatched, such stars open. A band without any
-    power is said to be beyond the modes.
+    Bars of bands that are cut off or not resolved by the surface are hatched, such stars open, and so are all where a
+    band that they are shares of is cut off. A band without any power is said to be beyond the modes.
 
     Parameters
     ----------
-    spectra : columns run, week, hemisphere, band, relative_power, complete, resolved
+    spectra : columns run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
     week
         Week in GW.
 
@@ -141,11 +142,12 @@ def spectra_weeks_chart(
 ) -> Figure:
     """Returns the relative power of the bands over weeks: a row per hemisphere, a column per band.
 
-    Runs are lines, measured brains black stars; bands that are cut off or not resolved have open markers.
+    Runs are lines, measured brains black stars; bands that are cut off, are shares of such, or are not resolved have
+    open markers.
 
     Parameters
     ----------
-    spectra : columns run, week, hemisphere, band, relative_power, complete, resolved
+    spectra : columns run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
     """
     rows = _with_band_numbers(spectra, bands)
     runs = simulated_runs(rows["run"])

@@ -4,9 +4,9 @@ from typing import Any
 
 import igl
 import numpy as np
-import pymeshlab
 
 from gyriflow.errors import MeshError
+from gyriflow.geometry.meshlab import pymeshlab
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area_vectors,

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from typing import Any
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.layers import layer_thickness
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
 from gyriflow.surface.extraction import LEVEL, isosurface, main_parts, smoothed_mask
 from gyriflow.surface.sides import sampled
@@ -44,6 +44,11 @@ class Thickness:
     measured: Mask
     report: dict[str, Any]
 
+    @property
+    def measured_mm(self) -> Floats:
+        """The (n,) thickness at each vertex, NaN where it was not measured."""
+        return np.where(self.measured, self.values_mm, np.nan)
+
 
 def cortical_thickness(
     pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats, smoothing_voxels: float
@@ -72,9 +77,7 @@ def cortical_thickness(
     core = np.where(kept, np.maximum(core, LEVEL + 1e-3), np.minimum(core, LEVEL - 1e-3)).astype(np.float32)
     inner = isosurface(core, affine)
     points = pial.vertices
-    there, nearest = _nearest(points, inner)
-    back, _ = _nearest(nearest, pial)
-    values = 0.5 * (there + back)
+    values = layer_thickness(pial, inner)
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
     measured = _cortex_under(points, cerebrum, cortex, affine, voxel) & (values >= THINNEST_VOXELS * voxel)
     if not measured.any():
@@ -90,12 +93,6 @@ def cortical_thickness(
     return Thickness(filled, measured, _described(values, measured, vertex_areas(pial), voxel))
 
 
-def _nearest(points: Floats, surface: TriangleMesh) -> tuple[Floats, Floats]:
-    """Returns the (n,) distances of points from a surface, and the (n, 3) nearest points on it."""
-    squared, _, nearest = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces)
-    return np.sqrt(squared), nearest
-
-
 def _cortex_under(points: Floats, cerebrum: Mask, cortex: Mask, affine: Floats, voxel_mm: float) -> Mask:
     """Returns which of (n, 3) points lie at the surface of the cerebrum's labels, with cortex under them."""
     size = np.linalg.norm(affine[:3, :3], axis=0)
@@ -107,9 +104,8 @@ def _cortex_under(points: Floats, cerebrum: Mask, cortex: Mask, affine: Floats, 
 def _described(values: Floats, measured: Mask, areas: Floats, voxel_mm: float) -> dict[str, Any]:
     """Returns the summary of the thickness; means are weighted by area."""
     chosen, weights = values[measured], areas[measured]
-    order = np.argsort(chosen)
-    below = np.cumsum(weights[order]) / weights.sum()
-    low, median, high = (float(chosen[order][np.searchsorted(below, q)]) for q in (QUANTILES[0], 0.5, QUANTILES[1]))
+    quantiles = np.quantile(chosen, [QUANTILES[0], 0.5, QUANTILES[1]], weights=weights, method="inverted_cdf")
+    low, median, high = map(float, quantiles)
     mean = float(np.average(chosen, weights=weights))
     return {
         "mean_mm": mean,

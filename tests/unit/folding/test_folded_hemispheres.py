@@ -70,7 +70,7 @@ def made(measured, tmp_path_factory):
     for week, positions in ((21.0, brain.vertices), (22.0, folded(brain.vertices))):
         write_frame(folder / f"{week}.h5", week, {"positions": positions})
     join_frames(folder / "frames.h5", brain.tets, [folder / "21.0.h5", folder / "22.0.h5"])
-    parts = {part: f"{part}.gii" for part in ("whole", "left", "right")}
+    parts = {part: f"{part}.gii" for part in ("whole", "left", "right", "thickness")}
     frames = {"frames": "frames.h5", "regions": "regions.xdmf"}
     run("folded_surface.py", folder, frames, parts, wildcards=SimpleNamespace(week="22.00"))
     return folder

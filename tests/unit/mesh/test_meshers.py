@@ -179,6 +179,7 @@ def test_tetgen_has_about_the_number_of_faces_asked_for(wanted):
     assert len(boundary_surface(mesh)[0].faces) == pytest.approx(wanted, rel=0.03)
 
 
+@pytest.mark.slow
 def test_pytetwild_has_about_the_number_of_faces_asked_for():
     mesh = tetrahedralise(egg(), mesher="pytetwild", pial_faces=2000, **(SIZES | {"envelope_mm": 0.3}))
     assert len(boundary_surface(mesh)[0].faces) == pytest.approx(2000, rel=0.25)

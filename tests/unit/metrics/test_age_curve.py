@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gyriflow.metrics.age_curve import LEAST_ERROR_GW, age_curve, estimated_age, leave_one_week_out
+from gyriflow.metrics.age_curve import LEAST_ERROR_GW, LeftOut, age_curve, estimated_age, leave_one_week_out, weights
 
 WEEKS = np.arange(21.0, 30.0)
 
@@ -46,9 +46,9 @@ def test_curve_never_turns_back() -> None:
 def test_constant_metric_says_nothing() -> None:
     found = estimated_age(age_curve(WEEKS, np.full(9, 3.0)), 3.0, 0.0)
     assert (found.low, found.week, found.high) == pytest.approx((21.0, 25.0, 29.0))
-    assert leave_one_week_out(WEEKS, np.full(9, 3.0)).weight == 0.0
-    # rounding is no signal
-    assert leave_one_week_out(WEEKS, 3.0 + 1e-15 * WEEKS).weight == 0.0
+    # neither is rounding a signal
+    level = leave_one_week_out(WEEKS, np.full(9, 3.0)), leave_one_week_out(WEEKS, 3.0 + 1e-15 * WEEKS)
+    assert weights(level).tolist() == [0.0, 0.0]
 
 
 def test_no_value_no_age() -> None:
@@ -57,12 +57,44 @@ def test_no_value_no_age() -> None:
 
 def test_weight_of_a_perfect_metric_and_of_noise() -> None:
     perfect = leave_one_week_out(WEEKS, 3 * WEEKS)
-    assert perfect.error_gw < 0.01
+    assert perfect.error_gw == LEAST_ERROR_GW
     assert perfect.noise == pytest.approx(0.0, abs=0.01)
     # from week 25: 3, 2, 1, 0, 1, 2 and 3 weeks
-    assert perfect.guess_gw == pytest.approx(12 / 7)
-    assert perfect.weight == pytest.approx(LEAST_ERROR_GW**-2 - perfect.guess_gw**-2)
-    assert leave_one_week_out(WEEKS, np.array([1.0, -1, 1, -1, 1, -1, 1, -1, 1])).weight == 0.0
+    assert perfect.guess_gw == pytest.approx(2.0)
+    assert perfect.number == 7
+    useless = leave_one_week_out(WEEKS, np.array([1.0, -1, 1, -1, 1, -1, 1, -1, 1]))
+    assert weights([perfect, useless]) == pytest.approx([LEAST_ERROR_GW**-2 - perfect.guess_gw**-2, 0.0])
+
+
+def test_weights_of_metrics_of_equal_skill_are_nearly_equal() -> None:
+    # the errors of seven weeks scatter by luck alone: mean squares of seven normal numbers
+    random = np.random.default_rng(3)
+    ratios = {"raw": [], "shrunk": []}
+    for _ in range(50):
+        errors = np.sqrt(np.mean(random.standard_normal((20, 7)) ** 2, axis=1))
+        skills = [LeftOut(error, 3.0, 1.0, 7) for error in errors]
+        raw, shrunk = errors**-2.0 - 3.0**-2, weights(skills)
+        for name, values in (("raw", raw), ("shrunk", shrunk)):
+            low, high = np.quantile(values, [0.05, 0.95])
+            ratios[name].append(high / low)
+    assert np.mean(ratios["raw"]) > 5.0
+    assert np.mean(ratios["shrunk"]) < 1.7
+
+
+def test_weights_of_metrics_of_unequal_skill_stay_unequal() -> None:
+    random = np.random.default_rng(4)
+    skill = np.repeat([0.2, 2.0], 10)
+    errors = skill * np.sqrt(np.mean(random.standard_normal((20, 7)) ** 2, axis=1))
+    found = weights([LeftOut(error, 5.0, 1.0, 7) for error in errors])
+    assert found[:10].mean() > 30 * found[10:].mean()
+
+
+def test_range_beyond_an_end_is_clipped() -> None:
+    curve = age_curve(WEEKS, 10 * WEEKS)
+    assert not estimated_age(curve, 250.0, 30.0).clipped
+    found = estimated_age(curve, 280.0, 30.0)
+    assert (found.outside, found.clipped, found.high) == ("", True, 29.0)
+    assert found.low == pytest.approx(25.0, abs=0.02)
 
 
 def test_one_deviant_week_is_seen_as_error_and_noise() -> None:
@@ -70,7 +102,7 @@ def test_one_deviant_week_is_seen_as_error_and_noise() -> None:
     values[4] += 20.0
     found = leave_one_week_out(WEEKS, values)
     # left out, week 25 is taken for 27 by a curve that is right
-    assert found.error_gw * 7 > 2.0
+    assert found.error_gw * np.sqrt(7) > 2.0
     assert found.noise * np.sqrt(7) > 20.0
 
 

@@ -8,8 +8,9 @@ import pytest
 
 from gyriflow.config.metrics import LEAST_AGE_WEEKS
 from gyriflow.errors import InputError
+from gyriflow.metrics import age_profile as profiles
 from gyriflow.metrics.age_metrics import comparable_metrics
-from gyriflow.metrics.age_profile import LEAST_WEEKS, age_profile, age_profile_check
+from gyriflow.metrics.age_profile import LEAST_WEEKS, age_profile_check, week_similarity
 
 WEEKS = np.arange(21.0, 29.0)
 REFERENCE = [f"brain{week:g}" for week in WEEKS]
@@ -29,6 +30,11 @@ METRICS: dict[str, tuple[str, Callable[[float], float]]] = {
     "spangy_B4_relative_power": ("1", lambda week: week),
 }
 POWERS_OF_LENGTH = {"mL": 3, "cm2": 2, "1": 0, "1/mm": -1, "mm2": 2}
+
+
+def age_profile(metrics: pd.DataFrame, spectra: pd.DataFrame, reference: list[str], **options) -> pd.DataFrame:
+    check = age_profile_check(metrics, spectra, reference)
+    return profiles.age_profile(metrics, spectra, reference, check, **options)
 
 
 def brain(subject: str, run: str, week: float, *, like: float, scale: float = 1.0, bands: int = 4) -> tuple:
@@ -88,7 +94,9 @@ def test_metrics_that_disagree_are_flagged() -> None:
     found = rows_of(profile, hemisphere="left")
     assert found.loc["all", "flag"] == "metrics disagree"
     assert found.loc["all without size", "flag"] == "ok"
-    assert found.loc["all", "high"] - found.loc["all", "low"] > 3.5
+    assert found.loc["all", "spread_high"] - found.loc["all", "spread_low"] > 3.5
+    # the range is how far reference brains left out are off, however the metrics agree
+    assert found.loc["all", "high"] - found.loc["all", "low"] < 1.0
 
 
 def test_metrics_without_age_have_no_weight() -> None:
@@ -150,6 +158,56 @@ def test_a_brain_is_told_by_the_others_alone() -> None:
     check = age_profile_check(*study(instead={24.0: 26.0}))
     found = check.query("hemisphere == 'left' and metric == 'all'").set_index("week")
     assert found.loc[24.0, "error"] == pytest.approx(2.0, abs=0.15)
+
+
+def test_metrics_that_growth_follows_take_no_part() -> None:
+    # the size of week 28 was put in, the folds are those of week 23
+    tables = study(brain("brain21", "steered", 28.0, like=23.0, scale=18 / 13))
+    found = rows_of(age_profile(*tables, followed={"steered": ("area", "volume")}), hemisphere="whole")
+    assert found.loc[["area", "volume", "area_scaled"], "flag"].tolist() == ["growth follows it"] * 3
+    assert found.loc["all without size", "estimated_week"] == pytest.approx(23.0, abs=0.2)
+    free = rows_of(age_profile(*tables), hemisphere="whole")
+    assert (free.loc[["area", "volume"], "flag"] == "ok").all() or (free.loc["area", "estimated_week"] > 27.0)
+    similar = week_similarity(*tables, followed={"steered": ("area", "volume")}).query("run == 'steered'")
+    assert similar["metrics"].max() < week_similarity(*tables).query("run == 'steered'")["metrics"].max()
+
+
+def test_ranges_that_reach_an_end_are_flagged() -> None:
+    # a noisy metric of a brain of the last week: half of its range is beyond the reference
+    tables = study(brain("brain21", "late", 28.0, like=28.0), instead={23.0: 24.0, 26.0: 25.0})
+    found = rows_of(age_profile(*tables), hemisphere="whole")
+    assert found.loc["volume", "flag"] == "range cut at the end"
+    assert found.loc["all", "flag"] == "range cut at the end"
+
+
+def test_one_brain_a_week_is_said() -> None:
+    assert (age_profile(*study(brain("brain21", "slow", 27.0, like=24.5)))["brains_per_week"] == 1).all()
+
+
+def test_many_metrics_of_one_family_count_as_one() -> None:
+    # ten copies of a metric that says week 27 beside one family that says 23
+    metrics, spectra, reference = study(brain("brain21", "odd", 25.0, like=23.0))
+    rows = metrics[metrics["metric"] == "mean_curvedness"]
+    copies = [rows.assign(metric=f"mean_sulcal_depth_{i}", value=1 / rows["value"], unit="mm") for i in range(10)]
+    for copy in copies:
+        copy.loc[copy["run"] == "odd", "value"] = 27.0 - 10.0
+    found = rows_of(age_profile(pd.concat([metrics, *copies]), spectra, reference), hemisphere="whole")
+    depth = found[found.index.str.startswith("mean_sulcal_depth") & ~found.index.str.endswith("_scaled")]
+    assert len(depth) == 10
+    assert depth["weight"].sum() < 0.35
+    assert found.loc["all", "estimated_week"] == pytest.approx(23.0, abs=0.3)
+
+
+def test_similarity_is_highest_at_the_week_it_looks_like() -> None:
+    noisy = {22.0: 22.3, 24.0: 23.8, 26.0: 26.2}
+    tables = study(brain("brain21", "slow", 27.0, like=25.0), brain("brain21", "alien", 25.0, like=60.0), instead=noisy)
+    found = week_similarity(*tables)
+    whole = found[found["hemisphere"] == "whole"].set_index(["run", "reference_week"])["similarity"]
+    assert whole["slow"].idxmax() == 25.0
+    assert whole["slow"].max() > 0.6
+    # a brain that is like no week is near to none, though an age would name the nearest
+    assert whole["alien"].max() < 0.1
+    assert found["similarity"].between(0, 1).all()
 
 
 def test_refused() -> None:

@@ -6,8 +6,32 @@ import pytest
 import trimesh
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, area, is_closed, merged, signed_volume, submesh, transformed
-from gyriflow.metrics.gyrification import area_over, capped, convex_hull, envelope, gyrification_index, sulcal_depth
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    is_closed,
+    merged,
+    signed_volume,
+    submesh,
+    transformed,
+    vertex_areas,
+)
+from gyriflow.metrics.depth import convex_hull, sulcal_depth
+from gyriflow.metrics.gyrification import (
+    capped,
+    envelope,
+    gyrification_index,
+    local_gyrification_index,
+    pieces_over,
+)
+
+
+def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
+    return gyrification_index([mesh], [pieces_over(around, mesh)])
+
+
+def area_over(around: TriangleMesh, mesh: TriangleMesh) -> float:
+    return float(pieces_over(around, mesh).areas.sum())
 
 
 def sphere(radius: float = 25.0) -> TriangleMesh:
@@ -35,8 +59,8 @@ def dented(depth: float, width: float, subdivisions: int = 5) -> TriangleMesh:
 
 def test_sphere_has_no_folds() -> None:
     mesh = sphere()
-    assert gyrification_index(mesh, convex_hull(mesh)) == pytest.approx(1.0, abs=1e-9)
-    assert gyrification_index(mesh, envelope(mesh)) == pytest.approx(1.0, abs=0.01)
+    assert index(mesh, convex_hull(mesh)) == pytest.approx(1.0, abs=1e-9)
+    assert index(mesh, envelope(mesh)) == pytest.approx(1.0, abs=0.01)
 
 
 def test_hull_is_closed_and_outward() -> None:
@@ -54,14 +78,14 @@ def test_envelope_bridges_a_sulcus_and_follows_a_wide_dent() -> None:
     assert depth(narrow, envelope(narrow)) > 7.0
     assert depth(wide, envelope(wide)) < 1.0
     assert depth(wide, convex_hull(wide)) > 2.5
-    assert gyrification_index(narrow, envelope(narrow)) > gyrification_index(narrow, convex_hull(narrow)) > 1.003
+    assert index(narrow, envelope(narrow)) > index(narrow, convex_hull(narrow)) > 1.003
     assert is_closed(envelope(narrow))
 
 
 @pytest.mark.parametrize("subdivisions", [5, 6])
 def test_sulcal_depth_of_a_dent(subdivisions: int) -> None:
     mesh = dented(8.0, 5.0, subdivisions)
-    depth = sulcal_depth(mesh, envelope(mesh))
+    depth = sulcal_depth(mesh, convex_hull(mesh))
     bottom = np.linalg.norm(mesh.vertices, axis=1).argmin()
     assert depth.argmax() == bottom
     # the mouth is bridged by a flat piece, at most 1 mm below the sphere's top
@@ -106,17 +130,51 @@ def test_cut_is_left_out_of_the_index() -> None:
     hull = convex_hull(half)
     assert area(hull) == pytest.approx(3 * np.pi * 25.0**2, rel=0.01)
     assert area_over(hull, half) == pytest.approx(2 * np.pi * 25.0**2, rel=0.01)
-    assert gyrification_index(half, hull) == pytest.approx(1.0, abs=0.02)
-    assert gyrification_index(half, envelope(half)) == pytest.approx(1.0, abs=0.03)
+    assert index(half, hull) == pytest.approx(1.0, abs=0.02)
+    assert index(half, envelope(half)) == pytest.approx(1.0, abs=0.03)
 
 
-def test_two_hemispheres_are_wrapped_as_one() -> None:
-    left = transformed(sphere(10.0), [[1, 0, 0, -10.5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    right = transformed(sphere(10.0), [[1, 0, 0, 10.5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    both = merged(left, right)
-    assert gyrification_index(both, convex_hull(both)) == pytest.approx(
-        8 * np.pi * 100 / (4 * np.pi * 100 + 2 * np.pi * 10 * 21), rel=0.01
-    )
+def test_the_fissure_between_two_hemispheres_is_no_fold() -> None:
+    left, right = (transformed(sphere(10.0), np.eye(4) + np.outer([1, 0, 0, 0], [0, 0, 0, x])) for x in (-10.5, 10.5))
+    both = [pieces_over(convex_hull(side), side) for side in (left, right)]
+    assert gyrification_index([left, right], both) == pytest.approx(1.0, abs=1e-9)
+    # one hull around both has the fissure as if it were a sulcus
+    joined = merged(left, right)
+    assert index(joined, convex_hull(joined)) == pytest.approx(8 * 100 / (4 * 100 + 2 * 10 * 21), rel=0.01)
+
+
+def test_index_of_two_hemispheres_is_the_ratio_of_sums() -> None:
+    large, small = dented(10.0, 12.0), sphere(10.0)
+    around = [pieces_over(convex_hull(side), side) for side in (large, small)]
+    expected = (area(large) + area(small)) / (area(convex_hull(large)) + area(small))
+    assert gyrification_index([large, small], around) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("radius", [15.0, 30.0])
+def test_local_index_of_a_sphere_is_one_everywhere(radius: float) -> None:
+    mesh = sphere(radius)
+    local = local_gyrification_index(mesh, pieces_over(convex_hull(mesh), mesh))
+    np.testing.assert_allclose(local, 1.0, atol=0.04)
+
+
+def test_local_index_is_high_at_a_sulcus_and_one_far_from_it() -> None:
+    mesh = dented(8.0, 5.0)
+    around = pieces_over(envelope(mesh), mesh)
+    local = local_gyrification_index(mesh, around, radius_mm=10.0)
+    bottom = np.linalg.norm(mesh.vertices, axis=1).argmin()
+    away = np.linalg.norm(mesh.vertices - [0, 0, 25.0], axis=1)
+    # a patch of 10 mm round the dent: its area with and without what the dent adds
+    inside = away < 10.0
+    areas = vertex_areas(mesh)[inside].sum() / (np.pi * 10.0**2)
+    assert local[bottom] == pytest.approx(areas, rel=0.05)
+    assert local[bottom] > 1.1
+    assert np.abs(local[away > 25.0] - 1.0).max() < 0.05
+
+
+def test_local_index_leaves_the_cut_out() -> None:
+    half = half_sphere()
+    local = local_gyrification_index(half, pieces_over(convex_hull(half), half))
+    assert np.abs(local - 1.0).max() < 0.15
 
 
 def test_flat_surface_has_no_hull() -> None:

@@ -63,6 +63,11 @@ def test_two_spheres(apart: BrainMetrics) -> None:
         assert value(apart, name, "curvature_radius") >= 3.0
         assert value(apart, name, "mean_sulcal_depth") == pytest.approx(0.0, abs=0.05)
         assert value(apart, name, "crossing_faces") == 0
+        assert value(apart, name, "intrinsic_curvature_index") == pytest.approx(1.0, rel=0.02)
+        assert value(apart, name, "folding_index") == pytest.approx(0.0, abs=0.01)
+        assert value(apart, name, "mean_curvature_norm") == pytest.approx(1.0, rel=0.02)
+        assert value(apart, name, "gaussian_curvature_norm") == pytest.approx(1.0, rel=0.02)
+        assert value(apart, name, "mean_curvature_q50") == pytest.approx(1 / radius, rel=0.02)
         # Weyl's number by the paper's formula is 8192/2π, whatever the radius
         assert value(apart, name, "weyl_number") == pytest.approx(8192 / (2 * np.pi), rel=0.01)
         assert value(apart, name, "spangy_modes") == 60
@@ -71,12 +76,53 @@ def test_two_spheres(apart: BrainMetrics) -> None:
         assert value(apart, "whole", metric) == pytest.approx(both)
 
 
+def test_the_whole_has_no_fissure_in_its_index(apart: BrainMetrics, cut: BrainMetrics) -> None:
+    assert value(apart, "whole", "gyrification_index") == pytest.approx(1.0, abs=1e-6)
+    assert value(cut, "whole", "gyrification_index") == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_cut_is_no_sulcus(cut: BrainMetrics) -> None:
+    # the wall of a cut is in the hull; what depth there is, is that of the facets
+    assert value(cut, "whole", "sulcal_depth_95") < 0.05
+
+
+def test_cut_bands_are_no_metrics(apart: BrainMetrics) -> None:
+    flags = apart.spectra.query("hemisphere == 'left'").set_index("band")
+    cut_off = flags.index[~flags["complete"] & (flags["modes"] > 0)]
+    assert len(cut_off)
+    assert np.isfinite(flags.loc[cut_off, "power"]).all()
+    assert all(np.isnan(value(apart, "left", f"spangy_B{band}_power")) for band in cut_off)
+    assert not flags["denominator_complete"].any()
+    assert np.isnan(value(apart, "left", "spangy_B1_relative_power"))
+
+
+def test_processes_change_nothing_but_the_time() -> None:
+    shape = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
+    left, right = (shifted(TriangleMesh(shape.vertices * [1, 1, 1.3], shape.faces), x) for x in (-21.0, 21.0))
+    thickness = np.linspace(1.0, 2.0, 2 * len(shape.vertices))
+    one, two = (
+        measure_brain(merged(left, right), left, right, thickness_mm=thickness, spangy_modes=20, threads=threads)
+        for threads in (1, 2)
+    )
+    pd.testing.assert_frame_equal(one.table, two.table)
+    assert value(one, "left", "mean_thickness") < 1.5 < value(one, "right", "mean_thickness")
+    assert value(one, "whole", "mean_thickness") == pytest.approx(1.5, abs=0.01)
+    np.testing.assert_allclose(one.maps["left"]["thickness_mm"], thickness[: len(shape.vertices)])
+
+
+def test_errors_come_out_of_processes() -> None:
+    shape = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
+    left, right = (shifted(TriangleMesh(shape.vertices, shape.faces), x) for x in (-21.0, 21.0))
+    with pytest.raises(MeshError, match="one piece"):
+        measure_brain(merged(left, right), left, merged(right, shifted(right, 60.0)), spangy_modes=10, threads=2)
+
+
 def test_maps_and_spectra(apart: BrainMetrics) -> None:
     assert set(apart.maps) == {"left", "right"}
     assert {name: len(values) for name, values in apart.maps["left"].items()} == dict.fromkeys(
         [
             *("shape_index", "curvedness", "mean_curvature", "gaussian_curvature"),
-            *("sulcal_depth_mm", "spangy_dominant_band"),
+            *("sulcal_depth_mm", "local_gyrification_index", "spangy_dominant_band", "reliable"),
         ],
         2562,
     )

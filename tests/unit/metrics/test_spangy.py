@@ -64,6 +64,17 @@ def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
     np.testing.assert_array_equal(found[clear], expected[clear])
 
 
+def test_a_band_that_is_cut_off_dominates_nowhere(solved) -> None:
+    modes, mass = solved
+    band = bands_of_modes(modes.eigenvalues)
+    slow, cut = (modes.functions[:, np.flatnonzero(band == k)[1]] for k in (2, 4))
+    found = spectrum(slow + 10.0 * cut, modes, mass, edge_length_mm=1.0)
+    assert not found.bands["complete"][4]
+    assert set(np.abs(found.dominant_band)) <= {1, 2, 3}
+    few = Modes(modes.eigenvalues[:3], modes.functions[:, :3])
+    np.testing.assert_array_equal(spectrum(slow, few, mass, edge_length_mm=1.0).dominant_band, 0)
+
+
 def test_parseval_with_all_modes() -> None:
     sphere = trimesh.creation.icosphere(subdivisions=2)
     mesh = TriangleMesh(sphere.vertices * [35.0, 25.0, 20.0], sphere.faces)
@@ -109,6 +120,10 @@ def test_wavelengths_and_flags(solved) -> None:
         assert bands["resolved"][k] == (longest / 2**k >= 6 * edge)
     assert bands["complete"][3]
     assert not bands["complete"][4]
+    # the shares of B1 to B3 are shares of a sum that holds a part of B4
+    assert bands["modes"][4] > 0
+    assert not bands["denominator_complete"].any()
+    assert bands["relative_power"][1:5].sum() == pytest.approx(1.0)
     assert bands["modes"][6] == 0
     assert np.isnan(bands["power"][6])
 

@@ -22,7 +22,7 @@ def brain(run: str, week: float, shift: float, flag: str = "ok") -> pd.DataFrame
         ("all without size", "together", week - shift, week - 2, week + 1, 1.0, "ok"),
         ("size alone", "together", week, week, week, 1.0, "ok"),
     ]
-    table = pd.DataFrame(rows, columns=COLUMNS).assign(run=run, week=week, mean_absolute_error=0.0)
+    table = pd.DataFrame(rows, columns=COLUMNS).assign(run=run, week=week, mean_absolute_error=0.0, brains_per_week=1)
     table.loc[table["metric"] == "all", "mean_absolute_error"] = 0.37
     table.loc[table["metric"] == "all without size", "mean_absolute_error"] = 1.25
     # sides are not drawn
@@ -92,3 +92,10 @@ def test_single_metrics_at_the_last_week_of_all_runs(figure):
 def test_without_a_simulated_brain_it_is_refused():
     with pytest.raises(InputError, match="no simulated brain"):
         age_profile_chart(CHECK, CHECK)
+
+
+def test_one_brain_a_week_is_said_in_the_figure() -> None:
+    said = [text.get_text() for text in age_profile_chart(PROFILE, CHECK).texts]
+    assert any("no single fetus" in text for text in said)
+    said = [text.get_text() for text in age_profile_chart(PROFILE.assign(brains_per_week=3), CHECK).texts]
+    assert not any("no single fetus" in text for text in said)

@@ -44,6 +44,7 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
                 "band": list(power),
                 "relative_power": [factor * value for value in power.values()],
                 "complete": complete,
+                "denominator_complete": complete,
                 "resolved": True,
             }
         )
@@ -198,17 +199,22 @@ def test_steps_are_drawn_and_unusual_rungs_marked():
             "max_u_mm": 0.3,
             "mean_u_mm": 0.05,
             "rung": ["cg", "cg", "cg", "minres", "cg", "cg"],
+            "elements_through_cortex": np.linspace(2.3, 1.7, count),
+            "radius_ratio_01": np.linspace(0.4, 0.3, count),
             "seconds": np.arange(1.0, count + 1),
         }
     )
     figure = steps_chart(steps)
-    newton, krylov, jacobian, displacement, seconds = figure.axes
+    newton, krylov, jacobian, displacement, through, quality, seconds = figure.axes
     assert newton.lines[0].get_ydata().tolist() == [2, 1, 1, 3, 1, 1]
     assert newton.lines[1].get_xydata().tolist() == [[steps["week"][3], 3]]
     assert newton.lines[1].get_label() == "rung: minres"
     assert krylov.lines[0].get_ydata().tolist() == steps["krylov"].tolist()
     assert jacobian.lines[0].get_ydata().min() == pytest.approx(0.7)
     assert [line.get_label() for line in displacement.lines] == ["max", "mean"]
+    assert through.lines[0].get_ydata()[[0, -1]].tolist() == [2.3, 1.7]
+    assert through.lines[1].get_ydata()[0] == 2.0
+    assert quality.lines[0].get_ydata()[-1] == 0.3
     assert seconds.lines[0].get_ydata().sum() == 21
     assert "(s)" in seconds.get_ylabel()
 

@@ -1,0 +1,185 @@
+"""Norms: published curves and measured brains over gestational weeks, and where a brain stands among them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from ..errors import InputError
+from ..geometry.triangles import Floats
+from .age_metrics import BRAIN, MEASURED
+
+QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
+"""The quantiles that norms give, by the names of their columns."""
+
+LEAST_BRAINS = 5
+"""Brains of a week, of which quantiles are given."""
+
+LEAST_FREEDOM = 3
+"""Degrees of freedom that the scatter round a curve needs to be known."""
+
+WINDOW_GW = 0.5
+"""Brains at most this far from a week are of that week."""
+
+
+@dataclass(frozen=True)
+class PublishedNorm:
+    """A published curve: mean and standard deviation as polynomials of the week, highest power first."""
+
+    mean: tuple[float, ...]
+    sd: tuple[float, ...]
+    weeks: tuple[float, float]
+    labels: tuple[int, ...]
+    unit: str
+    subjects: int | None
+
+
+def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
+    """Returns the norms of a file of `norms/`, by structure; InputError where a standard deviation is not positive."""
+    norms = {}
+    for name, entry in data["structures"].items():
+        first, last = data["weeks"]
+        norm = PublishedNorm(
+            tuple(entry["mean"]),
+            tuple(entry["sd"]),
+            (first, last),
+            tuple(entry["labels"]),
+            data["unit"],
+            data["subjects"],
+        )
+        lowest = float(np.polyval(norm.sd, np.linspace(first, last, 201)).min())
+        if lowest <= 0:
+            raise InputError(
+                f"the norm of {name} has no standard deviation", found=f"{lowest:.3g} at its least", expected="above 0"
+            )
+        norms[name] = norm
+    return norms
+
+
+def published_scores(volumes: Mapping[str, float], week: float, norms: Mapping[str, PublishedNorm]) -> pd.DataFrame:
+    """Returns where the volumes of a brain stand among published ones.
+
+    Parameters
+    ----------
+    volumes
+        By structure, in the norms' unit; structures without a norm are left out.
+
+    Returns
+    -------
+    DataFrame
+        structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution, 0 to
+        100), brains (that the norm was made of; NaN where its source does not say), flag ("ok" or "outside the norm's
+        weeks", then without expected, z and centile).
+    """
+    rows = []
+    for name, value in volumes.items():
+        if name not in norms:
+            continue
+        norm = norms[name]
+        inside = norm.weeks[0] <= week <= norm.weeks[1]
+        mean, sd = (float(np.polyval(curve, week)) if inside else np.nan for curve in (norm.mean, norm.sd))
+        z = (value - mean) / sd
+        brains = np.nan if norm.subjects is None else norm.subjects
+        flag = "ok" if inside else "outside the norm's weeks"
+        rows.append((name, week, value, norm.unit, mean, sd, z, 100 * float(stats.norm.cdf(z)), brains, flag))
+    columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+    """Returns the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
+
+    Parameters
+    ----------
+    metrics : columns subject, run, week, hemisphere, metric, value, unit
+    reference
+        Subjects whose measured brains are the norm.
+
+    Returns
+    -------
+    DataFrame
+        hemisphere, metric, unit, week, brains (at most half a week away), mean, sd (NaN for one brain), q05, q25, q50,
+        q75, q95 (NaN for fewer than five brains).
+    """
+    rows = []
+    for (hemisphere, metric), known in _reference(metrics, reference).groupby(["hemisphere", "metric"], sort=False):
+        for week in np.unique(known["week"]):
+            near = known.loc[(known["week"] - week).abs() <= WINDOW_GW, "value"].to_numpy(dtype=float)
+            sd = float(near.std(ddof=1)) if len(near) > 1 else np.nan
+            enough = len(near) >= LEAST_BRAINS
+            quantiles = np.quantile(near, list(QUANTILES.values())) if enough else np.full(len(QUANTILES), np.nan)
+            unit = known["unit"].iloc[0]
+            rows.append((hemisphere, metric, unit, week, len(near), float(near.mean()), sd, *quantiles))
+    columns = ["hemisphere", "metric", "unit", "week", "brains", "mean", "sd", *QUANTILES]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+    """Returns where brains stand among the measured brains of a reference, at their own week.
+
+    A quadratic of the week (a line for three weeks, their mean for fewer) is put through the reference brains by least
+    squares. The centile is that of a further brain's value under Student's distribution, which is the wider the fewer
+    brains there are: t = (x − expected)/(s √(1 + h)), with s the scatter round the curve and h the leverage of the
+    week. A brain of the reference is compared with the others.
+
+    Parameters
+    ----------
+    metrics, reference
+        As for `measured_norms`; all brains of the table but those of the reference's runs are scored, and these too.
+
+    Returns
+    -------
+    DataFrame
+        subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile (0 to
+        100), brains (of the reference), brains_of_week, flag: "ok"; "one brain a week": z and centile are of the
+        scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the
+        reference's weeks" or "too few brains", then without z and centile.
+    """
+    known = dict(list(_reference(metrics, reference).groupby(["hemisphere", "metric"])))
+    names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
+    rows = []
+    for row in metrics.dropna(subset=["value"])[names].to_dict("records"):
+        others = known.get((row["hemisphere"], row["metric"]))
+        if others is None:
+            continue
+        if row["run"] == MEASURED:
+            others = others[others["subject"] != row["subject"]]
+        weeks, values = others["week"].to_numpy(dtype=float), others["value"].to_numpy(dtype=float)
+        rows.append((*row.values(), *_score(row["week"], row["value"], weeks, values)))
+    columns = [*names, "expected", "sd", "z", "centile", "brains", "brains_of_week", "flag"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _reference(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+    return metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+
+
+def _score(
+    week: float, value: float, weeks: Floats, values: Floats
+) -> tuple[float, float, float, float, int, int, str]:
+    """Returns expected, sd, z, centile, brains, brains_of_week and flag of `measured_scores`."""
+    distinct = np.unique(weeks)
+    of_week = int(np.count_nonzero(np.abs(weeks - week) <= WINDOW_GW))
+    degree = 2 if len(distinct) > 3 else 1 if len(distinct) == 3 else 0
+    freedom = len(weeks) - degree - 1
+    nothing = (np.nan, np.nan, np.nan, np.nan, len(weeks), of_week)
+    if freedom < LEAST_FREEDOM:
+        return *nothing, "too few brains"
+    if not distinct[0] - WINDOW_GW <= week <= distinct[-1] + WINDOW_GW:
+        return *nothing, "outside the reference's weeks"
+    centre = weeks.mean()
+    powers = np.vander(weeks - centre, degree + 1)
+    here = np.vander([week - centre], degree + 1)[0]
+    factors, *_ = np.linalg.lstsq(powers, values, rcond=None)
+    expected = float(here @ factors)
+    sd = float(np.sqrt(np.sum((values - powers @ factors) ** 2) / freedom))
+    if sd == 0:
+        return expected, sd, np.nan, np.nan, len(weeks), of_week, "too few brains"
+    leverage = float(here @ np.linalg.solve(powers.T @ powers, here))
+    z = (value - expected) / sd
+    centile = 100 * float(stats.t.cdf(z / np.sqrt(1 + leverage), freedom))
+    single = (np.abs(weeks[:, None] - weeks) <= WINDOW_GW).sum() == len(weeks)
+    return expected, sd, z, centile, len(weeks), of_week, "one brain a week" if single else "ok"

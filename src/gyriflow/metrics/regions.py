@@ -1,0 +1,100 @@
+"""Metrics by region, from labels at the vertices of hemispheres, and the asymmetry between left and right."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.triangles import Ints, TriangleMesh, area, vertex_areas
+from ..units import CM2_PER_MM2
+
+UNLABELLED = 0
+"""The label of what is in no region."""
+
+MAP_UNITS = {
+    "shape_index": "1",
+    "curvedness": "1/mm",
+    "mean_curvature": "1/mm",
+    "sulcal_depth_mm": "mm",
+    "local_gyrification_index": "1",
+    "thickness_mm": "mm",
+}
+"""The maps whose means are given by region, and their units."""
+
+
+def region_metrics(
+    sides: Mapping[str, TriangleMesh],
+    maps: Mapping[str, Mapping[str, NDArray]],
+    labels: Mapping[str, Ints],
+    names: Mapping[int, str],
+) -> pd.DataFrame:
+    """Returns area and means of maps by region of each hemisphere, weighted by area.
+
+    Parameters
+    ----------
+    sides
+        The pial surfaces of "left" and "right".
+    maps
+        Per hemisphere arrays per vertex by name, as `measure.BrainMetrics.maps`; those of `MAP_UNITS` are used. NaN
+        is left out of means, and so is what lies near a cut where `reliable` is 0.
+    labels
+        Per hemisphere the (n,) label of each vertex, 0 for none.
+    names
+        Name of the region by label.
+
+    Returns
+    -------
+    DataFrame
+        hemisphere, region, metric, value, unit. Metrics are area (cm2), area_share (of the hemisphere) and the maps'
+        names without their unit, with mean_ in front; a region that is all NaN or near a cut has NaN.
+
+    InputError for labels that have no name, or are not as many as vertices.
+    """
+    rows = []
+    for side, mesh in sides.items():
+        label = np.asarray(labels[side])
+        unknown = sorted({int(number) for number in np.unique(label)} - {UNLABELLED, *names})
+        if unknown or len(label) != len(mesh.vertices):
+            raise InputError(
+                f"regions of the {side} hemisphere do not fit",
+                found=f"{len(label)} labels, without a name: {', '.join(map(str, unknown)) or 'none'}",
+                expected=f"{len(mesh.vertices)} labels, each named",
+            )
+        areas, total = vertex_areas(mesh), area(mesh)
+        reliable = np.asarray(maps[side].get("reliable", np.ones(len(label))), dtype=bool)
+        for number, name in names.items():
+            inside = label == number
+            covered = float(areas[inside].sum())
+            rows.append((side, name, "area", covered * CM2_PER_MM2, "cm2"))
+            rows.append((side, name, "area_share", covered / total, "1"))
+            for key, unit in MAP_UNITS.items():
+                if key in maps[side]:
+                    values = np.asarray(maps[side][key], dtype=float)
+                    used = inside & np.isfinite(values) & reliable
+                    mean = float(np.average(values[used], weights=areas[used])) if areas[used].any() else np.nan
+                    rows.append((side, name, f"mean_{key.removesuffix('_mm').removeprefix('mean_')}", mean, unit))
+    return pd.DataFrame(rows, columns=["hemisphere", "region", "metric", "value", "unit"])
+
+
+def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
+    """Returns the asymmetry index 2 (left − right)/(|left| + |right|) of each metric, of each region where there are.
+
+    Between −2 and 2, positive where the left side has more; NaN where both are 0 or one is not known.
+
+    Parameters
+    ----------
+    metrics : columns hemisphere, metric, value, and any others that rows of both sides have alike, such as region
+
+    Returns
+    -------
+    DataFrame
+        The other columns, metric, asymmetry_index.
+    """
+    keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
+    sides = metrics[metrics["hemisphere"].isin(["left", "right"])]
+    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first", sort=False, dropna=False)
+    total = wide["left"].abs() + wide["right"].abs()
+    index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)
+    return index.rename("asymmetry_index").reset_index()

@@ -1,0 +1,96 @@
+"""Cortical thickness of simulated brains, and thickness as metrics."""
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..errors import InputError, MeshError
+from ..geometry.layers import layer_thickness
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.triangles import Floats, TriangleMesh
+
+STEEPNESS = 10.0
+"""Of the cortical weight in the folding model."""
+
+SAME_POINT_MM = 1e-3
+"""Surfaces are written in single precision: vertices that are nearer are the same."""
+
+
+def depth_of_weight(weight: Floats) -> Floats:
+    """Returns the depth in cortical thicknesses, d/H, at which the cortical weight has (m,) values.
+
+    The inverse of the folding model's w = 1/(1 + exp(10 (d/H − 1))), which is ½ at the border of cortex and core.
+    """
+    # beyond three thicknesses the weight is written as 0
+    within = np.clip(weight, 1e-9, 1.0 - 1e-9)
+    return 1.0 + np.log(1.0 / within - 1.0) / STEEPNESS
+
+
+def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats, pial: TriangleMesh) -> Floats:
+    """Returns the (n,) cortical thickness in mm at the vertices of a simulated pial surface.
+
+    The border between cortex and core is where the depth at the start is the cortical thickness, which is where the
+    cortical weight is ½. It is made of material points and carried with the tissue: the cortex of a later week is what
+    was cortex at the start, however much it has grown or been pressed. Thickness is then that of the layer between the
+    pial surface and the carried border, as in measured brains (`geometry.layers.layer_thickness`).
+
+    Parameters
+    ----------
+    start
+        The mesh of the start, with m vertices.
+    depth : (m,) float
+        Distance to the pial surface at the start over the cortical thickness there: 1 at the border. As
+        `depth_of_weight` gives it from the field `cortex_weight` of a run's regions.
+    positions : (m, 3) float
+        Present positions of the vertices in mm.
+    pial
+        The present pial surface.
+
+    MeshError where no point is deeper than the cortex.
+    """
+    cells = np.column_stack([np.full(len(start.tets), 4), start.tets]).ravel()
+    grid = pv.UnstructuredGrid(cells, np.full(len(start.tets), pv.CellType.TETRA), np.asarray(positions, dtype=float))
+    grid.point_data["depth"] = depth
+    # cut in its present shape: linear along the edges, so the points are those of the start
+    border = grid.contour([1.0], scalars="depth").triangulate()
+    if not border.n_cells:
+        raise MeshError(
+            "the brain has no core",
+            found=f"points at most {float(np.max(depth)):.3g} cortical thicknesses deep",
+            expected="more than 1",
+        )
+    inner = TriangleMesh(np.asarray(border.points, dtype=float), border.faces.reshape(-1, 4)[:, 1:])
+    return layer_thickness(pial, inner)
+
+
+def at_part(values: NDArray, whole: TriangleMesh, part: TriangleMesh) -> NDArray:
+    """Returns the values (n, ...) at the vertices of a surface for the vertices of a part of it, such as a hemisphere.
+
+    InputError where the part has a vertex that the whole has not.
+    """
+    away, nearest = cKDTree(whole.vertices).query(part.vertices)
+    if len(values) != len(whole.vertices) or away.max() > SAME_POINT_MM:
+        raise InputError(
+            "values do not belong to the surface",
+            found=f"{len(values)} values; vertices of the part up to {away.max():.3g} mm from those of the whole",
+            expected=f"{len(whole.vertices)} values, and a part of this surface",
+        )
+    return values[nearest]
+
+
+def thickness_metrics(values: Floats, areas: Floats) -> list[tuple[str, float, str]]:
+    """Returns metric, value and unit of thickness at (n,) vertices, NaN where it was not measured; weights by area."""
+    known = np.isfinite(values)
+    if not known.any():
+        return []
+    chosen, weights = values[known], areas[known]
+    mean = float(np.average(chosen, weights=weights))
+    low, high = np.quantile(chosen, [0.05, 0.95], weights=weights, method="inverted_cdf")
+    return [
+        ("mean_thickness", mean, "mm"),
+        ("thickness_sd", float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))), "mm"),
+        ("thickness_q05", float(low), "mm"),
+        ("thickness_q95", float(high), "mm"),
+        ("thickness_measured_share", float(weights.sum() / areas.sum()), "1"),
+    ]

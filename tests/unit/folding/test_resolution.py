@@ -1,0 +1,58 @@
+"""What the step table and the log say of the resolution of a mesh whose resolution is known."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from shapes import box_mesh
+
+from gyriflow.folding.domain import Domain
+from gyriflow.folding.resolution import elements_through, resolution_warning, stiffness_warning, worst_quality
+from gyriflow.folding.simulation import unconverged_warning
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
+
+
+def test_elements_through_a_layer_are_its_thickness_over_the_edges_in_it():
+    mesh = box_mesh((4, 4, 8), (4.0, 4.0, 8.0))
+    # coarser below the layer, which is not to count
+    z = mesh.vertices[:, 2] - 4.0
+    stretched = np.where(z < -3, -3 + 4 * (z + 3), z)
+    domain = Domain(MPI.COMM_SELF, TetrahedralMesh(np.column_stack([mesh.vertices[:, :2], stretched]), mesh.tets))
+    depth = -domain.local(domain.positions)[:, 2]
+    # a cube in six tetrahedra, each with three edges, two diagonals and the long one
+    edge = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
+    assert elements_through(domain, depth, 3e-3) == pytest.approx(3 / edge)
+    domain.place(2 * domain.positions)
+    assert elements_through(domain, 2 * depth, 3e-3) == pytest.approx(1.5 / edge)
+    assert np.isnan(elements_through(domain, depth + 1.0, 3e-3))
+
+
+def test_quality_is_that_of_the_worst_hundredth_as_the_mesh_is():
+    mesh = box_mesh((4, 4, 4), (4.0, 4.0, 4.0))
+    domain = Domain(MPI.COMM_SELF, mesh)
+    regular = worst_quality(domain)
+    assert regular == pytest.approx(np.quantile(radius_ratios(mesh), 0.01))
+    domain.place(domain.positions * [1.0, 1.0, 0.2])
+    assert worst_quality(domain) < 0.5 * regular
+
+
+def rows(*through):
+    return [{"week": 21.0 + i, "elements_through_cortex": value} for i, value in enumerate(through)]
+
+
+def test_a_cortex_that_outgrows_its_elements_is_told_once():
+    assert resolution_warning(rows(2.3, 2.1)) == ""
+    assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9))
+    assert resolution_warning(rows(2.3, 1.9, 1.8)) == ""
+    assert "fewer than 2" in resolution_warning(rows(1.5))
+    assert resolution_warning(rows(np.nan)) == ""
+
+
+def test_nearly_incompressible_tissue_is_told():
+    assert stiffness_warning(0.45) == stiffness_warning(0.46) == ""
+    assert "0.48" in stiffness_warning(0.48)
+
+
+def test_a_step_above_its_tolerance_is_told():
+    row = {"step": 7, "residual": 3e-6, "converged": True}
+    assert unconverged_warning(row) == ""
+    assert "step 7" in unconverged_warning(row | {"converged": False})

@@ -1,0 +1,107 @@
+"""Norms of brains that are drawn from known curves, and the published ones that come with the project."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from scipy import stats
+
+from gyriflow.errors import InputError
+from gyriflow.metrics.norms import measured_norms, measured_scores, published_norms, published_scores
+
+NORMS = Path(__file__).parents[3] / "norms"
+
+
+def table(weeks: np.ndarray, values: np.ndarray, *others: tuple[str, float, float]) -> tuple[pd.DataFrame, list[str]]:
+    """Returns metrics of reference brains and of others (run, week, value), and the reference."""
+    rows = [
+        (f"s{i}", "real", week, "whole", "area", value, "cm2")
+        for i, (week, value) in enumerate(zip(weeks, values, strict=True))
+    ]
+    rows += [("other", run, week, "whole", "area", value, "cm2") for run, week, value in others]
+    columns = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
+    return pd.DataFrame(rows, columns=columns), [f"s{i}" for i in range(len(weeks))]
+
+
+@pytest.mark.parametrize("path", sorted(NORMS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_norms_that_come_with_the_project_are_sound(path: Path) -> None:
+    data = yaml.safe_load(path.read_text())
+    assert data["name"] == path.stem
+    assert len(data["source"]) > 40
+    for norm in published_norms(data).values():
+        weeks = np.linspace(22, 37, 16)
+        assert (np.polyval(norm.mean, weeks) > 0).all()
+
+
+def test_published_volumes_of_cortex_and_white_matter() -> None:
+    norms = published_norms(yaml.safe_load((NORMS / "svrtk-volumes.yaml").read_text()))
+    # at 29 weeks: 0.3052·841 − 11.828·29 + 123 and 0.0223·841 + 7.3471·29 − 145.28
+    found = published_scores({"cortex": 36.66 + 3.787, "white_matter": 86.54, "tail": 1.0}, 29.0, norms).set_index(
+        "structure"
+    )
+    assert found["expected"].tolist() == pytest.approx([36.66, 86.54], abs=0.01)
+    assert list(found.index) == ["cortex", "white_matter"]
+    # SD of the cortex: 0.01647·841 − 0.47701·29 + 3.76905
+    assert found.loc["cortex", "sd"] == pytest.approx(3.787, abs=0.001)
+    assert found.loc["cortex", "z"] == pytest.approx(1.0, abs=0.01)
+    assert found["centile"].tolist() == pytest.approx([84.13, 50.0], abs=0.3)
+    assert np.isnan(found["brains"]).all()
+    assert published_scores({"cortex": 30.0}, 18.0, norms)["flag"].tolist() == ["outside the norm's weeks"]
+
+
+def test_a_norm_without_scatter_is_refused() -> None:
+    data = {
+        "unit": "mL",
+        "weeks": [20, 40],
+        "subjects": 9,
+        "structures": {"x": {"labels": [1], "mean": [1], "sd": [-0.1, 3]}},
+    }
+    with pytest.raises(InputError, match="norm of x has no standard deviation"):
+        published_norms(data)
+
+
+def test_quantiles_need_several_brains_of_a_week() -> None:
+    weeks = np.repeat([22.0, 26.0, 30.0], [1, 3, 101])
+    values = np.concatenate([[5.0], [6.0, 8.0, 10.0], np.arange(101.0)])
+    found = measured_norms(*table(weeks, values)).set_index("week")
+    assert found["brains"].tolist() == [1, 3, 101]
+    assert found["mean"].tolist() == [5.0, 8.0, 50.0]
+    assert np.isnan(found.loc[22.0, "sd"])
+    assert found.loc[26.0, "sd"] == pytest.approx(2.0)
+    assert found.loc[[22.0, 26.0], "q50"].isna().all()
+    assert found.loc[30.0, ["q05", "q25", "q50", "q75", "q95"]].tolist() == [5.0, 25.0, 50.0, 75.0, 95.0]
+
+
+def test_centiles_of_drawn_brains_are_even() -> None:
+    random = np.random.default_rng(0)
+    weeks = random.uniform(21, 36, 400)
+    values = 0.5 * (weeks - 10) ** 2 + 4.0 * random.standard_normal(400)
+    found = measured_scores(*table(weeks, values))
+    assert (found["flag"] == "ok").all()
+    assert found["sd"].mean() == pytest.approx(4.0, rel=0.05)
+    # each against the others: a tenth of the brains in each tenth
+    counts, _ = np.histogram(found["centile"], np.linspace(0, 100, 11))
+    assert np.abs(counts - 40).max() < 20
+
+
+def test_few_brains_make_centiles_cautious() -> None:
+    weeks = np.array([21.0, 23.0, 25.0, 27.0, 29.0, 31.0] * 2)
+    values = 10 * weeks + np.tile([1.0, -1.0], 6)
+    metrics, reference = table(weeks, values, ("run", 26.0, 260.0 + 2.5))
+    found = measured_scores(metrics, reference).query("run == 'run'").iloc[0]
+    assert (found["brains"], found["brains_of_week"]) == (12, 0)
+    assert found["expected"] == pytest.approx(260.0, abs=0.3)
+    # the normal distribution would be surer than twelve brains allow
+    assert 95.0 < found["centile"] < 100 * stats.norm.cdf(found["z"])
+
+
+def test_what_cannot_be_scored_is_said() -> None:
+    weeks = np.arange(21.0, 29.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("a", 33.0, 1.0), ("b", 25.0, 250.0))
+    found = measured_scores(metrics, reference).set_index("run")["flag"]
+    assert (found["a"], found["b"]) == ("outside the reference's weeks", "one brain a week")
+    few = measured_scores(*table(weeks[:4], weeks[:4], ("a", 22.0, 1.0))).set_index("run").loc["a"]
+    assert few["flag"] == "too few brains"
+    assert np.isnan(few["centile"])
