@@ -8,6 +8,7 @@ import ipctk
 import numpy as np
 import pytest
 from boxes import COMM, MATERIAL, everywhere_known, smooth_displacement
+from mpi4py import MPI
 from scipy.optimize import brentq
 from shapes import box_mesh, ellipsoid_mesh
 
@@ -133,9 +134,10 @@ def stress_at(stretch, growth):
     return by_Fe / (1 + growth)
 
 
-def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance():
+@pytest.mark.parametrize("other", [(5, 5, 3), (4, 3, 3)])
+def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance(other):
     growth, gaps = 0.2, []
-    mesh = two_blocks()
+    mesh = two_blocks(other=other)
     zones = in_a_tube(mesh)
     for distance in (0.2, 0.1, 0.05):
         problem, contact = problem_with_contact(mesh, zones, distance, growth_along_z=growth)
@@ -226,7 +228,7 @@ def slab_with_a_sulcus():
     return TetrahedralMesh(np.stack([x, y, z * lift], axis=1), mesh.tets)
 
 
-def closing_sulcus(kind, **changes):
+def closing_sulcus(kind, comm=COMM, **changes):
     """Returns what folds a block with a groove that closes in some steps, and the state at the start."""
     mesh = slab_with_a_sulcus()
     p = parameters_from(
@@ -243,7 +245,7 @@ def closing_sulcus(kind, **changes):
         }
         | changes
     )
-    return Folding(COMM, mesh, zones_of_run(mesh, p), p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    return Folding(comm, mesh, zones_of_run(mesh, p), p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
 
 
 def after_steps(folding, state, number):
@@ -403,3 +405,44 @@ def test_stress_that_is_remembered_is_written_as_it_is():
         folding, _ = pressed(step_s, stress_memory_gw=2.0)
         pressures.append(np.median(folding.element_fields(["stress"])["pressure_pa"]))
     assert pressures[0] == pytest.approx(pressures[1], rel=0.03)
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "adams-bashforth"])
+def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one(scheme, tmp_path_factory):
+    tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}, "time_scheme": scheme}
+    state = after_steps(*closing_sulcus("global", **tight), 10)
+    assert state.rows[-1]["contact_pairs"] > 0
+    for alone in (COMM.rank == 0, COMM.rank == COMM.size - 1):
+        if alone:
+            single = after_steps(*closing_sulcus("global", comm=MPI.COMM_SELF, **tight), 10)
+            moved = np.abs(single.positions - slab_with_a_sulcus().vertices * M_PER_MM).max()
+            assert np.abs(single.positions - state.positions).max() <= 1e-6 * moved
+            assert single.rows[-1]["contact_pairs"] == state.rows[-1]["contact_pairs"]
+    COMM.barrier()
+
+
+def test_large_random_steps_of_a_groove_cross_nothing():
+    # unlike balls, the walls of a groove face each other, and a step that is not cut does cross them
+    mesh = slab_with_a_sulcus()
+    facets, _ = boundary_faces(mesh)
+    domain = Domain(COMM, mesh)
+    displacement = np.zeros((len(domain.vertex_of_node), 3))
+    contact = SelfContact(domain, displacement, facets, ContactSettings(1000.0, 0.1))
+    used = np.unique(facets)
+    number = np.searchsorted(used, facets).astype(np.int32)
+    surface = ipctk.CollisionMesh(mesh.vertices[used], ipctk.edges(number), number)
+    random, cut, would_cross = np.random.default_rng(6), 0, 0
+    for _ in range(600 // COMM.size**2):
+        direction = random.normal(0.0, 0.05, mesh.vertices.shape) * M_PER_MM
+        direction[:, 0] -= np.sign(mesh.vertices[:, 0]) * 0.3 * M_PER_MM
+        length = contact.largest_step(domain.local(direction))
+        now = mesh.vertices + domain.gathered(displacement[: domain.owned]) * MM_PER_M
+        whole = now + direction * MM_PER_M
+        would_cross += ipctk.has_intersections(surface, np.asfortranarray(whole[used]))
+        cut += length < 1
+        displacement += length * domain.local(direction)
+        place = mesh.vertices + domain.gathered(displacement[: domain.owned]) * MM_PER_M
+        assert not ipctk.has_intersections(surface, np.asfortranarray(place[used]))
+        if contact.smallest_distance_mm() < 1e-3:
+            displacement[:] = 0.0
+    assert min(cut, would_cross) > 10

@@ -1,5 +1,7 @@
 """Consistency of energy, residual and tangent, the patch test, and the rungs of the linear solver."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from boxes import COMM, distorted_box, everywhere_known, problem_on, smooth_displacement, zones_of
@@ -225,11 +227,22 @@ def test_the_tangent_for_products_is_the_tangent():
         assert other.norm() <= 1e-13 * one.norm()
 
 
-def test_a_step_that_ends_above_its_tolerance_says_so():
-    problem = growing_problem(contact=True)
-    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-18, krylov_tolerance=1e-8), residual_floor=0.0)
+def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monkeypatch):
+    problem = growing_problem()
+    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
+    monkeypatch.setattr(solver, "_advance", lambda iterate, convex: replace(iterate, exhausted=True))
     count = solver.solve(np.zeros_like(problem.displacement))
-    assert count.residual > 1e-18
+    assert count.newton == 1
+    assert count.residual > NewtonSettings().newton_tolerance
     assert not count.converged
-    solver = NewtonSolver(growing_problem(), NewtonSettings(newton_tolerance=1e-8), residual_floor=0.0)
+    monkeypatch.undo()
     assert solver.solve(np.zeros_like(problem.displacement)).converged
+
+
+@pytest.mark.parametrize(("gain", "newton"), [(1e-3, 50), (0.0, 5)])
+def test_iterations_that_lower_the_energy_do_not_count_towards_their_limit(gain, newton, monkeypatch):
+    problem = growing_problem()
+    solver = NewtonSolver(problem, NewtonSettings(max_newton=5), residual_floor=0.0)
+    monkeypatch.setattr(solver, "_advance", lambda iterate, convex: replace(iterate, gain=gain))
+    with pytest.raises(NotConvergedError, match=f"after {newton} iterations"):
+        solver.solve(np.zeros_like(problem.displacement))
