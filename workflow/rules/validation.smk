@@ -44,6 +44,12 @@ rule validation:
         ],
         start=PIAL["whole"],
         params=rules.parameters.output[0],
+        # what the errors of runs that follow no curve are errors against
+        curves=lambda wildcards: (
+            rules.growth_curves.output.curves
+            if CONFIG.estimated_from(wildcards.brain)
+            else []
+        ),
     output:
         f"{RUN}/metrics/validation.csv",
     log:
@@ -60,6 +66,7 @@ rule validation:
             float(week) for week in compared_with(wildcards.run, wildcards.brain)
         ],
         start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+        series=lambda wildcards: CONFIG.estimated_from(wildcards.brain),
         # growth taken from the brains that are compared explains them; it predicts nothing
         kind=lambda wildcards: (
             "explained"

@@ -1,7 +1,8 @@
 """Each simulated brain of a run beside the real one of its week, and beside the start brain merely scaled up."""
 
 from gyriflow.growth.curves import tabulated, value
-from gyriflow.io.files import write_table
+from gyriflow.growth.following import QUANTITIES
+from gyriflow.io.files import read_table, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
@@ -20,21 +21,26 @@ def shape(mesh, real):
     return Shape(even, bend.mean, bend.shape_index)
 
 
-def followed_at(sizes, week):
-    """Returns the size that growth followed at a week."""
-    return float(value(tabulated(list(sizes), list(sizes.values()), may_shrink=True), week))
+def aims(follow):
+    """Returns by quantity the sizes that growth followed, or those of the curves through the measured brains."""
+    if follow is not None:
+        return {name: follow[name] for name in QUANTITIES}
+    if not files.curves:
+        return {}
+    table = read_table(files.curves)
+    rows = table[table["series"] == params.series]
+    return {name: dict(part[["week", "value"]].to_numpy()) for name, part in rows.groupby("quantity")}
 
 
 with step(snakemake.log[0]):
-    follow, start, rows = read_yaml(files.params).get("follow"), read_surface(files.start), []
+    start, rows, sizes = read_surface(files.start), [], aims(read_yaml(files.params).get("follow"))
+    curves = [tabulated(list(sizes[name]), list(sizes[name].values()), may_shrink=True) for name in sizes]
     for week, *paths in zip(params.weeks, files.simulated, files.real, files.adjacent, strict=True):
         simulated, real, adjacent = map(read_surface, paths)
-        curve = None
-        if follow is not None:
-            area, volume = (followed_at(follow[name], week) for name in ("area_cm2", "volume_ml"))
-            curve = area / CM2_PER_MM2, volume / ML_PER_MM3
+        aim = [float(value(curve, week)) for curve in curves]
+        aim = (aim[0] / CM2_PER_MM2, aim[1] / ML_PER_MM3) if aim else None
         shapes = {name: shape(mesh, real) for name, mesh in (("run", simulated), ("real", real), ("start", start))}
         shapes["adjacent"] = shape(adjacent, real)
         comparison = Comparison(names.run, params.kind, params.start_week, week)
-        rows.append(validation_row(comparison, simulated=simulated, real_brain=real, curve=curve, **shapes))
+        rows.append(validation_row(comparison, simulated=simulated, real_brain=real, curve=aim, **shapes))
     write_table(snakemake.output[0], ordered(rows))
