@@ -17,7 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-MANUFACTURED_CELLS = (6, 12, 24)
+MANUFACTURED_CELLS = {1: (6, 12, 24), 2: (3, 6, 12)}
+"""Cells along a side by the order of the elements: as many unknowns of both."""
+ELEMENTS = {1: (2, 4, 8), 2: (1, 2, 4)}
+"""Cells to a cortical thickness by the order of the elements, of which error and price are compared."""
+POISSON_RATIOS = (0.45, 0.48, 0.49, 0.499)
+REFERENCE_THICKNESS_MM = 1.5
 CONTRASTS = (5.0, 20.0, 50.0)
 SLAB_CELLS = (2, 4, 8, 16)
 """Cells to a cortical thickness."""
@@ -28,15 +33,17 @@ MEMORIES = (0.0, 0.05, np.inf)
 MEMORY_CELLS = (2, 4, 8, 16)
 STEP_CELLS, STEP_COUNTS = 4, (6, 12, 24)
 RANKS = (1, 2, 3)
+ALONE = ("theory", "elements")
+"""Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
-def consistency() -> dict:
+def consistency(order: int = 1) -> dict:
     from verification_cases.consistency import LENGTHS, patch_residual, remainders
 
-    found = remainders()
+    found = remainders(order=order)
     return {
-        "patch_residual": patch_residual(),
+        "patch_residual": patch_residual(order=order),
         "lengths": LENGTHS,
         "energy_remainders": found.energy,
         "residual_remainders": found.residual,
@@ -45,15 +52,15 @@ def consistency() -> dict:
     }
 
 
-def manufactured() -> dict:
+def manufactured(order: int = 1) -> dict:
     from verification_cases.manufactured import CASES, rates, solved
 
     found = {}
     for case in CASES:
-        errors = [solved(case, cells) for cells in MANUFACTURED_CELLS]
+        errors = [solved(case, cells, order=order) for cells in MANUFACTURED_CELLS[order]]
         orders = rates(errors)
         found[case] = {
-            "cells": MANUFACTURED_CELLS,
+            "cells": MANUFACTURED_CELLS[order],
             "displacement_errors": [one.displacement for one in errors],
             "gradient_errors": [one.gradient for one in errors],
             "displacement_orders": orders[:, 0],
@@ -62,24 +69,54 @@ def manufactured() -> dict:
     return found
 
 
+def quadratic_consistency() -> dict:
+    return consistency(order=2)
+
+
+def quadratic_manufactured() -> dict:
+    return manufactured(order=2)
+
+
+def elements() -> list[dict]:
+    """Returns error and price of the fastest wave by element, mesh and Poisson's ratio, at the reference contrast."""
+    from verification_cases.slab import Waved, fastest_wave
+
+    found = []
+    for order, counts in ELEMENTS.items():
+        for cells in counts:
+            # the coarsest meshes also where tissue is nearly incompressible
+            for poisson_ratio in POISSON_RATIOS[: 4 if cells == counts[0] else 2]:
+                case = Waved(CONTRASTS[0], RATE_GROWTH, 1, poisson_ratio=poisson_ratio, order=order)
+                found.append(asdict(fastest_wave(case, cells)))
+    return found
+
+
 def symmetry() -> dict:
-    from verification_cases.mirrored import block, folded, hemisphere
+    from verification_cases.mirrored import block, folded, hemisphere, rounded
 
     runs = {
         "forgotten": (hemisphere(8), {}),
         "remembered": (hemisphere(8), {"stress_memory_gw": 1.0}),
         "forgotten_with_ties": (block(6), {}),
+        "quadratic_remembered": (rounded(hemisphere(4)), {"stress_memory_gw": 1.0}),
     }
     return {name: asdict(folded(half, 6, **changes)[1]) for name, (half, changes) in runs.items()}
 
 
 def ranks() -> dict:
-    """Returns the places of all vertices after some steps, with tight tolerances and with those of a run."""
-    from verification_cases.mirrored import folded, hemisphere
+    """Returns where all vertices went in some steps, in m, with tight tolerances and with those of a run."""
+    from verification_cases.mirrored import folded, hemisphere, reflected_and_merged, rounded
 
-    runs = {"tight": {}, "usual": {"solver": {}}}
+    linear, quadratic = hemisphere(8), rounded(hemisphere(4))
+    runs = {
+        "tight": (linear, {}),
+        "usual": (linear, {"solver": {}}),
+        "quadratic_tight": (quadratic, {}),
+        "quadratic_usual": (quadratic, {"solver": {}}),
+    }
     return {
-        name: folded(hemisphere(8), 4, stress_memory_gw=1.0, **changes)[0].positions for name, changes in runs.items()
+        name: folded(half, 4, stress_memory_gw=1.0, **changes)[0].positions - 1e-3 * reflected_and_merged(half).vertices
+        for name, (half, changes) in runs.items()
     }
 
 
@@ -154,7 +191,11 @@ def time_steps() -> dict:
 
 
 PARTS = {
-    part.__name__: part for part in (consistency, manufactured, symmetry, ranks, theory, rates, memory, time_steps)
+    part.__name__: part
+    for part in (
+        *(consistency, quadratic_consistency, manufactured, quadratic_manufactured, elements, symmetry, ranks, theory),
+        *(rates, memory, time_steps),
+    )
 }
 
 
@@ -189,14 +230,11 @@ def inside_mpi(part: str, into: Path) -> None:
 
 def differences_between_ranks() -> dict:
     """Returns the largest distance of a vertex between two numbers of ranks, over the largest displacement."""
-    from verification_cases.mirrored import hemisphere, reflected_and_merged
-
-    start = reflected_and_merged(hemisphere(8)).vertices * 1e-3
     runs = [run("ranks", count) for count in RANKS]
     found = {}
     for name in runs[0]:
         one, *others = (np.array(result[name]) for result in runs)
-        largest = np.linalg.norm(one - start, axis=1).max()
+        largest = np.linalg.norm(one, axis=1).max()
         found[name] = [float(np.linalg.norm(other - one, axis=1).max() / largest) for other in others]
     return found
 
@@ -204,6 +242,7 @@ def differences_between_ranks() -> dict:
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--figures", type=Path, help="folder for the pictures (PNG)")
+    parser.add_argument("--only", nargs="+", choices=sorted(PARTS), help="parts to run instead of all, without figures")
     parser.add_argument("--inside-mpi", choices=sorted(PARTS), help=argparse.SUPPRESS)
     parser.add_argument("--into", type=Path, help=argparse.SUPPRESS)
     return parser.parse_args()
@@ -211,16 +250,23 @@ def parse() -> argparse.Namespace:
 
 def main(arguments: argparse.Namespace) -> None:
     from verification_cases.figures import draw
-    from verification_cases.summary import summary
+    from verification_cases.summary import rounded, summary
+
+    from gyriflow.config.mesh import MeshSettings
 
     found: dict = {}
-    for part in PARTS:
-        found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part == "theory" else 2)
+    for part in arguments.only or PARTS:
+        found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part in ALONE else 2)
         print(f"{part}: done", flush=True)
+    if arguments.only:
+        print(json.dumps(rounded(found)), flush=True)
+        return
     if arguments.figures:
         meshes = {"slab_cells": SLAB_CELLS, "memory_cells": MEMORY_CELLS}
         draw(found | meshes | {"contrast": MEMORY_CONTRAST, "growth": MEMORY_GROWTH}, arguments.figures)
-    print(json.dumps(summary(found)), flush=True)
+    default = MeshSettings()
+    edge = default.order * default.surface_edge_mm
+    print(json.dumps(summary(found, default.order, round(REFERENCE_THICKNESS_MM / edge))), flush=True)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
 from gyriflow.parameters.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
 
@@ -23,18 +23,23 @@ LENGTHS = 0.4 * 0.5 ** np.arange(5)
 """Steps along a direction."""
 
 
-def cube() -> TetrahedralMesh:
-    """Returns a cube around the origin, in mm, whose inner vertices are moved at random (seeded)."""
+def cube(order: int) -> TetrahedralMesh:
+    """Returns a cube around the origin, in mm, whose inner vertices are moved at random (seeded): sides are curved."""
     mesh = grid([np.linspace(-SIDE_MM / 2, SIDE_MM / 2, 5)] * 3)
+    mesh = _shaken(mesh, 0.3)
+    return mesh if order == 1 else _shaken(quadratic(mesh), 0.08)
+
+
+def _shaken(mesh: TetrahedralMesh, by: float) -> TetrahedralMesh:
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
     vertices = mesh.vertices.copy()
-    vertices[inner] += np.random.default_rng(3).uniform(-0.3, 0.3, (len(inner), 3))
+    vertices[inner] += np.random.default_rng(3).uniform(-by, by, (len(inner), 3))
     return TetrahedralMesh(vertices, mesh.tets)
 
 
-def problem_of(zone_of, comm: MPI.Comm, uniform: bool) -> Problem:
+def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> Problem:
     """Returns a problem on the cube with zones by the facets' centroids, growth, oblique normals and kept stretch."""
-    mesh = cube()
+    mesh = cube(order)
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, zone_of(mesh.vertices[facets].mean(axis=1)), np.ones(len(mesh.vertices)), 0.0, (-3.2, 3.2))
     domain = Domain(comm, mesh)
@@ -42,7 +47,7 @@ def problem_of(zone_of, comm: MPI.Comm, uniform: bool) -> Problem:
     x = 0 if uniform else domain.local(domain.positions)[:, 2] / (SIDE_MM * 1e-3)
     ones, cells = np.ones(len(domain.vertex_of_node)), len(domain.cells)
     problem.set_layers(1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones, np.tile([1 / 3, 2 / 3, 2 / 3], (cells, 1)))
-    problem.set_stretch(np.tile(STRETCH, (cells, 1, 1)))
+    problem.set_stretch(np.tile(STRETCH, (cells, len(problem.points.weights), 1, 1)))
     return problem
 
 
@@ -59,7 +64,7 @@ class Remainders:
         return np.diff(np.log(values), axis=0) / np.diff(np.log(LENGTHS))[:, None]
 
 
-def remainders(comm: MPI.Comm = MPI.COMM_WORLD) -> Remainders:
+def remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Remainders:
     """Returns Taylor's remainders of a problem with all parts: layers, kept stress, a clamped base, both planes."""
 
     def zone_of(centre):
@@ -69,7 +74,7 @@ def remainders(comm: MPI.Comm = MPI.COMM_WORLD) -> Remainders:
         zone[centre[:, 2] < -0.499 * SIDE_MM] = CLAMPED
         return zone
 
-    problem = problem_of(zone_of, comm, uniform=False)
+    problem = problem_of(zone_of, comm, uniform=False, order=order)
     domain = problem.domain
     # walls at -3 and 3 mm that may not be left of 3.2 and right of -3.2 mm: contact acts all along
     x = domain.local(domain.positions) * 1e3
@@ -93,11 +98,11 @@ def remainders(comm: MPI.Comm = MPI.COMM_WORLD) -> Remainders:
     return Remainders(np.array(by_energy), np.array(by_residual))
 
 
-def patch_residual(comm: MPI.Comm = MPI.COMM_WORLD) -> float:
+def patch_residual(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> float:
     """Returns the force left inside a uniform body under an affine displacement, over that on its surface."""
     norms = []
     for zone in (CLAMPED, FREE):
-        problem = problem_of(lambda centre, zone=zone: np.full(len(centre), zone), comm, uniform=True)
+        problem = problem_of(lambda centre, zone=zone: np.full(len(centre), zone), comm, uniform=True, order=order)
         problem.set_displacement(problem.domain.local(problem.domain.positions) @ AFFINE.T)
         norms.append(problem.residual(problem.new_vector()))
     return float(norms[0] / norms[1])

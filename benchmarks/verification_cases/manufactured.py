@@ -18,7 +18,7 @@ from gyriflow.folding.domain import Domain
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
 from gyriflow.parameters.terms import CLAMPED
 
@@ -43,9 +43,10 @@ class Errors:
     gradient: float
 
 
-def cube(cells: int) -> TetrahedralMesh:
+def cube(cells: int, order: int) -> TetrahedralMesh:
     """Returns a cube in mm whose inner vertices are moved smoothly: on an even grid, errors could cancel."""
     x = grid([np.linspace(0.0, 1.0, cells + 1)] * 3)
+    x = x if order == 1 else quadratic(x)
     bubble = np.sin(np.pi * x.vertices).prod(axis=1)[:, None]
     moved = x.vertices + 0.06 * bubble * np.cos(np.pi * x.vertices[:, [1, 2, 0]])
     return TetrahedralMesh(SIDE_MM * moved, x.tets)
@@ -111,9 +112,9 @@ def first_piola_stress(u, mu, dg, dr, N, V):
     return by_Fe * before.T / ufl.det(V)
 
 
-def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Errors:
-    """Returns the errors of the solver on the cube with a case's body force."""
-    mesh = cube(cells)
+def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Errors:
+    """Returns the errors of the solver with elements of an order, on the cube with a case's body force."""
+    mesh = cube(cells, order)
     facets = boundary_faces(mesh)[0]
     zones = Zones(facets, np.full(len(facets), CLAMPED), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
     domain = Domain(comm, mesh)
@@ -121,14 +122,14 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Errors:
     problem = Problem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=kept)
 
     side = SIDE_MM * 1e-3
-    nodes = domain.local(domain.positions) / side
-    centres = nodes[domain.cells].mean(axis=1)
+    nodes, to_points = domain.local(domain.positions) / side, problem.points.smooth.T
+    points = np.matmul(problem.points.smooth, nodes[domain.cells])
     mu, dg, dr = (np.broadcast_to(values, len(nodes)) for values in layers(case, nodes.T, np.sin)[:3])
-    angle = np.broadcast_to(layers(case, centres.T, np.sin)[3], len(centres))
-    normals = np.stack([0.6 * np.cos(angle), 0.6 * np.sin(angle), np.full(len(angle), 0.8)], axis=1)
-    problem.set_layers(mu, dg, dr, normals)
+    angle = np.broadcast_to(layers(case, np.moveaxis(points, 2, 0), np.sin)[3], points.shape[:2])
+    normals = np.stack([0.6 * np.cos(angle), 0.6 * np.sin(angle), np.full(angle.shape, 0.8)], axis=2)
+    problem.set_layers_at_points(*(values[domain.cells] @ to_points for values in (mu, dg, dr)), normals)
     if kept:
-        problem.set_stretch(np.tile(STRETCH, (len(domain.cells), 1, 1)))
+        problem.set_stretch(np.tile(STRETCH, (*points.shape[:2], 1, 1)))
 
     x = ufl.SpatialCoordinate(domain.mesh) / side
     exact = side * exact_displacement(x)

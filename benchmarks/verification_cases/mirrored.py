@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones, zones_of_run
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.parameters.folding import FoldingParameters
 from gyriflow.parameters.reading import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
@@ -22,6 +22,8 @@ MIDDLE_MM = 7.5
 GAP_MM = 1.9
 """Width of the fissure for the contact planes, which the hemispheres all but touch at the start."""
 STEP_S = 86_400.0
+TURNED = {1: [0, 1, 3, 2], 2: [0, 1, 3, 2, 4, 8, 7, 6, 5, 9]}
+"""An element's nodes, by its order, once corners 2 and 3 have changed places."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,16 @@ def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
     return TetrahedralMesh(x * SEMI_AXES_MM + [MIDDLE_MM, 0.0, 0.0], cube.tets)
 
 
+def rounded(half: TetrahedralMesh, part: float = 0.5) -> TetrahedralMesh:
+    """Returns a `hemisphere` as quadratic elements, whose outer edges go a part of the way to the ellipsoid."""
+    straight = quadratic(half)
+    pial = np.unique(boundary_faces(straight)[0])
+    x = (straight.vertices[pial] - [MIDDLE_MM, 0.0, 0.0]) / SEMI_AXES_MM
+    vertices = straight.vertices.copy()
+    vertices[pial] += part * SEMI_AXES_MM * x * (1 / np.linalg.norm(x, axis=1, keepdims=True) - 1)
+    return TetrahedralMesh(vertices, straight.tets)
+
+
 def block(cells: int) -> TetrahedralMesh:
     """Returns a right half in mm: a box of even cells, where most points have several nearest pial vertices."""
     span = np.linspace(-1.0, 1.0, cells + 1)
@@ -66,8 +78,8 @@ def block(cells: int) -> TetrahedralMesh:
 def reflected_and_merged(half: TetrahedralMesh) -> TetrahedralMesh:
     """Returns a half and its mirror image at x = 0 side by side; vertex i of the first has its partner at n + i."""
     image = half.vertices * [-1.0, 1.0, 1.0]
-    # a mirrored element is inside out until two of its vertices change places
-    tets = half.tets[:, [0, 1, 3, 2]] + len(half.vertices)
+    # a mirrored element is inside out until two of its corners change places, and so do nodes on its edges
+    tets = half.tets[:, TURNED[half.order]] + len(half.vertices)
     return TetrahedralMesh(np.concatenate([half.vertices, image]), np.concatenate([half.tets, tets]))
 
 

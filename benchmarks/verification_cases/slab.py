@@ -5,6 +5,7 @@ that each grows as it would alone; a cosine transform of the surface tells them 
 the mesh itself adds, which is taken off. All lengths are in mm, and the cortex is 1 mm thick.
 """
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,8 @@ from scipy.fft import dct
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
-from gyriflow.parameters.folding import FoldingParameters
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
+from gyriflow.parameters.folding import FoldingParameters, Solver
 from gyriflow.parameters.reading import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
@@ -27,6 +28,8 @@ Floats = NDArray[np.float64]
 WAVES = np.arange(1, 13)
 """Half waves across the width."""
 HEIGHT_MM = 1e-4
+REFERENCE_GROWTH = 0.0086
+"""Growth in a step of the reference model."""
 RATE_PER_S = 1e-7
 FINE_DEPTH_MM = 2.0
 COARSENING = 1.8
@@ -34,7 +37,7 @@ COARSENING = 1.8
 LARGEST = 8
 """Height of the deepest elements over that of the finest."""
 ROWS = 2
-"""Vertices across the slab; all lie on sides that keep them from moving across it."""
+"""Corners across the slab; all lie on sides that keep them from moving across it."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,7 @@ class Waved:
     """A slab with waves, and steps in which its cortex grows by `growth` each.
 
     `memory` is the growth in which stress relaxes; width and depth hold two waves of the length that grows fastest.
+    `order` is that of the elements.
     """
 
     contrast: float
@@ -49,6 +53,8 @@ class Waved:
     steps: int
     memory: float = 0.0
     scheme: str = "implicit"
+    poisson_ratio: float = 0.45
+    order: int = 1
 
     @property
     def width_mm(self) -> float:
@@ -61,7 +67,7 @@ class Waved:
 
     @property
     def in_theory(self) -> Slab:
-        return Slab(self.contrast, depth=self.width_mm, memory=self.memory)
+        return Slab(self.contrast, self.poisson_ratio, depth=self.width_mm, memory=self.memory)
 
     def expected(self) -> Floats:
         """Returns the (steps + 1, waves) heights over those at the start, from `modes`."""
@@ -77,6 +83,7 @@ class Waved:
             "output_weeks": [15.0, 45.0],
             "fissure_x_mm": self.width_mm / 2,
             "thickness_mm": 1.0,
+            "poisson_ratio": self.poisson_ratio,
             "shear_modulus_core_pa": 300.0,
             "shear_modulus_cortex_pa": 300.0 * self.contrast,
             "growth_rate_per_s": RATE_PER_S,
@@ -106,10 +113,51 @@ def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
     )
     x = np.linspace(0.0, case.width_mm, round(case.width_mm * cells) + 1)
     slab = grid([x, np.arange(ROWS) / cells, -down[::-1]])
+    slab = slab if case.order == 1 else quadratic(slab)
     vertices = slab.vertices.copy()
     waves = np.cos(np.outer(vertices[:, 0], np.pi * WAVES / case.width_mm)).sum(axis=1)
     vertices[:, 2] += height_mm * waves * (1 + vertices[:, 2] / case.width_mm) ** 2
     return TetrahedralMesh(vertices, slab.tets)
+
+
+@dataclass(frozen=True)
+class FastestWave:
+    """What a mesh makes of the wave that grows fastest, and at what price.
+
+    Attributes
+    ----------
+    order, cells
+        Of the elements, and their number to a cortical thickness.
+    rate_error
+        Of its rate of growth in one step, relative to the theory.
+    unknowns_per_mm, seconds_per_mm
+        Unknowns, and processor time of a step with usual tolerances, for each mm across the slab. The first steps,
+        which compile and set up, are not counted.
+    """
+
+    order: int
+    cells: int
+    poisson_ratio: float
+    rate_error: float
+    unknowns_per_mm: float
+    seconds_per_mm: float
+
+
+def fastest_wave(case: Waved, cells: int, timed_steps: int = 4, comm: MPI.Comm = MPI.COMM_SELF) -> FastestWave:
+    """Returns the error of the fastest wave's rate in the first step, and what a step takes."""
+    exact = np.log(case.expected()[1])
+    error = (np.log(amplified(case, cells, comm)[1]) / exact - 1)[exact.argmax()]
+    mesh, p = mesh_of(case, cells, HEIGHT_MM), case.parameters()
+    p = p.model_copy(update={"solver": Solver(), "step_s": REFERENCE_GROWTH / RATE_PER_S})
+    folding = Folding(comm, mesh, zones_of_run(mesh, p), p)
+    state, seconds = State.at_start(mesh.vertices * M_PER_MM, p.step_s), []
+    for _ in range(2 + timed_steps):
+        began = time.process_time()
+        state = folding.step(state, p.step_s)
+        seconds.append(time.process_time() - began)
+    across = (ROWS - 1) / cells
+    price = float(np.median(seconds[2:])) / across
+    return FastestWave(case.order, cells, case.poisson_ratio, float(error), 3 * len(mesh.vertices) / across, price)
 
 
 def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats:
@@ -120,10 +168,14 @@ def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats
     states = [State.at_start(mesh.vertices * M_PER_MM, p.step_s)]
     for _ in range(case.steps):
         states.append(folding.step(states[-1], p.step_s))
-    columns = round(case.width_mm * cells) + 1
-    # vertices are numbered along z first: the surface comes last
-    surface = np.array([s.positions.reshape(columns, ROWS, -1, 3)[:, :, -1, 2].mean(axis=1) for s in states])
-    return (dct(surface, type=1, axis=1) / (columns - 1))[:, WAVES] * MM_PER_M
+    flat = mesh_of(case, cells, 0.0).vertices
+    top = np.flatnonzero(flat[:, 2] == 0.0)
+    # evenly spaced along x, several across
+    spacings = case.order * round(case.width_mm * cells)
+    column = np.rint(flat[top, 0] * spacings / case.width_mm).astype(int)
+    across = np.bincount(column)
+    surface = np.array([np.bincount(column, state.positions[top, 2]) / across for state in states])
+    return (dct(surface, type=1, axis=1) / spacings)[:, WAVES] * MM_PER_M
 
 
 def amplified(case: Waved, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Floats:

@@ -8,6 +8,11 @@ from .closed_forms import thin_film
 from .modes import Slab
 
 Floats = NDArray[np.float64]
+AS_FOUND = (
+    *("consistency", "quadratic_consistency", "manufactured", "quadratic_manufactured", "elements", "symmetry"),
+    *("ranks", "theory"),
+)
+"""Parts whose numbers need no working out."""
 
 
 def fastest(lengths: ArrayLike, values: ArrayLike) -> tuple[float, float]:
@@ -74,6 +79,13 @@ def time_steps_of(found: dict) -> dict:
     }
 
 
+def default_of(elements: list[dict], order: int, cells: int, poisson_ratio: float) -> float:
+    """Returns the error of the fastest wave's rate of an element among those that were compared."""
+    kind = (order, cells, poisson_ratio)
+    (found,) = [one for one in elements if (one["order"], one["cells"], one["poisson_ratio"]) == kind]
+    return found["rate_error"]
+
+
 def rounded(value, digits: int = 4):
     """Returns a value with all numbers at so many significant digits, arrays as lists."""
     if isinstance(value, dict):
@@ -83,15 +95,17 @@ def rounded(value, digits: int = 4):
     return float(f"{value:.{digits}g}") if isinstance(value, float) else value
 
 
-def summary(found: dict) -> dict:
-    """Returns the content of the benchmark's last line from what all parts found."""
+def summary(found: dict, order: int, cells: int) -> dict:
+    """Returns the content of the benchmark's last line from what all parts found.
+
+    `order` and `cells`, to a cortical thickness, are those of the default element at its default edge.
+    """
     return rounded(
         {
-            "consistency": found["consistency"],
-            "manufactured": found["manufactured"],
-            "symmetry": found["symmetry"],
-            "ranks": found["ranks"],
-            "theory": found["theory"],
+            "default_order": order,
+            "default_fastest_wave_rate_error": default_of(found["elements"], order, cells, 0.45),
+            "default_fastest_wave_rate_error_at_0_48": default_of(found["elements"], order, cells, 0.48),
+            **{name: found[name] for name in AS_FOUND},
             "rates": {contrast: rates_of(float(contrast), one) for contrast, one in found["rates"].items()},
             "memory": {tau: memory_of(one) for tau, one in found["memory"].items()},
             "time_steps": time_steps_of(found["time_steps"]),

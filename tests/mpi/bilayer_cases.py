@@ -59,6 +59,28 @@ def test_memory_leads_from_none_to_all():
     assert (ends[2] < ends[4]).all()
 
 
+def rate_error(order, cells):
+    """Returns the relative error of the rate of the wave that grows fastest at the reference contrast."""
+    case = Waved(contrast=5.0, growth=1e-3, steps=1, order=order)
+    exact = np.log(case.expected()[1])
+    return (np.log(amplified(case, cells, COMM)[1]) / exact - 1)[exact.argmax()]
+
+
+def test_one_quadratic_element_through_the_cortex_does_what_two_linear_ones_do_not():
+    assert -0.36 < rate_error(1, 2) < -0.25
+    assert abs(rate_error(2, 1)) < 0.06
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.03, np.inf])
+def test_waves_grow_as_in_theory_with_quadratic_elements(memory):
+    case = Waved(contrast=20.0, growth=0.01, steps=3, memory=memory, order=2)
+    exact = np.log(case.expected()[-1])
+    coarse, fine = (np.log(amplified(case, cells, COMM)[-1]) for cells in (1, 2))
+    assert (np.abs(fine - exact)[LONG] <= 0.5 * np.abs(coarse - exact)[LONG]).all()
+    np.testing.assert_allclose(fine[LONG], exact[LONG], rtol=0.02)
+    np.testing.assert_allclose(fine, exact, rtol=0.1)
+
+
 @pytest.mark.parametrize("memory", [0.0, 0.03, np.inf])
 def test_waves_grow_as_in_theory(memory):
     case = Waved(contrast=20.0, growth=0.01, steps=3, memory=memory)

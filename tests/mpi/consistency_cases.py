@@ -10,9 +10,11 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.consistency import patch_residual, remainders
 
 
-def test_taylors_remainders_fall_with_the_square_of_the_step():
-    assert remainders(COMM).slopes() == pytest.approx(2.0, abs=0.02)
+@pytest.mark.parametrize("order", [1, 2])
+def test_taylors_remainders_fall_with_the_square_of_the_step(order):
+    assert remainders(COMM, order).slopes() == pytest.approx(2.0, abs=0.02)
 
 
-def test_a_uniform_body_is_in_equilibrium_under_an_affine_displacement():
-    assert patch_residual(COMM) <= 1e-12
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_uniform_body_is_in_equilibrium_under_an_affine_displacement(order):
+    assert patch_residual(COMM, order) <= 1e-12

@@ -87,7 +87,7 @@ def test_an_elastic_state_stays_where_it_is_in_equilibrium():
     zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
     stiffness = {"shear_modulus_cortex_pa": 800, "shear_modulus_core_pa": 800}
     folding, start = folding_of(mesh, zones, stress_memory_gw="infinite", growth_rate_per_s=0.0, **stiffness)
-    start = replace(start, stretch=packed(np.tile(STRETCH, (len(mesh.tets), 1, 1))))
+    start = replace(start, stretch=packed(np.tile(STRETCH, (len(mesh.tets), 1, 1, 1))))
     once = folding.step(start, 43200.0)
     again = folding.step(once, 43200.0)
     moved = np.abs(once.positions - start.positions).max()

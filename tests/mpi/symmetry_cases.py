@@ -8,13 +8,14 @@ import pytest
 from boxes import COMM
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from verification_cases.mirrored import block, folded, hemisphere, reflected_and_merged
+from verification_cases.mirrored import block, folded, hemisphere, reflected_and_merged, rounded
 
 from gyriflow.geometry.tetrahedra import signed_volumes
 
 
-def test_the_halves_are_mirror_images_of_whole_elements():
-    mesh = reflected_and_merged(hemisphere(6))
+@pytest.mark.parametrize("half", [hemisphere(6), rounded(hemisphere(4))])
+def test_the_halves_are_mirror_images_of_whole_elements(half):
+    mesh = reflected_and_merged(half)
     one, other = np.split(signed_volumes(mesh), 2)
     assert one.min() > 0
     np.testing.assert_allclose(one, other, rtol=1e-12)
@@ -25,6 +26,14 @@ def test_mirrored_hemispheres_stay_mirror_images(memory_gw):
     state, found = folded(hemisphere(6), 5, COMM, stress_memory_gw=memory_gw)
     # contact acts, and what is compared is large
     assert found.penetration_mm > 0.05
+    assert found.displacement_mm > 0.5
+    assert found.relative <= 1e-9
+    assert (COMM.bcast(state.positions) == state.positions).all()
+
+
+def test_mirrored_hemispheres_of_quadratic_elements_stay_mirror_images():
+    state, found = folded(rounded(hemisphere(4)), 4, COMM, stress_memory_gw=1.0)
+    assert found.penetration_mm > 0.01
     assert found.displacement_mm > 0.5
     assert found.relative <= 1e-9
     assert (COMM.bcast(state.positions) == state.positions).all()

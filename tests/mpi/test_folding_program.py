@@ -14,6 +14,7 @@ import pytest
 import yaml
 from mpi4py import MPI
 from shapes import ellipsoid_mesh
+from trimesh.creation import icosphere
 
 from gyriflow.errors import SolverError, StorageError
 from gyriflow.folding.__main__ import require_space
@@ -22,10 +23,13 @@ from gyriflow.folding.ladder import NotConvergedError
 from gyriflow.folding.run import run
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh, is_closed
 from gyriflow.io.files import read_json
-from gyriflow.io.frames import read_field, read_positions, read_weeks
+from gyriflow.io.frames import read_cell_field, read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
+from gyriflow.mesh.curving import curved
 from gyriflow.parameters.reading import parameters_from
 
 pytestmark = pytest.mark.slow
@@ -102,6 +106,42 @@ def test_a_run_leaves_every_file_and_nothing_else(tight_run):
     moved = read_positions(tight_run / "frames.h5", 21.5) - read_positions(tight_run / "frames.h5", 21.0)
     np.testing.assert_allclose(moved, read_field(tight_run / "frames.h5", 21.5, "displacement_mm"), atol=1e-12)
     assert read_json(tight_run / "summary.json")["steps"] == len(steps)
+
+
+def curved_brain(path):
+    """Writes an ellipsoid of quadratic elements that follow it."""
+    ball = icosphere(subdivisions=4)
+    surface = TriangleMesh(ball.vertices * [20.0, 26.0, 18.0], ball.faces)
+    write_tetrahedral_mesh(path, curved(ellipsoid_mesh(4, (20.0, 26.0, 18.0)), surface))
+    return path
+
+
+def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp_path, monkeypatch):
+    path = curved_brain(tmp_path / "curved.xdmf")
+    settings = {
+        "solver": TIGHT,
+        "stress_memory_gw": 1.0,
+        "fields": ["displacement", "cortex_weight", "stress", "strain"],
+    }
+    assert fold(path, tmp_path / "three", 3, **settings).returncode == 0
+    mesh, p = read_tetrahedral_mesh(path), parameters_from(WEEK | settings)
+    zones = zones_of_run(mesh, p)
+    with monkeypatch.context() as patch:
+        patch.setattr(Folding, "step", failing_after(3))
+        with pytest.raises(SolverError):
+            run(MPI.COMM_SELF, mesh, zones, p, {}, tmp_path / "one")
+    run(MPI.COMM_SELF, mesh, zones, p, {}, tmp_path / "one")
+    assert read_json(tmp_path / "one" / "summary.json")["resumed_after_step"] == 3
+    one, three = (tmp_path / name / "frames.h5" for name in ("one", "three"))
+    assert read_tets(one).shape == (len(mesh.tets), 10)
+    moved = np.abs(read_positions(one, 21.5) - mesh.vertices).max()
+    assert np.abs(read_positions(one, 21.5) - read_positions(three, 21.5)).max() <= 1e-8 * moved
+    for field in ("von_mises_pa", "elastic_strain"):
+        values = read_cell_field(one, 21.5, field)
+        assert values.shape == (len(mesh.tets),)
+        np.testing.assert_allclose(values, read_cell_field(three, 21.5, field), rtol=1e-4, atol=1e-4 * values.max())
+    surface, _ = boundary_surface(TetrahedralMesh(read_positions(one, 21.5), read_tets(one)))
+    assert is_closed(surface)
 
 
 def test_every_output_week_is_hit_although_steps_do_not_divide_it(tight_run):

@@ -1,4 +1,4 @@
-"""Atlases in a study: which weeks of which series are used, where their files are, and the brains they stand for."""
+"""Atlases in a study: series and weeks in use, the places of their files, and the brains that they become."""
 
 import difflib
 import re
@@ -23,26 +23,26 @@ DOWNLOADS = Path("resources", "atlases")
 class AtlasSettings(Settings):
     """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` where it has one series).
 
-    `atlas: NAME` and `atlas: FILE.yaml` are short for a section with nothing but `name` or `file`; a list of names,
-    files and sections stands for several. Files that are not there are fetched when a stage needs them, and all of
-    them by `./run snakemake --cores 1 retrieve`; a file that exists is never replaced or deleted.
+    `atlas: NAME` and `atlas: FILE.yaml` are short for a section with only `name` or `file`; several atlases are a list.
+    Missing files are fetched when a stage needs them, or all at once by `./run snakemake --cores 1 retrieve`. An
+    existing file is never replaced or deleted.
     """
 
     name: str | None = setting(None, "", "An atlas that comes with gyriflow: the name of a folder in `atlases`.")
-    file: str | None = setting(None, "", "The `atlas.yaml` of an atlas of your own, in the place of `name`.")
-    series: str | tuple[str, ...] | None = setting(None, "", "Series that are used; `null`: all.")
+    file: str | None = setting(None, "", "The `atlas.yaml` of your own atlas, instead of `name`.")
+    series: str | tuple[str, ...] | None = setting(None, "", "Series to use; `null`: all.")
     weeks: tuple[Week, ...] | None = setting(
-        None, "GW", "Weeks that are used, each exactly as the files name it; `null`: all that the series have."
+        None, "GW", "Weeks to use, exactly as in the file names; `null`: all weeks of the series."
     )
-    images: bool = setting(False, "", "Whether T2-weighted volumes are used, which are shown under surfaces' outlines.")
+    images: bool = setting(False, "", "Whether to use T2-weighted volumes, shown with the surfaces' outlines.")
     folder: str | None = setting(
         None, "",
-        "Folder with files of the atlas, found by their names anywhere in it, into which missing ones are put; `null`: "
+        "Folder with files of the atlas, found by name anywhere in it; missing files are put there. `null`: "
         "`resources/atlases/NAME` in the working directory.",
     )  # fmt: skip
-    url: str | None = setting(None, "", "A mirror with the same paths, in the place of the atlas's own address.")
+    url: str | None = setting(None, "", "A mirror with the same paths, instead of the atlas's own address.")
     accept_licence: bool = setting(
-        False, "", "That you accept the licence; needed where the `atlas.yaml` says so, as with research-only data."
+        False, "", "Whether you accept the licence; required if the `atlas.yaml` says so, as for research-only data."
     )
 
     @model_validator(mode="after")
@@ -86,7 +86,7 @@ class AtlasSettings(Settings):
 
 @dataclass(frozen=True)
 class AtlasFile:
-    """A file of an atlas: what it is, where it lies or is to be put, and what is known of it."""
+    """A file of an atlas: its week and key, its place, its address and its record."""
 
     series: str
     week: float
@@ -95,7 +95,7 @@ class AtlasFile:
     url: str | None
     record: AtlasFileRecord
     copies: tuple[Path, ...]
-    """The files of that name: none where it is missing, several where it is not clear which counts."""
+    """The files of that name: none if it is missing, several if it is ambiguous."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class UsedAtlas:
         return {pattern: self._copies(pattern) for pattern in patterns}
 
     def _copies(self, pattern: str) -> dict[float, list[Path]]:
-        """Returns the files of a pattern anywhere in the folder by week, told by the part of the path with the week."""
+        """Returns the files of a pattern anywhere in the folder by week; the path from the week on has to match."""
         parts = pattern.split("/")
         tail = "/".join(parts[max(number for number, part in enumerate(parts) if "{week" in part) :])
         pieces = list(Formatter().parse(tail))
@@ -269,7 +269,7 @@ def _week_problems(used: UsedAtlas) -> Iterator[str]:
 
 
 def retrieval_note(used: UsedAtlas) -> str:
-    """Returns what a user is told before missing files of an atlas are fetched: how much, from whom, on which terms."""
+    """Returns the note that is shown before missing files of an atlas are fetched: size, reference and licence."""
     atlas, sizes = used.atlas, [file.record.bytes for file in used.missing]
     size = f" ({sum(size or 0 for size in sizes) / 1e6:.1f} MB)" if all(sizes) else ""
     checks = "" if all(file.record.sha256 for file in used.missing) else "; no checksums are known"

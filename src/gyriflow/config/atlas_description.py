@@ -1,4 +1,4 @@
-"""What an `atlas.yaml` says: a population by week, its files and where they are to be had, licence and reference."""
+"""The content of an `atlas.yaml`: populations by week, files and their source, licence and reference."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -20,11 +20,11 @@ NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 
 
 class AtlasLicence(Settings):
-    """On which terms the files may be used; shown before any is fetched."""
+    """Terms of use, shown before any file is fetched."""
 
     name: str = setting(..., "", "Name of the licence, as `CC0 1.0`.")
-    terms: str = setting(..., "", "What it says, in a sentence or two.")
-    url: str | None = setting(None, "", "Where the whole text is.")
+    terms: str = setting(..., "", "Summary in a sentence or two.")
+    url: str | None = setting(None, "", "Address of the full text.")
     accept: bool = setting(
         False, "", "Whether a configuration has to say `accept_licence: true`: for terms that are narrow or unclear."
     )
@@ -45,19 +45,22 @@ class AtlasReference(Settings):
 
 
 class AtlasFileRecord(Settings):
-    """How a file is known again."""
+    """Size and checksum of a file."""
 
     bytes: int | None = setting(None, "", "Size of the file.", ge=1)
     sha256: str | None = setting(
-        None, "", "SHA-256 of the file; `null`: not known, the file is only read as a check.", pattern="^[0-9a-f]{64}$"
+        None,
+        "",
+        "SHA-256 of the file; `null`: unknown, the file is only checked to be readable.",
+        pattern="^[0-9a-f]{64}$",
     )
 
 
 class AtlasSeries(Settings):
-    """One population over the weeks."""
+    """One population by week."""
 
-    population: str = setting(..., "", "What figures and tables call these brains.", min_length=1)
-    scheme: str | None = setting(None, "", "What the labels mean, as for `brains`; needed with `labels`.")
+    population: str = setting(..., "", "Name of these brains in figures and tables.", min_length=1)
+    scheme: str | None = setting(None, "", "Meaning of the labels, as for `brains`; required with `labels`.")
     affine_from: Literal["auto", "sform", "qform"] = setting("auto", "", "As for `brains`, with `labels`.")
     coordinates: Literal["auto", "ras", "lps"] = setting("auto", "", "As for `brains`, with surfaces.")
     files: dict[FileKey, str] = setting(
@@ -113,7 +116,7 @@ class AtlasSeries(Settings):
 
     @property
     def needed(self) -> list[FileKey]:
-        """The keys of the files without which a week is no brain."""
+        """The keys of the files that a week must have."""
         return [key for key in self.files if key != "image"]
 
 
@@ -125,11 +128,9 @@ class Atlas(Settings):
     licence: AtlasLicence = setting(..., "", "Terms of use.")
     reference: AtlasReference | None = setting(None, "", "What to cite.")
     url: str | None = setting(
-        None, "", "Address below which the files are to be had; `null`: they are not.", pattern="^https?://"
+        None, "", "Address of the files' root; `null`: not available online.", pattern="^https?://"
     )
-    folder: str | None = setting(
-        None, "", "Folder with files that lie at hand, relative to `atlas.yaml`; `null`: none does."
-    )
+    folder: str | None = setting(None, "", "Folder with local files, relative to `atlas.yaml`; `null`: none.")
     series: dict[Annotated[str, Field(pattern=NAME)], AtlasSeries] = setting(
         ..., "", "Populations by name, each a series over the weeks.", min_length=1
     )

@@ -1,4 +1,4 @@
-"""The brains of a study: what each is, and from which kind of data its pial surface comes."""
+"""The brains of a study, and the data that their pial surfaces are made from."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -10,7 +10,7 @@ from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
 from ..parameters.varying import Week
 
 SOURCES = ("labels", "segmentation", "hemispheres", "pial", "phantom", "shape")
-"""The keys of a brain of which exactly one is given."""
+"""The keys of which a brain has exactly one."""
 
 KINDS = {
     "labels": "volume",
@@ -29,9 +29,9 @@ MEANINGS: dict[str, tuple[str, ...]] = {
     "coordinates": ("hemispheres", "pial"),
     "population": tuple(source for source in SOURCES if source not in ("phantom", "shape")),
 }
-"""Keys that belong to some sources only."""
+"""Keys that make sense only with some sources."""
 PLACEHOLDERS = ("{image}", "{labels}")
-"""What stands for the two files in a command that segments."""
+"""Placeholders for the two files in a segmentation command."""
 
 
 class SegmentationSettings(Settings):
@@ -52,7 +52,7 @@ class SegmentationSettings(Settings):
     def _names_its_files(self) -> Iterator[Problem]:
         missing = [place for place in PLACEHOLDERS if place not in self.command]
         if missing:
-            text = f"lacks {' and '.join(missing)}, which stand for the files it reads and writes"
+            text = f"lacks {' and '.join(missing)}, the placeholders for the files it reads and writes"
             yield Problem(text, ("command",))
 
 
@@ -74,19 +74,20 @@ class Brain(Settings):
     )
     week: Week = setting(..., "GW", "Gestational age.")
     population: str | None = setting(
-        None, "", "What figures and tables call the brain, as `spina bifida aperta, unoperated`; `null`: real brain.",
+        None, "",
+        "Name of the population in figures and tables, such as `spina bifida aperta, unoperated`; `null`: real brain.",
         min_length=1,
     )  # fmt: skip
     labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI).")
     image: InputFile | None = setting(
-        None, "", "T2-weighted volume (NIfTI): what `segmentation` works on; with `labels`, for a figure only."
+        None, "", "T2-weighted volume (NIfTI): the input of `segmentation`; with `labels`, for a figure only."
     )
     segmentation: SegmentationSettings | None = setting(
-        None, "", "A program of yours that makes the labels from `image`."
+        None, "", "Your own program that makes the labels from `image`."
     )
     scheme: str | None = setting(
         None, "",
-        f"What the labels mean: {', '.join(f'`{name}`' for name in SCHEMES)}, or a name of `schemes`. Needed with "
+        f"Meaning of the labels: {', '.join(f'`{name}`' for name in SCHEMES)}, or a name of `schemes`. Needed with "
         "`labels` and `segmentation`.",
     )  # fmt: skip
     affine_from: Literal["auto", "sform", "qform"] = setting(
@@ -96,15 +97,15 @@ class Brain(Settings):
     pial: InputFile | None = setting(None, "", "Surface file of the whole brain, closed.")
     coordinates: Literal["auto", "ras", "lps"] = setting(
         "auto", "",
-        "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose of `hemispheres` in any rigid "
-        "pose, and takes `pial` as RAS+.",
+        "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose of `hemispheres`, whatever it "
+        "is, and takes `pial` as RAS+.",
     )  # fmt: skip
     phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
-    shape: ShapeSettings | None = setting(None, "", "A simple geometry in the place of a brain.")
+    shape: ShapeSettings | None = setting(None, "", "A simple geometry in place of a brain.")
 
     @property
     def source(self) -> str:
-        """The one key that says where the surface comes from."""
+        """The key that the surface is made from."""
         for name in SOURCES:
             if self.gives(name):
                 return name

@@ -19,13 +19,13 @@ class GrowthSettings(Settings):
 
     brains: Series | None = setting(
         None, "",
-        "Ids of the brains whose areas and volumes count, of two weeks or more; or such lists by the name of a series, "
-        "as `{surface: [...], volume: [...]}`. `null`: all brains. Without names, brains from surfaces and brains from "
-        "label volumes are two series, `surface` and `volume`, where both have two weeks or more. Brains of several "
-        "populations are never one series: without names each population is one, and goes by its own name.",
+        "Ids of the brains whose areas and volumes are used, of two weeks or more; or several such lists by name of a "
+        "series, such as `{surface: [...], volume: [...]}`. `null`: all brains. Without names, brains from surfaces "
+        "and brains from label volumes form two series, `surface` and `volume`, if each has two weeks or more. "
+        "Different populations are never mixed: without names each population forms a series of that name.",
     )  # fmt: skip
     estimated_from: str | None = setting(
-        None, "", "Series that `estimated` rates of the folding are taken from; `null`: the start brain's."
+        None, "", "Series that gives the `estimated` rates of the folding; `null`: that of the start brain."
     )
 
 
@@ -35,7 +35,7 @@ def growth_series(
     given: Sequence[str] | Mapping[str, Sequence[str]] | None,
     populations: Mapping[str, str | None] | None = None,
 ) -> dict[str, list[str]]:
-    """Returns the ids of the brains of each series of growth rates, those of fewer than two weeks left out.
+    """Returns the ids of the brains of each series of growth rates, without series of fewer than two weeks.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def growth_series(
     weeks
         Gestational week of each.
     given
-        The setting `brains`; its ids have to be known.
+        The setting `brains`; all its ids must be known.
     populations
-        Population of each brain, where known; no series without a name of its own has brains of two.
+        Population of each brain, if known. Only a named series may mix populations.
     """
     if isinstance(given, Mapping):
         series = {name: [brain for brain in kinds if brain in ids] for name, ids in given.items()}
@@ -65,18 +65,18 @@ def growth_series(
 
 
 def _series_by_kind(kinds: Mapping[str, str], weeks: Mapping[str, float]) -> dict[str, list[str]]:
-    """Returns brains by the kind of their data; all together where one kind has no two ages."""
+    """Returns brains by kind of data, or all together if one kind has fewer than two ages."""
     by_kind = {kind: [brain for brain in kinds if kinds[brain] == kind] for kind in ("surface", "volume")}
     known = {kind: ids for kind, ids in by_kind.items() if ids}
     several = len(known) > 1 and all(_ages(ids, weeks) > 1 for ids in known.values())
-    # brains of which one kind has no two ages can only be compared across kinds
+    # a kind with a single age can only be compared across kinds
     return known if several or len(known) == 1 else {"all": list(kinds)}
 
 
 def estimated_from(series: Mapping[str, Sequence[str]], given: str | None, start: str) -> str | None:
-    """Returns the name of the series that `estimated` rates are taken from, None where that is not said.
+    """Returns the name of the series that gives the `estimated` rates; None if it is not determined.
 
-    It is the one that is given, else the only one, else the one with the start brain.
+    It is the given one, or the only one, or the one with the start brain.
     """
     if given is not None:
         return given if given in series else None

@@ -1,4 +1,4 @@
-"""From plain dictionaries to a validated configuration, with every problem named at once."""
+"""Validates a configuration from plain dictionaries and reports all problems at once."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -113,7 +113,7 @@ def _atlases(raw: Any, base_dir: Path) -> tuple[Any, list[dict[str, Any]], list[
         if not found:
             sections.append(settings)
             entries += atlas_brains(used)
-    # no valid value: checks that need the ids of all brains then know that these are not all
+    # an invalid value tells the checks that not all ids of brains are known
     return None if problems else sections, entries, problems
 
 

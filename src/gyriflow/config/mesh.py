@@ -11,20 +11,31 @@ class MeshSettings(Settings):
     mesher: Literal["pytetwild", "tetgen"] = setting(
         "pytetwild",
         "",
-        "`pytetwild` (fTetWild): the best elements, on a surface of its own within `envelope_mm`; `tetgen`: a finer "
+        "`pytetwild` (fTetWild): the best elements, with its own surface within `envelope_mm`; `tetgen`: a finer "
         "surface with few elements below it, in a few seconds.",
     )
+    order: Literal[1, 2] = setting(
+        2,
+        "",
+        "Order of the elements: 1 linear, 2 quadratic with curved sides. Both have about as many nodes, quadratic "
+        "ones an eighth of the elements.",
+    )
     surface_edge_mm: float = setting(
-        0.72, "mm", "Edge length in the cortex: at most half the cortical thickness.", gt=0.1, le=10
+        0.72,
+        "mm",
+        "Distance of neighbouring nodes in the cortex, at most half the cortical thickness: the edge length of linear "
+        "elements, half of that of quadratic ones.",
+        gt=0.1,
+        le=10,
     )
     pial_faces: int | None = setting(
         None,
         "",
-        "About how many faces the mesh's surface has; `surface_edge_mm` then does not count.",
+        "About how many triangles between nodes the mesh's surface has; `surface_edge_mm` then does not count.",
         ge=100,
         le=2_000_000,
     )
-    core_edge_mm: float = setting(2.5, "mm", "Edge length deep inside.", gt=0.1, le=20)
+    core_edge_mm: float = setting(2.5, "mm", "Distance of neighbouring nodes deep inside.", gt=0.1, le=20)
     fine_depth_edges: float = setting(
         2.5,
         "surface edges",
@@ -32,9 +43,11 @@ class MeshSettings(Settings):
         ge=0,
         le=20,
     )
-    edge_growth: float = setting(0.5, "mm/mm", "Growth of edges with depth below that; `pytetwild` only.", gt=0, le=2)
+    edge_growth: float = setting(
+        0.5, "mm/mm", "Growth of these distances with depth below that; `pytetwild` only.", gt=0, le=2
+    )
     envelope_mm: float = setting(
-        0.1, "mm", "How far the mesh's surface may leave the pial surface; `pytetwild` only.", gt=0.001, le=2
+        0.1, "mm", "Largest distance of the mesh's surface from the pial surface; `pytetwild` only.", gt=0.001, le=2
     )
     time_limit_s: float = setting(1800.0, "s", "The mesher is stopped after this time.", gt=0)
     min_radius_ratio: float = setting(
@@ -47,10 +60,17 @@ class MeshSettings(Settings):
     min_dihedral_deg: float = setting(1.0, "deg", "Least accepted dihedral angle of an element.", ge=0, lt=70)
     max_dihedral_deg: float = setting(178.0, "deg", "Largest accepted dihedral angle of an element.", gt=71, le=180)
     min_volume_mm3: float = setting(1e-6, "mm³", "Least accepted volume of an element.", ge=0, lt=1)
+    min_jacobian_ratio: float = setting(
+        0.1,
+        "",
+        "Least accepted determinant of a quadratic element's map, over its mean; 1 is straight, 0 folded over.",
+        ge=0,
+        lt=1,
+    )
     max_volume_change: float = setting(
         0.01,
         "",
-        "Largest accepted difference of the mesh's volume from that inside the pial surface, relative.",
+        "Largest accepted relative difference between the mesh's volume and that inside the pial surface.",
         gt=0,
         lt=1,
     )
@@ -64,8 +84,8 @@ class MeshSettings(Settings):
     min_gap_kept: float = setting(
         0.95,
         "",
-        "Least accepted share of the fissure and of other gaps narrower than 3 mm, by the area of their walls, that "
-        "stays open in the mesh, with half of its width at least.",
+        "Least accepted fraction of the fissure and of other gaps narrower than 3 mm, by area of their walls, that "
+        "stays open to at least half of its width in the mesh.",
         ge=0,
         le=1,
     )

@@ -9,7 +9,7 @@ from ..parameters.settings import Settings, setting
 from .brains import Brain
 
 LEAST_AGE_WEEKS = 5
-"""Weeks of reference brains that an age profile needs."""
+"""Least number of weeks of reference brains for an age profile."""
 Modes = Annotated[
     Annotated[int, Field(ge=2, le=20000), Tag("(number)")]
     | Annotated[Literal["B4", "B5", "B6", "common", "own"], Tag("(word)")],
@@ -31,26 +31,25 @@ class MetricsSettings(Settings):
     )
     spangy_modes: Modes = setting(
         "B5", "",
-        "Number of eigenmodes, from 2 to 20000, or the last band, all modes up to whose end are computed: `B4`, `B5` "
-        "or `B6`, each four times as many as before; `common`: per hemisphere the largest Weyl number (modes that the "
-        "shortest wavelength needs) of all measured and simulated brains of the study; `own`: that of the surface "
-        "itself.",
+        "Number of eigenmodes: a number from 2 to 20000; the last complete band, `B4`, `B5` or `B6` (each needs four "
+        "times as many modes as the one before); `common`: per hemisphere the largest Weyl number (modes needed for "
+        "the shortest wavelength) of all measured and simulated brains of the study; `own`: that of each surface.",
     )  # fmt: skip
     spangy_wavelength: Literal["paper", "textbook"] = setting(
-        "paper", "", "Relation of the shortest wavelength to λ: `paper` 2π/WL², `textbook` (2π/WL)²."
+        "paper", "", "Relation between the shortest wavelength WL and λ: `paper` 2π/WL², `textbook` (2π/WL)²."
     )
     age_reference: tuple[str, ...] | None = setting(
         None, "",
-        "Ids of the measured brains from which the apparent age of a surface is estimated, of five weeks or more. "
-        "`null`: all that are not synthetic (of several populations, that of the start brain), or all phantoms where "
-        "there are no others; no age profile with fewer than five weeks.",
+        "Ids of the measured brains from which apparent ages are estimated, of at least five weeks. `null`: all that "
+        "are not synthetic (of several populations, that of the start brain), or all phantoms if there are no others. "
+        "There is no age profile with fewer than five weeks.",
     )  # fmt: skip
 
 
 def age_reference(brains: Sequence[Brain], given: tuple[str, ...] | None, population: str | None = None) -> list[str]:
-    """Returns the ids of the brains from which apparent ages are estimated; none where they are of too few weeks.
+    """Returns the ids of the brains from which apparent ages are estimated; none if they cover too few weeks.
 
-    Where none are `given` and the real ones are of several populations, those of `population` are taken.
+    If none are `given` and the real ones are of several populations, those of `population` are used.
     """
     real = [brain for brain in brains if not brain.synthetic] or [b for b in brains if b.source == "phantom"]
     if len({brain.population for brain in real}) > 1:

@@ -4,10 +4,10 @@ from ..parameters.settings import Settings, setting
 
 
 class EnergySettings(Settings):
-    """What energy and emissions are estimated with: t × (cores × core_power_w + GB × memory_w_per_gb) × pue.
+    """Assumptions of the estimated energy and emissions: t × (cores × core_power_w + GB × memory_w_per_gb) × pue.
 
     The formula and the defaults are those of Green Algorithms (Lannelongue, Grealey & Inouye 2021,
-    doi:10.1002/advs.202100707) for an unknown processor, a machine of one's own, and no country in particular.
+    doi:10.1002/advs.202100707) for an unknown processor, a private machine, and no particular country.
     """
 
     core_power_w: float = setting(
@@ -27,7 +27,7 @@ class EnergySettings(Settings):
 
 
 class ReportSettings(Settings):
-    """How figures are drawn, and what energy is estimated with."""
+    """Figures, and assumptions of the estimated energy."""
 
     dpi: int = setting(150, "dots per inch", "Resolution of the PNG figures.", ge=50, le=1200)
     energy: EnergySettings = setting(EnergySettings(), "", "Energy and emissions in the table of resources.")

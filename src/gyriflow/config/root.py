@@ -22,7 +22,7 @@ from .runs import Run, Start, start_ids
 from .surface import SurfaceSettings
 
 REAL_BRAIN = "real brain"
-"""What a measured brain is called whose population is not known."""
+"""Name of a measured brain of unknown population."""
 PHANTOM_SCHEME = "spina-bifida-atlas"
 """Phantoms have the labels of this atlas."""
 
@@ -31,7 +31,7 @@ class Config(Settings):
     """A validated configuration. `folding` is the base of every run, `runs` holds the runs' complete settings."""
 
     brains: tuple[Brain, ...] = setting(
-        (), "", "The brains: those that are folded, others to compare with and to estimate growth from. Needed without "
+        (), "", "The brains: those to fold, and others to compare with and to estimate growth from. Required without "
         "`atlas`.",
     )  # fmt: skip
     atlas: tuple[AtlasSettings, ...] = setting(
@@ -39,11 +39,9 @@ class Config(Settings):
         "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of "
         "these.",
     )  # fmt: skip
-    schemes: dict[str, SchemeSettings] = setting(
-        {}, "", "Label schemes by name, beside those that gyriflow has; for the brains' `scheme`."
-    )
+    schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
     start: Start | None = setting(
-        None, "", "Id of the brain that is folded, a list of ids, or `all`; needed where a run names none of its own."
+        None, "", "Id of the brain to fold, a list of ids, or `all`; required if a run has no `start` of its own."
     )
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
     mesh: MeshSettings = setting(MeshSettings(), "", "Tetrahedral mesh.")
@@ -114,10 +112,10 @@ class Config(Settings):
         raise KeyError(name)
 
     def measured_name(self, brains: Iterable[str]) -> str:
-        """Returns what measured brains of these ids are called in figures and tables: their populations where known.
+        """Returns the name of measured brains in figures and tables: their populations if known.
 
-        Several populations have their weeks with them. Real brains of no known population are a "real brain"; shapes go
-        by their kind where all are of one.
+        Several populations are listed with their weeks. Real brains of unknown population are called "real brain";
+        shapes are called by their kind if they share one.
         """
         chosen = [self.brain(name) for name in brains]
         populations: dict[str, list[float]] = {}

@@ -9,7 +9,7 @@ from ..parameters.folding import FoldingSettings
 from ..parameters.settings import setting
 
 ALL = "all"
-"""What stands for all brains in `start`."""
+"""The word for all brains in `start`."""
 
 Start = Annotated[
     Annotated[str, Tag("(id)")] | Annotated[tuple[str, ...], Tag("(list)")],

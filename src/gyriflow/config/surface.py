@@ -7,7 +7,7 @@ class SurfaceSettings(Settings):
     """How label volumes and surface files become clean pial surfaces."""
 
     smoothing_voxels: float = setting(
-        1.0, "voxels", "Standard deviation of the Gaussian that smooths a label mask before its surface is taken.",
+        1.0, "voxels", "Standard deviation of the Gaussian that smooths a label mask before its surface is extracted.",
         ge=0, le=5,
     )  # fmt: skip
     edge_length_mm: float = setting(
@@ -19,7 +19,7 @@ class SurfaceSettings(Settings):
     )
     fissure_mm: float = setting(
         1.5, "mm",
-        "Width to which the fissure between the hemispheres is opened where a label volume shows none; 0 leaves it.",
+        "Width to which the fissure between the hemispheres is opened where a label volume shows none; 0: not opened.",
         ge=0, le=5,
     )  # fmt: skip
     gap_mm: float = setting(

@@ -24,14 +24,20 @@ from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..parameters.varying import Maps
 from ..step import record_exit_code
 from .output import ZONES, say
+from .points import IntegrationPoints
 from .resolution import stiffness_warning
 from .run import run
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
 from .zones import zones_of_run
 
-PREDICTED_MIB_PER_RANK = 180
-PREDICTED_KIB_PER_TET = 3.0
-"""Memory of a solve, from runs of 60 k to 450 k elements (see summary.json of any run)."""
+MIB_PER_RANK = 250.0
+KIB_PER_TET = {1: 0.9, 2: 33.0}
+KIB_PER_TET_AND_RANK = {1: 1.6, 2: 0.0}
+"""Peak memory of a solve by the order of its elements: a part of the mesh, and positions and searches on every rank.
+From runs of 60 k to 1 M linear elements on one rank and on two (docs/benchmarks.md), which are met within 10 %, and of
+27 k quadratic ones, of which ranks are not told apart yet."""
+GLOBAL_CONTACT = 1.3
+"""Factor on what the elements take, where folds press on each other up to 36 GW."""
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -78,9 +84,12 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
         4 * len(set(ELEMENT_FIELDS) & set(parameters.fields)) * 4,
     )
     frame = per_vertex * len(mesh.vertices) + per_element * len(mesh.tets)
-    stretch = 8 * 6 * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
-    checkpoint = 2 * (8 * 9 * len(mesh.vertices) + stretch)
-    needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 16 * len(mesh.tets)
+    points = len(IntegrationPoints.of_degree(mesh.order).weights)
+    stretch = 8 * 6 * points * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
+    # positions and two displacements, and two velocities where steps are made of them
+    vectors = 3 if parameters.time_scheme == "implicit" else 5
+    checkpoint = 2 * (8 * 3 * vectors * len(mesh.vertices) + stretch)
+    needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 4 * mesh.tets.size
     free = shutil.disk_usage(out).free
     if free < needed:
         raise StorageError(
@@ -92,6 +101,12 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
         )
 
 
+def predicted_memory_mib(tets: int, ranks: int, contact: str, order: int = 1) -> float:
+    """Returns the peak memory in MiB, over all ranks, that a run with elements of an order is likely to take."""
+    per_tet = KIB_PER_TET[order] + KIB_PER_TET_AND_RANK[order] * ranks
+    return MIB_PER_RANK * ranks + per_tet * (GLOBAL_CONTACT if contact == "global" else 1.0) * tets / 1024
+
+
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Reads, checks, prints what is to be solved, and solves it."""
     parameters = read_parameters(arguments.params)
@@ -101,7 +116,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     if comm.rank == 0:
         require_maps(parameters, maps, len(mesh.vertices))
         report = zone_report(mesh, zones, float(np.median(parameters.thickness_at(parameters.start_week, maps))))
-        memory = PREDICTED_MIB_PER_RANK * comm.size + PREDICTED_KIB_PER_TET * len(mesh.tets) / 1024
+        memory = predicted_memory_mib(len(mesh.tets), comm.size, parameters.contact.kind, mesh.order)
         say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")
         for name in ZONE_NAMES:
             zone = report["zones"][name]
@@ -110,7 +125,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         say(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
         through = report["elements_through_cortex"]
         say(f"  elements through the cortex: {through:.1f}")
-        for warning in filter(None, (*zone_warnings(report), stiffness_warning(parameters.poisson_ratio))):
+        locking = stiffness_warning(parameters.poisson_ratio) if mesh.order == 1 else ""
+        for warning in filter(None, (*zone_warnings(report), locking)):
             say(f"warning: {warning}")
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)

@@ -40,8 +40,9 @@ class State:
         Lengths of the two last steps; zero where there was none.
     successes : int
         Steps since the last halving.
-    stretch : (m, 6) float or None
-        Elastic stretch of the elements that the next step starts with, where stress is remembered (see `memory`).
+    stretch : (m, q, 6) float or None
+        Elastic stretch at the integration points of the elements that the next step starts with, where stress is
+        remembered (see `memory`).
     rate, before_rate : (n, 3) float or None
         Velocities in m/s at the start of the two last steps, without contact, where steps are made of velocities.
     rows : tuple of dict
@@ -92,7 +93,7 @@ class State:
         stretch: Floats | None = None,
         rate: Floats | None = None,
     ) -> "State":
-        """Returns the state after an accepted step with its (n, 3) displacement in m and the (m, 6) stretch it left.
+        """Returns the state after an accepted step with its (n, 3) displacement in m and the stretch it left.
 
         `rate` is the velocity at its start, where it was made of velocities.
         """

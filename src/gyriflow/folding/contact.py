@@ -17,6 +17,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError
+from ..geometry.curved_faces import finer_surface
 from ..geometry.triangles import TriangleMesh, edges, mean_length
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_range
@@ -30,6 +31,8 @@ As the surface grows, its edges do; a distance that stayed behind would only mak
 STIFFNESS_PER_MODULUS = 0.1
 """The barrier's stiffness in shear moduli of the cortex. The pressure between folds, some tenths of the modulus, holds
 them at about half of the distance then; a stiffer barrier takes more iterations and changes nothing else."""
+EDGES_PER_SPACING = {1: 1, 2: 2}
+"""Edges of the surface of contact between neighbouring nodes, by the order of the elements."""
 CLOSE, WIDE = 0.1, 0.75
 """Parts of the distance: where the smallest gap is below the first, the next step's barrier is twice as stiff, and half
 where it is above the second. Stress that is kept presses folds ever harder; a barrier that is too soft for it lets them
@@ -79,6 +82,9 @@ def new_pairs() -> ipctk.NormalCollisions:
 class SelfContact:
     """The barrier between all parts of the pial surface: a contribution to the problem of a step.
 
+    Curved faces are taken as 16 flat triangles each, whose vertices follow the nodes: with the four between the nodes,
+    an even pressure would press the nodes unevenly, and quadratic elements would be pressed into waves of their size.
+
     Parameters
     ----------
     domain
@@ -110,8 +116,12 @@ class SelfContact:
         self.settings = settings
         self._displacement = displacement
         self._vertices, faces = np.unique(facets, return_inverse=True)
-        self._faces = np.asfortranarray(faces.reshape(-1, 3), dtype=np.int32)
-        surface = TriangleMesh(domain.positions[self._vertices], faces.reshape(-1, 3))
+        faces = faces.reshape(-1, 3)
+        self._finer: sparse.csr_array | None = None  # weights of the nodes at the vertices of the surface of contact
+        if domain.order == 2:
+            self._finer, faces = finer_surface(faces)
+        self._faces = np.asfortranarray(faces, dtype=np.int32)
+        surface = TriangleMesh(self._at_vertices(domain.positions[self._vertices]), faces)
         self._edges = np.asfortranarray(edges(surface)[0], dtype=np.int32)
         owned = domain.vertex_of_node[: domain.owned]
         place = np.searchsorted(self._vertices, owned).clip(max=len(self._vertices) - 1)
@@ -138,7 +148,7 @@ class SelfContact:
 
     def mesh_moved(self) -> None:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
-        self._start = np.asfortranarray(self.domain.positions[self._vertices] * MM_PER_M)
+        self._start = np.asfortranarray(self._at_vertices(self.domain.positions[self._vertices]) * MM_PER_M)
         self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
         self.distance_mm = self.settings.distance_mm or min(self._distance_of_edges(), self._widest_mm)
         self._barrier = ipctk.BarrierPotential(BARRIER, self.distance_mm, self.stiffness_pa, use_physical_barrier=True)
@@ -146,7 +156,8 @@ class SelfContact:
 
     def _distance_of_edges(self) -> float:
         """Returns the distance in mm that belongs to the present edges, the same whatever a rank's processor rounds."""
-        return DISTANCE_PER_EDGE * self.domain.comm.bcast(mean_length(self._start, self._edges), root=0)
+        spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
+        return DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
 
     def adapt(self, rows: Sequence[dict]) -> None:
         """Sets the stiffness of the next step from the table of the steps so far; call `mesh_moved` after it."""
@@ -172,7 +183,15 @@ class SelfContact:
 
     def _on_surface(self, local: Floats) -> Floats:
         """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""
-        return self.domain.gathered(local[: self.domain.owned])[self._vertices]
+        return self._at_vertices(self.domain.gathered(local[: self.domain.owned])[self._vertices])
+
+    def _at_vertices(self, at_nodes: Floats) -> Floats:
+        """Returns the (s, 3) values at the vertices of the surface of contact from those at the surface's nodes."""
+        return at_nodes if self._finer is None else np.asarray(self._finer @ at_nodes)
+
+    def _to_nodes(self, forces: Floats) -> Floats:
+        """Returns what (s, 3) forces at the vertices of the surface of contact are at the surface's nodes."""
+        return forces if self._finer is None else np.asarray(self._finer.T @ forces)
 
     def _within_reach(self, positions: Floats) -> bool:
         """Returns whether the known candidates hold all pairs that can be near at (s, 3) positions in mm."""
@@ -205,6 +224,8 @@ class SelfContact:
         pairs = self._pairs_near(self._start, self.distance_mm)
         near = [pairs[i].vertex_ids(self._edges, self._faces) for i in range(len(pairs))]
         of_vertex = part[self._vertices]
+        if self._finer is not None:
+            of_vertex = of_vertex[np.asarray(self._finer.argmax(axis=1)).ravel()]
         # the numbers below 0 stand for no vertex
         ends = [of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in near]
         links = np.array([[two.min(), two.max()] for two in ends]).reshape(-1, 2)
@@ -220,7 +241,10 @@ class SelfContact:
         return self.domain.comm.bcast(own, root=0)
 
     def forces(self) -> Floats:
-        """Returns the (s, 3) derivative of the energy in N at the surface's vertices."""
+        """Returns the (n, 3) derivative of the energy in N at the surface's nodes."""
+        return self._to_nodes(self._forces_at_vertices())
+
+    def _forces_at_vertices(self) -> Floats:
         positions, pairs = self._state()
         if not len(pairs):
             return np.zeros_like(positions)
@@ -237,6 +261,9 @@ class SelfContact:
             return None
         kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
         hessian = self._barrier.hessian(pairs, self._surface, positions, kind) * N_PER_M_PER_PA_MM
+        if self._finer is not None:
+            followed = sparse.kron(self._finer, np.eye(3), format="csr")
+            hessian = followed.T @ hessian @ followed
         return self._distributed(sparse.csr_matrix(hessian))
 
     def _distributed(self, matrix: sparse.csr_matrix) -> PETSc.Mat:
@@ -283,5 +310,7 @@ class SelfContact:
         """Returns the (n,) contact pressure in Pa at all vertices of the file, 0 off the surface: force per area."""
         areas = np.array(self._surface.vertex_areas) * M_PER_MM**2
         values = np.zeros(len(self.domain.positions))
-        values[self._vertices] = np.linalg.norm(self.forces(), axis=1) / areas
+        # nodes are the first vertices of the surface of contact
+        pressure = np.linalg.norm(self._forces_at_vertices(), axis=1) / areas
+        values[self._vertices] = pressure[: len(self._vertices)]
         return values

@@ -11,29 +11,47 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ..geometry.tetrahedra import TetrahedralMesh, connected_parts, volumes_between
+from ..geometry.jacobians import NODES as NODE_PLACES
+from ..geometry.jacobians import coefficients, jacobians, lower_bounds, shape_slopes
+from ..geometry.tetrahedra import (
+    NODES_OF_ORDER,
+    PIECES_OF_ORDER,
+    TetrahedralMesh,
+    connected_parts,
+    volumes_between,
+    whole_faces,
+)
 from ..units import M_PER_MM
 
 Floats = NDArray[np.float64]
+
+# dolfinx numbers the nodes on edges from the last edge to the first
+TO_DOLFINX = {1: [0, 1, 2, 3], 2: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4]}
+FROM_DOLFINX = {order: np.argsort(places) for order, places in TO_DOLFINX.items()}
+AT_NODES = shape_slopes(NODE_PLACES)
 
 
 class Domain:
     """A tetrahedral mesh spread over the ranks of a communicator, in metres.
 
+    A vertex is a node of the mesh file here: a corner of elements or, where they are quadratic, a node on an edge.
+
     Attributes
     ----------
+    order : int
+        1 where elements and displacement are linear, 2 where both are quadratic.
     mesh : dolfinx.mesh.Mesh
         The updated reference: moves with every step.
     space : dolfinx.fem.FunctionSpace
-        Continuous piecewise linear vectors: the displacement in m.
+        Continuous vectors, linear or quadratic in each element: the displacement in m.
     positions : (n, 3) float
         Positions of all vertices in m, in the file's order, equal on every rank.
     vertex_of_node : (k,) int
         File index of each local node (owned nodes first, then ghosts).
     owned : int
         Number of owned nodes.
-    cells : (c, 4) int
-        Local nodes of the local elements.
+    cells : (c, 4) or (c, 10) int
+        Local nodes of the local elements, in the order of the file.
     part : (n,) int
         The connected part of the mesh that each vertex belongs to, equal on every rank.
     tet_of_cell : (c,) int
@@ -47,21 +65,24 @@ class Domain:
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
         self.comm = comm
         self.positions: Floats = np.array(mesh.vertices) * M_PER_MM
-        element = basix.ufl.element("Lagrange", "tetrahedron", 1, shape=(3,))
-        cells = mesh.tets if comm.rank == 0 else np.empty((0, 4), dtype=np.int64)
+        self.order = mesh.order
+        element = basix.ufl.element("Lagrange", "tetrahedron", self.order, shape=(3,))
+        tets = mesh.tets[:, TO_DOLFINX[self.order]]
+        cells = tets if comm.rank == 0 else np.empty((0, tets.shape[1]), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
         # by keywords, whose order changed between versions; without ghost cells, the default in all of them
         self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
-        self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", 1, (3,)))
-        self.cells = self.space.dofmap.list
+        self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", self.order, (3,)))
+        nodes_of_cells = self.space.dofmap.list
+        self.cells = np.ascontiguousarray(nodes_of_cells[:, FROM_DOLFINX[self.order]])
         self.owned = self.space.dofmap.index_map.size_local
         nodes = self.owned + self.space.dofmap.index_map.num_ghosts
         self._geometry_node = np.empty(nodes, dtype=np.int64)
-        self._geometry_node[self.cells.ravel()] = self.mesh.geometry.dofmap.ravel()
+        self._geometry_node[nodes_of_cells.ravel()] = self.mesh.geometry.dofmap.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
         self.part = connected_parts(mesh)
         self._counts = [3 * owned for owned in comm.allgather(self.owned)]
-        self.volumes = self.cell_volumes(self.local(self.positions))
+        self._measure(self.local(self.positions))
         self.tet_of_cell = np.array(self.mesh.topology.original_cell_index[: len(self.cells)])
         self._cell_counts = comm.allgather(len(self.cells))
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
@@ -78,14 +99,15 @@ class Domain:
         return values
 
     def gathered_cells(self, cell_values: Floats) -> Floats:
-        """Returns on every rank the (m, k) values of all elements, in the file's order, from the local (c, k) ones."""
-        width = cell_values.shape[1]
+        """Returns on every rank the (m, ...) values of all elements in the file's order, from local (c, ...) ones."""
+        shape = cell_values.shape[1:]
+        width = int(np.prod(shape))
         received = np.empty((len(self._tets), width))
         counts = [width * count for count in self._cell_counts]
         self.comm.Allgatherv(np.ascontiguousarray(cell_values), (received, counts))
         values = np.empty_like(received)
         values[self._tets] = received
-        return values
+        return values.reshape(-1, *shape)
 
     def local(self, values: NDArray) -> NDArray:
         """Returns the values of the local nodes from those of all vertices."""
@@ -96,11 +118,40 @@ class Domain:
         self.positions = positions
         nodes = self.local(positions)
         self.mesh.geometry.x[self._geometry_node] = nodes
-        self.volumes = self.cell_volumes(nodes)
+        self._measure(nodes)
 
     def cell_volumes(self, node_positions: Floats) -> Floats:
         """Returns the signed volumes in m³ of the local elements for (k, 3) positions of the local nodes."""
         return volumes_between(node_positions, self.cells)
+
+    @property
+    def corners(self) -> NDArray[np.int32]:
+        """Local nodes (c, 4) at the corners of the local elements."""
+        return self.cells[:, : NODES_OF_ORDER[1]]
+
+    def _measure(self, node_positions: Floats) -> None:
+        """Takes note of what elements are measured against, for (k, 3) positions of the local nodes."""
+        self.volumes = self.cell_volumes(node_positions)
+        if self.order == 2:
+            self._maps_at_nodes = jacobians(node_positions, self.cells, AT_NODES)
+            self._largest_maps = coefficients(node_positions, self.cells).max(axis=1)
+
+    def volume_ratios(self, node_positions: Floats) -> Floats:
+        """Returns det F of a move of local nodes to (k, 3) positions in m: (c, 1), or (c, 10) at quadratic nodes."""
+        if self.order == 1:
+            return (self.cell_volumes(node_positions) / self.volumes)[:, None]
+        return jacobians(node_positions, self.cells, AT_NODES) / self._maps_at_nodes
+
+    def smallest_volume_ratio(self, node_positions: Floats) -> float:
+        """Returns a number that det F of a move is nowhere below, in no element of any rank.
+
+        It is positive only where no element is turned inside out anywhere. For linear elements it is the smallest
+        det F itself; that of quadratic ones varies, and the bound is that of the map's determinant after the move, over
+        the largest it can have had before.
+        """
+        if self.order == 1:
+            return self.minimum(self.volume_ratios(node_positions))
+        return self.minimum(lower_bounds(node_positions, self.cells) / self._largest_maps)
 
     def minimum(self, local_values: Floats) -> float:
         """Returns the smallest value over all ranks."""
@@ -115,16 +166,21 @@ class Domain:
         return min(self.comm.allgather(found), key=lambda entry: entry[:2])
 
     def local_facets(self, facets: NDArray[np.int64], tags: NDArray[np.int64]) -> dolfinx.mesh.MeshTags:
-        """Returns the tags of boundary facets, given as vertex indices of the file, on the local facets."""
+        """Returns the tags of boundary facets on the local facets.
+
+        They are given as vertex indices of the file; the triangles of a quadratic element's face have one tag.
+        """
+        faces, tags = whole_faces(facets, self.order), tags[:: PIECES_OF_ORDER[self.order]]
         topology = self.mesh.topology
         topology.create_entities(2)
         topology.create_connectivity(2, 3)
         local = dolfinx.mesh.exterior_facet_indices(topology)
-        nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local).reshape(-1, 3)
+        # corners first
+        nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local).reshape(len(local), -1)[:, :3]
         names = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
         count = len(self.positions)
         weights = np.array([count * count, count, 1], dtype=np.int64)
-        known = np.sort(facets, axis=1) @ weights
+        known = np.sort(faces, axis=1) @ weights
         order = np.argsort(known)
         wanted = names @ weights
         place = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]

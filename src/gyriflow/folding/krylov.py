@@ -1,8 +1,12 @@
 """PETSc's linear solvers as the folding wants them, and when a kept preconditioner has served its time."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
+
+from .multigrid import OrderHierarchy
 
 SETUP = 70.0
 """What a new preconditioner costs, in iterations."""
@@ -46,22 +50,45 @@ class Wear:
         self._excess = np.inf
 
 
-def new_krylov(comm: MPI.Comm, method: str, preconditioner: str, max_iterations: int) -> PETSc.KSP:
-    """Returns a linear solver; options in PETSc's database go by the prefix `gyriflow_<method>_`."""
+ALGEBRAIC = {
+    "pc_gamg_threshold": 0.01,
+    # else a rebuilt preconditioner would keep the coarse spaces of the first shape
+    "pc_gamg_reuse_interpolation": False,
+    "pc_gamg_aggressive_coarsening": 1,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 2,
+    "mg_levels_pc_type": "pbjacobi",
+}
+"""Options of algebraic multigrid."""
+BY_ORDER = {
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 1,
+    "mg_levels_pc_type": "pbjacobi",
+    "mg_coarse_ksp_type": "preonly",
+    "mg_coarse_pc_type": "gamg",
+} | {f"mg_coarse_{name}": value for name, value in ALGEBRAIC.items()}
+"""Options of multigrid from quadratic to linear elements, which are left to algebraic multigrid."""
+
+
+def new_krylov(
+    comm: MPI.Comm, method: str, preconditioner: str, max_iterations: int, hierarchy: OrderHierarchy | None = None
+) -> PETSc.KSP:
+    """Returns a linear solver; options in PETSc's database go by the prefix `gyriflow_<method>_`.
+
+    The preconditioner "gamg" is multigrid: by order first where there is a hierarchy, algebraic below.
+    """
     krylov = PETSc.KSP().create(comm)
     prefix = f"gyriflow_{method}_"
     options = PETSc.Options(prefix)
     if preconditioner == "gamg":
-        options["pc_gamg_threshold"] = 0.01
-        # else a rebuilt preconditioner would keep the coarse spaces of the first shape
-        options["pc_gamg_reuse_interpolation"] = False
-        options["pc_gamg_aggressive_coarsening"] = 1
-        options["mg_levels_ksp_type"] = "chebyshev"
-        options["mg_levels_ksp_max_it"] = 2
-        options["mg_levels_pc_type"] = "pbjacobi"
+        for name, value in (ALGEBRAIC if hierarchy is None else BY_ORDER).items():
+            options[name] = value
     krylov.setOptionsPrefix(prefix)
     krylov.setType(method)
-    krylov.getPC().setType(preconditioner)
+    if preconditioner == "gamg" and hierarchy is not None:
+        hierarchy.attach(krylov.getPC())
+    else:
+        krylov.getPC().setType(preconditioner)
     if method == "cg":
         # the norm that Newton's method is judged by
         krylov.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
@@ -87,7 +114,15 @@ def smooth_with(krylov: PETSc.KSP, products: PETSc.Mat, smoothing: PETSc.Mat) ->
     multigrid = krylov.getPC()
     finest = multigrid.getMGLevels() - 1
     multigrid.getMGSmoother(finest).setOperators(products, smoothing)
-    for level in range(1, finest):
+    _store_by_blocks(multigrid, range(1, finest))
+    below = multigrid.getMGCoarseSolve().getPC()
+    if below.getType() == "gamg":
+        _store_by_blocks(below, range(1, below.getMGLevels()))
+
+
+def _store_by_blocks(multigrid: PETSc.PC, levels: Iterable[int]) -> None:
+    """Gives the smoothers of some levels their matrices stored by blocks."""
+    for level in levels:
         smoother = multigrid.getMGSmoother(level)
         operator, matrix = smoother.getOperators()
         if operator.handle == matrix.handle:  # not yet done

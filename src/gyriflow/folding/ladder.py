@@ -60,7 +60,7 @@ class LinearLadder:
         self._level = 0  # of the shift that the last tangent needed
 
     def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
-        return new_krylov(self.problem.domain.comm, method, preconditioner, self.max_iterations)
+        return new_krylov(self.problem.domain.comm, method, preconditioner, self.max_iterations, self.problem.hierarchy)
 
     def solve(
         self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
@@ -198,6 +198,8 @@ class _System:
         krylov.setOperators(self.problem.operator(tangent.products if fast else matrix), matrix)
         multigrid = krylov.getPC()
         multigrid.setReusePreconditioner(reuse)
+        if not reuse and self.problem.hierarchy is not None and multigrid.getType() == "mg":
+            self.problem.hierarchy.renew(multigrid, matrix)
         try:
             if fast:
                 krylov.setUp()

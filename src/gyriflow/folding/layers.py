@@ -110,14 +110,38 @@ class PialSearch:
         to the nearest vertices, where they are known.
         """
         distance = (self.nearest(points)[0] if to_vertex is None else to_vertex).copy()
+        near = (distance > 0) & self._within(distance, reach)
+        if near.any():
+            distance[near] = self._nearest_places(points[near])[0]
+        return distance
+
+    def distance_and_normals(self, points: Floats, reach: float = np.inf) -> tuple[Floats, Floats]:
+        """Returns the distances of (k, 3) points to the pial triangles, and the unit normals at the nearest places.
+
+        Normals are linear in each triangle between those of its vertices. Beyond `reach` the nearest vertex may stand
+        for the nearest place.
+        """
+        distance, vertex = self.nearest(points)
+        normals = self.normals[vertex]
+        near = self._within(distance, reach)
+        if near.any():
+            distance[near], face, weights = self._nearest_places(points[near])
+            normals[near] = unit(np.einsum("kc,kci->ki", weights, self.normals[self.surface.faces[face]]))
+        return distance, normals
+
+    def _within(self, to_vertex: Floats, reach: float) -> NDArray[np.bool_]:
+        """Returns which points may be within reach of a triangle, from their distances to the nearest vertices."""
         # a point of a triangle is at most edge/√3 from its nearest vertex
         longest = np.linalg.norm(np.diff(self.surface.vertices[self.surface.faces], axis=1), axis=2).max()
-        near = (distance > 0) & (distance <= np.hypot(reach, longest / np.sqrt(3)))
-        if near.any():
-            faces = self.surface.faces.astype(np.int32)
-            squared = igl.point_mesh_squared_distance(points[near], self.surface.vertices.copy(), faces)[0]
-            distance[near] = np.sqrt(squared)
-        return distance
+        return np.asarray(to_vertex <= np.hypot(reach, longest / np.sqrt(3)))
+
+    def _nearest_places(self, points: Floats) -> tuple[Floats, Ints, Floats]:
+        """Returns distances of (k, 3) points to the triangles, the nearest ones, and barycentric coordinates there."""
+        faces = self.surface.faces.astype(np.int32)
+        vertices = self.surface.vertices.copy()
+        squared, face, place = igl.point_mesh_squared_distance(points, vertices, faces)
+        a, b, c = (np.ascontiguousarray(vertices[faces[face, i]]) for i in range(3))
+        return np.sqrt(squared), face, igl.barycentric_coordinates(place, a, b, c)
 
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
         """Returns for (k, 3) points the unit normals of the nearest of (k, c) candidate pial vertices.
@@ -145,3 +169,22 @@ class PialSearch:
         neighbours = min(8, len(self.pial))
         index = self.tree.query(points, k=neighbours)[1].reshape(len(points), neighbours)
         return self.normals_from(points, index)
+
+
+def normals_between(normals: Floats, smooth: Floats, bounded: Floats) -> Floats:
+    """Returns the (c, q, 3) unit normals at points inside elements from those (c, k, 3) at their nodes.
+
+    Only the direction of a normal counts, not its sense: walls that face each other have the same. So normals are
+    turned to the side of the first before their mean is taken; where that all but vanishes, the nearest node's stands
+    for it.
+
+    Parameters
+    ----------
+    smooth, bounded : (q, k) float
+        Weights of the nodes at the points, see `IntegrationPoints`.
+    """
+    turned = normals * np.where(np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0, -1.0, 1.0)[:, :, None]
+    mean = np.matmul(smooth, turned)
+    length = np.linalg.norm(mean, axis=2, keepdims=True)
+    heaviest = turned[:, bounded.argmax(axis=1)]
+    return np.where(length > 0.1, mean / np.maximum(length, 0.1), heaviest)

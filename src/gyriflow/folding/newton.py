@@ -101,7 +101,7 @@ class NewtonSolver:
 
     Attributes
     ----------
-    inverting : (c,) float or None
+    inverting : (c, p) float or None
         det F of the local elements at the last trial of the present step that turned one inside out.
     """
 

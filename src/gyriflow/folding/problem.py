@@ -5,6 +5,7 @@ With `domain` and `block_matrix`, the only files that use dolfinx: what differs 
 
 from typing import Literal, Protocol
 
+import basix.ufl
 import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
@@ -22,15 +23,17 @@ from ..units import M_PER_MM
 from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
+from .multigrid import OrderHierarchy
+from .points import IntegrationPoints
 from .rigid import FreeOperator, RigidMotions
-from .tangent import SumOperator, Tangent
+from .tangent import NODES_PER_TERM, SumOperator, Tangent
 from .zones import Zones
 
 Floats = NDArray[np.float64]
 
 
-CENTRE = np.full((1, 3), 0.25)
-"""The centre of the reference tetrahedron, where fields of elements are taken."""
+FACET_DEGREE = {1: 2, 2: 4}
+"""Degree of integration on facets by the order of the elements."""
 
 
 class Contribution(Protocol):
@@ -45,7 +48,7 @@ class Contribution(Protocol):
     def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
         """Returns the energy's second derivative in N/m, or one made positive semidefinite; None where it is zero.
 
-        A sum of terms that couple at most four nodes each. Rows and columns of fixed components need no care.
+        A sum of terms that couple few nodes each (`NODES_PER_TERM`). Rows and columns of fixed components need no care.
         """
 
     def largest_step(self, direction: Floats) -> float:
@@ -64,7 +67,7 @@ class Problem:
     remembers_stress
         Whether the present mesh may be stretched elastically, see `set_stretch`.
     quadrature_degree
-        1 takes stiffness and growth at the centre of each element; higher degrees take them as linear in it.
+        Degree of the polynomials that are integrated exactly; None takes what the elements' order needs.
 
     Attributes
     ----------
@@ -74,6 +77,10 @@ class Problem:
         Further parts of the energy.
     free : bool
         Whether nothing holds the body.
+    hierarchy : OrderHierarchy or None
+        The linear level below quadratic elements for multigrid, None for linear ones.
+    points : IntegrationPoints
+        Where stiffness, growth, normals and kept stretch are taken: q points in each element.
     """
 
     summed = False
@@ -86,32 +93,35 @@ class Problem:
         material: Material,
         *,
         penalty_pa_per_m: float = 0.0,
-        quadrature_degree: int = 1,
+        quadrature_degree: int | None = None,
         remembers_stress: bool = False,
     ) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
         mesh = domain.mesh
         self.u = dolfinx.fem.Function(domain.space)
-        field = ("DG", 0) if quadrature_degree == 1 else ("Lagrange", 1)
-        space = dolfinx.fem.functionspace(mesh, field)
-        self._mu, self._dg, self._dr = (dolfinx.fem.Function(space) for _ in range(3))
-        self._N = dolfinx.fem.Function(dolfinx.fem.functionspace(mesh, ("DG", 0, (3,))))
-        self._by_cell = quadrature_degree == 1
+        self.points = IntegrationPoints.of_degree(domain.order, quadrature_degree)
+        # reference coordinates, and parts of the regular element's volume
+        self._rule = self.points.places[:, 1:].copy(), self.points.weights / 6
+        self._mu, self._dg, self._dr = (self._field_at_points(()) for _ in range(3))
+        self._N = self._field_at_points((3,))
 
         # constants, so that other values need no other forms
         ratio = dolfinx.fem.Constant(mesh, material.bulk_to_shear_ratio)
         penalty = dolfinx.fem.Constant(mesh, penalty_pa_per_m)
         planes = [dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm]
         tags = domain.local_facets(zones.facets, zones.facet_zone)
-        dx = ufl.dx(metadata={"quadrature_degree": quadrature_degree})
-        ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": 2})
+        names = "quadrature_points", "quadrature_weights"
+        # as tuples, since arrays are shortened in the names of compiled forms
+        rule = [tuple(tuple(row) for row in self._rule[0]), tuple(self._rule[1])]
+        dx = ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True)))
+        ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
         F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
         moduli = self._mu, ratio * self._mu
         if remembers_stress:
-            self._V = dolfinx.fem.Function(dolfinx.fem.functionspace(mesh, ("DG", 0, (3, 3))))
-            self.set_stretch(np.tile(np.eye(3), (len(domain.cells), 1, 1)))
+            self._V = self._field_at_points((3, 3))
+            self.set_stretch(np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1)))
             Fe = elastic_deformation(F * self._V, Fg_inverse)
             # counted per volume of the state without stress
             energy = material.energy_density(Fe, *moduli) / ufl.det(self._V) * dx
@@ -136,12 +146,18 @@ class Problem:
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
         self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
+        self.hierarchy = OrderHierarchy(domain, fixed) if domain.order == 2 else None
         self._sum: SumOperator | None = None
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
         self._motions: RigidMotions | None = None
         self._free_operator = FreeOperator(self.vector) if self.free else None
         self.mesh_moved(domain.part)
+
+    def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
+        """Returns a field with values at the integration points alone."""
+        element = basix.ufl.quadrature_element("tetrahedron", shape, points=self._rule[0], weights=self._rule[1])
+        return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
 
     @property
     def quadratic(self) -> bool:
@@ -172,30 +188,32 @@ class Problem:
         return RigidMotions(self.domain, np.zeros_like(self.domain.part)).null_space(self.vector)
 
     def set_layers(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
-        """Sets shear modulus (Pa) and growth increments at the local nodes, and the unit normals of the local cells."""
-        for function, nodal in ((self._mu, mu), (self._dg, dg), (self._dr, dr)):
-            if self._by_cell:
-                function.x.array[function.function_space.dofmap.list[:, 0]] = nodal[self.domain.cells].mean(axis=1)
-            else:
-                function.x.array[function.function_space.dofmap.list] = nodal[self.domain.cells]
-        self._N.x.array.reshape(-1, 3)[self._N.function_space.dofmap.list[:, 0]] = normals
+        """Sets smooth layers: shear modulus (Pa) and growth (k,) at the local nodes, unit normals (c, 3) of cells."""
+        modulus, along, across = (nodal[self.domain.cells] @ self.points.smooth.T for nodal in (mu, dg, dr))
+        repeated = np.repeat(normals[:, None], len(self.points.weights), axis=1)
+        self.set_layers_at_points(modulus, along, across, repeated)
+
+    def set_layers_at_points(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
+        """Sets shear modulus (Pa) and growth increments (c, q), and unit normals (c, q, 3), at integration points."""
+        for function, values in ((self._mu, mu), (self._dg, dg), (self._dr, dr), (self._N, normals)):
+            set_at_points(function, values)
 
     def set_stretch(self, V: Floats) -> None:
-        """Sets the elastic left stretch (c, 3, 3) of the local cells that the present mesh has kept."""
-        self._V.x.array.reshape(-1, 9)[self._V.function_space.dofmap.list[:, 0]] = V.reshape(-1, 9)
+        """Sets the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
+        set_at_points(self._V, V)
 
     def outcome(self, name: Literal["deformation", "elastic", "stress"]) -> Floats:
-        """Returns the (c, 3, 3) tensors at the centres of the local elements; all ranks have to ask.
+        """Returns the (c, q, 3, 3) tensors at the integration points of the local elements; all ranks have to ask.
 
         `deformation` is the step's F and `elastic` its Fe = F·V·Fg⁻¹; `stress` is Cauchy's, in Pa, of the energy that
         is minimised. They refer to the mesh before the step: while it has not been placed anew.
         """
         if name not in self._evaluated:
             with form_compiler(self.domain.comm) as options:
-                expression = dolfinx.fem.Expression(self._outcomes[name], CENTRE, jit_options=options)
+                expression = dolfinx.fem.Expression(self._outcomes[name], self._rule[0], jit_options=options)
             self._evaluated[name] = expression
         cells = np.arange(len(self.domain.cells), dtype=np.int32)
-        return self._evaluated[name].eval(self.domain.mesh, cells).reshape(-1, 3, 3)
+        return self._evaluated[name].eval(self.domain.mesh, cells).reshape(len(cells), -1, 3, 3)
 
     @property
     def displacement(self) -> Floats:
@@ -243,7 +261,8 @@ class Problem:
             # one object for all iterates, since multigrid keeps the first it is given
             self._sum = SumOperator(products)
             self._sum_matrix = self._sum.as_matrix()
-        return Tangent(matrix, self._sum_matrix, self._further_parts(convex=False))
+        parts = self._further_parts(convex=False)
+        return Tangent(matrix, self._sum_matrix, parts, NODES_PER_TERM[self.domain.order])
 
     def _elastic_tangent(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Returns the tangent of all but the contributions, as a whole and for products."""
@@ -285,10 +304,19 @@ class Problem:
         return self.vector.duplicate()
 
     def volume_ratios(self) -> Floats:
-        """Returns det F of the (c,) local elements."""
-        current = self.domain.local(self.domain.positions)
-        return self.domain.cell_volumes(current + self.displacement) / self.domain.volumes
+        """Returns det F of the local elements: (c, 1), or (c, 10) at the nodes of quadratic ones."""
+        return self.domain.volume_ratios(self._moved())
 
     def smallest_volume_ratio(self) -> float:
-        """Returns the smallest det F over all elements: positive where no element is inverted."""
-        return self.domain.minimum(self.volume_ratios())
+        """Returns a number that det F is nowhere below: positive only where no element is inside out anywhere."""
+        return self.domain.smallest_volume_ratio(self._moved())
+
+    def _moved(self) -> Floats:
+        """Returns the (k, 3) positions in m of the local nodes after the displacement."""
+        return np.asarray(self.domain.local(self.domain.positions) + self.displacement)
+
+
+def set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:
+    """Gives a field at integration points its (c, q, ...) values."""
+    places = field.function_space.dofmap.list
+    field.x.array.reshape(-1, field.function_space.dofmap.bs)[places] = values.reshape(*places.shape, -1)

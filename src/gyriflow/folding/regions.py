@@ -26,7 +26,7 @@ def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
     weight : (n,) float
         Cortical weight at the vertices; an element is cortex where its mean is above a half.
     """
-    x = mesh.vertices[mesh.tets, 0].mean(axis=1)
+    x = mesh.vertices[mesh.corners, 0].mean(axis=1)
     left, right = zones.planes_mm
     return {
         "hemisphere": np.select([x <= left, x >= right], [LEFT, RIGHT], BRIDGE).astype(np.int32),

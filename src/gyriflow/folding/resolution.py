@@ -13,8 +13,8 @@ Floats = NDArray[np.float64]
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 WORST = 0.01
 """Part of the elements whose quality the step table tells."""
-NEEDED = 2.0
-"""Elements through the cortex below which folds are the mesh's (docs/verification.md)."""
+NEEDED = {1: 2.0, 2: 1.0}
+"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md)."""
 LARGEST_POISSON_RATIO = 0.46
 """Above this linear elements are clearly too stiff: at 0.45 the fastest wave of the slab grows 32 % too slowly with two
 of them through the cortex, at 0.48 40 %, at 0.49 47 %, at 0.499 69 %, the peak elsewhere."""
@@ -28,7 +28,7 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
     distance : (k,) float
         Of the local nodes to the pial surface, in m as the thickness.
     """
-    inside = domain.cells[distance[domain.cells].mean(axis=1) <= thickness]
+    inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
     nodes = domain.local(domain.positions)
     lengths = sum(float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum()) for i, j in EDGES)
     total, count = domain.comm.allreduce(np.array([lengths, len(EDGES) * len(inside)]))
@@ -51,13 +51,13 @@ def stiffness_warning(poisson_ratio: float) -> str:
     )
 
 
-def resolution_warning(rows: Sequence[dict]) -> str:
+def resolution_warning(rows: Sequence[dict], order: int) -> str:
     """Returns what to say where the cortex has just come to be resolved too coarsely; empty where it has not."""
     now = rows[-1]["elements_through_cortex"]
     before = rows[-2]["elements_through_cortex"] if len(rows) > 1 else math.inf
-    if not now < NEEDED <= before:
+    if not now < NEEDED[order] <= before:
         return ""
     return (
-        f"from GW {rows[-1]['week']:.2f} on fewer than {NEEDED:g} elements lie through the cortex, since it grows: "
-        "folds may be mesh noise; a smaller mesh.surface_edge_mm resolves it to a later week"
+        f"from GW {rows[-1]['week']:.2f} on fewer than {NEEDED[order]:g} elements lie through the cortex, "
+        "since it grows: folds may be mesh noise; a smaller mesh.surface_edge_mm resolves it to a later week"
     )

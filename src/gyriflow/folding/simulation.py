@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -20,9 +21,10 @@ from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
+from .element_layers import Layered, linear_layers, quadratic_layers
 from .following import following_step, size_of
 from .ladder import RUNGS, NotConvergedError
-from .layers import WEIGHT_REACH, PialSearch, layers_at
+from .layers import WEIGHT_REACH, PialSearch
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import NewtonSettings, NewtonSolver, StepCount
 from .output import say
@@ -39,8 +41,6 @@ from .stress import (
 from .zones import Zones
 
 Floats = NDArray[np.float64]
-NO_GROWTH = 1e-10
-"""Growth increment of a step that counts as none, a hundred-millionth of what the cortex grows."""
 STEPS_BEFORE_GROWING = 4
 """Accepted steps after which a halved time step is doubled again."""
 
@@ -68,7 +68,7 @@ class Folding:
         parameters: FoldingParameters,
         maps: Maps | None = None,
         *,
-        quadrature_degree: int = 1,
+        quadrature_degree: int | None = None,
     ) -> None:
         self.parameters = parameters
         self.zones = zones
@@ -101,13 +101,14 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
+        self._through = math.nan  # elements through the cortex in the last step
         self._start_size = size_of(mesh.vertices, zones)
         self.present = parameters  # those of the last step, with its rates of growth
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         if "strain" in parameters.fields:
             nodes = self.domain.local(self._start)
-            centres = nodes[self.domain.cells].mean(axis=1)
+            centres = nodes[self.domain.corners].mean(axis=1)
             self._start_normals = PialSearch(self._start, zones.cortex_facets).nearest_normals(centres)
         limits = NewtonSettings(solver.newton_tolerance, solver.krylov_tolerance, solver.max_newton)
         self.solver = NewtonSolver(self.problem, limits, floor)
@@ -128,40 +129,39 @@ class Folding:
         week = p.start_week + time_s / SECONDS_PER_GW
         reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
         search = PialSearch(domain.positions, self.zones.cortex_facets)
-        nodes = domain.local(domain.positions)
         thickness = float(np.mean(p.thickness_at(week, self.maps)))
-        to_vertex, nearest = search.nearest(nodes)
-        distance = search.distance(nodes, reach, to_vertex) * MM_PER_M
-        layers = layers_at(distance, self._growth, p, self._local_maps, week, step_s)
-        self._through = elements_through(domain, distance * M_PER_MM, thickness * M_PER_MM)
-        # the direction matters only where growth differs along and across it
-        directed = np.abs(layers.dg - layers.dr)[domain.cells].max(axis=1) > NO_GROWTH
-        normals = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
-        cells = domain.cells[directed]
-        normals[directed] = search.normals_from(nodes[cells].mean(axis=1), nearest[cells])
-        self.problem.set_layers(layers.mu, layers.dg, layers.dr, normals)
+        at_nodes = domain.local(domain.positions)
+        to_points = linear_layers if domain.order == 1 else quadratic_layers
+        given = Layered(domain.cells, self.problem.points, self._growth, self._local_maps, p, week, step_s)
+        layers, distance = to_points(given, search, at_nodes, reach)
+        self.problem.set_layers_at_points(*layers)
+        self._through = elements_through(domain, distance, thickness * M_PER_MM)
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats | None:
-        """Returns the (c, 3, 3) stretch of the local elements that is left for a step, None where all is forgotten."""
+        """Returns the (c, q, 3, 3) stretch of local elements that is left for a step, None where all is forgotten."""
         if not self._remembers:
             return None
         if state.stretch is None:
-            return unpacked(unstretched(len(self.domain.cells)))
+            return unpacked(unstretched(len(self.domain.cells), len(self.problem.points.weights)))
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
 
     def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
 
-        Names are those of the parameter `fields`; those of the arrays carry their units. Where stress is forgotten,
-        that of a step and its strain are in proportion to the step, and are given per week. Right after a step only.
+        They are means over the integration points. Names are those of the parameter `fields`; those of the arrays carry
+        their units. Where stress is forgotten, that of a step and its strain are in proportion to the step, and are
+        given per week. Right after a step only.
         """
         domain = self.domain
         fields: dict[str, Floats] = {}
         if set(ELEMENT_FIELDS).isdisjoint(wanted):
             return fields
         after = domain.positions
-        total = deformation_gradients(domain.local(self._start), domain.local(after), domain.cells)
+        slopes = self.problem.points.slopes
+        total = deformation_gradients(domain.local(self._start), domain.local(after), domain.cells, slopes)
+        total = total.reshape(-1, 3, 3)
+
         # back to where the step began, which its displacement refers to
         moved = self.problem.displacement.copy()
         domain.place(after - domain.gathered(moved[: domain.owned]))
@@ -172,21 +172,26 @@ class Folding:
         else:
             fields |= self._stress_fields(wanted)
         if "strain" in wanted:
-            fields |= total_strain_fields(total, self._start_normals)
+            fields |= total_strain_fields(total, np.repeat(self._start_normals, len(slopes), axis=0))
         self.problem.set_displacement(moved)
         if "volume_ratio" in wanted:
-            fields |= volume_ratio_fields(self.problem.outcome("deformation"), total)
+            fields |= volume_ratio_fields(self._at_all_points("deformation"), total)
         domain.place(after)
-        together = domain.gathered_cells(np.stack(list(fields.values()), axis=1))
+        by_cell = [values.reshape(-1, len(slopes)) @ self.problem.points.weights for values in fields.values()]
+        together = domain.gathered_cells(np.stack(by_cell, axis=1))
         return dict(zip(fields, together.T, strict=True))
 
+    def _at_all_points(self, name: Literal["deformation", "elastic", "stress"]) -> Floats:
+        """Returns the tensors (c q, 3, 3) at the integration points, one local element after the other."""
+        return self.problem.outcome(name).reshape(-1, 3, 3)
+
     def _stress_fields(self, wanted: Iterable[str], factor: float = 1.0) -> dict[str, Floats]:
-        """Returns a multiple of the stress and elastic strain (c,) in the local elements, as far as they are wanted."""
+        """Returns a multiple of the stress and elastic strain (c q,) at integration points, if they are wanted."""
         fields: dict[str, Floats] = {}
         if "stress" in wanted:
-            fields |= stress_fields(self.problem.outcome("stress"))
+            fields |= stress_fields(self._at_all_points("stress"))
         if "strain" in wanted:
-            fields |= elastic_strain_fields(self.problem.outcome("elastic"))
+            fields |= elastic_strain_fields(self._at_all_points("elastic"))
         return self._per_gw({name: factor * values for name, values in fields.items()})
 
     def contact_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
@@ -227,7 +232,8 @@ class Folding:
         residual = problem.new_vector()
         problem.residual(residual)
         forces = -np.linalg.norm(residual.array_r.reshape(-1, 3), axis=1)
-        ratio, tet, centre = domain.least(ratios, domain.tet_of_cell, before[domain.cells].mean(axis=1) * MM_PER_M)
+        centres = before[domain.corners].mean(axis=1) * MM_PER_M
+        ratio, tet, centre = domain.least(ratios.min(axis=1), domain.tet_of_cell, centres)
         force, vertex, place = domain.least(forces, domain.vertex_of_node, before * MM_PER_M)
         return (
             f"smallest det F {ratio:.3g} in element {tet} at {np.round(centre, 1).tolist()} mm, "
@@ -354,7 +360,8 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             state = replace(state, step_s=half, successes=0)
             continue
         if folding.domain.comm.rank == 0:
-            for warning in filter(None, (unconverged_warning(after.rows[-1]), resolution_warning(after.rows))):
+            coarse = resolution_warning(after.rows, folding.domain.order)
+            for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
                 say(f"warning: {warning}")
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)

@@ -11,19 +11,21 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.integer]
 
 
-def deformation_gradients(before: Floats, after: Floats, cells: Ints) -> Floats:
-    """Returns the (c, 3, 3) deformation gradients F = ∂x_after/∂x_before of linear tetrahedra.
+def deformation_gradients(before: Floats, after: Floats, cells: Ints, slopes: Floats) -> Floats:
+    """Returns the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
 
     Parameters
     ----------
     before, after : (k, 3) float
-        Positions of the vertices in one unit.
-    cells : (c, 4) int
+        Positions of the nodes in one unit.
+    cells : (c, n) int
         Their indices per element; the elements have a volume before.
+    slopes : (q, n, 3) float
+        Gradients of the nodes' shape functions in the regular element, at the points.
     """
-    # edges from the first vertex, a row each: rows after = rows before · Fᵀ
-    first, second = (x[cells[:, 1:]] - x[cells[:, :1]] for x in (before, after))
-    return np.asarray(np.linalg.solve(first, second), dtype=np.float64).transpose(0, 2, 1)
+    # the transposed maps from the regular element: those after = those before · Fᵀ
+    first, second = (np.matmul(slopes.transpose(0, 2, 1), x[cells][:, None]) for x in (before, after))
+    return np.asarray(np.linalg.solve(first, second), dtype=np.float64).swapaxes(-1, -2)
 
 
 def pressure(stress: Floats) -> Floats:

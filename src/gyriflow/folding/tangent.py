@@ -10,8 +10,9 @@ from contextlib import contextmanager
 import numpy as np
 from petsc4py import PETSc
 
-NODES_PER_TERM = 4
-"""Nodes that a single term of a contribution couples at most: a corner and a face, or two edges."""
+NODES_PER_TERM = {1: 4, 2: 12}
+"""Nodes that a single term of a contribution couples at most, by the order of the elements: a corner and a face, or two
+edges, of which each vertex follows the six nodes of a curved face."""
 
 
 class SumOperator:
@@ -46,6 +47,8 @@ class Tangent:
         What acts like the whole tangent, with fast products.
     parts
         Further parts in N/m, without entries in rows and columns of fixed components.
+    nodes_per_term
+        Nodes that a single term of a part couples at most.
 
     Attributes
     ----------
@@ -56,7 +59,14 @@ class Tangent:
         that couples k nodes is at most k times its own block diagonal. What is negative of the parts is left out.
     """
 
-    def __init__(self, matrix: PETSc.Mat, products: PETSc.Mat, parts: Sequence[PETSc.Mat]) -> None:
+    def __init__(
+        self,
+        matrix: PETSc.Mat,
+        products: PETSc.Mat,
+        parts: Sequence[PETSc.Mat],
+        nodes_per_term: int = NODES_PER_TERM[1],
+    ) -> None:
+        self._nodes_per_term = nodes_per_term
         self.products = products
         self.smoothing = matrix
         self._raised: list[tuple[np.ndarray, np.ndarray]] = []
@@ -67,7 +77,7 @@ class Tangent:
         for nodes, blocks in self._raised:
             add_block_diagonal(self.smoothing, nodes, -blocks)
         self._parts = parts
-        self._raised = [raising(part) for part in parts]
+        self._raised = [raising(part, self._nodes_per_term) for part in parts]
         self._whole = None if parts else self.smoothing
         for nodes, blocks in self._raised:
             add_block_diagonal(self.smoothing, nodes, blocks)
@@ -115,11 +125,11 @@ def block_diagonal(matrix: PETSc.Mat) -> tuple[np.ndarray, np.ndarray]:
     return nodes.astype(PETSc.IntType), blocks
 
 
-def raising(matrix: PETSc.Mat) -> tuple[np.ndarray, np.ndarray]:
+def raising(matrix: PETSc.Mat, nodes_per_term: int) -> tuple[np.ndarray, np.ndarray]:
     """Returns what is to be added to a block diagonal for a further matrix: nodes, and positive semidefinite blocks."""
     nodes, blocks = block_diagonal(matrix)
     values, directions = np.linalg.eigh((blocks + blocks.swapaxes(1, 2)) / 2)
-    positive = NODES_PER_TERM * np.maximum(values, 0.0)
+    positive = nodes_per_term * np.maximum(values, 0.0)
     return nodes, np.einsum("bij,bj,bkj->bik", directions, positive, directions)
 
 

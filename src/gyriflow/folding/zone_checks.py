@@ -4,11 +4,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InputError, MeshError
+from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
 from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES
 from .zones import Zones
 
+NEEDED_THROUGH_CORTEX = {1: (2, "two elements"), 2: (1, "one quadratic element")}
+"""Elements through the cortex by their order, below which a user is warned."""
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
 
@@ -32,6 +35,7 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
         "clamped_share": {
             side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
         },
+        "order": mesh.order,
         "growing_vertices": int((zones.growth > 0).sum()),
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
         "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
@@ -41,9 +45,9 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
 def zone_warnings(report: dict) -> list[str]:
     """Returns what a user should know of the zones, from their report, before trusting a run."""
     warnings = []
-    through = report["elements_through_cortex"]
-    if through < 2:
-        warnings.append(f"fewer than two elements through the cortex ({through:.2f}): folds may be mesh noise")
+    through, (needed, name) = report["elements_through_cortex"], NEEDED_THROUGH_CORTEX[report["order"]]
+    if through < needed:
+        warnings.append(f"fewer than {name} through the cortex ({through:.2f}): folds may be mesh noise")
     areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
     share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
     if share > MUCH_BETWEEN_PLANES:
@@ -56,11 +60,11 @@ def zone_warnings(report: dict) -> list[str]:
 
 def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
     """Returns the mean edge length in mm of the elements whose centroid lies in the cortex."""
-    centroids = mesh.vertices[mesh.tets].mean(axis=1)
+    centroids = mesh.vertices[mesh.corners].mean(axis=1)
     depth = cKDTree(mesh.vertices[np.unique(zones.cortex_facets)]).query(centroids)[0]
-    cortex = mesh.tets[depth <= thickness_mm]
+    cortex = mesh.corners[depth <= thickness_mm]
     if not len(cortex):
-        cortex = mesh.tets
+        cortex = mesh.corners
     pairs = cortex[:, [0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3]].reshape(-1, 2)
     return mean_length(mesh.vertices, pairs)
 
@@ -73,8 +77,18 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     InputError
         Where nothing grows, there is no cortex, no facet is clamped, or the fissure lies outside the brain.
     MeshError
-        Where the pial surface is not closed, or a part of the brain has no clamped facet and would float.
+        Where elements are inside out, the pial surface is not closed, or a part of the brain has no clamped facet and
+        would float.
     """
+    if mesh.order == 2:
+        folded = np.flatnonzero(lower_bounds(mesh.vertices, mesh.tets) <= 0)
+        if len(folded):
+            place = np.round(mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1).tolist()
+            raise MeshError(
+                "the mesh has curved elements that are folded over",
+                found=f"{len(folded)} of {len(mesh.tets)}, one at {place} mm",
+                remedy="Move the nodes on their edges towards the middles of the edges.",
+            )
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
     if not low < zones.fissure_x_mm < high:
         raise InputError(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
 from ..geometry.triangles import TriangleMesh, face_normals
 from ..parameters.folding import FoldingParameters
 from ..parameters.terms import (
@@ -35,7 +35,7 @@ class Zones:
     Attributes
     ----------
     facets : (f, 3) int
-        Pial facets, outward, as vertex indices.
+        Pial facets, outward, as vertex indices; the four triangles of a quadratic element's face follow each other.
     facet_zone : (f,) int
         FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES; BASE, SIDE_X or SIDE_Y where tissue is cut off
         flat and there is no cortex.
@@ -104,8 +104,9 @@ def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64], sides: bool) -> 
     for axis, name in ((0, SIDE_X), (1, SIDE_Y)) if sides else ():
         for end, sign in ((low, -1.0), (high, 1.0)):
             at_end = (np.abs(corners[:, :, axis] - end[axis]) <= near[axis]).all(axis=1)
-            zone[at_end & (sign * normals[:, axis] > 0.7)] = name
-    zone[(corners[:, :, 2] <= low[2] + near[2]).all(axis=1) & (normals[:, 2] < -0.7)] = BASE
+            zone[on_whole_faces(at_end & (sign * normals[:, axis] > 0.7), mesh.order)] = name
+    at_base = (corners[:, :, 2] <= low[2] + near[2]).all(axis=1)
+    zone[on_whole_faces(at_base & (normals[:, 2] < -0.7), mesh.order)] = BASE
     return zone
 
 
@@ -144,15 +145,18 @@ def find_zones(
     reach = np.ptp(x) / 8
     facet_x = x[facets]
     still = inside_ellipsoid(mesh.vertices, shift_y, shift_z, semi_axes)
-    between = ((facet_x > left_plane) & (facet_x < right_plane)).all(axis=1)
+
+    def faces_where(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Returns the facets on faces of elements at all of whose vertices something holds."""
+        return on_whole_faces(np.asarray(holds.all(axis=1)), mesh.order)
 
     zone = np.full(len(facets), FREE)
     if support == "ellipsoid":
-        zone[still[facets].all(axis=1)] = CLAMPED
+        zone[faces_where(still[facets])] = CLAMPED
     if contact:
-        zone[between] = BETWEEN_PLANES
-        zone[((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)).all(axis=1)] = LEFT_CONTACT
-        zone[((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)).all(axis=1)] = RIGHT_CONTACT
+        zone[faces_where((facet_x > left_plane) & (facet_x < right_plane))] = BETWEEN_PLANES
+        zone[faces_where((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))] = LEFT_CONTACT
+        zone[faces_where((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))] = RIGHT_CONTACT
     if support in ("base", "box"):
         cuts = flat_cuts(mesh, facets, sides=support == "box")
         zone[cuts != FREE] = cuts[cuts != FREE]

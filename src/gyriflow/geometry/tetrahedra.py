@@ -8,22 +8,29 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from .jacobians import EDGES, coefficients
 from .triangles import Floats, Ints, TriangleMesh, frozen
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
 KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
+NODES_OF_ORDER = {1: 4, 2: 10}
+# the face opposite to each corner, seen counter-clockwise from outside
+FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+PIECES_OF_ORDER = {1: 1, 2: 4}
+"""Triangles that a face is made of: one at each corner and one in the middle where it has nodes on its edges."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetrahedralMesh:
-    """A tetrahedral mesh.
+    """A tetrahedral mesh of linear or of quadratic elements.
 
     Attributes
     ----------
     vertices : (n, 3) float
-        Positions in mm.
-    tets : (m, 4) int
-        Vertex indices; volumes are positive in the order of VTK.
+        Positions of the nodes in mm: the corners of elements and, of quadratic ones, the nodes on their edges too.
+    tets : (m, 4) or (m, 10) int
+        Node indices in the order of VTK: four corners, and the nodes on the edges 01, 12, 02, 03, 13, 23. Volumes are
+        positive.
     """
 
     vertices: Floats
@@ -31,13 +38,31 @@ class TetrahedralMesh:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, np.float64, 3))
-        object.__setattr__(self, "tets", frozen(self.tets, np.int64, 4))
+        wide = np.ndim(self.tets) == 2 and np.shape(self.tets)[1] == NODES_OF_ORDER[2]
+        object.__setattr__(self, "tets", frozen(self.tets, np.int64, NODES_OF_ORDER[2 if wide else 1]))
         if len(self.tets) and not 0 <= self.tets.min() <= self.tets.max() < len(self.vertices):
             raise ValueError("a tetrahedron names a vertex that does not exist")
 
+    @property
+    def order(self) -> int:
+        """1 for linear, 2 for quadratic elements."""
+        return order_of(self.tets)
+
+    @property
+    def corners(self) -> Ints:
+        """The (m, 4) corners of the elements."""
+        return self.tets[:, : NODES_OF_ORDER[1]]
+
+
+def order_of(tets: NDArray[np.integer]) -> int:
+    """Returns the order of the elements whose nodes are the rows of an array."""
+    return 1 if tets.shape[1] == NODES_OF_ORDER[1] else 2
+
 
 def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Returns the (m,) volumes of (m, 4) tetrahedra, negative for inverted ones, in the cube of the vertices' unit."""
+    """Returns the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the given unit."""
+    if order_of(tets) == 2:
+        return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
     a, b, c, d = (np.take(vertices, tets[:, i], axis=0) for i in range(4))
     # the triple product of edges written out: faster than with NumPy's cross product
     (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
@@ -50,8 +75,11 @@ def signed_volumes(mesh: TetrahedralMesh) -> Floats:
 
 
 def radius_ratios(mesh: TetrahedralMesh) -> Floats:
-    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one."""
-    a, b, c, d = mesh.vertices[mesh.tets].transpose(1, 0, 2)
+    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
+
+    Of quadratic elements they are those of the corners.
+    """
+    a, b, c, d = mesh.vertices[mesh.corners].transpose(1, 0, 2)
     p, q, r = b - a, c - a, d - a
     volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
     surface2 = sum(np.linalg.norm(np.cross(x, y), axis=1) for x, y in ((p, q), (q, r), (r, p), (q - p, r - p)))
@@ -65,7 +93,7 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
 
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
     """Returns for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
-    pairs = mesh.tets[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)
+    pairs = np.stack(np.broadcast_arrays(mesh.tets[:, :1], mesh.tets[:, 1:]), axis=-1).reshape(-1, 2)
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
@@ -82,21 +110,61 @@ def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
     return TetrahedralMesh(points.reshape(-1, 3), tets)
 
 
-def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
-    """Returns the (f, 3) faces that belong to one element only, outward, and the (f,) element of each.
+def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
+    """Returns a mesh of linear elements with a node on the middle of each edge: quadratic elements, not yet curved.
 
-    Outward holds for elements of positive volume.
+    Corners keep their numbers.
     """
-    # the face opposite to each corner, seen counter-clockwise from outside
-    opposite = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-    faces = mesh.tets[:, opposite].reshape(-1, 3)
+    pairs = np.sort(mesh.tets[:, EDGES], axis=2).reshape(-1, 2)
+    names, place = np.unique(pairs @ [len(mesh.vertices), 1], return_inverse=True)
+    ends = np.stack(np.divmod(names, len(mesh.vertices)), axis=1)
+    tets = np.hstack([mesh.tets, len(mesh.vertices) + place.reshape(-1, len(EDGES))])
+    return TetrahedralMesh(np.concatenate([mesh.vertices, mesh.vertices[ends].mean(axis=1)]), tets)
+
+
+def faces_of_elements(order: int) -> Ints:
+    """Returns the (4, p, 3) places in an element of its faces' triangles, outward; p is `PIECES_OF_ORDER`.
+
+    A face with corners a, b, c and nodes on its edges is split into (a, ab, ca), (ab, b, bc), (ca, bc, c) and
+    (ab, bc, ca).
+    """
+    if order == 1:
+        return np.array(FACES)[:, None, :]
+    node = {frozenset(edge): 4 + i for i, edge in enumerate(EDGES)}
+    split = []
+    for a, b, c in FACES:
+        ab, bc, ca = node[frozenset((a, b))], node[frozenset((b, c))], node[frozenset((c, a))]
+        split.append([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)])
+    return np.array(split)
+
+
+def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
+    """Returns the (f, 3) triangles of the faces that belong to one element only, outward, and the (f,) element of each.
+
+    Outward holds for elements of positive volume. The triangles of one quadratic element's face follow each other, see
+    `faces_of_elements`.
+    """
+    faces = np.sort(mesh.tets[:, FACES].reshape(-1, 3))
     # one number per face: much faster than comparing rows
     count = len(mesh.vertices)
-    _, first, counts = np.unique(
-        np.sort(faces, axis=1) @ [count * count, count, 1], return_index=True, return_counts=True
-    )
+    _, first, counts = np.unique(faces @ [count * count, count, 1], return_index=True, return_counts=True)
     outer = np.sort(first[counts == 1])
-    return faces[outer], outer // 4
+    pieces = PIECES_OF_ORDER[mesh.order]
+    triangles = mesh.tets[:, faces_of_elements(mesh.order)].reshape(-1, pieces, 3)[outer]
+    return triangles.reshape(-1, 3), np.repeat(outer // 4, pieces)
+
+
+def whole_faces(triangles: NDArray[np.integer], order: int) -> NDArray[np.integer]:
+    """Returns the (f, 3) corners of the faces whose triangles are those of `boundary_faces`."""
+    if order == 1:
+        return triangles
+    return triangles.reshape(-1, PIECES_OF_ORDER[2], 3)[:, [0, 1, 2], [0, 1, 2]]
+
+
+def on_whole_faces(chosen: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
+    """Returns which of the (f,) triangles of `boundary_faces` belong to a face of which all triangles are chosen."""
+    pieces = PIECES_OF_ORDER[order]
+    return np.repeat(chosen.reshape(-1, pieces).all(axis=1), pieces)
 
 
 def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:

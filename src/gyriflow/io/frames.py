@@ -1,8 +1,9 @@
 """The frames of a folding run: one HDF5 file, with an XDMF file beside it that ParaView opens as a time series.
 
-Layout of the HDF5 file: `tets` (m, 4), once; per output week a group `week_21.00` with `positions` (n, 3) in mm, fields
-at the vertices, and in its group `cell_fields` those of the elements. Positions are in double precision: metrics and
-displacements are computed from them. Fields are in single precision, about seven digits, at half the size.
+Layout of the HDF5 file: `tets` (m, 4), of quadratic elements (m, 10), once; per output week a group `week_21.00` with
+`positions` (n, 3) in mm, fields at the vertices, and in its group `cell_fields` those of the elements. Positions are in
+double precision: metrics and displacements are computed from them. Fields are in single precision, about seven digits,
+at half the size.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,7 +75,7 @@ def join_frames(path: str | PathLike[str], tets: NDArray, frames: Sequence[str |
     Raises
     ------
     ValueError
-        Where fields of the elements do not fit the (m, 4) tetrahedra.
+        Where fields of the elements do not fit the (m, 4) or (m, 10) tetrahedra.
     """
     path = Path(path)
     with new_hdf5(path) as file:
@@ -117,7 +118,7 @@ def read_weeks(path: str | PathLike[str]) -> list[float]:
 
 
 def read_tets(path: str | PathLike[str]) -> NDArray[np.int64]:
-    """Returns the (m, 4) tetrahedra."""
+    """Returns the (m, 4) or (m, 10) tetrahedra."""
     with h5py.File(path) as file:
         return file["tets"][:].astype(np.int64)
 

@@ -15,7 +15,9 @@ from .hdf5 import new_hdf5
 
 XDMF_NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
 XDMF_ATTRIBUTE = {1: "Scalar", 3: "Vector", 9: "Tensor"}
-XDMF_TOPOLOGY = {3: "Triangle", 4: "Tetrahedron"}
+XDMF_TOPOLOGY = {3: "Triangle", 4: "Tetrahedron", 10: "Tet_10"}
+# what a tetrahedron becomes by corners 1 and 2 changing places
+TURNED = {4: [0, 2, 1, 3], 10: [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]}
 
 
 def data_item(values: NDArray, where: str) -> str:
@@ -33,7 +35,7 @@ def attribute(name: str, centre: str, values: NDArray, where: str) -> str:
 
 
 def topology(cells: NDArray, where: str) -> str:
-    """Returns the XDMF element of the tetrahedra or triangles stored at `where`."""
+    """Returns the XDMF element of the tetrahedra (of 4 or 10 nodes) or triangles stored at `where`."""
     item = data_item(cells, where)
     return f'<Topology TopologyType="{XDMF_TOPOLOGY[cells.shape[1]]}" NumberOfElements="{len(cells)}">{item}</Topology>'
 
@@ -85,6 +87,8 @@ def write_tetrahedral_mesh(
 def read_tetrahedral_mesh(path: str | PathLike[str]) -> TetrahedralMesh:
     """Returns the tetrahedra of an XDMF file (or any file that meshio reads), every volume made positive.
 
+    They are quadratic where the file has tetrahedra of ten nodes.
+
     Raises
     ------
     InputError
@@ -96,18 +100,18 @@ def read_tetrahedral_mesh(path: str | PathLike[str]) -> TetrahedralMesh:
     if wrong:
         raise InputError("has points that are not numbers", path=path, found=f"{wrong} of {len(points)}")
     used, local = np.unique(tets, return_inverse=True)
-    mesh = TetrahedralMesh(points[used], local.reshape(-1, 4))
+    mesh = TetrahedralMesh(points[used], local.reshape(tets.shape))
     volumes = signed_volumes(mesh)
     if (volumes == 0).any():
         raise InputError("has elements without volume", path=path, found=f"{int((volumes == 0).sum())}")
-    turned = np.where((volumes < 0)[:, None], mesh.tets[:, [0, 2, 1, 3]], mesh.tets)
+    turned = np.where((volumes < 0)[:, None], mesh.tets[:, TURNED[mesh.tets.shape[1]]], mesh.tets)
     return TetrahedralMesh(mesh.vertices, turned)
 
 
 def _content(path: Path) -> tuple[meshio.Mesh, NDArray]:
     try:
         read = meshio.read(path)
-        return read, read.cells_dict["tetra"]
+        return read, read.cells_dict["tetra10" if "tetra10" in read.cells_dict else "tetra"]
     except KeyError:
         raise InputError("holds no tetrahedra", path=path, found=sorted(read.cells_dict) or "no cells") from None
     except (Exception, SystemExit) as error:  # meshio leaves through sys.exit on files that it does not know

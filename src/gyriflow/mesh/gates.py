@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from .quality import dihedral_angles, radius_ratios
+from .quality import dihedral_angles, jacobian_ratios, radius_ratios
 
 
 def refuse_bad_mesh(
@@ -20,6 +20,7 @@ def refuse_bad_mesh(
     min_dihedral_deg: float,
     max_dihedral_deg: float,
     min_volume_mm3: float,
+    min_jacobian_ratio: float,
     max_volume_change: float,
     max_surface_distance_mm: float,
     min_gap_kept: float,
@@ -30,7 +31,7 @@ def refuse_bad_mesh(
     each other are always refused. `path` is for the message: where the mesh can be looked at.
     """
     faults = [
-        *_bad_elements(mesh, min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3),
+        *_bad_elements(mesh, min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3, min_jacobian_ratio),
         *_departures(summary, max_volume_change, max_surface_distance_mm, min_gap_kept),
     ]
     if faults:
@@ -45,10 +46,16 @@ def refuse_bad_mesh(
 
 
 def _bad_elements(
-    mesh: TetrahedralMesh, least_ratio: float, least_angle: float, largest_angle: float, least_volume: float
+    mesh: TetrahedralMesh,
+    least_ratio: float,
+    least_angle: float,
+    largest_angle: float,
+    least_volume: float,
+    least_jacobian: float,
 ) -> list[tuple[str, str]]:
     """Returns what was found and what was expected of elements, a pair for each limit that some of them pass."""
     ratio, angles, volume = radius_ratios(mesh), dihedral_angles(mesh), signed_volumes(mesh)
+    jacobian = jacobian_ratios(mesh)
     sharp, blunt = angles.min(axis=1), angles.max(axis=1)
     angle = "dihedral angle in degrees"
     limits = [
@@ -56,11 +63,12 @@ def _bad_elements(
         (angle, sharp, sharp < least_angle, sharp.argmin(), f"at least {least_angle:g}"),
         (angle, blunt, blunt > largest_angle, blunt.argmax(), f"at most {largest_angle:g}"),
         ("volume in mm3", volume, volume < least_volume, volume.argmin(), f"at least {least_volume:g}"),
+        ("ratio of Jacobians", jacobian, jacobian < least_jacobian, jacobian.argmin(), f"at least {least_jacobian:g}"),
     ]
     faults = []
     for name, values, bad, worst, limit in limits:
         if bad.any():
-            place = np.round(mesh.vertices[mesh.tets[worst]].mean(axis=0), 1).tolist()
+            place = np.round(mesh.vertices[mesh.corners[worst]].mean(axis=0), 1).tolist()
             found = f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at {place} mm"
             faults.append((found, f"{name} {limit}"))
     return faults

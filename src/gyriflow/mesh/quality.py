@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.crossings import crossing_faces
+from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, radius_ratios, signed_volumes
 from ..geometry.triangles import TriangleMesh, area, face_areas, mean_edge_length, signed_volume
 from .fidelity import gap_kept, gap_summary, gap_walls, surface_distance
@@ -16,9 +17,19 @@ EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
 
 
+def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
+    """Returns for each of (m,) elements a lower bound of the determinant of its map, over the mean.
+
+    It is 1 for straight sides with nodes on their middles, and positive only where the element folds over nowhere.
+    """
+    if mesh.order == 1:
+        return np.ones(len(mesh.tets))
+    return lower_bounds(mesh.vertices, mesh.tets) / (6 * signed_volumes(mesh))
+
+
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Returns the (m, 6) angles in degrees between the faces at each edge."""
-    corner = mesh.vertices[mesh.tets]
+    """Returns the (m, 6) angles in degrees between the faces at each edge, as they are between the corners."""
+    corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
     for i, ((a, b), (c, d)) in enumerate(zip(EDGES, OPPOSITE, strict=True)):
         edge = corner[:, b] - corner[:, a]
@@ -29,7 +40,7 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
 
 
 def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
-    """Returns per element radius_ratio, min_dihedral_deg, max_dihedral_deg and volume_mm3."""
+    """Returns per element radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3 and jacobian_ratio."""
     angles = dihedral_angles(mesh)
     return pd.DataFrame(
         {
@@ -37,6 +48,7 @@ def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
             "min_dihedral_deg": angles.min(axis=1),
             "max_dihedral_deg": angles.max(axis=1),
             "volume_mm3": signed_volumes(mesh),
+            "jacobian_ratio": jacobian_ratios(mesh),
         }
     )
 
@@ -47,8 +59,8 @@ def elements_through(mesh: TetrahedralMesh, thickness_mm: float) -> float:
     Those elements count whose centroid lies within `thickness_mm` of a vertex of the surface.
     """
     outer = np.unique(boundary_faces(mesh)[0])
-    depth = cKDTree(mesh.vertices[outer]).query(mesh.vertices[mesh.tets].mean(axis=1))[0]
-    corner = mesh.vertices[mesh.tets[depth <= thickness_mm]]
+    depth = cKDTree(mesh.vertices[outer]).query(mesh.vertices[mesh.corners].mean(axis=1))[0]
+    corner = mesh.vertices[mesh.corners[depth <= thickness_mm]]
     lengths = [np.linalg.norm(corner[:, b] - corner[:, a], axis=1) for a, b in EDGES]
     return float(thickness_mm / np.mean(lengths))
 
@@ -57,7 +69,8 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     """Returns counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
     `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
-    that of the volume, relative to the one inside it; `gap_mm` holds the gaps of both, and `gap_kept` the share of the
+    that of the volume, relative to the one inside it. Of quadratic elements all of them are taken on the triangles
+    between nodes. `gap_mm` holds the gaps of both, and `gap_kept` the share of the
     given one's gaps that the mesh leaves open, None where it has none (see `fidelity`). `histogram` holds for radius
     ratio, dihedral angles and volume the edges of the classes and the number of elements in each.
     """
@@ -72,6 +85,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "volume_mm3": 10.0 ** (np.arange(*_tenths_of_decades(volume)) / 10),
     }
     return {
+        "order": mesh.order,
         "tets": len(mesh.tets),
         "vertices": len(mesh.vertices),
         "pial_faces": len(own.faces),
@@ -90,6 +104,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "min_dihedral_deg": float(quality["min_dihedral_deg"].min()),
         "max_dihedral_deg": float(quality["max_dihedral_deg"].max()),
         "min_volume_mm3": float(volume.min()),
+        "min_jacobian_ratio": float(quality["jacobian_ratio"].min()),
         "histogram": {
             name: {"edges": edges.tolist(), "counts": np.histogram(quality[name], edges)[0].tolist()}
             for name, edges in classes.items()

@@ -8,8 +8,9 @@ import numpy as np
 from ..errors import MeshError
 from ..geometry.crossings import crossing_faces
 from ..geometry.remeshing import remeshed, untangled
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
+from ..geometry.tetrahedra import PIECES_OF_ORDER, TetrahedralMesh, boundary_surface, signed_volumes
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
+from .curving import curved
 from .improvement import improved
 from .meshers import run_mesher
 from .sizing import background_mesh, edge_length_for
@@ -37,6 +38,7 @@ def tetrahedralise(
     pial_faces: int | None = None,
     fine_depth_edges: float = 2.5,
     edge_growth: float = 0.5,
+    order: int = 1,
 ) -> TetrahedralMesh:
     """Returns a tetrahedral mesh of the inside of a closed surface.
 
@@ -45,7 +47,8 @@ def tetrahedralise(
     surface
         Closed, outward, in mm; one or more components.
     surface_edge_mm, core_edge_mm
-        Edge length at the surface, and deep inside.
+        Distance of neighbouring nodes at the surface, and deep inside: the edge length of linear elements, and half
+        of that of quadratic ones. So both orders have about as many nodes.
     envelope_mm
         How far pytetwild may leave the given surface.
     time_limit_s
@@ -55,10 +58,12 @@ def tetrahedralise(
         "tetgen" keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as
         their quality allows, and the poor ones are improved.
     pial_faces
-        About how many faces the mesh's surface is to have; `surface_edge_mm` then follows from it.
+        About how many triangles between nodes the mesh's surface is to have; `surface_edge_mm` then follows from it.
     fine_depth_edges, edge_growth
-        For pytetwild: down to this depth in surface edges elements are as fine as at the surface; below, edges grow
-        by this part of each mm.
+        For pytetwild: down to this depth in surface edges elements are as fine as at the surface; below, distances of
+        nodes grow by this part of each mm.
+    order
+        1 for linear elements; 2 for quadratic ones, curved to follow the given surface.
 
     Raises
     ------
@@ -69,17 +74,18 @@ def tetrahedralise(
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
         raise MeshError("the surface to be filled must be closed and face outwards", remedy="Repair it first.")
-    edge = edge_length_for(surface, pial_faces) if pial_faces else surface_edge_mm
-    core = max(core_edge_mm, edge)
+    faces = pial_faces // PIECES_OF_ORDER[order] if pial_faces else None
+    edge = edge_length_for(surface, faces) if faces else order * surface_edge_mm
+    core = max(order * core_edge_mm, edge)
     if mesher == "tetgen":
-        even = even_surface(surface, edge, pial_faces)
+        even = even_surface(surface, edge, faces)
         arrays: dict[str, Any] = {
             "vertices": even.vertices,
             "faces": even.faces,
             "volume": REGULAR_VOLUME * core**3,
         }
     else:
-        background, lengths = background_mesh(surface, edge, core, fine_depth_edges, edge_growth)
+        background, lengths = background_mesh(surface, edge, core, fine_depth_edges / order, order * edge_growth)
         arrays = {
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -92,7 +98,8 @@ def tetrahedralise(
     mesh = run_mesher(mesher, arrays, time_limit_s)
     _refuse_other_shape(mesh, surface)
     # fTetWild has optimised its elements itself
-    return improved(mesh) if mesher == "tetgen" else mesh
+    mesh = improved(mesh) if mesher == "tetgen" else mesh
+    return curved(mesh, surface) if order == 2 else mesh
 
 
 def even_surface(surface: TriangleMesh, edge_mm: float, faces: int | None) -> TriangleMesh:

@@ -10,10 +10,10 @@ from .settings import refused
 
 
 def _absolute(path: str, info: ValidationInfo) -> str:
-    """Returns the absolute path of a file; refused where there is none.
+    """Returns the absolute path of a file, which must exist.
 
-    With the context `folder`, that of the configuration, where relative paths are looked for before the working
-    directory. `awaited` are files that need not be there yet. Without a context a path stays as it is.
+    The context names the `folder` of the configuration, which is searched for relative paths before the working
+    directory, and `awaited` files, which need not exist yet. Without a context the path is returned unchanged.
     """
     if not info.context:
         return path
@@ -29,7 +29,7 @@ InputFile = Annotated[str, AfterValidator(_absolute)]
 
 
 def _present_instead(path: Path) -> str:
-    """Returns the files beside a missing one that differ from it in a number only, such as those of other weeks."""
+    """Returns the files beside a missing one that differ from it only in a number, such as other weeks."""
     pattern = re.compile(re.sub(r"\d+(\\\.\d+)?", r"[0-9.]+", re.escape(path.name)))
     try:
         names = sorted(other.name for other in path.parent.iterdir() if pattern.fullmatch(other.name))

@@ -1,4 +1,4 @@
-"""The mechanical model, its parameters and its numerics, as a study gives them and as a run takes them."""
+"""The mechanical model, its parameters and its numerics: settings of a study, parameters of a run."""
 
 import math
 from collections.abc import Iterator
@@ -61,14 +61,14 @@ class Contact(Settings):
         gt=0, le=5,
     )  # fmt: skip
     stiffness_pa: float | None = setting(
-        None, "Pa", "With `global`, stiffness of the barrier; null: a tenth of the cortex's largest shear modulus.",
+        None, "Pa", "With `global`, stiffness of the barrier; `null`: a tenth of the cortex's largest shear modulus.",
         gt=0, le=1e9,
     )  # fmt: skip
     penalty_pa_per_m: float = setting(5.0e5, "Pa/m", "With `planes`, pressure per depth of penetration.", gt=0, le=1e9)
     gap_mm: float = setting(
         2.5, "mm",
-        "Width of the fissure: the planes are a quarter of it off; between them nothing grows. With all kinds but "
-        "`none`.",
+        "Width of the fissure. The planes are a quarter of it from the middle, and nothing grows between them. With "
+        "all kinds but `none`.",
         gt=0, le=20,
     )  # fmt: skip
 
@@ -78,10 +78,10 @@ class NoGrowth(Settings):
 
     kind: Literal["ellipsoid", "none"] = setting(
         "ellipsoid", "",
-        "`ellipsoid`: nothing grows in it, nor in the bridge between the hemispheres; `none`: all tissue grows.",
+        "`ellipsoid`: no growth in it, nor in the bridge between the hemispheres; `none`: all tissue grows.",
     )  # fmt: skip
-    shift_y: float = setting(0.05, "Y-extent", "Shift of its centre from the middle, to anterior.", ge=-1, le=1)
-    shift_z: float = setting(-0.15, "Z-extent", "Shift of its centre from the middle, to superior.", ge=-1, le=1)
+    shift_y: float = setting(0.05, "Y-extent", "Anterior shift of its centre from the middle.", ge=-1, le=1)
+    shift_z: float = setting(-0.15, "Z-extent", "Superior shift of its centre from the middle.", ge=-1, le=1)
     semi_axes: tuple[Fraction, Fraction, Fraction] = setting(
         (0.35, 0.40, 0.50), "extents", "Semi-axes along X, Y, Z, each above 0 and at most 2."
     )
@@ -91,7 +91,7 @@ class Solver(Settings):
     """The nonlinear and the linear solver."""
 
     newton_tolerance: float = setting(
-        1e-6, "", "Newton ends where the residual has fallen to this fraction of that at u = 0.", gt=0, lt=1
+        1e-6, "", "Newton stops when the residual has fallen to this fraction of its value at u = 0.", gt=0, lt=1
     )
     krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
     max_newton: int = setting(20, "", "Newton iterations without progress before a step is halved.", ge=1, le=200)
@@ -132,7 +132,7 @@ class Follow(Settings):
 
 
 class FoldingSettings(Settings):
-    """The mechanical model, its parameters and its numerics; reference values of the paper."""
+    """The mechanical model, its parameters and its numerics. The defaults are the reference values of the paper."""
 
     preset: Literal["fetalfoldsim", "measured"] | None = setting(
         None, "",
@@ -142,14 +142,14 @@ class FoldingSettings(Settings):
     )  # fmt: skip
     end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
     step_s: float = setting(
-        43200.0, "s", "Time step; the last one before an output is shortened where it does not fit.", gt=0, le=604800
+        43200.0, "s", "Time step; the last one before an output week is shortened to fit.", gt=0, le=604800
     )
-    thickness_mm: VaryingNumber = varying(1.5, "mm", "Cortical thickness H, at the start where it grows.", gt=0, le=10)
+    thickness_mm: VaryingNumber = varying(1.5, "mm", "Cortical thickness H; at the start if it grows.", gt=0, le=10)
     thickness_growth_mm_per_gw: float = setting(
-        0.0, "mm/GW", "Growth of the thickness, H = H₀ + β·t from the start on.", ge=-1, le=1
+        0.0, "mm/GW", "Growth β of the thickness since the start, H = H₀ + β·t.", ge=-1, le=1
     )
     shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
-    shear_modulus_core_pa: VaryingNumber = varying(300.0, "Pa", "Shear modulus of what lies under it.", gt=0, le=1e7)
+    shear_modulus_core_pa: VaryingNumber = varying(300.0, "Pa", "Shear modulus of the core.", gt=0, le=1e7)
     material: MaterialName = setting(
         "neo-hookean", "", "Constitutive law; docs/model.md gives the energy of each. The paper's is `neo-hookean`."
     )
@@ -158,11 +158,11 @@ class FoldingSettings(Settings):
         2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated`: from the brains' areas.", ge=-1e-5, le=1e-5
     )
     radial_growth_rate_per_s: VaryingNumber = varying(
-        0.0, "1/s", "Growth rate along the cortical normal, under the cortex.", ge=-1e-5, le=1e-5
+        0.0, "1/s", "Radial growth rate of the core, along the cortical normal.", ge=-1e-5, le=1e-5
     )
     core_growth_rate_per_s: VaryingOrEstimated = varying(
         0.0, "1/s",
-        "Growth rate in all directions, under the cortex; `estimated`: from the brains' volumes.", ge=-1e-5, le=1e-5,
+        "Isotropic growth rate of the core; `estimated`: from the brains' volumes.", ge=-1e-5, le=1e-5,
     )  # fmt: skip
     follow: Follow | None = setting(
         None, "", "Growth that follows curves of area and volume; the two growth rates then have no meaning."
@@ -170,7 +170,7 @@ class FoldingSettings(Settings):
     allow_negative_growth: bool = setting(False, "", "Whether the growth rates may be negative (atrophy).")
     stress_memory_gw: Memory = setting(
         0.0, "GW",
-        "Time in which elastic stress relaxes: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
+        "Relaxation time of elastic stress: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
         word="infinite",
     )  # fmt: skip
     time_scheme: Literal["implicit", "adams-bashforth", "midpoint"] = setting(
@@ -181,13 +181,13 @@ class FoldingSettings(Settings):
     )  # fmt: skip
     support: Literal["ellipsoid", "base", "box", "free"] = setting(
         "ellipsoid", "",
-        "What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth, `base` the flat base, "
-        "`box` too and lets the upright sides slide, `free` nothing (rigid motions are removed).",
+        "How the brain is held: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the flat "
+        "base; `box` does too and lets the upright sides slide; `free`: unconstrained (rigid motions are removed).",
     )  # fmt: skip
     contact: Contact = setting(Contact(), "", "Contact.")
-    no_growth: NoGrowth = setting(NoGrowth(), "", "Where nothing grows.")
+    no_growth: NoGrowth = setting(NoGrowth(), "", "Tissue that does not grow.")
     output_every_gw: float = setting(
-        1.0, "GW", "Spacing of the output weeks; the start and the end are always among them.", ge=0.01, le=10
+        1.0, "GW", "Interval between output weeks; the start and the end are always included.", ge=0.01, le=10
     )
     fields: tuple[FieldName, ...] = setting(
         ("displacement", "cortex_weight", "growth"), "", "Fields written for ParaView at each output week."
@@ -230,9 +230,9 @@ def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[fl
 
 
 class FoldingParameters(FoldingSettings):
-    """All that a run needs to know, the content of its `params.yaml`: settings, start, output weeks and fissure.
+    """The content of a run's `params.yaml`: settings, start, output weeks and fissure.
 
-    A map goes by the name of the parameter that it belongs to.
+    A map has the name of its parameter.
     """
 
     start_week: Week = setting(..., "GW", "Gestational age at the start.")
@@ -262,7 +262,7 @@ class FoldingParameters(FoldingSettings):
     def _no_estimates_left(self) -> Iterator[Problem]:
         for key in GROWTH_RATES:
             if self.has(key) and getattr(self, key) == "estimated":
-                yield Problem("found 'estimated'; it should be the curve of the growth stage", (key,))
+                yield Problem("found 'estimated'; expected the curve of the growth stage", (key,))
 
     @check
     def _values_are_possible(self) -> Iterator[Problem]:
@@ -275,14 +275,14 @@ def thickness_at(p: FoldingSettings, start_week: float, week: float, maps: Maps)
 
 
 def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[Problem]:
-    """Yields what is wrong between the settings of a run over all its weeks and places.
+    """Yields the inconsistencies between the settings of a run, over all its weeks and vertices.
 
     Parameters whose maps are not among `maps`, and estimated ones, are left out.
 
     Parameters
     ----------
     start
-        What the start is called in messages, such as "the week of the start brain a".
+        Name of the start in messages, such as "the week of the start brain a".
     """
     groups = (_week_problems, _thickness_problems, _stiffness_problems, _growth_problems, _step_problems)
     for problems in (*groups, _scheme_problems):
@@ -290,7 +290,7 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
 
 
 def _known(p: FoldingSettings, key: str, maps: Maps) -> Any:
-    """Returns the value of a parameter that may vary, None where it is estimated or its map is not there."""
+    """Returns the value of a parameter that may vary; None if it is estimated or its map is missing."""
     value = getattr(p, key)
     missing = isinstance(value, Varying) and value.map is not None and value.map not in maps
     return None if missing or value == "estimated" else value

@@ -1,4 +1,4 @@
-"""What is said of settings that are not valid: the full path of each key, what was found, what is allowed."""
+"""Messages about invalid settings: the full path of each key, what was found, what is allowed."""
 
 import difflib
 from collections.abc import Iterable
@@ -30,14 +30,14 @@ def dotted(path: Path) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Returns what to say of an unknown name: the nearest one that is known, or all of them."""
+    """Returns a hint for an unknown name: the most similar known name, or all of them."""
     known = list(known)
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
 
 
 def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Path, str]:
-    # names of the kinds of a value stand in parentheses
+    # pydantic puts the tag of a union's member, here in parentheses, into the path
     path = tuple(part for part in details["loc"] if not str(part).startswith("("))
     match details["type"]:
         case t if t == PROBLEM:
@@ -53,7 +53,7 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Path, str]:
 
 
 def keys_at(kind: Any, path: Path) -> list[str]:
-    """Returns the keys of the settings that stand at `path` inside the type `kind`."""
+    """Returns the keys of the settings at `path` inside the type `kind`."""
     origin, arguments = get_origin(kind), get_args(kind)
     if path and origin in (dict, tuple):
         return keys_at(arguments[1 if origin is dict else 0], path[1:])

@@ -1,4 +1,4 @@
-"""From the content of a `params.yaml` to the parameters of a run, and what its maps must be."""
+"""The parameters of a run from the content of its `params.yaml`, and checks of its maps."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ def parameters_from(values: Any) -> FoldingParameters:
 
 
 def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
-    """Raises InputError where a map is missing, does not fit the mesh, or holds values that cannot be."""
+    """Raises InputError where a map is missing, does not fit the mesh, or holds impossible values."""
     for name in sorted(p.maps):
         if name not in maps:
             raise InputError(f"the map {name} is missing", expected="a file with it, given with --maps")

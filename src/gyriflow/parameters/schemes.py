@@ -11,20 +11,20 @@ Label = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
 class SchemeSettings(Settings):
-    """What the labels of a volume mean; 0 is background. A brain uses it by its name, as `scheme: NAME`."""
+    """The meaning of the labels of a volume; 0 is background. A brain refers to it by name: `scheme: NAME`."""
 
     cerebrum: tuple[Label, ...] = setting(
-        ..., "", "Labels that together fill the cerebrum inside the pial surface; each has to be there."
+        ..., "", "Labels that together fill the cerebrum inside the pial surface; each must occur in the volume."
     )
     cortex: tuple[Label, ...] = setting(
-        (), "", "Those of them that are cortex; with them, the fissure is opened and cortical thickness estimated."
+        (), "", "Those that are cortex; with them the fissure is opened and cortical thickness estimated."
     )
     left: tuple[Label, ...] = setting(
-        (), "", "Those of them that lie in the left hemisphere only; with `right`, they part the hemispheres."
+        (), "", "Those that lie in the left hemisphere only; with `right`, they separate the hemispheres."
     )
-    right: tuple[Label, ...] = setting((), "", "Those of them that lie in the right hemisphere only.")
+    right: tuple[Label, ...] = setting((), "", "Those that lie in the right hemisphere only.")
     known: dict[Label, str] = setting(
-        {}, "", "Tissue by label, as `{4: outer CSF}`; any label that is in no list has to stand here."
+        {}, "", "Tissue by label, such as `{4: outer CSF}`; every label that is in no list must be named here."
     )
 
     @property

@@ -1,8 +1,8 @@
 """The base of all settings: each key has its unit, bounds and description, and all problems are reported at once.
 
-Keys by themselves are checked by pydantic. A check across keys is a method with the decorator `check` that yields a
-`Problem` for each thing that is wrong. Checks are made even where other keys are wrong: then the settings hold only
-what is valid, and a check ends at the first key that is not.
+Pydantic checks single keys. A check across keys is a method with the decorator `check` that yields a `Problem` for each
+mistake. Checks run even if some keys are invalid: the settings then hold only the valid keys, and a check stops at the
+first key that is missing.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -24,35 +24,35 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 PROBLEM = "problem"
-"""Type of the errors whose message is a whole sentence of ours."""
+"""Type of the errors whose message is complete as it is."""
 _NOTHING = object()
 
 
 class NotValidError(AttributeError):
-    """A key that is missing or wrong is asked for by a check."""
+    """A check asks for a key that is missing or invalid."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What is wrong, and the path of the key that it is said of, below the settings that are checked."""
+    """A mistake, and the path of its key below the settings that are checked."""
 
     text: str
     key: tuple[str | int, ...] = ()
 
 
 def check[Check: Callable[[Any], Iterator[Problem]]](method: Check) -> Check:
-    """Makes a method of settings that yields problems a check across their keys."""
+    """Marks a method of settings that yields problems as a check across their keys."""
     method.is_check = True  # type: ignore[attr-defined]
     return method
 
 
 def refused(text: str) -> PydanticCustomError:
-    """Returns the error that a validator of one key raises where `text` is to be said of it as it stands."""
+    """Returns the error that a validator of one key raises so that `text` becomes its whole message."""
     return PydanticCustomError(PROBLEM, text)
 
 
 def up_to_invalid(problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Yields problems until one needs a key that is itself missing or wrong."""
+    """Yields problems until one needs a key that is missing or invalid."""
     with suppress(NotValidError):
         yield from problems
 
@@ -80,7 +80,7 @@ class Settings(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
-        # a section of which nothing is given, as in `mesh:`
+        # an empty section, such as `mesh:`
         raw = {} if raw is None else raw
         errors: list[InitErrorDetails] = []
         try:
@@ -98,7 +98,7 @@ class Settings(BaseModel):
 
     @classmethod
     def _valid_part(cls, raw: Mapping[str, Any], wrong: set[str], context: Any) -> Self:
-        """Returns settings that hold the valid keys of `raw` and defaults, but none of the keys that are `wrong`."""
+        """Returns settings with the valid keys of `raw` and the defaults, without the keys in `wrong`."""
         values = {}
         for name in raw.keys() & cls.model_fields.keys():
             value = valid_part(cls.model_fields[name].rebuild_annotation(), raw[name], context, whole=name not in wrong)
@@ -121,14 +121,14 @@ class Settings(BaseModel):
         return all(hasattr(self, key) for key in keys)
 
     def gives(self, key: str) -> bool:
-        """Returns whether a key was given, with any value but null, right or wrong."""
+        """Returns whether a key was given with a value other than null, valid or not."""
         return key in self.model_fields_set and self.__dict__.get(key, _NOTHING) is not None
 
 
 def setting(default: Any, unit: str, description: str, *, word: str | None = None, **bounds: Any) -> Any:
-    """Returns a pydantic field with its unit; `default` is ... where the user has to give the value.
+    """Returns a pydantic field with its unit; `default` is ... if the user has to give the value.
 
-    `word` may stand in the place of a number. `bounds` are those of pydantic: gt, ge, lt, le, min_length, max_length,
+    `word` is accepted in place of a number. `bounds` are those of pydantic: gt, ge, lt, le, min_length, max_length,
     pattern.
     """
     extra: dict[str, Any] = {"unit": unit} if word is None else {"unit": unit, "word": word}
@@ -136,7 +136,7 @@ def setting(default: Any, unit: str, description: str, *, word: str | None = Non
 
 
 def valid_part(kind: Any, raw: Any, context: Any, *, whole: bool) -> Any:
-    """Returns what is valid of a value of the type `kind`: settings, and settings in lists and tables, in part."""
+    """Returns the valid part of a value of the type `kind`, for settings and for lists and tables of settings."""
     if whole:
         try:
             return TypeAdapter(kind).validate_python(raw, context=context)
@@ -160,6 +160,6 @@ def valid_part(kind: Any, raw: Any, context: Any, *, whole: bool) -> Any:
 
 
 def _again(details: Any) -> InitErrorDetails:
-    """Returns an error that pydantic has reported in the form in which it can be raised again."""
+    """Converts an error that pydantic has reported into a form that can be raised again."""
     kind = refused(details["msg"]) if details["type"] == PROBLEM else details["type"]
     return InitErrorDetails(type=kind, loc=details["loc"], input=details["input"], ctx=details.get("ctx", {}))

@@ -1,4 +1,4 @@
-"""Settings of the brains that the workflow makes itself: phantoms and simple shapes."""
+"""Settings of synthetic brains: phantoms and simple shapes."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -8,7 +8,7 @@ from pydantic import Field
 from .settings import Problem, Settings, check, setting
 
 PHANTOM_WEEKS = (21.0, 36.0)
-"""Gestational weeks of which phantoms can be made, the first and the last."""
+"""First and last gestational week of phantoms."""
 
 ShapeKind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
 SHAPE_SIZES: dict[ShapeKind, str] = {
@@ -19,18 +19,18 @@ SHAPE_SIZES: dict[ShapeKind, str] = {
 }
 """The key that holds the size of each kind of shape."""
 MOST_UNEQUAL_AXES = 2.0
-"""Longest over shortest semi-axis of a shape: beyond this its ends are too sharp for even triangles."""
+"""Longest over shortest semi-axis of a shape: beyond this the ends are too sharp for even triangles."""
 MOST_NOISE = 0.02
-"""Height of the bumps over the smallest size of a shape."""
+"""Largest height of the bumps relative to the smallest size of a shape."""
 
 Length = Annotated[float, Field(ge=5, le=150)]
 
 
 class PhantomSettings(Settings):
-    """A synthetic brain, made for the brain's week."""
+    """A synthetic brain of the brain's week."""
 
     voxel_mm: float = setting(0.8, "mm", "Edge of the isotropic voxels.", ge=0.3, le=2.0)
-    seed: int = setting(0, "", "Seed of the folds' random pattern.", ge=0)
+    seed: int = setting(0, "", "Seed of the random pattern of the folds.", ge=0)
     cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
 
 
@@ -53,11 +53,11 @@ class ShapeSettings(Settings):
     )
     noise_mm: float = setting(
         0.05, "mm",
-        "Root mean square height of smooth bumps that folding starts from, at most a fiftieth of the smallest size; "
-        "flat bases and a slab's sides stay flat.",
+        "Root mean square height of smooth bumps that start the folding, at most a fiftieth of the smallest size. Flat "
+        "bases and a slab's sides stay flat.",
         ge=0, le=0.5,
     )  # fmt: skip
-    seed: int = setting(0, "", "Seed of the bumps' random pattern.", ge=0)
+    seed: int = setting(0, "", "Seed of the random pattern of the bumps.", ge=0)
 
     @property
     def size_mm(self) -> tuple[float, float, float]:
@@ -82,7 +82,7 @@ class ShapeSettings(Settings):
     @check
     def _bumps_are_small(self) -> Iterator[Problem]:
         largest = MOST_NOISE * min(self.size_mm)
-        # the default is right for the default sizes only to begin with
+        # the default suits the default sizes; only a given value can be wrong
         if self.gives("noise_mm") and self.noise_mm > largest:
             expected = f"at most {largest:g}, a fiftieth of the smallest size in {SHAPE_SIZES[self.kind]}"
             yield Problem(f"found {self.noise_mm:g}; it should be {expected}", ("noise_mm",))

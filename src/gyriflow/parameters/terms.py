@@ -24,19 +24,19 @@ ELEMENT_FIELDS: tuple[ElementField, ...] = get_args(ElementField)
 REGION_FIELDS: tuple[VertexField, ...] = (
     *("zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal"),
 )
-"""Fields that are shown with the regions, before the solve."""
+"""Fields written with the regions, before the solve."""
 
 MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
-"""Laws of the material; each is a class of `mechanics`."""
+"""Names of the constitutive laws; each is a class of `mechanics.materials`."""
 
 FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y = range(8)
 """Zones of the boundary's facets."""
 ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y")
 """Their names, by code."""
 FLAT_CUTS = (BASE, SIDE_X, SIDE_Y)
-"""Zones that only simple shapes have: tissue is cut off flat, and there is no cortex."""
+"""Zones of simple shapes only: flat cuts through tissue, without cortex."""
 
 LEFT, RIGHT, BRIDGE = 1, 2, 3
-"""Tags of the hemispheres, and of what lies between the planes of contact."""
+"""Tags of the hemispheres, and of the tissue between the contact planes."""
 CORTEX, CORE = 1, 2
 """Tags of the layers."""

@@ -1,4 +1,4 @@
-"""Parameters that vary: a number, a curve over weeks, a map over the brain, a map times a curve, or an estimate."""
+"""Parameters that may vary: a number, a curve over weeks, a map over the brain, map times curve, or an estimate."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
@@ -28,7 +28,7 @@ class Varying(Settings):
     """
 
     weeks: dict[Week, float] | None = setting(
-        None, "GW", "Values by gestational week, as `{21: 1.5, 30: 2.0}`: linear in between, constant beyond."
+        None, "GW", "Values by gestational week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside."
     )
     map: FileOrPair | None = setting(None, "", "File with the values, or the left and the right hemisphere's.")
     surface: FileOrPair | None = setting(None, "", "Surface file, or the left and the right one, of the map.")
@@ -74,7 +74,7 @@ def files_of(files: str | tuple[str, str] | None) -> list[str]:
 
 
 Estimated = Literal["estimated"]
-"""A rate that is the curve which the growth stage finds."""
+"""A rate that the growth stage estimates as a curve."""
 
 
 def _kind(value: Any) -> str:
@@ -87,7 +87,7 @@ VaryingNumber = Annotated[
     Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")],
     Discriminator(lambda value: "(table)" if _kind(value) == "(table)" else "(number)"),
 ]
-"""A number, or what `Varying` says."""
+"""A number, a curve or a map."""
 
 VaryingOrEstimated = Annotated[
     Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")] | Annotated[Estimated, Tag("(word)")],

@@ -229,7 +229,8 @@ def _middle(mesh: TetrahedralMesh) -> Floats:
 def _grid(
     mesh: TetrahedralMesh, fields: Mapping[str, Floats], tags: Mapping[str, NDArray[np.integer]]
 ) -> pv.UnstructuredGrid:
-    grid = pv.UnstructuredGrid({pv.CellType.TETRA: np.array(mesh.tets)}, np.array(mesh.vertices))
+    kind = {1: pv.CellType.TETRA, 2: pv.CellType.QUADRATIC_TETRA}[mesh.order]
+    grid = pv.UnstructuredGrid({kind: np.array(mesh.tets)}, np.array(mesh.vertices))
     for name, values in fields.items():
         grid.point_data[name] = np.asarray(values, dtype=float)
     for name, codes in tags.items():

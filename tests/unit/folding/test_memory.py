@@ -12,7 +12,7 @@ STRETCH = np.eye(3) + 0.1 * (lambda a: a + a.T)(RANDOM.standard_normal((3, 3)))
 
 def test_packing_keeps_symmetric_tensors():
     np.testing.assert_array_equal(unpacked(packed(STRETCH[None]))[0], STRETCH)
-    np.testing.assert_array_equal(unpacked(unstretched(4)), np.tile(np.eye(3), (4, 1, 1)))
+    np.testing.assert_array_equal(unpacked(unstretched(4, 2)), np.tile(np.eye(3), (4, 2, 1, 1)))
 
 
 def test_a_rotation_is_forgotten_and_the_stretch_kept():

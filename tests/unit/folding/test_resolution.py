@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 from shapes import box_mesh
 
+from gyriflow.folding.__main__ import predicted_memory_mib
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.resolution import elements_through, resolution_warning, stiffness_warning, worst_quality
 from gyriflow.folding.simulation import unconverged_warning
@@ -40,11 +41,13 @@ def rows(*through):
 
 
 def test_a_cortex_that_outgrows_its_elements_is_told_once():
-    assert resolution_warning(rows(2.3, 2.1)) == ""
-    assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9))
-    assert resolution_warning(rows(2.3, 1.9, 1.8)) == ""
-    assert "fewer than 2" in resolution_warning(rows(1.5))
-    assert resolution_warning(rows(np.nan)) == ""
+    assert resolution_warning(rows(2.3, 2.1), 1) == ""
+    assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9), 1)
+    assert resolution_warning(rows(2.3, 1.9, 1.8), 1) == ""
+    assert "fewer than 2" in resolution_warning(rows(1.5), 1)
+    assert resolution_warning(rows(1.5), 2) == ""
+    assert "fewer than 1" in resolution_warning(rows(1.2, 0.9), 2)
+    assert resolution_warning(rows(np.nan), 1) == ""
 
 
 def test_nearly_incompressible_tissue_is_told():
@@ -56,3 +59,15 @@ def test_a_step_above_its_tolerance_is_told():
     row = {"step": 7, "residual": 3e-6, "converged": True}
     assert unconverged_warning(row) == ""
     assert "step 7" in unconverged_warning(row | {"converged": False})
+
+
+@pytest.mark.parametrize(
+    ("tets", "ranks", "contact", "measured"),
+    [
+        *((59_497, 1, "global", 428), (59_497, 2, "global", 776), (151_021, 1, "global", 696)),
+        *((151_021, 2, "global", 1193), (463_621, 2, "global", 2964), (463_621, 2, "planes", 2479)),
+        *((1_048_961, 1, "planes", 2772), (1_048_961, 2, "planes", 4596)),
+    ],
+)
+def test_predicted_memory_is_what_runs_have_taken(tets, ranks, contact, measured):
+    assert predicted_memory_mib(tets, ranks, contact) == pytest.approx(measured, rel=0.1)

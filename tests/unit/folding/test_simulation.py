@@ -39,7 +39,7 @@ class Stepper:
 
     def __init__(self, longest, **changes):
         self.parameters = parameters_from(RUN | {"output_weeks": [21.0, 22.0]} | changes)
-        self.domain = SimpleNamespace(comm=MPI.COMM_SELF)
+        self.domain = SimpleNamespace(comm=MPI.COMM_SELF, order=1)
         self.longest = longest
 
     def step(self, state, step_s):

@@ -25,7 +25,7 @@ from gyriflow.folding.stress import (
     von_mises,
 )
 from gyriflow.folding.zones import Zones
-from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import MATERIALS, CompressibleNeoHookean, Material, NeoHookean
 from gyriflow.parameters.terms import FREE, MaterialName
 
@@ -37,23 +37,27 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @cache
-def problem_of(law: type[Material]) -> Problem:
+def problem_of(law: type[Material], order: int) -> Problem:
     """Returns a problem on a few elements that may remember stress."""
     mesh = box_mesh((1, 1, 1), (2.0, 3.0, 1.0))
+    mesh = quadratic(mesh) if order == 2 else mesh
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
     return Problem(Domain(MPI.COMM_SELF, mesh), zones, law(0.45), remembers_stress=True)
 
 
 def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):
-    """Returns the tensor that a problem has in its elements after a homogeneous deformation."""
-    problem = problem_of(law)
-    x, cells = problem.domain.local(problem.domain.positions), len(problem.domain.cells)
-    ones = np.ones(len(x))
-    problem.set_layers(MU * ones, dg * ones, dr * ones, np.tile(normal, (cells, 1)))
-    problem.set_stretch(np.tile(np.eye(3) if stretch is None else stretch, (cells, 1, 1)))
-    problem.set_displacement(x @ (F - np.eye(3)).T)
-    tensors = problem.outcome(name)
+    """Returns the tensor that linear and quadratic elements have at all points after a homogeneous deformation."""
+    found = []
+    for order in (1, 2):
+        problem = problem_of(law, order)
+        x, cells = problem.domain.local(problem.domain.positions), len(problem.domain.cells)
+        ones, points = np.ones(len(x)), len(problem.points.weights)
+        problem.set_layers(MU * ones, dg * ones, dr * ones, np.tile(normal, (cells, 1)))
+        problem.set_stretch(np.tile(np.eye(3) if stretch is None else stretch, (cells, points, 1, 1)))
+        problem.set_displacement(x @ (F - np.eye(3)).T)
+        found.append(problem.outcome(name).reshape(-1, 3, 3))
+    tensors = np.concatenate(found)
     np.testing.assert_allclose(tensors, np.broadcast_to(tensors[0], tensors.shape), rtol=1e-9, atol=1e-9)
     return tensors[:1]
 
@@ -73,11 +77,17 @@ def energy(Fe, law):
     return float(law.energy_density(ufl.as_matrix(Fe.tolist()), MU, K)(()))
 
 
-def test_every_element_of_an_affine_motion_has_its_gradient():
+@pytest.mark.parametrize("order", [1, 2])
+def test_every_element_of_an_affine_motion_has_its_gradient(order):
     mesh = box_mesh((2, 3, 2), (2.0, 3.0, 1.0))
+    if order == 2:  # with curved sides
+        mesh = quadratic(mesh)
+        mesh = TetrahedralMesh(mesh.vertices + RNG.uniform(-0.02, 0.02, mesh.vertices.shape), mesh.tets)
+    points = problem_of(NeoHookean, order).points
     moved = mesh.vertices @ SOME[0].T + [5.0, -1.0, 2.0]
-    F = deformation_gradients(mesh.vertices, moved, mesh.tets)
-    np.testing.assert_allclose(F, np.broadcast_to(SOME[0], (len(mesh.tets), 3, 3)), atol=1e-12)
+    F = deformation_gradients(mesh.vertices, moved, mesh.tets, points.slopes)
+    assert F.shape == (len(mesh.tets), len(points.weights), 3, 3)
+    np.testing.assert_allclose(F, np.broadcast_to(SOME[0], F.shape), atol=1e-12)
 
 
 def test_the_elastic_part_is_what_growth_and_old_stretch_leave():

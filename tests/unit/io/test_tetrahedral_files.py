@@ -7,7 +7,8 @@ import pyvista
 from shapes import box_mesh
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from gyriflow.geometry.jacobians import lower_bounds
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, quadratic, signed_volumes
 from gyriflow.io.frames import (
     join_frames,
     read_cell_field,
@@ -30,6 +31,39 @@ def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path):
     other = meshio.read(path)
     np.testing.assert_array_equal(other.point_data["p"], mesh.vertices)
     np.testing.assert_allclose(other.cell_data["v"][0], signed_volumes(mesh))
+
+
+def test_quadratic_meshes_come_back_curved_and_positive_readable_by_others(tmp_path):
+    mesh = quadratic(box_mesh((2, 2, 2), (2.0, 2.0, 2.0)))
+    mesh = TetrahedralMesh(
+        mesh.vertices + np.random.default_rng(1).uniform(-0.05, 0.05, mesh.vertices.shape), mesh.tets
+    )
+    write_tetrahedral_mesh(tmp_path / "brain.xdmf", mesh, {"x": mesh.vertices[:, 0]})
+    read = read_tetrahedral_mesh(tmp_path / "brain.xdmf")
+    np.testing.assert_array_equal(read.tets, mesh.tets)
+    np.testing.assert_array_equal(read.vertices, mesh.vertices)
+    # mirrored: corners 2 and 3 change places, and the nodes on their edges with them
+    turned = mesh.tets[:, [0, 1, 3, 2, 4, 8, 7, 6, 5, 9]]
+    meshio.Mesh(mesh.vertices, [("tetra10", turned)]).write(tmp_path / "other.xdmf")
+    other = read_tetrahedral_mesh(tmp_path / "other.xdmf")
+    np.testing.assert_allclose(signed_volumes(other), signed_volumes(mesh), rtol=1e-12)
+    assert (lower_bounds(other.vertices, other.tets) > 0).all()
+
+
+def test_frames_of_quadratic_elements_are_read_as_such_by_vtk(tmp_path):
+    mesh = quadratic(box_mesh((2, 2, 2), (2.0, 2.0, 2.0)))
+    x = mesh.vertices
+    for week, size in ((21.0, 1.0), (22.0, 2.0)):
+        write_frame(
+            tmp_path / f"{week}.h5", week, {"positions": size * x, "x": x[:, 0]}, {"v": np.arange(len(mesh.tets))}
+        )
+    join_frames(tmp_path / "frames.h5", mesh.tets, [tmp_path / "21.0.h5", tmp_path / "22.0.h5"])
+    reader = pyvista.get_reader(tmp_path / "frames.xdmf")
+    reader.set_active_time_value(22.0)
+    seen = reader.read()
+    assert set(seen.celltypes) == {pyvista.CellType.QUADRATIC_TETRA}
+    np.testing.assert_array_equal(seen.cells.reshape(-1, 11)[:, 1:], mesh.tets)
+    assert seen.compute_cell_sizes()["Volume"].sum() == pytest.approx(64.0)
 
 
 def test_any_xdmf_of_tetrahedra_is_read_and_turned_positive(tmp_path):

@@ -20,6 +20,7 @@ GATES = {
     "min_dihedral_deg": 1.0,
     "max_dihedral_deg": 178.0,
     "min_volume_mm3": 1e-6,
+    "min_jacobian_ratio": 0.1,
     "max_volume_change": 0.02,
     "max_surface_distance_mm": 0.1,
     "min_gap_kept": 0.95,

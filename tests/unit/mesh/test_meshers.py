@@ -7,15 +7,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from shapes import box_mesh
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.tetrahedra import boundary_surface, signed_volumes
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
 from gyriflow.geometry.triangles import TriangleMesh, merged, signed_volume, transformed
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.mesh.curving import curved
 from gyriflow.mesh.gates import refuse_bad_mesh
-from gyriflow.mesh.quality import quality_summary, radius_ratios
+from gyriflow.mesh.quality import jacobian_ratios, quality_summary, radius_ratios
 from gyriflow.mesh.tetrahedralisation import even_surface, tetrahedralise
 
 SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "tetrahedralise.py"
@@ -25,6 +27,7 @@ GATES = {
     "min_dihedral_deg": 1.0,
     "max_dihedral_deg": 178.0,
     "min_volume_mm3": 1e-6,
+    "min_jacobian_ratio": 0.1,
     "max_volume_change": 0.01,
     "max_surface_distance_mm": 0.1,
     "min_gap_kept": 0.95,
@@ -199,3 +202,33 @@ def test_a_surface_that_cuts_itself_is_refused():
     into = transformed(half, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     with pytest.raises(MeshError, match=r"cuts itself and cannot be kept.*cross others|is not the inside of"):
         tetrahedralise(merged(half, into), mesher="tetgen", **SIZES)
+
+
+@pytest.mark.parametrize("mesher", ["pytetwild", "tetgen"])
+def test_quadratic_elements_follow_the_surface_on_as_many_nodes(mesher):
+    surface = ball(8.0, 4)
+    meshes = [
+        tetrahedralise(surface, mesher=mesher, order=order, **(SIZES | {"surface_edge_mm": 1.2})) for order in (1, 2)
+    ]
+    linear, bent = (quality_summary(mesh, surface) for mesh in meshes)
+    # pytetwild makes more where its surface is strongly curved, as this one is for elements of 2.4 mm
+    assert 0.5 < bent["vertices"] / linear["vertices"] < 2.6
+    assert bent["tets"] < linear["tets"] / 2
+    assert bent["min_jacobian_ratio"] >= 0.3
+    assert bent["crossing_faces"] == 0
+    assert bent["surface_distance_mm"]["hausdorff99"] < 1.2 * linear["surface_distance_mm"]["hausdorff99"]
+    assert abs(bent["volume_change"]) < 0.002
+
+
+def test_a_node_that_would_fold_its_element_over_stays_back():
+    # a flat corner of a box that is to become round: elements with two faces outside cannot follow
+    cube = box_mesh((3, 3, 3), (2.0, 2.0, 2.0))
+    length = np.linalg.norm(cube.vertices, axis=1, keepdims=True)
+    outer = np.unique(boundary_faces(cube)[0])
+    vertices = cube.vertices.copy()
+    vertices[outer] = 8.0 * vertices[outer] / length[outer]
+    vertices[np.setdiff1d(np.arange(len(vertices)), outer)] *= 4.0
+    mesh = curved(TetrahedralMesh(vertices, cube.tets), ball(8.0, 4))
+    ratios = jacobian_ratios(mesh)
+    assert 0 < ratios.min() < 0.5
+    assert ratios.max() <= 1.0

@@ -1,0 +1,111 @@
+"""Where the map of a tetrahedron with ten nodes may fold over: bounds of its Jacobian over the whole element.
+
+The sides of such an element may be curved, so that the determinant of the map from the regular element varies: it is
+a polynomial of third degree in the barycentric coordinates. In Bernstein's form, a mean of its coefficients with
+weights that are positive and sum to 1 everywhere, it lies between the least and the largest of the 20 coefficients
+(Johnen, Remacle and Geuzaine 2013, J. Comput. Phys. 233, 359-372).
+"""
+
+import math
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .triangles import Floats
+
+# corners of the edges on whose middles nodes 4 to 9 lie, as VTK has them
+EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+# the eight parts between the nodes of an element: one at each corner, four around the axis from node 4 to node 9
+PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
+NODES = np.array([np.eye(4)[i] for i in range(4)] + [(np.eye(4)[a] + np.eye(4)[b]) / 2 for a, b in EDGES])
+"""Barycentric coordinates (10, 4) of the nodes."""
+POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])
+"""Exponents (20, 4) of the barycentric coordinates in Bernstein's polynomials of third degree."""
+SLOPES = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+"""Gradients of the barycentric coordinates in the regular element."""
+DEPTH = 3
+"""How often an element that the bounds leave open is parted."""
+CHUNK = 4096
+"""Elements at a time, which the processor's cache holds."""
+
+
+def shape_values(places: Floats) -> Floats:
+    """Returns the (p, 10) shape functions of the nodes at (p, 4) barycentric coordinates."""
+    corner = places * (2 * places - 1)
+    middle = np.stack([4 * places[:, a] * places[:, b] for a, b in EDGES], axis=1)
+    return np.concatenate([corner, middle], axis=1)
+
+
+def shape_slopes(places: Floats) -> Floats:
+    """Returns the (p, 10, 3) gradients of the shape functions in the regular element."""
+    corner = (4 * places - 1)[:, :, None] * SLOPES
+    middle = np.stack([4 * (places[:, a, None] * SLOPES[b] + places[:, b, None] * SLOPES[a]) for a, b in EDGES], axis=1)
+    return np.concatenate([corner, middle], axis=1)
+
+
+def bernstein(places: Floats) -> Floats:
+    """Returns the (p, 20) Bernstein polynomials of third degree at (p, 4) barycentric coordinates."""
+    factors = [6 / math.prod(math.factorial(int(power)) for power in powers) for powers in POWERS]
+    return np.asarray((places[:, None, :] ** POWERS).prod(axis=2) * factors)
+
+
+FROM_VALUES = np.linalg.inv(bernstein(POWERS / 3))
+"""The coefficients of a polynomial from its values at the 20 points of the lattice."""
+LATTICE_SLOPES = shape_slopes(POWERS / 3)
+ON_PARTS = np.stack([FROM_VALUES @ bernstein(POWERS / 3 @ NODES[list(part)]) for part in PARTS])
+"""The (8, 20, 20) matrices that give a polynomial's coefficients on the parts from those on the whole."""
+AT_CORNERS = np.flatnonzero(POWERS.max(axis=1) == 3)
+
+
+def determinants(matrices: Floats) -> Floats:
+    """Returns the determinants of (..., 3, 3) matrices, written out: many times faster than a factorisation of each."""
+    a, b, c = matrices[..., 0, :], matrices[..., 1, :], matrices[..., 2, :]
+    return np.asarray(
+        a[..., 0] * (b[..., 1] * c[..., 2] - b[..., 2] * c[..., 1])
+        + a[..., 1] * (b[..., 2] * c[..., 0] - b[..., 0] * c[..., 2])
+        + a[..., 2] * (b[..., 0] * c[..., 1] - b[..., 1] * c[..., 0])
+    )
+
+
+def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Floats:
+    """Returns the (m, p) determinants of the maps of (m, 10) elements where shape functions have (p, 10, 3) slopes."""
+    found = np.empty((len(tets), len(slopes)))
+    by_node = slopes.transpose(0, 2, 1).reshape(-1, 10)
+    for first in range(0, len(tets), CHUNK):
+        chunk = slice(first, first + CHUNK)
+        maps = np.matmul(by_node, np.take(vertices, tets[chunk], axis=0))
+        found[chunk] = determinants(maps.reshape(len(maps), -1, 3, 3))
+    return found
+
+
+def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
+    """Returns the (m, 20) Bernstein coefficients of the determinants of the maps of (m, 10) elements.
+
+    Their mean is six times the element's volume.
+    """
+    return jacobians(vertices, tets, LATTICE_SLOPES) @ FROM_VALUES.T
+
+
+def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
+    """Returns for (m, 10) elements a number that the determinant of the map is nowhere below.
+
+    It is positive only where the element is folded over nowhere. Elements for which it might be so, though the
+    coefficients do not show it, are parted up to three times; a smaller part's bounds are closer.
+    """
+    found = coefficients(vertices, tets)
+    bounds = found.min(axis=1)
+    open_ = np.flatnonzero((bounds <= 0) & (found[:, AT_CORNERS].min(axis=1) > 0))
+    if len(open_):
+        bounds[open_] = _parted_bounds(found[open_], DEPTH)
+    return bounds
+
+
+def _parted_bounds(whole: Floats, depth: int) -> Floats:
+    """Returns lower bounds of polynomials with (k, 20) coefficients from those on their elements' parts."""
+    parts = np.einsum("sij,kj->ksi", ON_PARTS, whole)
+    least = parts.min(axis=2)
+    open_ = (least <= 0) & (parts[:, :, AT_CORNERS].min(axis=2) > 0)
+    if depth > 1 and open_.any():
+        least[open_] = _parted_bounds(parts[open_], depth - 1)
+    return np.asarray(least.min(axis=1))

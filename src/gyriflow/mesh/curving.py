@@ -1,0 +1,118 @@
+"""Linear elements made quadratic, with the nodes of their outer faces on the smooth surface that they fill.
+
+Facets are bumps of the size of an element, and bumps grow with the cortex: nodes on the middles of outer edges would
+keep them. A node goes to the nearest place of the surface only as far as its elements stay sound.
+"""
+
+import logging
+from collections.abc import Callable
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.crossings import faces_that_cross
+from ..geometry.jacobians import coefficients
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, quadratic, signed_volumes
+from ..geometry.triangles import TriangleMesh, edges, face_normals, vertex_normals
+from .quality import jacobian_ratios, radius_ratios
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+log = logging.getLogger(__name__)
+
+ALIKE = 0.5
+"""Least cosine between the normals of the mesh at a node and of the surface where the node is to go: the wall of a
+sulcus may be nearer to a node than the place it comes from."""
+FARTHEST = 0.25
+"""Largest move of a node, in lengths of the shortest outer edge that ends there."""
+ROUNDS = 6
+"""How often the move of an unsound element's nodes is halved before it is given up."""
+SOUND = 0.3
+"""Least ratio of the determinant of a curved element's map to its mean."""
+WORSE = 0.5
+"""Part of its radius ratio that an element keeps at least when its corners move."""
+
+
+def curved(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
+    """Returns a linear mesh as quadratic elements whose outer nodes lie on a smooth surface where they can.
+
+    Corners move first, with straight sides; then the nodes on the middles of outer edges leave their chords. Where
+    an element would become unsound, or the surface of the mesh cross itself, moves are halved and then given up.
+
+    Parameters
+    ----------
+    mesh
+        Linear elements.
+    surface
+        The smooth surface, closed and outward, near to that of the mesh; both in mm.
+    """
+    corners = _settled(mesh, surface)
+    straight = quadratic(corners)
+    target, way = _projected(straight, surface)
+    middles = way & (np.arange(len(way)) >= len(mesh.vertices))
+
+    def unsound(placed: TetrahedralMesh) -> Mask:
+        values = coefficients(placed.vertices, placed.tets)
+        return np.asarray(values.min(axis=1) < SOUND * values.mean(axis=1))
+
+    result, left = _moved(straight, target, middles, unsound)
+    log.info(
+        "quadratic elements: %d of %d nodes on middles of outer edges on the surface, least ratio of Jacobians %.2f",
+        int(left.sum()),
+        int((np.unique(boundary_faces(straight)[0]) >= len(mesh.vertices)).sum()),
+        jacobian_ratios(result).min(),
+    )
+    return result
+
+
+def _settled(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
+    """Returns the linear mesh with its outer corners on the surface where their elements stay sound."""
+    target, way = _projected(mesh, surface)
+    before = radius_ratios(mesh)
+
+    def unsound(placed: TetrahedralMesh) -> Mask:
+        return np.asarray((signed_volumes(placed) <= 0) | (radius_ratios(placed) < WORSE * before))
+
+    return _moved(mesh, target, way, unsound)[0]
+
+
+def _projected(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask]:
+    """Returns the (n, 3) places to which nodes are to go, and which of them have one: outer nodes near the surface."""
+    own, outer = boundary_surface(mesh)
+    squared, face, place = igl.point_mesh_squared_distance(
+        own.vertices.copy(), surface.vertices.copy(), surface.faces.astype(np.int32)
+    )
+    ends, _ = edges(own)
+    length = np.linalg.norm(np.diff(own.vertices[ends], axis=1)[:, 0], axis=1)
+    shortest = np.full(len(outer), np.inf)
+    np.minimum.at(shortest, ends.ravel(), np.repeat(length, 2))
+    alike = np.einsum("ij,ij->i", vertex_normals(own), face_normals(surface)[face]) >= ALIKE
+    near = alike & (np.sqrt(squared) <= FARTHEST * shortest)
+    target, way = mesh.vertices.copy(), np.zeros(len(mesh.vertices), dtype=bool)
+    target[outer[near]] = place[near]
+    way[outer[near]] = True
+    return target, way
+
+
+def _moved(
+    mesh: TetrahedralMesh, target: Floats, way: Mask, unsound: Callable[[TetrahedralMesh], Mask]
+) -> tuple[TetrahedralMesh, Mask]:
+    """Returns the mesh with its nodes as far on their way as its elements and faces allow, and which nodes moved."""
+    part = way.astype(float)
+    triangles, _ = boundary_faces(mesh)
+    used, local = np.unique(triangles, return_inverse=True)
+    faces = local.reshape(-1, 3)
+    crossed = faces_that_cross(TriangleMesh(mesh.vertices[used], faces))
+    for round_ in range(3 * ROUNDS):
+        placed = TetrahedralMesh(mesh.vertices + part[:, None] * (target - mesh.vertices), mesh.tets)
+        bad = mesh.tets[unsound(placed)].ravel()
+        new = np.setdiff1d(faces_that_cross(TriangleMesh(placed.vertices[used], faces)), crossed)
+        bad = np.unique(np.concatenate([bad, triangles[new].ravel()]))
+        bad = bad[part[bad] > 0]
+        if not len(bad):
+            break
+        part[bad] = part[bad] / 2 if round_ < ROUNDS else 0.0
+    return placed, part > 0

@@ -1,0 +1,325 @@
+"""Quadratic elements with curved sides: what they must do as linear ones do, and what is theirs alone."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from boxes import COMM, MATERIAL, distorted_box, everywhere_known, smooth_displacement, zones_of
+from mpi4py import MPI
+from shapes import box_mesh
+
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.contact import ContactSettings, SelfContact
+from gyriflow.folding.domain import Domain
+from gyriflow.folding.ladder import KEPT
+from gyriflow.folding.memory import unpacked
+from gyriflow.folding.multigrid import linear_in_quadratic
+from gyriflow.folding.newton import NewtonSettings, NewtonSolver
+from gyriflow.folding.problem import Problem
+from gyriflow.folding.simulation import Folding
+from gyriflow.folding.zones import Zones
+from gyriflow.geometry.jacobians import lower_bounds
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
+from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
+from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
+RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0], "solver": TIGHT}
+
+
+def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
+    """Returns a box in mm of quadratic elements, whose inner nodes are moved at random (seeded): sides are curved."""
+    mesh = quadratic(distorted_box(cells, size))
+    inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
+    vertices = mesh.vertices.copy()
+    vertices[inner] += np.random.default_rng(5).uniform(-by, by, (len(inner), 3))
+    return TetrahedralMesh(vertices, mesh.tets)
+
+
+def at_the_bottom(centre):
+    return centre[:, 2] < -2.9
+
+
+def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, comm=COMM, normal=(0.0, 0.0, 1.0), **settings):
+    """Returns a problem with layers that are uniform, or nodal functions of the position in m."""
+    domain = Domain(comm, mesh)
+    problem = Problem(domain, zones, MATERIAL, penalty_pa_per_m=5e5, **settings)
+    x = domain.local(domain.positions)
+    nodal = [value(x) if callable(value) else np.full(len(x), value) for value in (mu, dg, dr)]
+    problem.set_layers(*nodal, np.tile(normal, (len(domain.cells), 1)))
+    return problem
+
+
+def growing_problem(comm=COMM):
+    mesh = curved_box()
+    layers = {"mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3), "dg": lambda x: 0.004 + 0.4 * x[:, 2], "dr": 0.002}
+    return problem_on(mesh, zones_of(mesh, at_the_bottom), comm=comm, **layers)
+
+
+def test_volumes_and_facets_are_those_of_the_curved_elements():
+    mesh = curved_box()
+    zones = zones_of(mesh, at_the_bottom, left=lambda c: c[:, 0] < -3.99, right=lambda c: c[:, 0] > 3.99)
+    domain = Domain(COMM, mesh)
+    assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(signed_volumes(mesh).sum() * 1e-9, rel=1e-12)
+    assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(288e-9, rel=1e-12)
+    tags = domain.local_facets(zones.facets, zones.facet_zone)
+    counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
+    np.testing.assert_array_equal(4 * counts, np.bincount(zones.facet_zone, minlength=5))
+    np.testing.assert_allclose(domain.gathered(domain.local(domain.positions)[: domain.owned]), mesh.vertices * 1e-3)
+
+
+def test_growth_without_restraint_is_free_of_stress():
+    oblique = np.array([1.0, 2.0, 2.0]) / 3
+    mesh = curved_box()
+    problem = problem_on(mesh, zones_of(mesh), dg=0.2, dr=-0.05, normal=oblique)
+    along = np.outer(oblique, oblique)
+    growth = 1.2 * (np.eye(3) - along) + 0.95 * along
+    problem.set_displacement(problem.domain.local(problem.domain.positions) @ (growth - np.eye(3)).T)
+    assert problem.energy() == pytest.approx(0.0, abs=1e-16)
+    problem.set_displacement(problem.domain.local(problem.domain.positions) * [0.2, 0.0, 0.0])
+    assert problem.volume_ratios() == pytest.approx(1.2)
+    assert 0 < problem.smallest_volume_ratio() <= 1.2 * (1 + 1e-12)
+
+
+def test_planes_push_back_with_the_penalty_pressure():
+    mesh = curved_box()
+    zones = zones_of(mesh, right=lambda c: c[:, 0] > 3.99, planes=(-5.0, 4.5))
+    total = []
+    for given in (zones, zones_of(mesh)):
+        problem = problem_on(mesh, given)
+        residual = problem.new_vector()
+        problem.set_displacement(np.zeros_like(problem.displacement))
+        problem.residual(residual)
+        total.append(COMM.allreduce(float(residual.array.reshape(-1, 3)[:, 0].sum())))
+    assert total[0] - total[1] == pytest.approx(-5e5 * 0.5e-3 * 36e-6, rel=1e-10)
+
+
+def test_newton_converges_quadratically_and_conjugate_gradients_as_on_linear_elements():
+    problem = growing_problem()
+    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-12, krylov_tolerance=1e-10), residual_floor=0.0)
+    count = solver.solve(np.zeros_like(problem.displacement))
+    assert count.newton <= 7
+    assert count.residual <= 1e-12
+    assert count.rung == KEPT
+    # ten digits in each of the linear solves
+    assert count.krylov <= 50 * count.newton
+
+
+def test_iterations_do_not_grow_with_the_mesh():
+    taken = []
+    for cells in (2, 4, 8):
+        mesh = quadratic(box_mesh((cells,) * 3, (6.0, 6.0, 6.0)))
+        problem = problem_on(mesh, zones_of(mesh, at_the_bottom), dg=lambda x: 0.01 + x[:, 2])
+        count = NewtonSolver(problem, NewtonSettings(1e-9, krylov_tolerance=1e-8), residual_floor=0.0).solve(
+            np.zeros_like(problem.displacement)
+        )
+        taken.append(count.krylov / count.newton)
+    assert taken[2] <= 1.5 * taken[1]
+
+
+def test_the_prolongation_leads_linear_functions_on_and_leaves_fixed_components_apart():
+    mesh = quadratic(distorted_box((2, 2, 2)))
+    domain = Domain(COMM, mesh)
+    rng = np.random.default_rng(2)
+    fixed = rng.random((len(mesh.vertices), 3)) < 0.1
+    for held in (np.zeros_like(fixed), fixed):
+        own = domain.local(held)[: domain.owned]
+        prolongation, corners = linear_in_quadratic(domain, own)
+        matrix, offset = np.array([[1.0, 2.0, -1.0], [0.5, 0.0, 3.0], [2.0, 1.0, 1.0]]), [1.0, -2.0, 0.3]
+        values = (domain.local(domain.positions) * MM_PER_M @ matrix + offset)[: domain.owned]
+        coarse, fine = prolongation.createVecRight(), prolongation.createVecLeft()
+        coarse.array[:] = values[corners].ravel()
+        prolongation.mult(coarse, fine)
+        if not held.any():
+            np.testing.assert_allclose(fine.array.reshape(-1, 3), values, atol=1e-12)
+            continue
+        # what a fixed corner has reaches no other node, and a fixed node on an edge has nothing
+        coarse.array[:] = own[corners].ravel().astype(float)
+        prolongation.mult(coarse, fine)
+        is_corner = np.isin(np.arange(domain.owned), corners)[:, None]
+        np.testing.assert_array_equal(fine.array.reshape(-1, 3), (own & is_corner).astype(float))
+
+
+def test_an_element_that_folds_over_between_its_points_is_seen():
+    mesh = quadratic(box_mesh((1, 1, 1), (2.0, 2.0, 2.0)))
+    problem = problem_on(mesh, zones_of(mesh))
+    # a node on an edge pulled beyond a quarter of it: the Jacobian changes sign at the end of the edge
+    a, b, middle = mesh.tets[0, [0, 1, 4]]
+    bounds = []
+    for part in (0.2, 0.3):
+        moved = np.zeros_like(mesh.vertices)
+        moved[middle] = part * (mesh.vertices[b] - mesh.vertices[a])
+        problem.set_displacement(problem.domain.local(moved * M_PER_MM))
+        bounds.append(problem.smallest_volume_ratio())
+        inside = np.linalg.det(problem.outcome("deformation"))
+        assert problem.domain.minimum(inside) > 0
+    assert bounds[0] > 0 >= bounds[1]
+
+
+def test_what_is_moved_inside_out_is_not_accepted():
+    problem = growing_problem()
+    guess = np.zeros_like(problem.displacement)
+    guess[:, 2] = -2.0 * problem.domain.local(problem.domain.positions)[:, 2]
+    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
+    assert solver.solve(guess).residual <= NewtonSettings().newton_tolerance
+    after = problem.domain.positions + everywhere_known(problem)
+    assert lower_bounds(after, curved_box().tets).min() > 0
+
+
+@pytest.mark.parametrize("memory_gw", [0.25, np.inf])
+def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(memory_gw):
+    mesh = curved_box((2, 2, 2))
+    zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
+    folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw)
+    # all inner nodes are free, but uniform growth moves none
+    nodes, cells = np.ones(len(folding.domain.vertex_of_node)), len(folding.domain.cells)
+    uniform = (300.0 * nodes, 0.01 * nodes, 0.01 * nodes, np.tile([0.0, 0.0, 1.0], (cells, 1)))
+    folding.set_layers = lambda *_: folding.problem.set_layers(*uniform)
+    for _ in range(4):
+        state = folding.step(state, 43200.0)
+    kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
+    strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
+    assert strain.shape == (len(mesh.tets), 8, 3)
+    np.testing.assert_allclose(strain, -np.log(1.01) * sum(kept**n for n in range(4)), rtol=1e-9)
+
+
+def folding_of(mesh, zones, comm=COMM, **changes):
+    parameters = parameters_from(RUN | {"contact": {"kind": "none"}} | changes)
+    return Folding(comm, mesh, zones, parameters), State.at_start(mesh.vertices * M_PER_MM, parameters.step_s)
+
+
+def test_a_kept_state_does_not_depend_on_the_number_of_ranks():
+    mesh = curved_box()
+    zones = zones_of(mesh, at_the_bottom)
+    ends = []
+    for comm in (COMM, MPI.COMM_SELF):
+        folding, state = folding_of(mesh, zones, comm, stress_memory_gw=1.0, thickness_mm=2.0)
+        for _ in range(3):
+            state = folding.step(state, 43200.0)
+        ends.append(state)
+    together, alone = ends
+    assert np.abs(together.positions - alone.positions).max() <= 1e-8 * np.abs(alone.last).max()
+    np.testing.assert_allclose(together.stretch, alone.stretch, atol=1e-9)
+    assert (COMM.bcast(together.positions) == together.positions).all()
+
+
+def test_a_free_body_grows_without_drifting():
+    mesh = curved_box()
+    zones = replace(zones_of(mesh), free=True)
+    folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"})
+    folding._growth = (folding.domain.local(folding.domain.positions)[:, 0] > 0).astype(float)
+    for _ in range(3):
+        before, state = state.positions, folding.step(state, 43200.0)
+        u, x = state.last, before - before.mean(axis=0)
+        size = np.abs(u).max()
+        assert size > 1e-6
+        assert np.abs(u.mean(axis=0)).max() <= 1e-12 * size
+        assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(x).max() * size * len(x)
+
+
+HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2
+
+
+def pressed_blocks(comm, growth, distance):
+    """Returns the problem of two blocks in a tube that grow towards each other, their contact, and the mesh."""
+    low, high = (quadratic(box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM))) for n in ((2, 2, 1), (3, 2, 2)))
+    shift = np.array([0.0, 0.0, (HEIGHT_MM + GAP_MM) / 2])
+    mesh = TetrahedralMesh(
+        np.concatenate([low.vertices - shift, high.vertices + shift]),
+        np.concatenate([low.tets, high.tets + len(low.vertices)]),
+    )
+    facets, _ = boundary_faces(mesh)
+    centre = mesh.vertices[facets].mean(axis=1)
+    zone = np.full(len(facets), FREE)
+    zone[np.abs(centre[:, 0]) > SIDE_MM / 2 - 1e-6] = SIDE_X
+    zone[np.abs(centre[:, 1]) > SIDE_MM / 2 - 1e-6] = SIDE_Y
+    zone[np.abs(centre[:, 2]) > np.abs(mesh.vertices[:, 2]).max() - 1e-6] = CLAMPED
+    zones = Zones(facets, zone, np.ones(len(mesh.vertices)), 0.0, (-0.5, 0.5))
+    problem = problem_on(mesh, zones, dr=growth, comm=comm)
+    contact = SelfContact(problem.domain, problem.displacement, facets, ContactSettings(2000.0, distance))
+    problem.contributions.append(contact)
+    return problem, contact, mesh
+
+
+def test_pressed_blocks_have_the_pressure_of_the_closed_answer_on_any_number_of_ranks():
+    places = []
+    for comm in (COMM, MPI.COMM_SELF):
+        problem, contact, mesh = pressed_blocks(comm, growth=0.1, distance=0.1)
+        solver = NewtonSolver(problem, NewtonSettings(1e-10, 1e-8, max_newton=80), residual_floor=0.0)
+        solver.solve(np.zeros_like(problem.displacement))
+        assert contact.pair_count() > 10
+        places.append(mesh.vertices + everywhere_known(problem) * MM_PER_M)
+    assert np.abs(places[0] - places[1]).max() <= 1e-6 * np.abs(places[1] - mesh.vertices).max()
+    place = places[0]
+    on_top, below = (np.isclose(mesh.vertices[:, 2], side * GAP_MM / 2) for side in (-1, 1))
+    gap = place[below, 2].mean() - place[on_top, 2].mean()
+    forces = np.zeros_like(place)
+    forces[np.unique(boundary_faces(mesh)[0])] = contact.forces()
+    pressure = forces[on_top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
+    # uniaxial strain: the first Piola-Kirchhoff stress along z
+    nu, mu = MATERIAL.poisson_ratio, 1000.0
+    Fe = (1 + (GAP_MM - gap) / 2 / HEIGHT_MM) / 1.1
+    by_Fe = mu / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3))
+    by_Fe += 2 * mu * (1 + nu) / (3 * (1 - 2 * nu)) * (Fe - 1)
+    assert 0 < gap < 0.1
+    assert pressure == pytest.approx(-by_Fe / 1.1, rel=0.01)
+    # an even pressure leaves faces even, although the meshes do not match: elements are 2 and 3 mm long
+    assert place[below, 2].std() < 0.01
+
+
+def test_the_preconditioner_sees_contact():
+    problem, contact, _ = pressed_blocks(COMM, growth=0.0, distance=0.15)
+    u = smooth_displacement(problem.domain, 1e-5)
+    u[:, 2] -= np.sign(problem.domain.local(problem.domain.positions)[:, 2]) * GAP_MM / 4 * M_PER_MM
+    problem.set_displacement(u)
+    tangent = problem.tangent()
+    x, whole, bound = (problem.new_vector() for _ in range(3))
+    rng = np.random.default_rng(1)
+    assert contact.pair_count() > 0
+    for _ in range(20):
+        x.array[:] = problem.domain.local(rng.standard_normal((len(problem.domain.positions), 3)))[
+            : problem.domain.owned
+        ].ravel()
+        tangent.products.mult(x, whole)
+        tangent.smoothing.mult(x, bound)
+        assert bound.dot(x) >= whole.dot(x)
+
+
+def test_forces_fit_the_energy_and_stiffness_the_forces():
+    problem, contact, _ = pressed_blocks(COMM, growth=0.0, distance=0.15)
+    domain = problem.domain
+    # shaken along the surfaces: where edges are parallel, which parts are nearest changes at once
+    shaken = np.random.default_rng(4).uniform(-1e-4, 1e-4, (len(domain.positions), 3)) * [1.0, 1.0, 0.0]
+    u = smooth_displacement(domain, 1e-5) + domain.local(shaken)
+    u[:, 2] -= np.sign(domain.local(domain.positions)[:, 2]) * GAP_MM / 4 * M_PER_MM
+    v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
+    v[domain.local(problem_fixed(problem))] = 0.0
+    problem.set_displacement(u)
+    energy, residual, change, direction, other = problem.energy(), *(problem.new_vector() for _ in range(4))
+    direction.array[:] = v[: domain.owned].ravel()
+    problem.residual(residual)
+    problem.tangent().whole().mult(direction, change)
+    errors = []
+    for h in (0.2, 0.1):
+        problem.set_displacement(u + h * v)
+        first = abs(problem.energy() - energy - h * residual.dot(direction))
+        problem.residual(other)
+        other.axpy(-1.0, residual)
+        other.axpy(-h, change)
+        errors.append((first, other.norm() / (h * change.norm())))
+    assert contact.pair_count() > 0
+    assert np.log2(errors[0][0] / errors[1][0]) == pytest.approx(2.0, abs=0.1)
+    # the second derivative of the barrier jumps where other parts become the nearest
+    assert errors[1][1] < 2e-3
+
+
+def problem_fixed(problem):
+    """Returns which of the (n, 3) components of all vertices are fixed."""
+    fixed = np.zeros(3 * problem.domain.owned)
+    fixed[problem._fixed_owned] = 1.0
+    return problem.domain.gathered(fixed.reshape(-1, 3)) > 0
