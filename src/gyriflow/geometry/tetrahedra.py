@@ -122,6 +122,28 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
     return TetrahedralMesh(np.concatenate([mesh.vertices, mesh.vertices[ends].mean(axis=1)]), tets)
 
 
+def linear_pieces(mesh: TetrahedralMesh) -> Ints:
+    """Returns the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight of each quadratic one.
+
+    One lies at each corner, four fill the octahedron between them, round its diagonal from the middle of edge (0, 2) to
+    that of (1, 3). Positive volumes stay positive where the sides are straight.
+    """
+    if mesh.order == 1:
+        return mesh.tets
+    node = {frozenset(edge): 4 + i for i, edge in enumerate(EDGES)}
+    m = {(i, j): node[frozenset((i, j))] for i in range(4) for j in range(4) if i != j}
+    one, other = m[0, 2], m[1, 3]
+    ring = (m[0, 1], m[1, 2], m[2, 3], m[0, 3])
+    pieces = [
+        (0, m[0, 1], m[0, 2], m[0, 3]),
+        (m[0, 1], 1, m[1, 2], m[1, 3]),
+        (m[0, 2], m[1, 2], 2, m[2, 3]),
+        (m[0, 3], m[1, 3], m[2, 3], 3),
+        *((one, other, ring[i], ring[(i + 1) % 4]) for i in range(4)),
+    ]
+    return np.asarray(mesh.tets[:, pieces]).reshape(-1, 4)
+
+
 def faces_of_elements(order: int) -> Ints:
     """Returns the (4, p, 3) places in an element of its faces' triangles, outward; p is `PIECES_OF_ORDER`.
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError, MeshError
 from ..geometry.layers import layer_thickness
-from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh
 
 STEEPNESS = 10.0
@@ -49,8 +49,7 @@ def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats
 
     MeshError where no point is deeper than the cortex.
     """
-    cells = np.column_stack([np.full(len(start.tets), 4), start.tets]).ravel()
-    grid = pv.UnstructuredGrid(cells, np.full(len(start.tets), pv.CellType.TETRA), np.asarray(positions, dtype=float))
+    grid = pv.UnstructuredGrid({pv.CellType.TETRA: linear_pieces(start)}, np.asarray(positions, dtype=float))
     grid.point_data["depth"] = depth
     # cut in its present shape: linear along the edges, so the points are those of the start
     border = grid.contour([1.0], scalars="depth").triangulate()

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from shapes import box_mesh, ellipsoid_mesh
 
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_faces,
+    boundary_surface,
+    grid,
+    linear_pieces,
+    quadratic,
+    signed_volumes,
+)
 from gyriflow.geometry.triangles import area, euler_number, is_closed, signed_volume
 
 
@@ -34,3 +42,14 @@ def test_each_boundary_face_names_its_element():
     mesh = box_mesh((2, 2, 2), (1.0, 1.0, 1.0))
     faces, elements = boundary_faces(mesh)
     assert all(set(face) <= set(mesh.tets[element]) for face, element in zip(faces, elements, strict=True))
+
+
+def test_a_quadratic_mesh_is_filled_by_eight_linear_pieces_of_each_element():
+    mesh = grid([np.linspace(0, 2, 3), np.linspace(0, 3, 3), np.linspace(0, 1, 2)])
+    fine = quadratic(mesh)
+    pieces = TetrahedralMesh(fine.vertices, linear_pieces(fine))
+    volumes = signed_volumes(pieces).reshape(-1, 8)
+    np.testing.assert_allclose(volumes, np.repeat(signed_volumes(mesh)[:, None] / 8, 8, axis=1))
+    # neighbours meet: the boundary is that of the quadratic elements
+    assert len(boundary_faces(pieces)[0]) == len(boundary_faces(fine)[0])
+    assert linear_pieces(mesh) is mesh.tets
