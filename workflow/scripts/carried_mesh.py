@@ -3,6 +3,7 @@
 import numpy as np
 
 from gyriflow.geometry.deformations import moved
+from gyriflow.geometry.tetrahedra import linear_pieces
 from gyriflow.io.files import read_json
 from gyriflow.io.registrations import CarriedMesh, read_deformation, write_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
@@ -18,6 +19,7 @@ with step(snakemake.log[0]):
     start = moved(mesh.vertices, np.linalg.inv(pose))
     positions = over_weeks(start, [read_deformation(path)[0] for path in files.registrations])
     growth = {
-        length: {"volume": local_growth(positions, mesh.tets, params.weeks, length)} for length in params.smoothing_mm
+        length: {"volume": local_growth(positions, linear_pieces(mesh), params.weeks, length)}
+        for length in params.smoothing_mm
     }
     write_carried_mesh(snakemake.output[0], CarriedMesh(np.array(params.weeks), positions, growth))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gyriflow.geometry.diffusion import vertex_sizes
-from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.geometry.tetrahedra import boundary_faces, linear_pieces
 from gyriflow.growth.following import regional_map, relative_growth
 from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
@@ -32,6 +32,6 @@ with step(snakemake.log[0]):
     if files.carried:
         carried, follow = read_carried_mesh(files.carried), snakemake.params.follow
         rates = carried.growth[follow["smoothing_mm"]]["volume"]
-        local = relative_growth(rates, vertex_sizes(mesh.vertices, mesh.tets), follow["regional"])
+        local = relative_growth(rates, vertex_sizes(mesh.vertices, linear_pieces(mesh)), follow["regional"])
         maps |= {regional_map(week): values for week, values in zip(carried.weeks, local, strict=False)}
     write_maps(snakemake.output[0], maps)
