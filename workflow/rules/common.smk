@@ -67,6 +67,12 @@ def from_source(*sources):
     return one_of(brain.id for brain in CONFIG.brains if brain.source in sources)
 
 
+def regional(run):
+    """Returns whether a run's growth differs between regions as measured by registration."""
+    follow = CONFIG.run(run).follow
+    return follow is not None and follow.regional > 0
+
+
 def of_runs(pattern, **wildcards):
     """Returns the files of a pattern for every run and each brain that it folds."""
     return [

@@ -1,5 +1,5 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
-RUNS_WITH_MAPS = [run for run in CONFIG.runs if CONFIG.maps(run)]
+RUNS_WITH_MAPS = [run for run in CONFIG.runs if CONFIG.maps(run) or regional(run)]
 
 
 def maps_of_run(wildcards):
@@ -13,10 +13,23 @@ def rates_of_run(wildcards):
     return rules.growth_rates.output.rates if "estimated" in settings.values() else []
 
 
+def curves_of_run(wildcards):
+    """Returns the table of the measured curves where the run follows one of them."""
+    follow = CONFIG.run(wildcards.run).follow
+    measured = follow is not None and "measured" in (follow.area_cm2, follow.volume_ml)
+    return rules.growth_curves.output.curves if measured else []
+
+
+def carried_of_run(wildcards):
+    """Returns the mesh carried through real brains where the run's growth differs between regions."""
+    return rules.carried_mesh.output[0] if regional(wildcards.run) else []
+
+
 rule parameters:
     input:
         surface=PIAL["report"],
         rates=rates_of_run,
+        curves=curves_of_run,
     output:
         f"{RUN}/params.yaml",
     log:
@@ -29,7 +42,14 @@ rule parameters:
         settings=lambda wildcards: CONFIG.parameters(wildcards.run),
         weeks=lambda wildcards: CONFIG.weeks(wildcards.run, wildcards.brain),
         estimated_from=lambda wildcards: (
-            CONFIG.estimated_from(wildcards.brain) if rates_of_run(wildcards) else None
+            CONFIG.estimated_from(wildcards.brain)
+            if rates_of_run(wildcards) or curves_of_run(wildcards)
+            else None
+        ),
+        regional_weeks=lambda wildcards: (
+            [CONFIG.brain(brain).week for brain in later_brains(wildcards.brain)]
+            if regional(wildcards.run)
+            else []
         ),
     script:
         "../scripts/parameters.py"
@@ -45,6 +65,7 @@ rule parameter_maps:
         mesh=rules.tetrahedralise.output.mesh,
         data=rules.tetrahedralise.output.data,
         surface=PIAL["report"],
+        carried=carried_of_run,
     output:
         f"{RUN}/folding/maps.h5",
     log:
@@ -60,6 +81,11 @@ rule parameter_maps:
         runtime=15,
     params:
         maps=lambda wildcards: CONFIG.maps(wildcards.run),
+        follow=lambda wildcards: (
+            CONFIG.run(wildcards.run).follow.model_dump()
+            if regional(wildcards.run)
+            else None
+        ),
         bounds=lambda wildcards: {
             name: CONFIG.bounds(name) for name in CONFIG.maps(wildcards.run)
         },

@@ -39,6 +39,24 @@ rule growth_rates:
         "../scripts/growth_rates.py"
 
 
+rule growth_curves:
+    input:
+        rules.growth_rates.output.areas,
+    output:
+        curves=f"{STUDY}/growth/curves.csv",
+        errors=f"{STUDY}/growth/curve_errors.csv",
+    log:
+        f"{STUDY}/logs/growth_curves.log",
+    benchmark:
+        f"{STUDY}/benchmarks/growth_curves.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        may_shrink=CONFIG.folding.allow_negative_growth,
+    script:
+        "../scripts/growth_curves.py"
+
+
 rule growth_figure:
     input:
         areas=rules.growth_rates.output.areas,

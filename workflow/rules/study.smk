@@ -97,5 +97,6 @@ rule metrics:
             table=[name for name, files in JOINED.items() if files],
         ),
         rules.spectral_distance.output,
+        rules.validate.input,
         # with brains of too few weeks no apparent age can be estimated
         rules.age_profile.output if CONFIG.age_reference else [],

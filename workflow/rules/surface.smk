@@ -27,10 +27,14 @@ def surface_settings(*names):
     return CONFIG.surface.model_dump(include=set(names))
 
 
-def label_volume(wildcards):
+def label_volume_of(brain):
     """Returns the label volume of a brain: the user's, or the one that the workflow makes."""
-    own = CONFIG.brain(wildcards.brain).labels
-    return own or f"results/brains/{wildcards.brain}/surface/labels.nii.gz"
+    own = CONFIG.brain(brain).labels
+    return own or f"results/brains/{brain}/surface/labels.nii.gz"
+
+
+def label_volume(wildcards):
+    return label_volume_of(wildcards.brain)
 
 
 def coordinates_of(wildcards):

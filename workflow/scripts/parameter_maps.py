@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.geometry.diffusion import vertex_sizes
+from gyriflow.geometry.tetrahedra import boundary_faces, linear_pieces
+from gyriflow.growth.following import regional_map, relative_growth
 from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
+from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
 from gyriflow.step import step
@@ -26,4 +29,9 @@ with step(snakemake.log[0]):
             volume, motion = read_volume_map(path, reading["affine_from"]), volume_pose(report, path)
             maps[name] = volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
         require_within(maps[name], snakemake.params.bounds[name], path)
+    if files.carried:
+        carried, follow = read_carried_mesh(files.carried), snakemake.params.follow
+        rates = carried.growth[follow["smoothing_mm"]]["volume"]
+        local = relative_growth(rates, vertex_sizes(mesh.vertices, linear_pieces(mesh)), follow["regional"])
+        maps |= {regional_map(week): values for week, values in zip(carried.weeks, local, strict=False)}
     write_maps(snakemake.output[0], maps)

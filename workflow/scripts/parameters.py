@@ -1,5 +1,6 @@
 """The validated parameters of a run, which its folding reads and which stay with its results."""
 
+from gyriflow.growth.following import followed_sizes, regional_map
 from gyriflow.growth.rates import FOLDING_RATES, rate_curve
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.yaml_files import write_yaml
@@ -14,6 +15,12 @@ with step(snakemake.log[0]):
             rates = rates[rates["series"] == snakemake.params.estimated_from]
             curve = rate_curve(rates, column, allow_negative=allowed)
             settings[name] = {"weeks": dict(zip(*(numbers.tolist() for numbers in curve), strict=True))}
+    if settings["follow"] is not None:
+        curves = read_table(files.curves) if files.curves else None
+        shrink = settings["allow_negative_growth"]
+        sizes = followed_sizes(settings["follow"], curves, snakemake.params.estimated_from, weeks, shrink)
+        settings["follow"] = settings["follow"] | sizes
+        settings["regional_growth"] = {week: regional_map(week) for week in snakemake.params.regional_weeks[:-1]}
     known = {
         "start_week": weeks[0],
         "output_weeks": list(weeks),

@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING
 from ..parameters.messages import dotted, line, messages
+from ..parameters.presets import PRESETS
 from .atlas import AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections, unknown_atlas
 from .atlas_description import Atlas
 from .root import Config
@@ -34,6 +35,8 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
     """
     plain = {"folding": {}} | _plain(raw)
     plain["runs"] = _complete_runs(plain.get("runs"), plain.get("folding"))
+    if isinstance(plain["folding"], dict):
+        plain["folding"] = _with_preset(plain["folding"], {})
     plain["atlas"], of_atlas, problems = _atlases(plain.get("atlas"), Path(base_dir))
     if of_atlas:
         plain["brains"] = [*(plain.get("brains") or ()), *of_atlas]
@@ -61,15 +64,21 @@ def _plain(value: Any) -> Any:
 
 
 def _complete_runs(runs: Any, folding: Any) -> Any:
-    """Returns the runs, each with the keys of `folding` that it does not name itself."""
+    """Returns the runs, each with the keys of its preset and of `folding` that it does not name itself."""
     runs = runs or REFERENCE_RUNS
     if not isinstance(runs, dict):
         return runs
     base = folding if isinstance(folding, dict) else {}
     return {
-        name: _merge(base, override or {}) if isinstance(override, dict | None) else override
+        name: _with_preset(base, override or {}) if isinstance(override, dict | None) else override
         for name, override in runs.items()
     }
+
+
+def _with_preset(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
+    """Returns the settings of a run: those of its preset, those of `base` over them, its own over both."""
+    preset = override.get("preset", base.get("preset"))
+    return _merge(_merge(PRESETS.get(str(preset), {}), base), override)
 
 
 def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:

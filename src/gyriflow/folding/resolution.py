@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from .domain import Domain
+from .zone_checks import NEEDED
 
 Floats = NDArray[np.float64]
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 WORST = 0.01
 """Part of the elements whose quality the step table tells."""
-NEEDED = {1: 2.0, 2: 1.0}
-"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md)."""
 LARGEST_POISSON_RATIO = 0.46
 """Above this linear elements are clearly too stiff: at 0.45 the fastest wave of the slab grows 32 % too slowly with two
 of them through the cortex, at 0.48 40 %, at 0.49 47 %, at 0.499 69 %, the peak elsewhere."""

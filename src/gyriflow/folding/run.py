@@ -15,6 +15,7 @@ from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
+from .following import missed_curves
 from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say
 from .simulation import Folding, advance
 from .zones import Zones
@@ -57,8 +58,10 @@ def run(
             asked = parameters.fields if arrived else ()
             contact, elements = folding.contact_fields(asked), folding.element_fields(asked)
             if comm.rank == 0:
+                if arrived and (missed := missed_curves(state.rows[-1])):
+                    say(f"warning: {missed}")
                 if arrived:
-                    save_frame(folder, week, state.positions, start, zones, parameters, maps, contact, elements)
+                    save_frame(folder, week, state.positions, start, zones, folding.present, maps, contact, elements)
                 write_checkpoint(folder / "state.h5", key, state)
                 rate = (time.monotonic() - resumed) / (len(state.rows) - first)
                 steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s

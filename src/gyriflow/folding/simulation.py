@@ -22,6 +22,7 @@ from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
 from .element_layers import Layered, linear_layers, quadratic_layers
+from .following import following_step, size_of
 from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
@@ -101,6 +102,8 @@ class Folding:
         solver = parameters.solver
         self._start = self.domain.positions
         self._through = math.nan  # elements through the cortex in the last step
+        self._start_size = size_of(mesh.vertices, zones)
+        self.present = parameters  # those of the last step, with its rates of growth
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         self._through, self._part = math.nan, self.domain.part  # of its layers
@@ -123,7 +126,7 @@ class Folding:
 
     def _set_tissue(self, time_s: float, step_s: float) -> None:
         """Sets stiffness, normals and the growth of a step, with parameters as at a time."""
-        p, domain = self.parameters, self.domain
+        p, domain = self.present, self.domain
         week = p.start_week + time_s / SECONDS_PER_GW
         reach = WEIGHT_REACH * float(np.max(p.thickness_at(week, self.maps))) * M_PER_MM
         search = PialSearch(domain.positions, self.zones.cortex_facets)
@@ -286,6 +289,10 @@ class Folding:
             domain.place(state.positions)
         if self.contact is not None:
             self.contact.adapt(state.rows)
+        last = state.rows[-1] if state.rows else {}
+        before = size_of(state.positions * MM_PER_M, self.zones)
+        growth = following_step(self.parameters, self._start_size, before, state.time_s, step_s, last, self.maps)
+        self.present = growth.parameters
         kept = self._kept_stretch(state, step_s)
         if kept is not None:
             problem.set_stretch(kept)
@@ -311,6 +318,7 @@ class Folding:
             "max_u_pial_mm": float(length[self._pial].max()),
             "mean_u_pial_mm": float(length[self._pial].mean()),
             **self._contact_row(domain.positions + u),
+            **growth.row(size_of((domain.positions + u) * MM_PER_M, self.zones), step_s),
             "elements_through_cortex": self._through,
             "rung": RUNGS[count.rung],
         }

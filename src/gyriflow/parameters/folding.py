@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
+from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag, ValidationInfo, field_validator
 
 from .settings import Problem, Settings, check, setting, up_to_invalid
 from .terms import FieldName, MaterialName
@@ -98,9 +98,48 @@ class Solver(Settings):
     max_halvings: int = setting(6, "", "Halvings of the time step before the run ends.", ge=0, le=30)
 
 
+SizeCurve = Annotated[
+    Annotated[dict[Week, Annotated[float, Field(gt=0)]], Tag("(table)")]
+    | Annotated[Literal["measured"], Tag("(word)")],
+    Discriminator(lambda value: "(table)" if isinstance(value, dict) else "(word)"),
+]
+"""A size by gestational week, or the curve through the measured brains."""
+
+
+class Follow(Settings):
+    """Growth that follows a brain: before each step the rates of cortex and core are set so that both curves are met.
+
+    A brain that does not start on the curves comes onto them within its first week.
+    """
+
+    area_cm2: SizeCurve = setting(
+        "measured", "cm²",
+        "Pial area of both hemispheres by gestational week, as `{21: 99, 30: 252}`; `measured`: a smooth curve through "
+        "the brains of the start's growth series.",
+    )  # fmt: skip
+    volume_ml: SizeCurve = setting(
+        "measured", "mL", "Volume inside the pial surface by gestational week, or `measured`; likewise."
+    )
+    regional: float = setting(
+        0.0, "",
+        "How much of the measured differences between regions growth has: 0 none, 1 all; they come from registering "
+        "the brains of successive weeks.",
+        ge=0, le=2,
+    )  # fmt: skip
+    smoothing_mm: float = setting(
+        6.0, "mm", "Standard deviation of the Gaussian that smooths measured local growth.", ge=1, le=50
+    )
+
+
 class FoldingSettings(Settings):
     """The mechanical model, its parameters and its numerics. The defaults are the reference values of the paper."""
 
+    preset: Literal["fetalfoldsim", "measured"] | None = setting(
+        None, "",
+        "Parameters to start from; other keys come on top. `fetalfoldsim`: those of the paper; `measured`: growth that "
+        "follows the brains' areas and volumes, regional as registration measures it. All values stand in "
+        "`params.yaml`.",
+    )  # fmt: skip
     end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
     step_s: float = setting(
         43200.0, "s", "Time step; the last one before an output week is shortened to fit.", gt=0, le=604800
@@ -125,6 +164,9 @@ class FoldingSettings(Settings):
         0.0, "1/s",
         "Isotropic growth rate of the core; `estimated`: from the brains' volumes.", ge=-1e-5, le=1e-5,
     )  # fmt: skip
+    follow: Follow | None = setting(
+        None, "", "Growth that follows curves of area and volume; the two growth rates then have no meaning."
+    )
     allow_negative_growth: bool = setting(False, "", "Whether the growth rates may be negative (atrophy).")
     stress_memory_gw: Memory = setting(
         0.0, "GW",
@@ -152,6 +194,14 @@ class FoldingSettings(Settings):
     )
     solver: Solver = setting(Solver(), "", "The solvers.")
     ranks: int = setting(2, "", "MPI ranks of one simulation.", ge=1, le=4096)
+
+    @check
+    def _rates_or_curves(self) -> Iterator[Problem]:
+        if not self.gives("follow"):
+            return
+        for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
+            if self.gives(key) and type(self) is FoldingSettings:
+                yield Problem("has no meaning with `follow`, which sets it at each step", (key,))
 
     @field_validator("*")
     @classmethod
@@ -188,11 +238,15 @@ class FoldingParameters(FoldingSettings):
     start_week: Week = setting(..., "GW", "Gestational age at the start.")
     output_weeks: tuple[Week, ...] = setting(..., "GW", "Output weeks, from `start_week` to `end_week`.")
     fissure_x_mm: float = setting(..., "mm", "Position of the interhemispheric fissure.")
+    regional_growth: dict[Week, str] = setting(
+        {}, "GW", "With `follow.regional`: by the week from which each holds, the names of maps of relative growth."
+    )
 
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
-        return {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
+        own = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
+        return own | set(self.regional_growth.values())
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""

@@ -1,0 +1,87 @@
+"""A smooth map of space: a displacement field on a grid followed by an affine map."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from .triangles import Floats, frozen
+
+INVERSION_ROUNDS = 100
+INVERTED_MM = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """The map p → A(p + u(p)) from one brain's space to another's, both in RAS+ mm.
+
+    Attributes
+    ----------
+    matrix : (4, 4) float
+        The affine map A.
+    displacement : (i, j, k, 3) float
+        u in mm at the points of a grid in the first brain's space; in between linear, beyond the grid as at its rim.
+    affine : (4, 4) float
+        Index of the grid to RAS+ position in mm.
+    """
+
+    matrix: Floats
+    displacement: Floats
+    affine: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", frozen(self.matrix, np.float64, 4))
+        object.__setattr__(self, "affine", frozen(self.affine, np.float64, 4))
+        if self.displacement.ndim != 4 or self.displacement.shape[3] != 3:
+            raise ValueError(f"expected an (i, j, k, 3) displacement, found shape {self.displacement.shape}")
+
+
+def moved(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
+    """Returns (n, 3) points under a (4, 4) affine map."""
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
+
+
+def displacement_at(deformation: Deformation, points: Floats) -> Floats:
+    """Returns the (n, 3) displacement u in mm at points in mm."""
+    index = moved(points, np.linalg.inv(deformation.affine)).T
+    parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
+    return np.stack(parts, axis=1).astype(np.float64)
+
+
+def carried(deformation: Deformation, points: Floats) -> Floats:
+    """Returns where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
+    return moved(points + displacement_at(deformation, points), deformation.matrix)
+
+
+def carried_back(deformation: Deformation, points: Floats) -> Floats:
+    """Returns which (n, 3) points of the first brain come to lie at given points of the second, in mm.
+
+    By fixed-point iteration p ← A⁻¹(q) − u(p), which halves its steps where they grow (Chen et al. 2008, doi
+    10.1118/1.2816107). Where the map folds there is no inverse, and the nearest approach found is returned.
+    """
+    aim = moved(points, np.linalg.inv(deformation.matrix))
+    found = aim.copy()
+    left = np.full(len(aim), np.inf)
+    share = np.ones(len(aim))
+    best = found.copy()
+    for _ in range(INVERSION_ROUNDS):
+        missing = aim - found - displacement_at(deformation, found)
+        away = np.linalg.norm(missing, axis=1)
+        nearer = away < left
+        best[nearer], left[nearer] = found[nearer], away[nearer]
+        if not (left > INVERTED_MM).any():
+            break
+        share[~nearer] *= 0.5
+        found = np.where(nearer[:, None], found + share[:, None] * missing, 0.5 * (found + best))
+    return best
+
+
+def determinants(deformation: Deformation) -> Floats:
+    """Returns the (i, j, k) determinant of the map's gradient at the points of its grid: local growth of volume.
+
+    By central differences of the displacement; 0 or less where the map folds.
+    """
+    gradient = np.stack(np.gradient(deformation.displacement.astype(np.float64), axis=(0, 1, 2)), axis=-1)
+    gradient = gradient @ np.linalg.inv(deformation.affine[:3, :3])
+    return np.asarray(np.linalg.det(np.eye(3) + gradient) * np.linalg.det(deformation.matrix[:3, :3]))

@@ -1,0 +1,79 @@
+"""Values smoothed or continued along a surface or inside a solid mesh, not across a sulcus or fissure."""
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg
+
+from .tetrahedra import volumes_between
+from .triangles import Floats, TriangleMesh, face_areas
+
+STEPS = 8
+"""Implicit steps: their product has the Gaussian's variance, and nearly its shape."""
+
+
+def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
+    """Returns the (m,) areas in mm² of (m, 3) triangles, or signed volumes in mm³ of (m, 4) tetrahedra."""
+    if cells.shape[1] == 3:
+        return face_areas(TriangleMesh(vertices, cells.astype(np.int64)))
+    return volumes_between(vertices, cells)
+
+
+def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
+    """Returns the (n,) areas or volumes that belong to the vertices: equal parts of the cells around."""
+    share = np.repeat(cell_sizes(vertices, cells) / cells.shape[1], cells.shape[1])
+    return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
+
+
+def diffused(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:
+    """Returns (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
+
+    Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2. The integral of
+    the values over the mesh stays as it is. 0 returns them as they are.
+
+    Parameters
+    ----------
+    vertices, cells
+        (n, 3) positions in mm, and (m, 3) triangles or (m, 4) tetrahedra, none inverted.
+    """
+    if sigma_mm == 0:
+        return values.copy()
+    mass = vertex_sizes(vertices, cells)
+    used = mass > 0
+    step = sigma_mm**2 / 2 / STEPS
+    matrix = sparse.csr_matrix(sparse.diags(np.where(used, mass, 1.0)) + step * _stiffness(vertices, cells))
+    inverse = 1.0 / matrix.diagonal()
+    nearly = LinearOperator(matrix.shape, matvec=lambda x: inverse * x.ravel(), dtype=float)
+    columns = values.reshape(len(values), -1).T.astype(float)
+    smooth = []
+    for column in columns:
+        for _ in range(STEPS):
+            column, failed = cg(matrix, np.where(used, mass, 1.0) * column, x0=column, M=nearly, rtol=1e-8)
+            if failed:
+                raise ValueError(f"diffusion by {sigma_mm:g} mm does not converge: the mesh has degenerate cells")
+        smooth.append(column)
+    return np.stack(smooth, axis=1).reshape(values.shape)
+
+
+def harmonic(vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats) -> Floats:
+    """Returns (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
+    stiffness = _stiffness(vertices, cells)
+    unknown = np.setdiff1d(np.unique(cells), known)
+    found = np.zeros((len(vertices), values.shape[1]))
+    found[known] = values
+    rows = stiffness[unknown]
+    matrix, right = rows[:, unknown], -(rows[:, known] @ values)
+    inverse = 1.0 / matrix.diagonal()
+    nearly = LinearOperator(matrix.shape, matvec=lambda x: inverse * x.ravel(), dtype=float)
+    for column in range(values.shape[1]):
+        found[unknown, column], failed = cg(matrix, right[:, column], M=nearly, rtol=1e-8, maxiter=10000)
+        if failed:
+            raise ValueError("the harmonic continuation does not converge: the mesh has degenerate cells")
+    return found
+
+
+def _stiffness(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:
+    """Returns the (n, n) stiffness matrix of linear finite elements, positive semidefinite."""
+    cotangents = igl.cotmatrix(np.ascontiguousarray(vertices), np.ascontiguousarray(cells, dtype=np.int64))
+    return sparse.csr_matrix(-cotangents)

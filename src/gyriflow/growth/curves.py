@@ -1,0 +1,295 @@
+"""Smooth curves of area, volume and thickness over gestational weeks, through measured weeks or from a table."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline, PchipInterpolator
+from scipy.linalg import solve
+from scipy.optimize import brentq, lsq_linear
+
+from ..errors import InputError
+
+log = logging.getLogger(__name__)
+
+Floats = NDArray[np.float64]
+
+DEGREES_OF_FREEDOM = 4.0
+"""Of a fitted curve: a size, a rate of growth, how that rate changes, and a little more."""
+
+SPACING_WEEKS = 0.1
+"""Of the points that a fitted curve is kept at."""
+
+LEAST_SCATTER = 0.005
+"""Scatter of measured sizes, as a fraction, that is not taken for a leap."""
+
+TUKEY = 4.685
+"""Residual over scatter beyond which a week does not count (Beaton and Tukey 1974)."""
+
+TELLING = 2.0
+"""Weeks per degree of freedom from which on the others tell that one leaps."""
+
+ROUNDS = 50
+KNOT_INTERVALS = 12
+CERTAIN = 1.96
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A positive quantity over the weeks.
+
+    Between its points the logarithm is a monotone cubic (Fritsch and Butland 1984); beyond them the rate of growth of
+    the end goes on.
+
+    Attributes
+    ----------
+    weeks : (k,) float
+        Ascending.
+    values : (k,) float
+        In any unit.
+    sd : (k,) float
+        Standard deviation of the logarithm; NaN where the data do not tell, 0 for a given table.
+    """
+
+    weeks: Floats
+    values: Floats
+    sd: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A curve through measured weeks, and what each week has to do with it.
+
+    Attributes
+    ----------
+    curve
+    weeks, measured : (n,) float
+        What it was fitted to.
+    weights : (n,) float
+        From 1 to 0, for a week that leaps.
+    """
+
+    curve: Curve
+    weeks: Floats
+    measured: Floats
+    weights: Floats
+
+
+def value(curve: Curve, week: ArrayLike) -> Floats:
+    """Returns the quantity at weeks, in the curve's unit."""
+    return np.exp(_log_and_rate(curve, week)[0])
+
+
+def rate(curve: Curve, week: ArrayLike) -> Floats:
+    """Returns the rate of growth d(ln y)/dt at weeks, in 1/week."""
+    return _log_and_rate(curve, week)[1]
+
+
+def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
+    """Returns the bounds of the 95 % interval of the curve at weeks; beyond its ends as wide as there."""
+    sd = np.interp(np.asarray(week, dtype=float), curve.weeks, curve.sd)
+    middle = value(curve, week)
+    return middle * np.exp(-CERTAIN * sd), middle * np.exp(CERTAIN * sd)
+
+
+def tabulated(
+    weeks: Sequence[float], values: Sequence[float], *, name: str = "curve", may_shrink: bool = False
+) -> Curve:
+    """Returns the curve of a given table, such as a norm; InputError where it is no table or shrinks unnamed."""
+    weeks_, values_ = _checked(weeks, values, name)
+    if len(np.unique(weeks_)) < len(weeks_):
+        raise InputError(f"a week of the {name} is there twice", found=weeks_.tolist(), expected="one value a week")
+    if not may_shrink and (np.diff(values_) < 0).any():
+        _refuse_shrinking(name, weeks_[1:][np.diff(values_) < 0])
+    return Curve(weeks_, values_, np.zeros(len(weeks_)))
+
+
+def fitted(
+    weeks: Sequence[float],
+    values: Sequence[float],
+    *,
+    name: str = "curve",
+    degrees_of_freedom: float = DEGREES_OF_FREEDOM,
+    may_shrink: bool = False,
+) -> Fit:
+    """Returns a smooth curve through measured weeks that does not follow a single week that leaps.
+
+    The rate of growth of the logarithm is a quadratic spline with a penalty on its second differences (on its first
+    ones below three degrees of freedom, P-splines of Eilers and Marx 1996), not negative unless `may_shrink`. The
+    penalty is that which leaves `degrees_of_freedom`, at most one less than there are weeks. Where there are twice as
+    many weeks, those far from the curve lose their weight (Tukey's biweight, begun from least absolute deviations).
+    The standard deviation is Bayesian (Wahba 1983), with the scatter of the weeks about the curve.
+
+    Parameters
+    ----------
+    weeks, values
+        Gestational weeks, at least two different ones, and positive sizes; several brains may share a week.
+
+    InputError for other values, and where the sizes shrink and that is not allowed.
+    """
+    weeks_, values_ = _checked(weeks, values, name)
+    count = len(np.unique(weeks_))
+    degrees = min(degrees_of_freedom, max(count - 1.0, 2.0))
+    basis = _Basis(weeks_[0], weeks_[-1])
+    design, logs = basis.sizes(weeks_), np.log(values_)
+    penalty = basis.penalty(2 if degrees >= 3 else 1)
+    strength = _strength(design, penalty, degrees)
+    weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
+    coefficients = _solved(design, logs, weights, strength * penalty, may_shrink)
+    if not may_shrink and coefficients[1:].max() < 1e-6:
+        _refuse_shrinking(name, weeks_)
+    spread = _scatter(logs - design @ coefficients, weights, degrees)
+    at = np.linspace(weeks_[0], weeks_[-1], max(2, round((weeks_[-1] - weeks_[0]) / SPACING_WEEKS) + 1))
+    rows = basis.sizes(at)
+    free = np.ones(len(coefficients), dtype=bool)
+    free[1:] = may_shrink | (coefficients[1:] > 1e-8)
+    normal = (design.T * weights) @ design + strength * penalty
+    covariance = np.linalg.pinv(normal[np.ix_(free, free)])
+    sd = spread * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows[:, free], covariance, rows[:, free]), 0.0))
+    leaping = weeks_[weights < 0.5]
+    if len(leaping):
+        log.warning("%s: weeks %s lie apart from the curve", name, ", ".join(f"{week:g}" for week in leaping))
+    return Fit(Curve(at, np.exp(rows @ coefficients), sd), weeks_, values_, weights)
+
+
+def errors(fits: Mapping[str, Fit]) -> pd.DataFrame:
+    """Returns how far curves are from the weeks that they were fitted to, a row per quantity and measured value.
+
+    Columns quantity, week, measured, curve, low, high (95 % interval), error (the curve's, as a fraction of what was
+    measured), weight.
+    """
+    tables = []
+    for name, fit in fits.items():
+        low, high = interval(fit.curve, fit.weeks)
+        middle = value(fit.curve, fit.weeks)
+        columns = {"week": fit.weeks, "measured": fit.measured, "curve": middle, "low": low, "high": high}
+        columns |= {"error": middle / fit.measured - 1, "weight": fit.weights}
+        tables.append(pd.DataFrame({"quantity": name} | columns))
+    return pd.concat(tables, ignore_index=True)
+
+
+def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
+    """Returns curves as a table: quantity, week, value, low, high (95 % interval), rate_per_week."""
+    tables = []
+    for name, curve in curves.items():
+        low, high = interval(curve, curve.weeks)
+        columns = {"week": curve.weeks, "value": curve.values, "low": low, "high": high}
+        tables.append(pd.DataFrame({"quantity": name} | columns | {"rate_per_week": rate(curve, curve.weeks)}))
+    return pd.concat(tables, ignore_index=True)
+
+
+class _Basis:
+    """Sizes whose rate of growth is a quadratic spline: column 0 is the logarithm at the first week."""
+
+    def __init__(self, first: float, last: float) -> None:
+        inner = np.linspace(first, last, KNOT_INTERVALS + 1)
+        knots = np.concatenate([[first] * 2, inner, [last] * 2])
+        self.first = first
+        self.splines = [BSpline(knots, row, 2, extrapolate=False) for row in np.eye(KNOT_INTERVALS + 2)]
+        self.integrals = [spline.antiderivative() for spline in self.splines]
+
+    def sizes(self, weeks: Floats) -> Floats:
+        """Returns the (n, 1 + k) design matrix of the logarithm."""
+        columns = [integral(weeks) - integral(self.first) for integral in self.integrals]
+        return np.stack([np.ones(len(weeks)), *columns], axis=1)
+
+    def penalty(self, order: int) -> Floats:
+        """Returns the (1 + k, 1 + k) matrix of squared differences of the rate."""
+        # the end knots lie together, so differences are those of the splines' middles
+        middles = np.array([np.mean(spline.t[i + 1 : i + 3]) for i, spline in enumerate(self.splines)])
+        slopes = np.diff(np.eye(len(middles)), axis=0) / np.diff(middles)[:, None]
+        if order == 2:
+            gaps = 0.5 * (middles[2:] - middles[:-2])
+            slopes = np.diff(slopes, axis=0) / gaps[:, None]
+        matrix = np.zeros((1 + len(middles),) * 2)
+        matrix[1:, 1:] = slopes.T @ slopes
+        return matrix
+
+
+def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
+    """Returns the factor of the penalty that leaves the degrees of freedom, the trace of the hat matrix."""
+    # a trace of ridge keeps the matrix regular where weeks are fewer than splines
+    ridge = 1e-10 * np.eye(len(penalty))
+
+    def excess(exponent: float) -> float:
+        normal = design.T @ design
+        return float(np.trace(solve(normal + 10**exponent * penalty + ridge, normal, assume_a="pos"))) - degrees
+
+    low, high = -8.0, 8.0
+    if excess(low) <= 0:
+        return 10**low
+    if excess(high) >= 0:
+        return 10**high
+    return float(10 ** brentq(excess, low, high))
+
+
+def _solved(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool) -> Floats:
+    root = np.linalg.cholesky(penalty + 1e-10 * np.eye(len(penalty))).T
+    rows = np.concatenate([np.sqrt(weights)[:, None] * design, root])
+    right = np.concatenate([np.sqrt(weights) * logs, np.zeros(len(root))])
+    if may_shrink:
+        return np.linalg.lstsq(rows, right, rcond=None)[0]
+    lowest = np.full(design.shape[1], 0.0)
+    lowest[0] = -np.inf
+    return np.asarray(lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls").x)
+
+
+def _robust_weights(
+    design: Floats, logs: Floats, penalty: Floats, strength: float, degrees: float, may_shrink: bool
+) -> Floats:
+    """Returns the (n,) weights of the weeks: least absolute deviations first, then Tukey's biweight."""
+    count = len(logs)
+    weights = np.ones(count)
+    if count < TELLING * degrees:
+        return weights
+    for _ in range(ROUNDS):
+        residuals = logs - design @ _solved(design, logs, weights, strength * penalty, may_shrink)
+        weights = 1.0 / np.maximum(np.abs(residuals), LEAST_SCATTER)
+        weights *= count / weights.sum()
+    for _ in range(ROUNDS):
+        scale = max(1.4826 * float(np.median(np.abs(residuals))) * np.sqrt(count / (count - degrees)), LEAST_SCATTER)
+        weights = np.clip(1 - (residuals / (TUKEY * scale)) ** 2, 0, None) ** 2
+        residuals = logs - design @ _solved(design, logs, weights, strength * penalty, may_shrink)
+    return weights
+
+
+def _scatter(residuals: Floats, weights: Floats, degrees: float) -> float:
+    left = weights.sum() - degrees
+    return float(np.sqrt((weights * residuals**2).sum() / left)) if left > 0.5 else float("nan")
+
+
+def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
+    at = np.asarray(week, dtype=float)
+    inside = np.clip(at, curve.weeks[0], curve.weeks[-1])
+    logs = PchipInterpolator(curve.weeks, np.log(curve.values))
+    rates = logs.derivative()(inside)
+    return logs(inside) + rates * (at - inside), rates
+
+
+def _checked(weeks: Sequence[float], values: Sequence[float], name: str) -> tuple[Floats, Floats]:
+    weeks_, values_ = np.asarray(weeks, dtype=float), np.asarray(values, dtype=float)
+    bad = (
+        weeks_.shape != values_.shape
+        or not np.isfinite(weeks_).all()
+        or not (np.isfinite(values_) & (values_ > 0)).all()
+    )
+    if bad or len(np.unique(weeks_)) < 2:
+        raise InputError(
+            f"no {name} goes through these weeks",
+            found=f"weeks {weeks_.tolist()}, values {values_.tolist()}",
+            expected="positive values at two or more weeks",
+        )
+    order = np.argsort(weeks_, kind="stable")
+    return weeks_[order], values_[order]
+
+
+def _refuse_shrinking(name: str, weeks: Floats) -> None:
+    raise InputError(
+        f"the {name} shrinks",
+        found=f"at weeks {', '.join(f'{week:g}' for week in weeks)}",
+        expected="growth",
+        remedy="Leave out the brains that do not fit, or allow shrinking by name.",
+    )

@@ -1,0 +1,153 @@
+"""Diffeomorphic registration of two brains' volumes with greedy (Yushkevich et al. 2016, pyushkevich/greedy)."""
+
+import io
+import logging
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import SimpleITK
+from numpy.typing import NDArray
+from picsl_greedy import Greedy3D
+from scipy.ndimage import binary_dilation, map_coordinates
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError
+from ..geometry.deformations import Deformation, moved
+from ..geometry.triangles import Floats
+from .channels import CEREBRUM, Channels
+
+log = logging.getLogger(__name__)
+
+WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
+
+AFFINE = "-a -dof 12 -m SSD -n 60x30"
+DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -s 2.5vox 0.8vox -wp 0"
+
+TURNS = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
+"""The 24 rotations of a cube, none first."""
+
+CLEARLY_BETTER = 0.7
+"""A turned start has to have a smaller share of the difference of the start as given to be taken."""
+
+POINTS = 20000
+"""Of the cerebrum, by which these starts are compared."""
+
+NEAR_MM = 3.0
+"""Round the cerebrum, what is compared for the deformation."""
+
+MIRROR = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""greedy hands matrices over in RAS and all else in LPS."""
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """A deformation that was found, and how.
+
+    Attributes
+    ----------
+    deformation
+        Takes points of the earlier brain to the later one.
+    turned_deg
+        By how much the later brain was turned before the affine registration began.
+    seconds, cpu_seconds
+        Time that it took, and the processor's.
+    channels
+        Names of the channels compared.
+    """
+
+    deformation: Deformation
+    turned_deg: float
+    seconds: float
+    cpu_seconds: float
+    channels: tuple[str, ...]
+
+
+def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registration:
+    """Returns the registration of an earlier brain with a later one.
+
+    The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
+    cross-correlation for the deformation. It begins where centroids and volumes of the cerebra match, turned by that
+    of the cube's rotations which fits clearly better than none. The same input gives the same result. InputError where
+    greedy fails; whether the result is good is for `quality.judged` to say.
+    """
+    began, busy = time.perf_counter(), time.process_time()
+    names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
+    turn, start = _started(earlier, later, names)
+    images = {f"fixed_{name}": _image(getattr(earlier, name), earlier.affine) for name in names}
+    # greedy begins at the identity, so the later brain is handed over where the start puts it
+    placed = np.linalg.inv(start) @ later.affine
+    images |= {f"moving_{name}": _image(getattr(later, name), placed) for name in names}
+    images["where"] = _image(_round_cerebrum(earlier), earlier.affine)
+    pairs = " ".join(f"-w {WEIGHTS[name]:g} -i fixed_{name} moving_{name}" for name in names)
+    common = f"-threads {threads} -seed 1 -V 0"
+    greedy = Greedy3D()
+    said = io.StringIO()
+    try:
+        greedy.execute(f"{AFFINE} {common} {pairs} -ia-identity -o found", out=said, err=said, found=None, **images)
+        greedy.execute(f"{DEFORMABLE} {common} {pairs} -gm where -it found -o warp", out=said, err=said, warp=None)
+    except RuntimeError as error:
+        raise InputError(
+            f"greedy cannot register the brains: {error}",
+            found=f"channels {', '.join(names)}" + said.getvalue()[-500:],
+            remedy="Look at both label volumes: are they of the same kind of brain, whole and in mm?",
+        ) from error
+    matrix = start @ MIRROR @ np.asarray(greedy["found"], dtype=float) @ MIRROR
+    # images hold their axes the other way round in SimpleITK's arrays
+    warp = SimpleITK.GetArrayFromImage(greedy["warp"]).transpose(2, 1, 0, 3).astype(np.float32)
+    seconds = time.perf_counter() - began
+    log.info("registered by %s in %.0f s", ", ".join(names), seconds)
+    return Registration(
+        Deformation(matrix, np.ascontiguousarray(warp), earlier.affine),
+        float(np.degrees(Rotation.from_matrix(turn).magnitude())),
+        seconds,
+        time.process_time() - busy,
+        names,
+    )
+
+
+def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
+    """Returns a volume for greedy, with RAS+ mm in the place of its LPS mm: turned alike for both brains."""
+    image = SimpleITK.GetImageFromArray(np.ascontiguousarray(values.transpose(2, 1, 0)))
+    spacing = np.linalg.norm(affine[:3, :3], axis=0)
+    image.SetSpacing(spacing.tolist())
+    image.SetDirection((affine[:3, :3] / spacing).ravel().tolist())
+    image.SetOrigin(affine[:3, 3].tolist())
+    return image
+
+
+def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
+    """Returns 1 in the cerebrum and near it: what surrounds the brain is not to pull on it."""
+    rounds = int(np.ceil(NEAR_MM / brain.voxel_mm))
+    return binary_dilation(brain.tissue & CEREBRUM > 0, iterations=rounds).astype(np.float32)
+
+
+def _started(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
+    """Returns the (3, 3) turn and the (4, 4) similarity, from earlier to later, that registration begins with."""
+    (first, size), (second, other_size) = _place(earlier), _place(later)
+    scale = (other_size / size) ** (1 / 3)
+    index = np.argwhere(earlier.cerebrum > 0.01)
+    index = index[:: max(1, len(index) // POINTS)]
+    points = moved(index, earlier.affine)
+    tried, differences = [], []
+    for turn in TURNS:
+        matrix = np.eye(4)
+        matrix[:3, :3] = scale * turn
+        matrix[:3, 3] = second - matrix[:3, :3] @ first
+        at = moved(moved(points, matrix), np.linalg.inv(later.affine)).T
+        squares = [
+            WEIGHTS[name]
+            * np.square(getattr(earlier, name)[tuple(index.T)] - map_coordinates(getattr(later, name), at, order=1))
+            for name in names
+        ]
+        tried.append(matrix)
+        differences.append(float(np.sum([square.mean() for square in squares])))
+    best = int(np.argmin(differences))
+    chosen = best if differences[best] < CLEARLY_BETTER * differences[0] else 0
+    return TURNS[chosen], tried[chosen]
+
+
+def _place(brain: Channels) -> tuple[Floats, float]:
+    """Returns the (3,) centroid in mm and the volume in mm³ of a cerebrum."""
+    index = np.argwhere(brain.tissue & CEREBRUM > 0)
+    return moved(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3

@@ -1,0 +1,93 @@
+"""What a mesh that was carried over weeks tells: local growth, and the displacement of every vertex."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.diffusion import diffused, vertex_sizes
+from ..geometry.motion import without_rigid_motion
+from ..geometry.triangles import Floats
+
+
+def local_growth(positions: Floats, cells: NDArray[np.integer], weeks: Sequence[float], sigma_mm: float) -> Floats:
+    """Returns the (w − 1, n) local log growth per week: of area for triangles, of volume for tetrahedra.
+
+    The size that belongs to a vertex, as a multiple of that in the first week, is smoothed in both weeks by diffusion
+    along the mesh, and the logarithm of the ratio divided by the time between. Smoothed so, the whole grows as measured
+    whatever the length, and single inverted elements do no harm. A growth of volume is that of the map's gradient,
+    ln det ∇; one of the pial triangles is tangential.
+
+    Parameters
+    ----------
+    positions
+        (w, n, 3) positions in mm of the same vertices in all weeks: vertex-matched surfaces, or a mesh carried along.
+    cells
+        (m, 3) triangles or (m, 4) tetrahedra, sound in the first week.
+    weeks
+        Gestational weeks, ascending.
+    sigma_mm
+        Standard deviation of the Gaussian in mm of each interval's first week (2.355 times less than its full width at
+        half maximum): lengths of the first week are scaled with the whole to that week's.
+
+    InputError where weeks do not ascend, or a vertex's share vanishes or is inverted after smoothing.
+    """
+    _require_ascending(positions, weeks)
+    start = vertex_sizes(positions[0], cells)
+    used = start > 0
+    dimension = cells.shape[1] - 1
+    sizes = np.stack([vertex_sizes(position, cells) for position in positions])
+    relative = np.where(used, sizes, 1.0) / np.where(used, start, 1.0)
+    rates = []
+    for first, second, duration in zip(range(len(weeks) - 1), range(1, len(weeks)), np.diff(weeks), strict=True):
+        scale = (sizes[first].sum() / sizes[0].sum()) ** (1 / dimension)
+        smooth = diffused(positions[0], cells, relative[[first, second]].T, sigma_mm / scale)
+        bad = np.asarray(smooth.min(axis=1) <= 0)
+        if bad.any():
+            raise InputError(
+                f"local growth from week {weeks[first]:g} to {weeks[second]:g} has no logarithm",
+                found=f"{np.count_nonzero(bad)} of {len(bad)} vertices in inverted or vanished cells",
+                expected="none",
+                remedy=f"Smooth growth by more than {sigma_mm:g} mm, or look at the registration of these weeks.",
+            )
+        rates.append(np.log(smooth[:, 1] / smooth[:, 0]) / duration)
+    return np.stack(rates)
+
+
+def with_amplitude(rates: Floats, sizes: Floats, amplitude: float) -> Floats:
+    """Returns local rates whose deviation from the whole's is multiplied: 0 uniform, 1 as measured.
+
+    Parameters
+    ----------
+    rates
+        (w − 1, n) local log growth per week.
+    sizes
+        (n,) weights of the vertices, their areas or volumes.
+    """
+    whole = np.average(rates, axis=1, weights=sizes)[:, None]
+    return np.asarray(whole + amplitude * (rates - whole))
+
+
+def weekly_displacements(positions: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
+    """Returns the (w − 1, n, 3) displacements in mm per week of the vertices, without their common rigid motion.
+
+    The rigid motion that is taken out of each interval is that of least squares, with the (n,) `sizes` of the vertices
+    as weights.
+    """
+    _require_ascending(positions, weeks)
+    return np.stack(
+        [
+            without_rigid_motion(first, second, sizes) / duration
+            for first, second, duration in zip(positions[:-1], positions[1:], np.diff(weeks), strict=True)
+        ]
+    )
+
+
+def _require_ascending(positions: Floats, weeks: Sequence[float]) -> None:
+    if len(positions) != len(weeks) or len(weeks) < 2 or not (np.diff(weeks) > 0).all():
+        raise InputError(
+            "growth is between successive weeks",
+            found=f"weeks {list(weeks)} for {len(positions)} meshes",
+            expected="two or more, ascending, one for each mesh",
+        )

@@ -1,0 +1,76 @@
+"""In which week a sulcus appears that is not there at the start."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
+
+DEEP_MM = 2.0
+"""A sulcus is there when it is so much below its neighbouring crowns."""
+
+NEIGHBOURHOOD_MM = 10.0
+"""Round a region, where its crowns are."""
+
+BOTTOM, CROWN = 0.9, 0.1
+"""Quantiles of depth by area that stand for the bottom of a region and for the crowns beside it."""
+
+
+def relief(
+    mesh: TriangleMesh, depth_mm: Floats, regions: NDArray[np.integer], names: Mapping[int, str]
+) -> pd.DataFrame:
+    """Returns how deep regions are below their neighbouring crowns: columns region, bottom_mm, crown_mm, relief_mm.
+
+    Parameters
+    ----------
+    depth_mm
+        (n,) depth of the vertices below the hull or envelope.
+    regions
+        (n,) region labels of the vertices, each the place of a sulcus, carried along from an atlas.
+    names
+        Names of the labels that count. A region without vertices has NaN.
+    """
+    areas = vertex_areas(mesh)
+    rows = []
+    for label, name in names.items():
+        inside = regions == label
+        if not inside.any():
+            rows.append((name, np.nan, np.nan, np.nan))
+            continue
+        away, _ = cKDTree(mesh.vertices[inside]).query(mesh.vertices, distance_upper_bound=NEIGHBOURHOOD_MM)
+        near = np.isfinite(away)
+        bottom = _quantile(depth_mm[inside], areas[inside], BOTTOM)
+        crown = _quantile(depth_mm[near], areas[near], CROWN)
+        rows.append((name, bottom, crown, bottom - crown))
+    return pd.DataFrame(rows, columns=["region", "bottom_mm", "crown_mm", "relief_mm"])
+
+
+def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
+    """Returns the week in which each region's sulcus appears, from tables of `relief` by week.
+
+    The first time that the relief reaches 2 mm, linear between weeks. Columns region, there_at_start, onset_week (NaN
+    where it was there at the start or never comes), first_relief_mm, last_relief_mm.
+    """
+    weeks = sorted(reliefs)
+    by_week = pd.concat([reliefs[week].assign(week=week) for week in weeks])
+    rows = []
+    for name, table in by_week.groupby("region", sort=False):
+        depths = table["relief_mm"].to_numpy(dtype=float)
+        there = bool(depths[0] >= DEEP_MM)
+        reached = np.flatnonzero(depths >= DEEP_MM)
+        week = np.nan
+        if not there and len(reached):
+            after = int(reached[0])
+            before = after - 1
+            part = (DEEP_MM - depths[before]) / (depths[after] - depths[before])
+            # where the depth of the week before is not known, the week itself
+            week = weeks[before] + part * (weeks[after] - weeks[before]) if np.isfinite(part) else weeks[after]
+        rows.append((name, there, week, depths[0], depths[-1]))
+    return pd.DataFrame(rows, columns=["region", "there_at_start", "onset_week", "first_relief_mm", "last_relief_mm"])
+
+
+def _quantile(values: Floats, weights: Floats, share: float) -> float:
+    return float(np.quantile(values, share, weights=weights, method="inverted_cdf"))

@@ -1,0 +1,90 @@
+"""Growth that follows curves of area and volume: both are met, whatever part of growth the tissue realises."""
+
+import math
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from shapes import ellipsoid_mesh
+
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.following import size_of
+from gyriflow.folding.simulation import Folding
+from gyriflow.folding.zones import zones_of_run
+from gyriflow.parameters.reading import parameters_from
+from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
+
+COMM = MPI.COMM_WORLD
+AXES = (20.0, 24.0, 18.0)
+DAY_S = 86_400.0
+
+
+def following(growth, **changes):
+    """Returns a free ellipsoid that is to grow by (area, volume) per week as logarithms, and the state before."""
+    mesh = ellipsoid_mesh(8, AXES)
+    known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
+    settings = {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
+    plain = parameters_from(known | settings)
+    start = size_of(mesh.vertices, zones_of_run(mesh, plain))
+    sizes = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
+    curves = {
+        name: {21.0: size, 23.0: size * math.exp(2 * rate)}
+        for name, size, rate in zip(("area_cm2", "volume_ml"), sizes, growth, strict=True)
+    }
+    parameters = parameters_from(known | settings | {"follow": curves, "step_s": DAY_S} | changes)
+    folding = Folding(COMM, mesh, zones_of_run(mesh, parameters), parameters)
+    return folding, State.at_start(mesh.vertices * M_PER_MM, DAY_S)
+
+
+def grown(folding, state, steps):
+    for _ in range(steps):
+        state = folding.step(state, DAY_S)
+    return state
+
+
+@pytest.mark.parametrize("growth", [(0.10, 0.15), (0.02, 0.03)])
+def test_area_and_volume_meet_their_curves_after_a_week(growth):
+    folding, state = following(growth)
+    state = grown(folding, state, 10)
+    row = state.rows[-1]
+    assert row["area_cm2"] == pytest.approx(row["area_aim_cm2"], rel=5e-3)
+    assert row["volume_ml"] == pytest.approx(row["volume_aim_ml"], rel=5e-3)
+    found = size_of(state.positions * MM_PER_M, folding.zones)
+    assert row["area_cm2"] == pytest.approx(found.area_mm2 * CM2_PER_MM2, rel=1e-12)
+    # the aim is the curve itself
+    weeks = 10 / 7
+    start = folding.parameters.follow.area_cm2[21.0]
+    assert row["area_aim_cm2"] == pytest.approx(start * math.exp(growth[0] * weeks), rel=1e-9)
+
+
+def test_a_brain_that_shrinks_is_followed_where_that_is_allowed():
+    # a ball keeps its shape, so that its area goes with its volume
+    folding, state = following((-0.10, -0.15), allow_negative_growth=True)
+    row = grown(folding, state, 9).rows[-1]
+    assert row["volume_ml"] == pytest.approx(row["volume_aim_ml"], rel=5e-3)
+    assert row["core_growth_rate_per_s"] < 0
+    folding, state = following((-0.10, -0.15))
+    row = grown(folding, state, 1).rows[-1]
+    assert (row["growth_rate_per_s"], row["core_growth_rate_per_s"], row["growth_limited"]) == (0.0, 0.0, 1)
+
+
+def test_what_was_learnt_of_growth_goes_on_from_the_step_table():
+    folding, state = following((0.10, 0.15))
+    middle = grown(folding, state, 3)
+    whole = grown(folding, middle, 2)
+    again, _ = following((0.10, 0.15))
+    resumed = grown(again, middle, 2)
+    assert resumed.rows[-1]["realised_share"] == pytest.approx(whole.rows[-1]["realised_share"], rel=1e-6)
+    np.testing.assert_allclose(resumed.positions, whole.positions, atol=1e-3 * M_PER_MM)
+    assert whole.rows[-1]["realised_share"] != pytest.approx(0.6, abs=0.01)
+
+
+def test_regional_growth_is_faster_where_its_map_says():
+    folding, state = following((0.10, 0.15))
+    mesh_x = state.positions[:, 0]
+    maps = {"regional_growth_21.00": 1.0 + 0.5 * np.sign(mesh_x)}
+    values = folding.parameters.model_dump(mode="json") | {"regional_growth": {21.0: "regional_growth_21.00"}}
+    local = Folding(COMM, ellipsoid_mesh(8, AXES), folding.zones, parameters_from(values), maps)
+    after = grown(local, state, 3)
+    stretch = [np.ptp(after.positions[side, 1]) / np.ptp(state.positions[side, 1]) for side in (mesh_x > 0, mesh_x < 0)]
+    assert stretch[0] > stretch[1] + 0.01

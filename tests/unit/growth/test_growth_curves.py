@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+
+from gyriflow.errors import InputError
+from gyriflow.growth.curves import curve_table, errors, fitted, interval, rate, tabulated, value
+
+WEEKS = np.arange(21.0, 31.0)
+# growth that slows down: 0.16 per week at 21, 0.07 at 30
+VOLUMES = 50 * np.exp(0.16 * (WEEKS - 21) - 0.005 * (WEEKS - 21) ** 2)
+RATES = 0.16 - 0.01 * (WEEKS - 21)
+
+
+def test_growth_that_slows_down_is_met():
+    fit = fitted(WEEKS, VOLUMES)
+    assert value(fit.curve, WEEKS) == pytest.approx(VOLUMES, rel=2e-3)
+    assert rate(fit.curve, WEEKS) == pytest.approx(RATES, abs=6e-3)
+    assert fit.weights == pytest.approx(np.ones(10), abs=0.05)
+
+
+def test_rates_are_the_derivative():
+    fit = fitted(WEEKS, VOLUMES)
+    middle = np.arange(21.5, 30)
+    small = 0.01
+    slope = np.log(value(fit.curve, middle + small) / value(fit.curve, middle - small)) / (2 * small)
+    assert rate(fit.curve, middle) == pytest.approx(slope, abs=1e-3)
+
+
+@pytest.mark.parametrize("leaping", [0, 4, 9])
+@pytest.mark.parametrize("factor", [0.8, 1.3])
+def test_a_week_that_leaps_does_not_leap(leaping, factor):
+    measured = VOLUMES.copy()
+    measured[leaping] *= factor
+    fit = fitted(WEEKS, measured)
+    away = 0.04 if leaping in (0, 9) else 0.01
+    assert value(fit.curve, WEEKS) == pytest.approx(VOLUMES, rel=away)
+    assert fit.weights[leaping] < 0.1
+    table = errors({"volume": fit}).set_index("week")
+    assert table.loc[21.0 + leaping, "error"] == pytest.approx(1 / factor - 1, abs=0.05)
+
+
+def test_it_is_monotone_where_weeks_are_not():
+    measured = [50.0, 60.0, 70.0, 64.0, 63.0, 75.0, 90.0]
+    fit, free = (fitted(WEEKS[:7], measured, degrees_of_freedom=6, may_shrink=shrinks) for shrinks in (False, True))
+    assert (np.diff(fit.curve.values) >= 0).all()
+    assert (rate(fit.curve, np.linspace(21, 27, 200)) >= 0).all()
+    assert rate(free.curve, 23.7) < -0.02
+
+
+def test_noise_is_smoothed_and_covered_by_the_interval():
+    generator = np.random.default_rng(7)
+    covered, gain = [], []
+    for _ in range(40):
+        measured = VOLUMES * np.exp(0.02 * generator.normal(size=10))
+        fit = fitted(WEEKS, measured)
+        low, high = interval(fit.curve, WEEKS)
+        covered.append((low < VOLUMES) & (high > VOLUMES))
+        gain.append(np.log(value(fit.curve, WEEKS) / VOLUMES).std() / np.log(measured / VOLUMES).std())
+    assert 0.75 < np.mean(covered) <= 1.0
+    assert np.mean(gain) < 0.8
+
+
+def test_several_brains_of_a_week_and_two_weeks_alone():
+    fit = fitted([21, 21, 23, 23], [49.0, 51.0, 98.0, 102.0])
+    assert value(fit.curve, [21, 22, 23]) == pytest.approx([50, np.sqrt(50 * 100), 100], rel=2e-3)
+    alone = fitted([21, 24], [50.0, 80.0])
+    assert value(alone.curve, [21, 24]) == pytest.approx([50, 80], rel=1e-4)
+    assert rate(alone.curve, 22) == pytest.approx(np.log(1.6) / 3, rel=1e-3)
+    assert np.isnan(alone.curve.sd).all()
+
+
+def test_beyond_its_ends_growth_goes_on():
+    fit = fitted(WEEKS, VOLUMES)
+    end = rate(fit.curve, 30.0)
+    assert value(fit.curve, 32.0) == pytest.approx(value(fit.curve, 30.0) * np.exp(2 * end))
+
+
+def test_shrinking_is_refused_unless_named():
+    with pytest.raises(InputError, match="the ventricles shrinks"):
+        fitted(WEEKS, VOLUMES[::-1], name="ventricles")
+    fit = fitted(WEEKS, VOLUMES[::-1], may_shrink=True)
+    assert value(fit.curve, WEEKS) == pytest.approx(VOLUMES[::-1], rel=2e-3)
+    assert rate(fit.curve, 25.0) < 0
+    with pytest.raises(InputError, match="at weeks 23"):
+        tabulated([21, 22, 23], [1.0, 2.0, 1.5])
+    assert rate(tabulated([21, 22, 23], [1.0, 2.0, 1.5], may_shrink=True), 22.5) < 0
+
+
+@pytest.mark.parametrize(
+    ("weeks", "values"), [([21], [1.0]), ([21, 21], [1.0, 2.0]), ([21, 22], [1.0, -1.0]), ([21, 22], [1.0, np.nan])]
+)
+def test_what_is_no_curve_is_refused(weeks, values):
+    with pytest.raises(InputError, match="no volume goes through"):
+        fitted(weeks, values, name="volume")
+
+
+def test_tables_go_through_their_values_and_are_written_out():
+    curve = tabulated([22, 21, 25], [60.0, 50.0, 90.0])
+    assert value(curve, [21, 22, 25]) == pytest.approx([50, 60, 90])
+    table = curve_table({"volume_ml": curve})
+    assert table.columns.tolist() == ["quantity", "week", "value", "low", "high", "rate_per_week"]
+    assert table["value"].tolist() == pytest.approx([50, 60, 90])
+    again = tabulated(table["week"], table["value"])
+    assert value(again, 23.3) == pytest.approx(value(curve, 23.3))

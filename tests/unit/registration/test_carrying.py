@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+import trimesh
+from shapes import ellipsoid_mesh
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.deformations import Deformation, moved
+from gyriflow.geometry.motion import without_rigid_motion
+from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.registration.carrying import back_over_weeks, carried_map, carried_regions, over_weeks
+from gyriflow.registration.growth import local_growth, weekly_displacements, with_amplitude
+
+GRID = np.diag([4.0, 4.0, 4.0, 1.0])
+GRID[:3, 3] = -30.0
+
+
+def affine_map(matrix: np.ndarray) -> Deformation:
+    return Deformation(matrix, np.zeros((16, 16, 16, 3)), GRID)
+
+
+def scaled(factor: float, shift: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
+    matrix = np.diag([factor] * 3 + [1.0])
+    matrix[:3, 3] = shift
+    return matrix
+
+
+BALL = ellipsoid_mesh(10, (10.0, 10.0, 10.0))
+
+
+def sphere() -> TriangleMesh:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
+    return TriangleMesh(ball.vertices, ball.faces)
+
+
+def test_points_are_carried_in_turn_and_back():
+    chain = [affine_map(scaled(1.1, (1, 0, 0))), affine_map(scaled(1.2))]
+    positions = over_weeks(BALL.vertices, chain)
+    assert positions.shape == (3, len(BALL.vertices), 3)
+    assert positions[2] == pytest.approx(1.2 * (1.1 * BALL.vertices + [1, 0, 0]))
+    assert back_over_weeks(positions[2], chain) == pytest.approx(positions, abs=2e-3)
+
+
+def test_points_beyond_the_grid_are_refused():
+    with pytest.raises(InputError, match=r"beyond the grid.*8\.00 mm|beyond the grid"):
+        over_weeks(BALL.vertices + [60.0, 0, 0], [affine_map(np.eye(4))])
+
+
+def test_maps_and_regions_come_to_the_same_places_of_another_brain():
+    source = sphere()
+    matrix = scaled(1.3, (5.0, 0, 0))
+    target = TriangleMesh(
+        moved(trimesh.creation.icosphere(subdivisions=3, radius=10.0).vertices, matrix),
+        trimesh.creation.icosphere(subdivisions=3).faces,
+    )
+    deformation = affine_map(matrix)
+    values = carried_map(source.vertices[:, 2], source, target, deformation)
+    assert values == pytest.approx(target.vertices[:, 2] / 1.3, abs=0.1)
+    regions = carried_regions((source.vertices[:, 0] > 0).astype(int), source, target, deformation)
+    clear = np.abs(target.vertices[:, 0] - 5.0) > 1.5
+    assert (regions == (target.vertices[:, 0] > 5.0))[clear].all()
+
+
+@pytest.mark.parametrize("sigma", [0.0, 3.0, 25.0])
+def test_uniform_growth_is_found_whatever_the_smoothing(sigma):
+    positions = np.stack([BALL.vertices, 1.1 * BALL.vertices, 1.1 * 1.3 * BALL.vertices])
+    rates = local_growth(positions, BALL.tets, [21, 22, 24], sigma)
+    assert rates[0] == pytest.approx(np.full(rates.shape[1], 3 * np.log(1.1)))
+    assert rates[1] == pytest.approx(np.full(rates.shape[1], 3 * np.log(1.3) / 2))
+    surface, used = boundary_surface(BALL)
+    areas = local_growth(positions[:, used], surface.faces, [21, 22, 24], sigma)
+    assert areas[0] == pytest.approx(np.full(len(used), 2 * np.log(1.1)))
+
+
+def test_local_growth_is_where_it_was_and_fades_with_smoothing():
+    x = BALL.vertices
+    # stretched along x by 1 + x/20: local growth ln(1 + x/20), that of the whole near 0
+    positions = np.stack([x, np.stack([x[:, 0] + x[:, 0] ** 2 / 40, x[:, 1], x[:, 2]], axis=1)])
+    rates = {sigma: local_growth(positions, BALL.tets, [21, 22], sigma)[0] for sigma in (0.0, 3.0, 25.0)}
+    inner = np.linalg.norm(x, axis=1) < 8
+    assert rates[0.0][inner] == pytest.approx(np.log(1 + x[inner, 0] / 20), abs=0.02)
+    spread = [np.std(values) for values in rates.values()]
+    assert spread[0] > spread[1] > spread[2]
+    assert spread[2] < 0.2 * spread[0]
+
+
+def test_inverted_vertices_are_told():
+    positions = np.stack([BALL.vertices, BALL.vertices * [-1.0, 1.0, 1.0]])
+    with pytest.raises(InputError, match=f"{len(BALL.vertices)} of {len(BALL.vertices)} vertices"):
+        local_growth(positions, BALL.tets, [21, 22], 3.0)
+
+
+def test_weeks_that_do_not_ascend_are_refused():
+    with pytest.raises(InputError, match=r"\[22, 21\]"):
+        local_growth(np.stack([BALL.vertices] * 2), BALL.tets, [22, 21], 3.0)
+
+
+def test_amplitude_multiplies_what_deviates_from_the_whole():
+    rates, sizes = np.array([[0.1, 0.2, 0.6]]), np.array([1.0, 2.0, 1.0])
+    assert with_amplitude(rates, sizes, 0.0) == pytest.approx(np.full((1, 3), 1.1 / 4))
+    assert with_amplitude(rates, sizes, 1.0) == pytest.approx(rates)
+    assert with_amplitude(rates, sizes, 2.0)[0, 2] == pytest.approx(1.1 / 4 + 2 * (0.6 - 1.1 / 4))
+
+
+def test_rigid_motion_is_no_displacement():
+    surface = sphere()
+    turn = np.eye(4)
+    turn[:3, :3] = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
+    turn[:3, 3] = [4, 5, 6]
+    moved_points = transformed(surface, turn).vertices
+    sizes = np.ones(len(moved_points))
+    assert without_rigid_motion(surface.vertices, moved_points, sizes) == pytest.approx(
+        np.zeros_like(moved_points), abs=1e-9
+    )
+    grown = transformed(surface, turn @ scaled(1.2)).vertices
+    weekly = weekly_displacements(np.stack([surface.vertices, grown]), [21, 23], sizes)
+    assert weekly[0] == pytest.approx(0.1 * surface.vertices, abs=1e-9)

@@ -1,0 +1,94 @@
+# Correspondence between brains of successive weeks: where each point of a start brain goes in the real ones.
+def later_brains(brain):
+    """Returns a start brain and the later brains of its growth series, one a week, where all have label volumes."""
+    series = CONFIG.growth_series.get(CONFIG.estimated_from(brain), [])
+    start = CONFIG.brain(brain)
+    chosen = {start.week: brain}
+    for other in map(CONFIG.brain, series):
+        if other.week > start.week and other.source in WITH_LABELS:
+            chosen.setdefault(other.week, other.id)
+    if start.source not in WITH_LABELS:
+        return [brain]
+    return [chosen[week] for week in sorted(chosen)]
+
+
+def registrations(brain):
+    """Returns the files of the registrations from a start brain through the later ones."""
+    chain = later_brains(brain)
+    return [
+        f"{STUDY}/registration/{earlier}/{later}.h5"
+        for earlier, later in zip(chain, chain[1:])
+    ]
+
+
+# start brains that real ones of later weeks follow
+CARRIED = [brain for brain in CONFIG.start_brains if len(later_brains(brain)) > 1]
+
+
+rule register:
+    input:
+        earlier=lambda wildcards: label_volume_of(wildcards.earlier),
+        later=lambda wildcards: label_volume_of(wildcards.later),
+    output:
+        f"{STUDY}/registration/{{earlier}}/{{later}}.h5",
+    log:
+        f"{STUDY}/registration/logs/{{earlier}}.{{later}}.log",
+    benchmark:
+        f"{STUDY}/registration/benchmarks/{{earlier}}.{{later}}.tsv"
+    wildcard_constraints:
+        earlier=one_of(BRAINS),
+        later=one_of(BRAINS),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        images=lambda wildcards: [
+            CONFIG.brain(brain).image for brain in (wildcards.earlier, wildcards.later)
+        ],
+        affine_from=lambda wildcards: [
+            CONFIG.brain(brain).affine_from
+            for brain in (wildcards.earlier, wildcards.later)
+        ],
+        schemes=lambda wildcards: [
+            CONFIG.scheme(CONFIG.brain(brain))
+            for brain in (wildcards.earlier, wildcards.later)
+        ],
+    script:
+        "../scripts/register.py"
+
+
+rule carried_mesh:
+    input:
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        report=PIAL["report"],
+        registrations=lambda wildcards: registrations(wildcards.brain),
+    output:
+        f"{BRAIN}/mesh/carried.h5",
+    log:
+        f"{BRAIN}/logs/carried_mesh.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/carried_mesh.tsv"
+    wildcard_constraints:
+        brain=one_of(CARRIED),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=8000,
+        runtime=30,
+    params:
+        weeks=lambda wildcards: [
+            CONFIG.brain(brain).week for brain in later_brains(wildcards.brain)
+        ],
+        # the smoothing lengths that runs from this brain ask for
+        smoothing_mm=lambda wildcards: sorted(
+            {
+                CONFIG.run(run).follow.smoothing_mm
+                for run, brain in FOLDED
+                if brain == wildcards.brain and regional(run)
+            }
+        ),
+    script:
+        "../scripts/carried_mesh.py"

@@ -1,0 +1,25 @@
+"""The mesh of a start brain carried through the real brains of later weeks, with the local growth between them."""
+
+import numpy as np
+
+from gyriflow.geometry.deformations import moved
+from gyriflow.geometry.tetrahedra import linear_pieces
+from gyriflow.io.files import read_json
+from gyriflow.io.registrations import CarriedMesh, read_deformation, write_carried_mesh
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.registration.carrying import over_weeks
+from gyriflow.registration.growth import local_growth
+from gyriflow.step import step
+
+files, params = snakemake.input, snakemake.params
+with step(snakemake.log[0]):
+    mesh = read_tetrahedral_mesh(files.mesh)
+    pose = np.array(read_json(files.report)["pose"])
+    # the labels' world, in which brains were registered, is not the pose of the mesh
+    start = moved(mesh.vertices, np.linalg.inv(pose))
+    positions = over_weeks(start, [read_deformation(path)[0] for path in files.registrations])
+    growth = {
+        length: {"volume": local_growth(positions, linear_pieces(mesh), params.weeks, length)}
+        for length in params.smoothing_mm
+    }
+    write_carried_mesh(snakemake.output[0], CarriedMesh(np.array(params.weeks), positions, growth))

@@ -1,0 +1,21 @@
+"""How the displacement of a run's pial vertices agrees with that of the real brains, interval by interval."""
+
+import numpy as np
+
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
+from gyriflow.io.files import write_table
+from gyriflow.io.frames import read_positions, read_tets, read_weeks
+from gyriflow.io.registrations import read_carried_mesh
+from gyriflow.step import step
+from gyriflow.validation.displacement import displacement_table
+
+files, labels = snakemake.input, snakemake.params.labels
+with step(snakemake.log[0]):
+    carried, weeks = read_carried_mesh(files.carried), read_weeks(files.frames)
+    both = [week for week in weeks if np.isclose(carried.weeks, week).any()]
+    start = read_positions(files.frames, weeks[0])
+    surface, pial = boundary_surface(TetrahedralMesh(start, read_tets(files.frames)))
+    simulated = np.stack([read_positions(files.frames, week)[pial] for week in both])
+    measured = np.stack([carried.positions[np.isclose(carried.weeks, week).argmax()][pial] for week in both])
+    table = displacement_table(both, simulated, measured, surface.faces)
+    write_table(snakemake.output[0], table.assign(**labels)[[*labels, *table.columns]])
