@@ -23,7 +23,7 @@ def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
     assert "the configuration has 3 problems" in said
     assert "folding.poisson_ratio: found 0.5; it should be less than 0.5" in said
     assert "folding.thicknes_mm: unknown key; did you mean thickness_mm?" in said
-    assert "folding.end_week: found 20; it should be above the start brain's week, 21" in said
+    assert "folding.end_week: found 20; it should be above 21, the week of the start brain a" in said
 
 
 def test_two_runs_of_one_name_are_refused(workflow):

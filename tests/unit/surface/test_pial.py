@@ -92,6 +92,7 @@ def test_phantom_surface_is_sound_and_of_the_masks_volume(phantom):
     assert report["rotation_deg"] < 1.0
 
 
+@pytest.mark.slow
 def test_phantoms_of_all_ages_are_sound_and_fold():
     surfaces = [
         from_labels(*phantom_labels(week, voxel_mm=voxel_mm), ATLAS, week=week, edge_length_mm=edge_mm)
@@ -202,6 +203,7 @@ def test_pial_surface_with_a_small_hole_is_closed(phantom):
     assert surface.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.2)
 
 
+@pytest.mark.slow
 def test_pial_surface_that_cuts_itself_is_made_anew(phantom):
     vertices = phantom.whole.vertices.copy()
     # the left hemisphere's medial wall pushed through the right one's
@@ -266,6 +268,7 @@ def test_sides_of_a_scheme_that_contradict_the_affine_are_refused(volume):
         from_labels(sided, mirrored, scheme, week=24.0, **QUICK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("week", [21, 29])
 def test_real_atlas_labels_give_sound_surfaces(week):
     volume = atlas_volume(week)
