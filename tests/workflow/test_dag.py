@@ -140,7 +140,7 @@ def test_growth_comes_from_the_brains_that_are_named(workflow):
 
 def test_only_a_common_number_of_modes_ties_measured_brains_to_simulated_ones(workflow):
     target = "results/brains/b/metrics/metrics.csv"
-    alone = {"phantom": 1, "pial_from_labels": 1, "measure": 1}
+    alone = {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1}
     assert workflow.jobs(target, "--configfile", workflow.write("plain.yaml", SMALL_STUDY)) == alone
     common = workflow.write("common.yaml", SMALL_STUDY | {"metrics": {"spangy_modes": "common"}})
     jobs = workflow.jobs(target, "--configfile", common)

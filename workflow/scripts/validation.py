@@ -1,7 +1,7 @@
 """Each simulated brain of a run beside the real one of its week, and beside the start brain merely scaled up."""
 
-from gyriflow.growth.curves import tabulated, value
-from gyriflow.growth.following import QUANTITIES
+from gyriflow.growth.curves import value
+from gyriflow.growth.following import curves_of_run
 from gyriflow.io.files import read_table, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import read_yaml
@@ -21,20 +21,9 @@ def shape(mesh, real):
     return Shape(even, bend.mean, bend.shape_index)
 
 
-def aims(follow):
-    """Returns by quantity the sizes that growth followed, or those of the curves through the measured brains."""
-    if follow is not None:
-        return {name: follow[name] for name in QUANTITIES}
-    if not files.curves:
-        return {}
-    table = read_table(files.curves)
-    rows = table[table["series"] == params.series]
-    return {name: dict(part[["week", "value"]].to_numpy()) for name, part in rows.groupby("quantity")}
-
-
 with step(snakemake.log[0]):
-    start, rows, sizes = read_surface(files.start), [], aims(read_yaml(files.params).get("follow"))
-    curves = [tabulated(list(sizes[name]), list(sizes[name].values()), may_shrink=True) for name in sizes]
+    start, rows, follow = read_surface(files.start), [], read_yaml(files.params).get("follow")
+    curves = curves_of_run(follow, read_table(files.curves) if files.curves else None, params.series)
     for week, *paths in zip(params.weeks, files.simulated, files.real, files.adjacent, strict=True):
         simulated, real, adjacent = map(read_surface, paths)
         aim = [float(value(curve, week)) for curve in curves]

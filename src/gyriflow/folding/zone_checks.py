@@ -11,8 +11,8 @@ from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES
 from .zones import Zones
 
 NEEDED = {1: 2.0, 2: 0.9}
-"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md): two linear ones, or
-about one quadratic."""
+"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md): two linear
+ones, or about one quadratic."""
 NAMES_OF_NEEDED = {1: "two elements", 2: "one quadratic element"}
 """What the elements that `NEEDED` asks for are called, by their order."""
 MUCH_BETWEEN_PLANES = 0.05

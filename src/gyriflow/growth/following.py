@@ -71,6 +71,23 @@ def followed_sizes(
     return tables
 
 
+def curves_of_run(follow: Mapping[str, Any] | None, curves: pd.DataFrame | None, series: str | None) -> list[Curve]:
+    """Returns the curves of `QUANTITIES` that a run followed, or those through the measured brains.
+
+    There are none without either.
+
+    Parameters
+    ----------
+    follow
+        The sizes in the run's parameters; None where its growth was prescribed.
+    curves, series
+        As for `followed_sizes`.
+    """
+    if follow is not None:
+        return [tabulated(list(follow[name]), list(follow[name].values()), may_shrink=True) for name in QUANTITIES]
+    return [] if curves is None else [_measured(curves, series, name) for name in QUANTITIES]
+
+
 def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str) -> Curve:
     """Returns the curve through the measured brains of a series; InputError where there is none."""
     table = pd.DataFrame(columns=["series", "quantity", "week", "value"]) if curves is None else curves

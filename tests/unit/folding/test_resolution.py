@@ -46,7 +46,7 @@ def test_a_cortex_that_outgrows_its_elements_is_told_once():
     assert resolution_warning(rows(2.3, 1.9, 1.8), 1) == ""
     assert "fewer than 2" in resolution_warning(rows(1.5), 1)
     assert resolution_warning(rows(1.5), 2) == ""
-    assert "fewer than 1" in resolution_warning(rows(1.2, 0.9), 2)
+    assert "fewer than 0.9" in resolution_warning(rows(1.2, 0.8), 2)
     assert resolution_warning(rows(np.nan), 1) == ""
 
 

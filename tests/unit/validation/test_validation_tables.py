@@ -103,7 +103,7 @@ def test_the_benchmark_prints_the_summary_of_a_study(tmp_path, table):
     folder = tmp_path / "results" / "study"
     folder.mkdir(parents=True)
     table.to_csv(folder / "validation.csv", index=False)
-    MOVES.to_csv(folder / "displacement.csv", index=False)
+    MOVES.to_csv(folder / "displacement_agreement.csv", index=False)
     command = [sys.executable, str(ROOT / "benchmarks" / "validation.py"), str(tmp_path)]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     last = json.loads(printed.splitlines()[-1])
