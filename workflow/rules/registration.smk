@@ -1,11 +1,22 @@
 # Correspondence between brains of successive weeks: where each point of a start brain goes in the real ones.
 def later_brains(brain):
-    """Returns a start brain and the later brains of its growth series, one a week, where all have label volumes."""
+    """Returns a start brain and the brains of its growth series up to where its runs end, one a week.
+
+    All have label volumes.
+    """
     series = CONFIG.growth_series.get(CONFIG.estimated_from(brain), [])
     start = CONFIG.brain(brain)
+    end = max(CONFIG.run(run).end_week for run, folded in FOLDED if folded == brain)
+    # the first brain past the end tells of growth up to it
+    within = [
+        week
+        for week in sorted({CONFIG.brain(name).week for name in series})
+        if week >= end
+    ]
+    last = within[0] if within else end
     chosen = {start.week: brain}
     for other in map(CONFIG.brain, series):
-        if other.week > start.week and other.source in WITH_LABELS:
+        if start.week < other.week <= last and other.source in WITH_LABELS:
             chosen.setdefault(other.week, other.id)
     if start.source not in WITH_LABELS:
         return [brain]
