@@ -9,6 +9,8 @@ SURFACE_SETTINGS = {
         "fissure_mm",
     ),
     "hemispheres": ("gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"),
+    "hemisphere": ("edge_length_mm", "smoothing_iterations", "max_hole_mm"),
+    "hemisphere labels": ("smoothing_voxels", "edge_length_mm", "smoothing_iterations"),
     "pial": ("edge_length_mm", "smoothing_iterations", "max_hole_mm"),
     # made with the edge length that they keep
     "shape": (),
@@ -25,13 +27,25 @@ WITH_CORTEX = [
     if brain.source in ("labels", "segmentation", "phantom")
     and label_scheme(**CONFIG.scheme(brain)).cortex
 ]
-WITHOUT_CORTEX = [brain for brain in BRAINS if brain not in WITH_CORTEX]
+# brains of one hemisphere, by its side
+ONE_SIDED = {
+    side: [b.id for b in CONFIG.brains if b.hemisphere and b.hemisphere.side == side]
+    for side in ("left", "right")
+}
+WITHOUT_CORTEX = [
+    brain
+    for brain in BRAINS
+    if brain not in (*WITH_CORTEX, *ONE_SIDED["left"], *ONE_SIDED["right"])
+]
 # hemispheres whose pose is to be found, for all of a study at once
 TO_POSE = [
     brain
     for brain in CONFIG.brains
     if brain.source == "hemispheres" and brain.coordinates == "auto"
 ]
+
+
+LIMITS = CONFIG.surface.model_dump(include={"max_hemisphere_ratio", "max_asymmetry"})
 
 
 def surface_files(wildcards):
@@ -47,7 +61,9 @@ def surface_source(wildcards):
 
 def surface_settings(wildcards):
     """Returns the settings that matter for the brain's kind of data."""
-    chosen = SURFACE_SETTINGS[surface_source(wildcards)]
+    kind = surface_source(wildcards)
+    labels = " labels" if kind == "hemisphere" and surface_scheme(wildcards) else ""
+    chosen = SURFACE_SETTINGS[kind + labels]
     return CONFIG.surface.model_dump(include=set(chosen))
 
 
@@ -59,16 +75,23 @@ def surface_reading(wildcards):
             return {"affine_from": brain.affine_from}
         case "shape":
             return {}
-        case "pial" if brain.coordinates == "auto":
-            return {"coordinates": "ras"}
+        case "hemisphere" if brain.scheme:
+            return {"affine_from": brain.affine_from}
         case _:
             return {"coordinates": brain.coordinates}
 
 
 def surface_scheme(wildcards):
     """Returns what the labels of the brain's volume mean; None where it is given by surfaces."""
-    from_volume = surface_source(wildcards) == "labels"
-    return CONFIG.scheme(CONFIG.brain(wildcards.brain)) if from_volume else None
+    brain = CONFIG.brain(wildcards.brain)
+    from_volume = surface_source(wildcards) == "labels" or brain.scheme
+    return CONFIG.scheme(brain) if from_volume else None
+
+
+def surface_side(wildcards):
+    """Returns the side of a brain that has one hemisphere; None for others."""
+    one = CONFIG.brain(wildcards.brain).hemisphere
+    return one.side if one else None
 
 
 def poses_of(wildcards):
@@ -96,6 +119,7 @@ rule poses:
         # exchanged files are the same inputs to Snakemake
         order=[path for brain in TO_POSE for path in brain.files],
         max_hole_mm=CONFIG.surface.max_hole_mm,
+        limits=LIMITS,
         code=code("surface"),
     script:
         "../scripts/poses.py"
@@ -130,6 +154,10 @@ rule pial_surface:
         reading=surface_reading,
         scheme=surface_scheme,
         settings=surface_settings,
+        side=surface_side,
+        limits=lambda wildcards: (
+            LIMITS if surface_source(wildcards) == "hemispheres" else None
+        ),
         code=code("surface"),
     script:
         "../scripts/pial_surface.py"
@@ -148,7 +176,33 @@ use rule pial_surface as pial_surface_alone with:
         brain=one_of(WITHOUT_CORTEX),
 
 
+use rule pial_surface as pial_surface_of_left with:
+    output:
+        whole="results/{brain}/surface/pial.surf.gii",
+        left="results/{brain}/surface/left.pial.surf.gii",
+        stl="results/{brain}/surface/pial.stl",
+        report="results/{brain}/surface/surface.json",
+    benchmark:
+        "results/{brain}/benchmarks/pial_surface_of_left.tsv"
+    wildcard_constraints:
+        brain=one_of(ONE_SIDED["left"]),
+
+
+use rule pial_surface as pial_surface_of_right with:
+    output:
+        whole="results/{brain}/surface/pial.surf.gii",
+        right="results/{brain}/surface/right.pial.surf.gii",
+        stl="results/{brain}/surface/pial.stl",
+        report="results/{brain}/surface/surface.json",
+    benchmark:
+        "results/{brain}/benchmarks/pial_surface_of_right.tsv"
+    wildcard_constraints:
+        brain=one_of(ONE_SIDED["right"]),
+
+
 rule surface:
     input:
         expand(rules.pial_surface.output, brain=WITH_CORTEX),
         expand(rules.pial_surface_alone.output, brain=WITHOUT_CORTEX),
+        expand(rules.pial_surface_of_left.output, brain=ONE_SIDED["left"]),
+        expand(rules.pial_surface_of_right.output, brain=ONE_SIDED["right"]),

@@ -9,9 +9,9 @@ from gyriflow.errors import InputError, MeshError
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres
 from gyriflow.step import step
-from gyriflow.surface.halves import pair_by_shape
-from gyriflow.surface.pial import hemisphere
-from gyriflow.surface.posing import poses
+from gyriflow.surface.from_surfaces import hemisphere
+from gyriflow.surface.hemisphere_pose import pair_by_shape
+from gyriflow.surface.study_poses import poses
 
 files = list(snakemake.input)
 with step(snakemake.log[0]):

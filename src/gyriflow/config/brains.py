@@ -6,7 +6,7 @@ from pydantic import Field
 
 from .base import Settings, setting
 
-SOURCES = ("labels", "segmentation", "hemispheres", "pial", "phantom", "shape")
+SOURCES = ("labels", "segmentation", "hemispheres", "hemisphere", "pial", "phantom", "shape")
 """The keys of a brain of which exactly one is given."""
 
 KINDS = {
@@ -14,6 +14,7 @@ KINDS = {
     "segmentation": "volume",
     "phantom": "volume",
     "hemispheres": "surface",
+    "hemisphere": "surface",
     "pial": "surface",
     "shape": "surface",
 }
@@ -99,8 +100,16 @@ class HemisphereFiles(Settings):
     right: str = setting(..., "", "GIFTI, STL or PLY file of the right hemisphere.")
 
 
+class HemisphereFile(Settings):
+    """The only hemisphere of a brain, as after hemispherectomy."""
+
+    file: str = setting(..., "", "Its pial surface, or a volume with its tissue labels (NIfTI, MGH; needs `scheme`).")
+    side: Literal["left", "right"] = setting(..., "", "Which one it is.")
+
+
 class Brain(Settings):
-    """One brain. Exactly one of `labels`, `segmentation`, `hemispheres`, `pial`, `phantom`, `shape` is its source.
+    """One brain. Exactly one of `labels`, `segmentation`, `hemispheres`, `hemisphere`, `pial`, `phantom`, `shape` is
+    its source.
 
     Paths are relative to the configuration file or, if no such file is there, to the working directory.
     """
@@ -118,18 +127,19 @@ class Brain(Settings):
     )
     scheme: str | None = setting(
         None, "",
-        "What the labels mean: `spina-bifida-atlas`, `dhcp-19`, `feta-7`, `binary`, or a name of `schemes`. Needed "
-        "with `labels` and `segmentation`.",
+        "What the labels mean: `spina-bifida-atlas`, `dhcp-19`, `multi-bounti-43`, `feta-7`, `drawem-9`, `freesurfer`, "
+        "`crl`, `binary`, or a name of `schemes`. Needed with `labels` and `segmentation`.",
     )  # fmt: skip
     affine_from: Literal["auto", "sform", "qform"] = setting(
         "auto", "", "Which NIfTI affine of `labels` and `image` is used; `auto` refuses two that disagree."
     )
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
+    hemisphere: HemisphereFile | None = setting(None, "", "The only hemisphere that there is.")
     pial: str | None = setting(None, "", "Surface file of the whole brain, closed.")
     coordinates: Literal["auto", "ras", "lps"] = setting(
         "auto", "",
-        "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose of `hemispheres` in any rigid "
-        "pose, and takes `pial` as RAS+.",
+        "Axes of the coordinates in `hemispheres`, `hemisphere` or `pial` files. `auto` finds the pose, whatever rigid "
+        "motion the files went through.",
     )  # fmt: skip
     phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
     shape: ShapeSettings | None = setting(None, "", "A simple geometry in the place of a brain.")
@@ -148,4 +158,5 @@ class Brain(Settings):
     def files(self) -> list[str]:
         """The files that the surface is made from, the left hemisphere's first."""
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
-        return [path for path in (self.labels, self.pial, *sides) if path is not None]
+        one = None if self.hemisphere is None else self.hemisphere.file
+        return [path for path in (self.labels, self.pial, *sides, one) if path is not None]

@@ -11,6 +11,10 @@ from .schemes import BUILT_IN_SCHEMES
 
 VOLUMES = ("labels", "segmentation")
 """Sources that give a label volume."""
+SURFACES = ("hemispheres", "hemisphere", "pial")
+"""Sources that give surfaces whose coordinates may have other axes."""
+VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
+"""How files with volumes are named."""
 PLACEHOLDERS = ("{image}", "{labels}")
 """What stands for the two files in a command that segments."""
 PHANTOM_WEEKS = (21, 36)
@@ -45,11 +49,19 @@ def brain_problems(raw: Any, where: str, schemes: Collection[str] = ()) -> list[
     volumes = [key for key in VOLUMES if key in given]
     if volumes and raw.get("scheme") is None:
         problems.append(f"{where}.scheme: is missing; it says what the labels of {where}.{volumes[0]} mean")
+    one = raw.get("hemisphere")
+    if isinstance(one, dict) and str(one.get("file")).endswith(VOLUME_SUFFIXES) and raw.get("scheme") is None:
+        problems.append(f"{where}.scheme: is missing; it says what the labels of {where}.hemisphere.file mean")
     scheme = raw.get("scheme")
     if isinstance(scheme, str) and scheme not in (known := dict.fromkeys([*BUILT_IN_SCHEMES, *schemes])):
         problems.append(f"{where}.scheme: found {scheme!r}; expected one of {', '.join(known)}, or a name of schemes")
     problems += _segmentation_problems(raw, where)
-    meanings = {"scheme": VOLUMES, "image": VOLUMES, "affine_from": VOLUMES, "coordinates": ("hemispheres", "pial")}
+    meanings = {
+        "scheme": (*VOLUMES, "hemisphere"),
+        "image": VOLUMES,
+        "affine_from": (*VOLUMES, "hemisphere"),
+        "coordinates": SURFACES,
+    }
     for key, sources in meanings.items():
         if key in raw and len(given) == 1 and given[0] not in sources:
             problems.append(f"{where}.{key}: has no meaning with {given[0]}; only with {' or '.join(sources)}")

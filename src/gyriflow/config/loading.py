@@ -137,14 +137,11 @@ def _with_files(entry: Any, base_dir: Path, where: str, problems: list[str]) -> 
     if not isinstance(entry, dict):
         return entry
     entry = dict(entry)
-    if isinstance(entry.get("hemispheres"), dict):
-        entry["hemispheres"] = dict(entry["hemispheres"])
-        holders = [
-            *((entry, key, "") for key in SINGLE_FILES),
-            *((entry["hemispheres"], s, "hemispheres.") for s in SIDES),
-        ]
-    else:
-        holders = [(entry, key, "") for key in SINGLE_FILES]
+    holders = [(entry, key, "") for key in SINGLE_FILES]
+    for name, keys in (("hemispheres", SIDES), ("hemisphere", ("file",))):
+        if isinstance(entry.get(name), dict):
+            entry[name] = dict(entry[name])
+            holders += [(entry[name], key, f"{name}.") for key in keys]
     for holder, key, prefix in holders:
         if isinstance(holder.get(key), str):
             holder[key] = _found_file(holder[key], base_dir, f"{where}.{prefix}{key}", problems)

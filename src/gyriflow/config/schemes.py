@@ -6,7 +6,16 @@ from pydantic import Field
 
 from .base import Settings, setting
 
-BUILT_IN_SCHEMES = ("spina-bifida-atlas", "dhcp-19", "feta-7", "binary")
+BUILT_IN_SCHEMES = (
+    "spina-bifida-atlas",
+    "dhcp-19",
+    "feta-7",
+    "drawem-9",
+    "multi-bounti-43",
+    "freesurfer",
+    "crl",
+    "binary",
+)
 """Names that a brain's `scheme` may have without an entry of `schemes`."""
 
 Label = Annotated[int, Field(ge=1, le=2**31 - 1)]
@@ -16,15 +25,23 @@ class SchemeSettings(Settings):
     """What the labels of a volume mean; 0 is background. A brain uses it by its name, as `scheme: NAME`."""
 
     cerebrum: tuple[Label, ...] = setting(
-        ..., "", "Labels that together fill the cerebrum inside the pial surface; each has to be there."
+        ..., "", "Labels that together fill the cerebrum inside the pial surface; not all have to be there."
     )
     cortex: tuple[Label, ...] = setting(
-        (), "", "Those of them that are cortex; with them, the fissure is opened and cortical thickness estimated."
-    )
+        (), "",
+        "Those of them that are cortex, of which some have to be there; with them, the fissure is opened and cortical "
+        "thickness estimated.",
+    )  # fmt: skip
     left: tuple[Label, ...] = setting(
         (), "", "Those of them that lie in the left hemisphere only; with `right`, they part the hemispheres."
     )
     right: tuple[Label, ...] = setting((), "", "Those of them that lie in the right hemisphere only.")
+    white_matter: tuple[Label, ...] = setting((), "", "Those of them that are white matter; some have to be there.")
+    ventricles: tuple[Label, ...] = setting(
+        (), "", "Those of them that are fluid; what of it the cerebrum's tissue does not enclose is left out."
+    )
+    cerebellum: tuple[Label, ...] = setting((), "", "Labels of the cerebellum; with `brainstem`, they tell the pose.")
+    brainstem: tuple[Label, ...] = setting((), "", "Labels of the brainstem.")
     known: dict[Label, str] = setting(
         {}, "", "Tissue by label, as `{4: outer CSF}`; any label that is in no list has to stand here."
     )
@@ -36,7 +53,8 @@ def scheme_problems(name: str, raw: Any) -> list[str]:
     problems = [f"{where}: the name is that of a scheme of gyriflow; choose another"] * (name in BUILT_IN_SCHEMES)
     if not isinstance(raw, dict):
         return problems
-    lists = {key: raw.get(key) or [] for key in ("cerebrum", "cortex", "left", "right")}
+    inside = ("cerebrum", "cortex", "left", "right", "white_matter", "ventricles")
+    lists = {key: raw.get(key) or [] for key in inside}
     if not all(isinstance(labels, list) and all(isinstance(n, int) for n in labels) for labels in lists.values()):
         return problems
     if "cerebrum" in raw and not lists["cerebrum"]:

@@ -145,7 +145,9 @@ def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: 
     factor = share ** (1 / 3)
 
     def came_from(place: Floats) -> Floats:
-        return np.stack([1.5 * SIGN[side] + (place[0] - 1.5 * SIGN[side]) / factor, place[1] / factor, place[2] / factor])
+        return np.stack(
+            [1.5 * SIGN[side] + (place[0] - 1.5 * SIGN[side]) / factor, place[1] / factor, place[2] / factor]
+        )
 
     x, _, _ = positions(labels, affine)
     return np.where(SIGN[side] * x > 0, warped(whole, affine, came_from), whole).astype(np.int32)

@@ -74,20 +74,22 @@ def missing_tissues(labels: NDArray[np.integer], scheme: LabelScheme) -> list[st
     return [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number not in present]
 
 
-def require_cortex_outside(labels: NDArray[np.integer], scheme: LabelScheme) -> float:
+def require_cortex_outside(
+    labels: NDArray[np.integer], scheme: LabelScheme, least: float = LEAST_CORTEX_OUTSIDE
+) -> float:
     """Returns how much of the cerebrum's surface has cortex at it, from 0 to 1.
 
-    InputError where it is less than half: the scheme is another volume's, whose labels happen to be known.
+    InputError where it is less than `least`: the scheme is another volume's, whose labels happen to be known.
     """
     cerebrum = np.pad(np.isin(labels, scheme.cerebrum), 1)
     outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
     cortex = ndimage.binary_dilation(np.pad(np.isin(labels, scheme.cortex), 1))
     share = float((outside & cortex).sum() / outside.sum())
-    if share < LEAST_CORTEX_OUTSIDE:
+    if share < least:
         raise InputError(
             f"what the scheme {scheme.name!r} calls cortex does not lie around what it calls the cerebrum",
             found=f"cortex at {100 * share:.0f} % of the surface",
-            expected=f"{100 * LEAST_CORTEX_OUTSIDE:.0f} % or more",
+            expected=f"{100 * least:.0f} % or more",
             remedy="Choose the scheme of this volume.",
         )
     return share

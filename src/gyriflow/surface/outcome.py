@@ -9,7 +9,6 @@ from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, area, euler_number, is_closed, mean_edge_length, signed_volume
 from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.repair import pieces
-from gyriflow.surface.thickness import Thickness
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
 
@@ -22,32 +21,35 @@ class PialSurface:
     whole
         The closed, outward surface of the brain: one piece, or one for each hemisphere.
     left, right
-        The hemispheres' parts of it, open where a connected brain is cut at the fissure.
+        The hemispheres' parts of it, open where a connected brain is cut at the fissure; None for one that is not
+        there.
     fissure_x_mm
         Where the interhemispheric fissure is: the plane x = const between the hemispheres.
     report
         What was found and done, in plain values for JSON.
-    thickness
-        Cortical thickness at the vertices of `whole`, where labels of the cortex give it.
     """
 
     whole: TriangleMesh
-    left: TriangleMesh
-    right: TriangleMesh
+    left: TriangleMesh | None
+    right: TriangleMesh | None
     fissure_x_mm: float
     report: dict[str, Any]
-    thickness: Thickness | None = None
 
 
 def described(
-    whole: TriangleMesh, left: TriangleMesh, right: TriangleMesh, fissure_x: float, report: dict[str, Any], week: float
+    whole: TriangleMesh,
+    left: TriangleMesh | None,
+    right: TriangleMesh | None,
+    fissure_x: float,
+    report: dict[str, Any],
+    week: float,
 ) -> PialSurface:
     """Returns the surface with what was measured on it added to the report."""
     parts = {"whole": whole, "left": left, "right": right}
     report |= {
         "week": week,
         "fissure_x_mm": fissure_x,
-        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items()},
+        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items() if part},
         "volume_mL": signed_volume(whole) * ML_PER_MM3,
         "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
         "vertices": len(whole.vertices),

@@ -207,7 +207,7 @@ def _freesurfer() -> LabelScheme:
     sided |= {(3000 + n, 4000 + n): f"white matter of area {n}" for n in range(36)}
     middle = {14: "third ventricle", 72: "fifth ventricle", 77: "white matter hypointensities", 192: "corpus callosum"}
     middle |= {80: "non-white-matter hypointensities"}
-    middle |= {number: "corpus callosum" for number in range(251, 256)}
+    middle |= dict.fromkeys(range(251, 256), "corpus callosum")
     outside = {7: "cerebellar white matter, left", 8: "cerebellar cortex, left", 15: "fourth ventricle"}
     outside |= {46: "cerebellar white matter, right", 47: "cerebellar cortex, right", 16: "brainstem"}
     outside |= {24: "outer CSF", 85: "optic chiasm", 1: "cerebral exterior, left", 40: "cerebral exterior, right"}

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
 from gyriflow.surface.extraction import LEVEL, isosurface, main_parts, smoothed_mask
-from gyriflow.surface.sides import sampled
+from gyriflow.surface.fissure import sampled
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -43,11 +43,15 @@ def outside_ventricles(labels: NDArray[np.integer], scheme: LabelScheme) -> Mask
     if count:
         sizes = np.bincount(number.ravel())[1:]
         crumbs = np.flatnonzero(sizes < CRUMB * sizes.max()) + 1
-        out |= np.isin(number, crumbs) & ndimage.binary_propagation(out, EVERY_NEIGHBOUR, mask=out | np.isin(number, crumbs))
+        out |= np.isin(number, crumbs) & ndimage.binary_propagation(
+            out, EVERY_NEIGHBOUR, mask=out | np.isin(number, crumbs)
+        )
     return out & np.isin(*_beside_hindbrain(out, labels, scheme))
 
 
-def _beside_hindbrain(out: Mask, labels: NDArray[np.integer], scheme: LabelScheme) -> tuple[NDArray[np.int32], list[int]]:
+def _beside_hindbrain(
+    out: Mask, labels: NDArray[np.integer], scheme: LabelScheme
+) -> tuple[NDArray[np.int32], list[int]]:
     """Returns the (i, j, k) number of each part of a mask, and the numbers of those at the cerebellum or brainstem."""
     number, count = ndimage.label(out, EVERY_NEIGHBOUR)
     hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))

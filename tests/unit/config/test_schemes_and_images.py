@@ -58,8 +58,8 @@ def test_all_mistakes_in_schemes_are_named_at_once(folder):
         "schemes.b.cortex: found all of the cerebrum; the tissue inside the cortex is missing",
         "schemes.b.right: is missing; hemispheres are told apart by both left and right",
         "schemes.e.cerebrum: found no labels; it should have one or more",
-        "brains[0].scheme: found 'd'; expected one of spina-bifida-atlas, dhcp-19, feta-7, binary, a, b, c, e, or a "
-        "name of schemes",
+        "brains[0].scheme: found 'd'; expected one of spina-bifida-atlas, dhcp-19, feta-7, drawem-9, multi-bounti-43, "
+        "freesurfer, crl, binary, a, b, c, e, or a name of schemes",
     ]
 
 

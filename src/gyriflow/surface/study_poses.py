@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
-from gyriflow.surface.halves import MIRROR, SYLVIAN_AHEAD, Pair, about_x, pitch_deg
+from gyriflow.surface.hemisphere_pose import MIRROR, SYLVIAN_AHEAD, Pair, about_x, pitch_deg
 from gyriflow.surface.registration import Target, angle_deg, registered
 
 Floats = NDArray[np.float64]
@@ -78,10 +78,10 @@ def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
         "method": "file" if frame else "shape",
         "coordinates": frame,
         "pitch_deg": pitch,
-        "residual": {side: round(half.residual, DIGITS) for side, half in both.items()},
-        "confidence": {side: round(half.confidence, DIGITS) for side, half in both.items()},
+        "residual": {side: round(hemisphere.residual, DIGITS) for side, hemisphere in both.items()},
+        "confidence": {side: round(hemisphere.confidence, DIGITS) for side, hemisphere in both.items()},
         "mirror_residual": round(pair.fit.residual, DIGITS),
-        "sylvian_ahead": {side: round(half.sylvian, DIGITS) for side, half in both.items()},
+        "sylvian_ahead": {side: round(hemisphere.sylvian, DIGITS) for side, hemisphere in both.items()},
         "warnings": [],
     }
     if np.mean(list(report["sylvian_ahead"].values())) < SYLVIAN_AHEAD:
@@ -106,13 +106,13 @@ def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
 def _separate(pair: Pair, pitch: float, place: Floats) -> tuple[Floats, Floats]:
     """Returns the motions that put the medial walls beside x = 0 and the centres around `place` (y and z)."""
     motions = []
-    for half, sign in ((pair.left, 0.5), (pair.right, -0.5)):
+    for hemisphere, sign in ((pair.left, 0.5), (pair.right, -0.5)):
         motion = np.eye(4)
-        motion[:3, :3] = about_x(pitch) @ half.rotation
+        motion[:3, :3] = about_x(pitch) @ hemisphere.rotation
         target = np.zeros(3)
         target[1:] = place + sign * (about_x(pitch) @ pair.offset_mm)[1:]
-        target[0] = BESIDE_MM - half.wall_mm
-        motion[:3, 3] = target - motion[:3, :3] @ half.outline.centre
+        target[0] = BESIDE_MM - hemisphere.wall_mm
+        motion[:3, 3] = target - motion[:3, :3] @ hemisphere.outline.centre
         motions.append(motion)
     return MIRROR @ motions[0] @ MIRROR, motions[1]
 
@@ -142,7 +142,7 @@ def _frame(pair: Pair, declared: bool) -> str | None:
     if not _share_coordinates(pair):
         return None
     for name, axes in FRAMES.items():
-        turns = [half.rotation @ axes.T for half in (pair.left, pair.right)]
+        turns = [hemisphere.rotation @ axes.T for hemisphere in (pair.left, pair.right)]
         # mirrored files have the same axes up to signs, which cancel
         tilts = [np.degrees(np.arccos(np.clip(turn[0, 0], -1.0, 1.0))) for turn in turns]
         most = max(DECLARED_DEG if declared else 0.0, EXACT_DEG_PER_RESIDUAL * pair.fit.residual)
@@ -185,7 +185,7 @@ def _pitches(pairs: Sequence[Pair], frames: list[str | None]) -> list[float]:
 
 
 def _pitch_in_file(pair: Pair, frame: str) -> float:
-    return float(np.mean([pitch_deg(FRAMES[frame] @ half.rotation.T) for half in (pair.left, pair.right)]))
+    return float(np.mean([pitch_deg(FRAMES[frame] @ hemisphere.rotation.T) for hemisphere in (pair.left, pair.right)]))
 
 
 def _registered(one: Pair, other: Pair) -> tuple[float, float]:
@@ -214,9 +214,9 @@ def _places(pairs: Sequence[Pair], frames: list[str | None]) -> list[Floats]:
 
 def _centre(pair: Pair, frame: str) -> Floats:
     """Returns y and z of a brain's centre in RAS+, of files in these axes."""
-    centres = [FRAMES[frame] @ half.outline.centre for half in (pair.left, pair.right)]
+    centres = [FRAMES[frame] @ hemisphere.outline.centre for hemisphere in (pair.left, pair.right)]
     return np.asarray(np.mean(centres, axis=0)[1:])
 
 
 def _size(pair: Pair) -> float:
-    return float(np.mean([half.outline.size_mm for half in (pair.left, pair.right)]))
+    return float(np.mean([hemisphere.outline.size_mm for hemisphere in (pair.left, pair.right)]))

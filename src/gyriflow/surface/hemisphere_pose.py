@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
+from gyriflow.surface.limits import USUAL, Limits
 from gyriflow.surface.medial_wall import medial_wall
 from gyriflow.surface.outlines import Outline, outline, reference
 from gyriflow.surface.registration import Fit, Target, found, matched
@@ -21,8 +22,8 @@ Floats = NDArray[np.float64]
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 # the next best pose of a hemisphere has to fit worse by this factor, and the best one this well (in its size)
 LEAST_CONFIDENCE, WORST_RESIDUAL = 1.1, 0.085
-# two sides of one brain are mirror images as well as this
-WORST_PAIR_RESIDUAL = 0.07
+# two sides of one brain are mirror images as well as this times the asymmetry allowed
+PAIR_RESIDUAL_PER_ASYMMETRY = 3.5
 # a fit of one side on the other is off by about so many degrees per residual, about each axis
 ERROR_DEG_PER_RESIDUAL = 50.0
 # the Sylvian dent is in front of the middle by so much of the hemisphere's size where it is to be told from the back
@@ -30,7 +31,7 @@ SYLVIAN_AHEAD = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Half:
+class Hemisphere:
     """A hemisphere, mirrored where it is a left one, with what its shape says about its pose.
 
     Attributes
@@ -62,8 +63,8 @@ class Half:
 class Pair:
     """The hemispheres of a brain, of one pitch, and the fit of the left outline on the right one."""
 
-    left: Half
-    right: Half
+    left: Hemisphere
+    right: Hemisphere
     fit: Fit
 
     @property
@@ -72,23 +73,25 @@ class Pair:
         return np.asarray(self.right.rotation @ self.fit.shift * self.right.outline.size_mm)
 
 
-def pair_by_shape(left: TriangleMesh, right: TriangleMesh) -> Pair:
+def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUAL) -> Pair:
     """Returns the poses that the shapes of two closed, outward surfaces say.
 
     InputError where a hemisphere fits the reference badly or in more than one way, where the two are no mirror images
     of each other, and where they seem to be swapped.
     """
-    halves = [_half(transformed(left, MIRROR), "left"), _half(right, "right")]
-    one, other = halves
+    hemispheres = [_clearly_posed(transformed(left, MIRROR), "left"), _clearly_posed(right, "right")]
+    one, other = hemispheres
     fit = matched(Target(one.outline), Target(other.outline), other.rotation.T @ one.rotation)
-    if fit.residual > WORST_PAIR_RESIDUAL:
+    worst = PAIR_RESIDUAL_PER_ASYMMETRY * limits.max_asymmetry
+    if fit.residual > worst:
         raise InputError(
             "the hemispheres are no mirror images of each other",
             found=f"a mean distance of {fit.residual:.3f} of their size between one and the other's mirror image",
-            expected=f"at most {WORST_PAIR_RESIDUAL}",
-            remedy="Give both hemispheres of one subject and week. Are both files of the same side?",
+            expected=f"at most {worst:.3f}",
+            remedy="Give both hemispheres of one subject and week. Are both files of the same side? If they are so "
+            "asymmetric, raise surface.max_asymmetry.",
         )
-    ahead = [half.sylvian for half in halves]
+    ahead = [hemisphere.sylvian for hemisphere in hemispheres]
     if min(ahead) < -SYLVIAN_AHEAD and max(ahead) > SYLVIAN_AHEAD:
         raise InputError(
             "both hemispheres seem to be of one side",
@@ -104,17 +107,17 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh) -> Pair:
             remedy="Swap `left` and `right`; or, if they are right, pose the files yourself and set coordinates: ras.",
         )
     one, other = (
-        replace(half, rotation=turn.as_matrix() @ half.rotation)
-        for half, turn in zip(halves, _reconciled(one, other, fit), strict=True)
+        replace(hemisphere, rotation=turn.as_matrix() @ hemisphere.rotation)
+        for hemisphere, turn in zip(hemispheres, _reconciled(one, other, fit), strict=True)
     )
     return Pair(one, other, fit)
 
 
-def _reconciled(one: Half, other: Half, fit: Fit) -> tuple[Rotation, Rotation]:
-    """Returns by which rotations both halves are to be turned to lie as the fit and their walls say.
+def _reconciled(one: Hemisphere, other: Hemisphere, fit: Fit) -> tuple[Rotation, Rotation]:
+    """Returns by which rotations both hemispheres are to be turned to lie as the fit and their walls say.
 
     Least squares of three measures: each wall's tilts and the fit, by their errors. Of the pitch the walls say nothing:
-    each half gets one half-way between what the two say.
+    each hemisphere gets one half-way between what the two say.
     """
     apart = Rotation.from_matrix(other.rotation @ fit.rotation @ one.rotation.T).as_rotvec()
     walls = np.array([one.wall_error_deg, other.wall_error_deg]) ** 2
@@ -135,16 +138,22 @@ def pitch_deg(rotation: Floats) -> float:
     return float(np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1])))
 
 
-def _half(mesh: TriangleMesh, side: str) -> Half:
-    shape = outline(mesh)
-    fit, confidence = found(shape, Target(reference()))
-    if confidence < LEAST_CONFIDENCE or fit.residual > WORST_RESIDUAL:
+def _clearly_posed(mesh: TriangleMesh, side: str) -> Hemisphere:
+    posed = hemisphere_by_shape(mesh)
+    if posed.confidence < LEAST_CONFIDENCE or posed.residual > WORST_RESIDUAL:
         raise InputError(
             f"the pose of the {side} hemisphere cannot be told from its shape",
-            found=f"a residual of {fit.residual:.3f}, the next best pose {confidence:.2f} times worse",
+            found=f"a residual of {posed.residual:.3f}, the next best pose {posed.confidence:.2f} times worse",
             expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times",
             remedy="Is it a cerebral hemisphere's closed pial surface? If so, pose it and set coordinates: ras or lps.",
         )
+    return posed
+
+
+def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
+    """Returns the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
+    shape = outline(mesh)
+    fit, confidence = found(shape, Target(reference()))
     points = np.asarray((mesh.vertices - shape.centre) / shape.size_mm, dtype=np.float64)
     start = np.asarray(-fit.rotation[0], dtype=np.float64)
     areas = vertex_areas(mesh)
@@ -155,7 +164,7 @@ def _half(mesh: TriangleMesh, side: str) -> Half:
     # of the surface the sulci may outweigh the Sylvian fissure, of the outline it may be shallow
     both = (points, areas), (shape.points, np.ones(len(shape.points)))
     ahead = float(np.mean([_sylvian(places @ rotation.T, weights) for places, weights in both]))
-    return Half(shape, rotation, -wall.offset * shape.size_mm, wall.error_deg, fit.residual, confidence, ahead)
+    return Hemisphere(shape, rotation, -wall.offset * shape.size_mm, wall.error_deg, fit.residual, confidence, ahead)
 
 
 def _sylvian(points: Floats, areas: Floats) -> float:
