@@ -10,19 +10,24 @@ from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres
 from gyriflow.step import step
 from gyriflow.surface.from_surfaces import hemisphere
-from gyriflow.surface.hemisphere_pose import pair_by_shape
-from gyriflow.surface.study_poses import poses
+from gyriflow.surface.limits import Limits
+from gyriflow.surface.study_poses import pairs_by_shape, poses
 
 files = list(snakemake.input)
 with step(snakemake.log[0]):
-    pairs, named = {}, []
-    for path, left, right in zip(snakemake.output, files[::2], files[1::2], strict=True):
+    brains, named, refused = {}, {}, {}
+    for path, *sides in zip(snakemake.output, files[::2], files[1::2], strict=True):
         try:
-            *surfaces, same = read_hemispheres(left, right)
-            pairs[path] = pair_by_shape(*(hemisphere(side, snakemake.params.max_hole_mm)[0] for side in surfaces))
-            named.append(same)
+            *surfaces, named[path] = read_hemispheres(*sides)
+            brains[path] = tuple(hemisphere(side, snakemake.params.max_hole_mm)[0] for side in surfaces)
         except (InputError, MeshError) as error:
-            logging.error("%s, %s: %s", left, right, error)
-            write_json(path, {"refused": str(error)})
-    for path, found in zip(pairs, poses(list(pairs.values()), named), strict=True):
+            refused[path] = error
+    pairs = dict(zip(brains, pairs_by_shape(list(brains.values()), Limits(**snakemake.params.limits)), strict=True))
+    refused |= {path: pair for path, pair in pairs.items() if isinstance(pair, InputError)}
+    pairs = {path: pair for path, pair in pairs.items() if path not in refused}
+    for path, found in zip(pairs, poses(list(pairs.values()), [named[path] for path in pairs]), strict=True):
         write_json(path, found.report)
+    for path, *sides in zip(snakemake.output, files[::2], files[1::2], strict=True):
+        if path in refused:
+            logging.error("%s: %s", ", ".join(sides), refused[path])
+            write_json(path, {"refused": str(refused[path])})

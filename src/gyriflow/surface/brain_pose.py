@@ -9,8 +9,17 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.surface.hemisphere_pose import LEAST_CONFIDENCE, MIRROR, SYLVIAN_AHEAD, hemisphere_by_shape
+from gyriflow.surface.hemisphere_pose import (
+    CONVENTION_DEG,
+    CONVENTIONS,
+    LEAST_CONFIDENCE,
+    MIRROR,
+    SYLVIAN_AHEAD,
+    hemisphere_by_shape,
+)
 from gyriflow.surface.orientation import mid_plane
+from gyriflow.surface.outlines import reference
+from gyriflow.surface.registration import Target, angle_deg, registered
 from gyriflow.surface.schemes import LabelScheme
 
 Floats = NDArray[np.float64]
@@ -24,13 +33,10 @@ TO_RIGHT = np.array([1.0, 0.0, 0.0])
 LEAST_TURN_DEG = 60.0
 # two directions nearer to each other than this (in radians) say nothing of the turn about them
 LEAST_SPREAD = 0.06
-# of the axes of a file, the shape's are this near
-CONVENTION_DEG = 35.0
 # the narrowest extent of a whole cerebrum is 0.61 of its longest and more, that of one hemisphere 0.46 and less
 NARROWEST_BRAIN, DOUBTFUL_BRAIN = 0.5, 0.56
 # a brain that is turned is turned by quarters, as wrong axis codes do, where these are as near as this
 QUARTERS_DEG = 15.0
-CONVENTIONS = {"ras": np.eye(3), "lps": np.diag([-1.0, -1.0, 1.0])}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,29 +97,36 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     return _kept_or_turned(rotation, by)
 
 
-def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float]:
+def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
     """Returns the rotation (3, 3) to RAS+ that a whole brain's shape tells, and how sure that is.
 
     The brain is cut in its plane of mirror symmetry and one side is posed as a hemisphere. The second value is how many
     times worse the next best pose of it is, which tells up from down; the third how far the Sylvian fissures are in
-    front of the middle, in sizes, which tells front from back.
+    front of the middle, in sizes, which tells front from back; the fourth how many times worse than the best pose
+    that of RAS+ coordinates is, infinite where it leads away from RAS+.
     """
     plane = mid_plane(mesh, search_deg=90.0)
     body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     cut = body.clip_closed_surface(normal=plane.normal, origin=plane.offset * plane.normal).triangulate().clean()
     side = TriangleMesh(cut.points, cut.regular_faces)
     one = hemisphere_by_shape(side)
+    mirrored = transformed(side, MIRROR)
+    is_right = float(side.vertices[:, 0].mean() - mesh.vertices[:, 0].mean()) > 0
+    as_given = one if is_right else hemisphere_by_shape(mirrored)
+    fit = registered(as_given.outline, Target(reference()), np.eye(3))
+    near = angle_deg(fit.rotation) < CONVENTION_DEG
+    ras = fit.residual / as_given.residual if near else float("inf")
     rotation, sylvian = one.rotation, one.sylvian
     if sylvian < 0:
         # it is the left hemisphere: front and back change places
-        other = hemisphere_by_shape(transformed(side, MIRROR))
+        other = as_given if not is_right else hemisphere_by_shape(mirrored)
         mirror = MIRROR[:3, :3]
         rotation, sylvian = mirror @ other.rotation @ mirror, max(other.sylvian, -sylvian)
         one = other
     # its medial wall is the plane of symmetry
     normal = plane.normal * np.sign((rotation @ plane.normal)[0])
     turn, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [rotation @ normal])
-    return turn.as_matrix() @ rotation, one.confidence, sylvian
+    return turn.as_matrix() @ rotation, one.confidence, sylvian, ras
 
 
 def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
@@ -122,7 +135,7 @@ def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
     What the user names is kept, and doubted in a warning where the shape clearly says otherwise. InputError where the
     shape is to tell the pose and cannot.
     """
-    rotation, confidence, sylvian = pose_of_surface(mesh)
+    rotation, confidence, sylvian, ras = pose_of_surface(mesh)
     upright, ahead = confidence >= LEAST_CONFIDENCE, sylvian >= SYLVIAN_AHEAD
     angles = {name: angle_deg(rotation @ axes.T) for name, axes in CONVENTIONS.items()}
     nearest = min(angles, key=lambda name: angles[name])
@@ -141,6 +154,9 @@ def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
             "default",
             ("the shape does not tell front from back: the coordinates were taken as RAS+; set coordinates",),
         )
+    if not (upright and ahead) and ras < LEAST_CONFIDENCE:
+        doubt = "the shape fits other poses as well as RAS+, in which the coordinates were taken: check the pose"
+        return BrainPose(np.eye(3), "default", (doubt,))
     if not (upright and ahead):
         raise InputError(
             "the pose of the brain cannot be told from its shape",
@@ -150,11 +166,6 @@ def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
             remedy="Pose it and set coordinates: ras or lps.",
         )
     return BrainPose(rotation, "shape", (f"the brain was turned by {angles['ras']:.0f}°, as its shape says",))
-
-
-def angle_deg(rotation: Floats) -> float:
-    """Returns the angle of a (3, 3) rotation in degrees."""
-    return float(np.degrees(Rotation.from_matrix(rotation).magnitude()))
 
 
 def _from_hindbrain(found: dict[str, Floats], expected: dict[str, Floats]) -> Floats | None:

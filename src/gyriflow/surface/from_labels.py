@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import area, corners
@@ -13,10 +12,12 @@ from gyriflow.surface.brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrown
 from gyriflow.surface.cerebrum import cerebrum_labels, tell_of_border, tell_of_dropped
 from gyriflow.surface.extraction import (
     COMPARABLE,
+    LEVEL,
     PAD_VOXELS,
     cropped,
     isosurface,
     made_simple,
+    main_parts,
     refined,
     shifted_affine,
     smoothed_mask,
@@ -38,7 +39,7 @@ from gyriflow.surface.labels import (
 )
 from gyriflow.surface.orientation import mid_plane
 from gyriflow.surface.outcome import PialSurface
-from gyriflow.surface.pial import even, motion, posed, warn
+from gyriflow.surface.pial import TOLD_LOSS, even, motion, posed, warn
 from gyriflow.surface.schemes import LabelScheme
 from gyriflow.surface.shrinkage import KEPT, after_repairs, with_volume
 from gyriflow.surface.single_hemisphere import require_one, single_hemisphere
@@ -217,10 +218,11 @@ def _require_both(
             expected="both hemispheres",
             remedy=remedy,
         )
-    simple, _ = ndimage.label(field > 0.5)
-    largest = simple == np.bincount(simple.ravel())[1:].argmax() + 1
-    shape = narrowness(isosurface(smoothed_mask(largest if not scheme.left else field > 0.5, 1.0), affine))
-    if shape < NARROWEST_BRAIN and np.bincount(simple.ravel())[1:].max() > 0.8 * (field > 0.5).sum():
+    # a part that is left out below, for its size, makes no second hemisphere
+    parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
+    shape = narrowness(isosurface(smoothed_mask(parts, 1.0), affine))
+    # a brain that the field of view cuts off may be as flat, which is told already
+    if shape < NARROWEST_BRAIN and report["border_share"] <= TOLD_LOSS:
         raise InputError(
             "the volume seems to hold one hemisphere only",
             found=f"a cerebrum whose narrowest extent is {shape:.2f} of its longest",

@@ -7,9 +7,9 @@ import numpy as np
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
-from gyriflow.surface.brain_pose import CONVENTIONS, DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, posed_surface
+from gyriflow.surface.brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, posed_surface
 from gyriflow.surface.fissure import SHIFTED_MM, fissure_between
-from gyriflow.surface.hemisphere_pose import pair_by_shape
+from gyriflow.surface.hemisphere_pose import CONVENTIONS, pair_by_shape
 from gyriflow.surface.hemispheres import least_gap, left_faces, require_common_pose, require_pair, set_apart
 from gyriflow.surface.limits import USUAL, Limits
 from gyriflow.surface.orientation import mid_plane

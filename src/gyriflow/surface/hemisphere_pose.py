@@ -3,6 +3,7 @@
 Left hemispheres are mirrored, so that all are right ones here.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas,
 from gyriflow.surface.limits import USUAL, Limits
 from gyriflow.surface.medial_wall import medial_wall
 from gyriflow.surface.outlines import Outline, outline, reference
-from gyriflow.surface.registration import Fit, Target, found, matched
+from gyriflow.surface.registration import Fit, Target, angle_deg, found, matched, registered
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +27,14 @@ LEAST_CONFIDENCE, WORST_RESIDUAL = 1.1, 0.085
 PAIR_RESIDUAL_PER_ASYMMETRY = 3.5
 # a fit of one side on the other is off by about so many degrees per residual, about each axis
 ERROR_DEG_PER_RESIDUAL = 50.0
+# beside the shape, poses near these axes of files are likely
+CONVENTIONS = {"ras": np.eye(3), "lps": np.diag([-1.0, -1.0, 1.0])}
+CONVENTION_DEG = 35.0
+# two hemispheres side by side have their centres so far apart, in sizes
+APART = 0.4
+# so many brains of the study are asked for the pose of a doubtful one
+OTHERS = 2
+SIDES = ("left", "right")
 # the Sylvian dent is in front of the middle by so much of the hemisphere's size where it is to be told from the back
 SYLVIAN_AHEAD = 0.05
 
@@ -73,13 +82,22 @@ class Pair:
         return np.asarray(self.right.rotation @ self.fit.shift * self.right.outline.size_mm)
 
 
-def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUAL) -> Pair:
-    """Returns the poses that the shapes of two closed, outward surfaces say.
+def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUAL, others: Sequence[Pair] = ()) -> Pair:
+    """Returns the poses that the shapes of two closed, outward surfaces say, with further evidence where in doubt.
 
-    InputError where a hemisphere fits the reference badly or in more than one way, where the two are no mirror images
-    of each other, and where they seem to be swapped.
+    Where the shape of a hemisphere fits the reference nearly as well in another pose, that is chosen which is near RAS
+    or LPS in both files and has the left hemisphere on the left; else the one in which it fits the most alike of
+    `others` clearly best, hemispheres of the same study. InputError where a hemisphere fits badly or still in more than
+    one way, where the two are no mirror images of each other, and where they seem to be swapped.
     """
-    hemispheres = [_clearly_posed(transformed(left, MIRROR), "left"), _clearly_posed(right, "right")]
+    right_sided = [transformed(left, MIRROR), right]
+    hemispheres = [hemisphere_by_shape(mesh) for mesh in right_sided]
+    if not all(_is_clear(hemisphere) for hemisphere in hemispheres):
+        hemispheres = (
+            _near_a_convention(right_sided, hemispheres)
+            or _like_others(right_sided, hemispheres, others)
+            or [_require_clear(hemisphere, side) for hemisphere, side in zip(hemispheres, SIDES, strict=True)]
+        )
     one, other = hemispheres
     fit = matched(Target(one.outline), Target(other.outline), other.rotation.T @ one.rotation)
     worst = PAIR_RESIDUAL_PER_ASYMMETRY * limits.max_asymmetry
@@ -138,22 +156,67 @@ def pitch_deg(rotation: Floats) -> float:
     return float(np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1])))
 
 
-def _clearly_posed(mesh: TriangleMesh, side: str) -> Hemisphere:
-    posed = hemisphere_by_shape(mesh)
-    if posed.confidence < LEAST_CONFIDENCE or posed.residual > WORST_RESIDUAL:
-        raise InputError(
-            f"the pose of the {side} hemisphere cannot be told from its shape",
-            found=f"a residual of {posed.residual:.3f}, the next best pose {posed.confidence:.2f} times worse",
-            expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times",
-            remedy="Is it a cerebral hemisphere's closed pial surface? If so, pose it and set coordinates: ras or lps.",
-        )
-    return posed
+def _is_clear(hemisphere: Hemisphere) -> bool:
+    return hemisphere.confidence >= LEAST_CONFIDENCE and hemisphere.residual <= WORST_RESIDUAL
+
+
+def _require_clear(hemisphere: Hemisphere, side: str) -> Hemisphere:
+    if _is_clear(hemisphere):
+        return hemisphere
+    raise InputError(
+        f"the pose of the {side} hemisphere cannot be told from its shape",
+        found=f"a residual of {hemisphere.residual:.3f}, the next best pose {hemisphere.confidence:.2f} times worse",
+        expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times; or a pose near RAS or LPS",
+        remedy="Is it a cerebral hemisphere's closed pial surface? If so, pose it and set coordinates: ras or lps.",
+    )
+
+
+def _near_a_convention(meshes: list[TriangleMesh], hemispheres: list[Hemisphere]) -> list[Hemisphere]:
+    """Returns both hemispheres posed from RAS or from LPS axes; empty where the two do not agree with one of these.
+
+    They agree where each fits the reference nearly as well as in its best pose, at no more than 35° from these axes,
+    and the left one is on the left. Few random poses are so near: this is evidence where the shape leaves a choice.
+    """
+    for axes in CONVENTIONS.values():
+        posed = []
+        for mesh, best in zip(meshes, hemispheres, strict=True):
+            fit = registered(best.outline, Target(reference()), axes)
+            nearly = fit.residual < LEAST_CONFIDENCE * best.residual and fit.residual <= WORST_RESIDUAL
+            if nearly and angle_deg(fit.rotation @ axes.T) < CONVENTION_DEG:
+                posed.append(_described(mesh, best.outline, fit, best.confidence))
+        # the left one is mirrored, so that both are to be right of the middle
+        across = [(axes @ hemisphere.outline.centre)[0] for hemisphere in posed]
+        if len(posed) == 2 and sum(across) > APART * posed[0].outline.size_mm:
+            return posed
+    return []
+
+
+def _like_others(meshes: list[TriangleMesh], hemispheres: list[Hemisphere], others: Sequence[Pair]) -> list[Hemisphere]:
+    """Returns hemispheres posed like those of another brain, the most alike in size; empty where that is doubtful."""
+    posed: list[Hemisphere] = []
+    for mesh, best, side in zip(meshes, hemispheres, SIDES, strict=True):
+        if _is_clear(best):
+            posed.append(best)
+            continue
+        known = [getattr(pair, side) for pair in others]
+        known.sort(key=lambda hemisphere: abs(np.log(hemisphere.outline.size_mm / best.outline.size_mm)))
+        for other in known[:OTHERS]:
+            fit, confidence = found(best.outline, Target(other.outline))
+            if confidence >= LEAST_CONFIDENCE and fit.residual <= WORST_RESIDUAL:
+                turned = Fit(other.rotation @ fit.rotation, fit.shift, fit.residual)
+                posed.append(_described(mesh, best.outline, turned, confidence))
+                break
+    return posed if len(posed) == 2 else []
 
 
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
     """Returns the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
     shape = outline(mesh)
-    fit, confidence = found(shape, Target(reference()))
+    return _described(mesh, shape, *found(shape, Target(reference())))
+
+
+def _described(mesh: TriangleMesh, shape: Outline, fit: Fit, confidence: float) -> Hemisphere:
+    """Returns a hemisphere whose fit on the reference is known, its medial wall upright."""
     points = np.asarray((mesh.vertices - shape.centre) / shape.size_mm, dtype=np.float64)
     start = np.asarray(-fit.rotation[0], dtype=np.float64)
     areas = vertex_areas(mesh)

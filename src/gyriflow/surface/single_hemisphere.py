@@ -8,16 +8,21 @@ from scipy.spatial.transform import Rotation
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.surface.brain_pose import (
-    CONVENTION_DEG,
-    CONVENTIONS,
     DOUBTFUL_BRAIN,
     LEAST_TURN_DEG,
-    angle_deg,
     narrowness,
 )
-from gyriflow.surface.hemisphere_pose import LEAST_CONFIDENCE, MIRROR, SYLVIAN_AHEAD, hemisphere_by_shape
+from gyriflow.surface.hemisphere_pose import (
+    CONVENTION_DEG,
+    CONVENTIONS,
+    LEAST_CONFIDENCE,
+    MIRROR,
+    SYLVIAN_AHEAD,
+    hemisphere_by_shape,
+)
 from gyriflow.surface.outcome import PialSurface, described
 from gyriflow.surface.pial import motion, warn
+from gyriflow.surface.registration import angle_deg
 
 # the medial wall's distance from the mid-sagittal plane
 BESIDE_MM = 0.5

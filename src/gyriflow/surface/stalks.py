@@ -25,6 +25,8 @@ REACH_MM = 4.0
 WIDEST_CUT_MM = 12.0
 # voxels in which a surface is looked at
 SURFACE_VOXEL_MM = 0.8
+# lengths of brains and hemispheres
+SMALLEST_MM, LARGEST_MM = 15.0, 300.0
 INSIDE = ndimage.generate_binary_structure(3, 1)
 
 
@@ -72,6 +74,9 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
 
 def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
     """Returns a closed surface without what hangs on it by stalks, closed where these were cut, and the parts."""
+    if not SMALLEST_MM < np.ptp(mesh.vertices, axis=0).max() < LARGEST_MM:
+        # in another unit, which is told elsewhere
+        return mesh, []
     size = np.full(3, SURFACE_VOXEL_MM)
     first = mesh.vertices.min(axis=0) - 2.0 * size
     shape = np.ceil((np.ptp(mesh.vertices, axis=0) + 4.0 * size) / size).astype(int)
