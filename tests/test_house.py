@@ -156,7 +156,7 @@ def test_snakefile_is_short():
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=short)
 def test_scripts_are_thin(path):
-    assert 5 <= code_lines(path) <= 25
+    assert 5 <= code_lines(path) <= 40
 
 
 def test_no_vague_names():

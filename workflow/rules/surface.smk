@@ -26,6 +26,8 @@ WITH_CORTEX = [
     for brain in CONFIG.brains
     if brain.source in ("labels", "segmentation", "phantom")
     and label_scheme(**CONFIG.scheme(brain)).cortex
+    or brain.source in ("hemispheres", "pial")
+    and brain.white_files
 ]
 # brains of one hemisphere, by its side
 ONE_SIDED = {
@@ -127,8 +129,9 @@ rule poses:
 
 rule pial_surface:
     input:
-        surface_files,
+        brain=surface_files,
         pose=poses_of,
+        white=lambda wildcards: list(CONFIG.brain(wildcards.brain).white_files.values()),
     output:
         whole="results/{brain}/surface/pial.surf.gii",
         left="results/{brain}/surface/left.pial.surf.gii",
@@ -155,6 +158,7 @@ rule pial_surface:
         scheme=surface_scheme,
         settings=surface_settings,
         side=surface_side,
+        white=lambda wildcards: CONFIG.brain(wildcards.brain).white_files,
         limits=lambda wildcards: (
             LIMITS if surface_source(wildcards) == "hemispheres" else None
         ),

@@ -9,33 +9,32 @@ from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres, fr
 from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.limits import Limits
 from gyriflow.surface.pial import from_shape
+from gyriflow.surface.white import thickness_from_white
 
-files, output, params = list(snakemake.input), snakemake.output, snakemake.params
-with step(snakemake.log[0], *files[:2]):
-    match params.source:
-        case "labels":
-            scheme, volume = label_scheme(**params.scheme), read_label_volume(files[0], **params.reading)
-            surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
-            if scheme.cortex:
-                smoothing = params.settings["smoothing_voxels"]
-                thickness, said = thickness_from_labels(surface, volume.labels, volume.affine, scheme, smoothing)
-                write_vertex_maps(output.thickness, {"cortical thickness (mm)": thickness.values_mm})
-                surface.report["cortical_thickness"] = thickness.report
-                surface.report["warnings"] += said
-        case "hemisphere" if params.scheme:
-            volume = read_label_volume(files[0], **params.reading)
-            given = volume.labels, volume.affine, label_scheme(**params.scheme), params.side
-            surface = hemisphere_from_labels(*given, week=params.week, **params.settings)
-        case "hemisphere":
-            reading = params.reading | params.settings
-            surface = from_hemisphere(read_surface(files[0]), params.side, week=params.week, **reading)
-        case "hemispheres":
-            given = *map(read_surface, files[:2]), *map(read_json, files[2:])
-            reading = params.reading | {"limits": Limits(**params.limits)}
-            surface = from_hemispheres(*given, week=params.week, **reading, **params.settings)
-        case source:
-            make = {"pial": from_pial, "shape": from_shape}[source]
-            surface = make(read_surface(files[0]), week=params.week, **params.reading, **params.settings)
+files, output, params = snakemake.input, snakemake.output, snakemake.params
+given, settings = list(files.brain), params.settings | {"week": params.week}
+with step(snakemake.log[0], *given):
+    thickness = None
+    if params.scheme:
+        volume, scheme = read_label_volume(given[0], **params.reading), label_scheme(**params.scheme)
+        labels = volume.labels, volume.affine, scheme
+        make = hemisphere_from_labels if params.side else from_labels
+        surface = make(*labels, *filter(None, [params.side]), **settings)
+        if "thickness" in output.keys():  # noqa: SIM118
+            thickness = thickness_from_labels(surface, *labels, params.settings["smoothing_voxels"])
+    else:
+        make = {"pial": from_pial, "shape": from_shape, "hemisphere": from_hemisphere}.get(
+            params.source, from_hemispheres
+        )
+        more = [params.side] if params.side else [read_json(files.pose)] if files.pose else []
+        limits = {"limits": Limits(**params.limits)} if params.limits else {}
+        surface = make(*map(read_surface, given), *more, **params.reading, **settings, **limits)
+        if params.white:
+            whites = {side: read_surface(path) for side, path in params.white.items()}
+            thickness = thickness_from_white(surface, whites)
+    if thickness:
+        surface.report["cortical_thickness"] = thickness.report
+        write_vertex_maps(output.thickness, {"cortical thickness (mm)": thickness.values_mm})
     for part, structure in (("whole", None), ("left", "CortexLeft"), ("right", "CortexRight")):
         if getattr(surface, part):
             write_surface(output[part], getattr(surface, part), structure)

@@ -13,21 +13,21 @@ from gyriflow.surface.from_surfaces import hemisphere
 from gyriflow.surface.limits import Limits
 from gyriflow.surface.study_poses import pairs_by_shape, poses
 
-files = list(snakemake.input)
+files, params = list(snakemake.input), snakemake.params
 with step(snakemake.log[0]):
     brains, named, refused = {}, {}, {}
-    for path, *sides in zip(snakemake.output, files[::2], files[1::2], strict=True):
+    names = dict(zip(snakemake.output, zip(files[::2], files[1::2], strict=True), strict=True))
+    for path, sides in names.items():
         try:
             *surfaces, named[path] = read_hemispheres(*sides)
-            brains[path] = tuple(hemisphere(side, snakemake.params.max_hole_mm)[0] for side in surfaces)
+            brains[path] = tuple(hemisphere(side, params.max_hole_mm)[0] for side in surfaces)
         except (InputError, MeshError) as error:
             refused[path] = error
-    pairs = dict(zip(brains, pairs_by_shape(list(brains.values()), Limits(**snakemake.params.limits)), strict=True))
+    pairs = dict(zip(brains, pairs_by_shape(list(brains.values()), Limits(**params.limits)), strict=True))
     refused |= {path: pair for path, pair in pairs.items() if isinstance(pair, InputError)}
-    pairs = {path: pair for path, pair in pairs.items() if path not in refused}
-    for path, found in zip(pairs, poses(list(pairs.values()), [named[path] for path in pairs]), strict=True):
+    posed = {path: pair for path, pair in pairs.items() if path not in refused}
+    for path, found in zip(posed, poses(list(posed.values()), [named[path] for path in posed]), strict=True):
         write_json(path, found.report)
-    for path, *sides in zip(snakemake.output, files[::2], files[1::2], strict=True):
-        if path in refused:
-            logging.error("%s: %s", ", ".join(sides), refused[path])
-            write_json(path, {"refused": str(refused[path])})
+    for path, error in refused.items():
+        logging.error("%s: %s", ", ".join(names[path]), error)
+        write_json(path, {"refused": str(error)})

@@ -22,7 +22,7 @@ KINDS = {
 
 SIDES = ("left", "right")
 
-SINGLE_FILES = ("labels", "image", "pial")
+SINGLE_FILES = ("labels", "image", "pial", "white")
 """The keys of a brain that hold one file each."""
 
 ShapeKind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
@@ -93,11 +93,21 @@ class SegmentationSettings(Settings):
     )  # fmt: skip
 
 
+class WhiteFiles(Settings):
+    """The white surfaces of one brain's hemispheres: the inner borders of the cortex."""
+
+    left: str = setting(..., "", "File of the left hemisphere.")
+    right: str = setting(..., "", "File of the right hemisphere.")
+
+
 class HemisphereFiles(Settings):
     """The pial surfaces of one brain's hemispheres."""
 
-    left: str = setting(..., "", "GIFTI, STL or PLY file of the left hemisphere.")
-    right: str = setting(..., "", "GIFTI, STL or PLY file of the right hemisphere.")
+    left: str = setting(..., "", "GIFTI, VTK, STL, PLY or FreeSurfer file of the left hemisphere.")
+    right: str = setting(..., "", "GIFTI, VTK, STL, PLY or FreeSurfer file of the right hemisphere.")
+    white: WhiteFiles | None = setting(
+        None, "", "White surfaces in the same coordinates; the distance to them is the cortical thickness."
+    )
 
 
 class HemisphereFile(Settings):
@@ -105,6 +115,7 @@ class HemisphereFile(Settings):
 
     file: str = setting(..., "", "Its pial surface, or a volume with its tissue labels (NIfTI, MGH; needs `scheme`).")
     side: Literal["left", "right"] = setting(..., "", "Which one it is.")
+    white: str | None = setting(None, "", "Its white surface, in the same coordinates; for the cortical thickness.")
 
 
 class Brain(Settings):
@@ -136,6 +147,7 @@ class Brain(Settings):
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
     hemisphere: HemisphereFile | None = setting(None, "", "The only hemisphere that there is.")
     pial: str | None = setting(None, "", "Surface file of the whole brain, closed.")
+    white: str | None = setting(None, "", "White surface beside `pial`, in the same coordinates.")
     coordinates: Literal["auto", "ras", "lps"] = setting(
         "auto", "",
         "Axes of the coordinates in `hemispheres`, `hemisphere` or `pial` files. `auto` finds the pose, whatever rigid "
@@ -160,3 +172,11 @@ class Brain(Settings):
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
         one = None if self.hemisphere is None else self.hemisphere.file
         return [path for path in (self.labels, self.pial, *sides, one) if path is not None]
+
+    @property
+    def white_files(self) -> dict[str, str]:
+        """The white surfaces by the side that they are of: left, right, whole."""
+        pair = self.hemispheres.white if self.hemispheres else None
+        one = {self.hemisphere.side: self.hemisphere.white} if self.hemisphere else {}
+        given = {"whole": self.white} | ({"left": pair.left, "right": pair.right} if pair else {}) | one
+        return {side: path for side, path in given.items() if path is not None}

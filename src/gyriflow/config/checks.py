@@ -61,6 +61,7 @@ def brain_problems(raw: Any, where: str, schemes: Collection[str] = ()) -> list[
         "image": VOLUMES,
         "affine_from": (*VOLUMES, "hemisphere"),
         "coordinates": SURFACES,
+        "white": ("pial",),
     }
     for key, sources in meanings.items():
         if key in raw and len(given) == 1 and given[0] not in sources:

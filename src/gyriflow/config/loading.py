@@ -138,10 +138,13 @@ def _with_files(entry: Any, base_dir: Path, where: str, problems: list[str]) -> 
         return entry
     entry = dict(entry)
     holders = [(entry, key, "") for key in SINGLE_FILES]
-    for name, keys in (("hemispheres", SIDES), ("hemisphere", ("file",))):
+    for name, keys in (("hemispheres", SIDES), ("hemisphere", ("file", "white"))):
         if isinstance(entry.get(name), dict):
             entry[name] = dict(entry[name])
             holders += [(entry[name], key, f"{name}.") for key in keys]
+            if isinstance(entry[name].get("white"), dict):
+                entry[name]["white"] = dict(entry[name]["white"])
+                holders += [(entry[name]["white"], side, f"{name}.white.") for side in SIDES]
     for holder, key, prefix in holders:
         if isinstance(holder.get(key), str):
             holder[key] = _found_file(holder[key], base_dir, f"{where}.{prefix}{key}", problems)

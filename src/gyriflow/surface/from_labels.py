@@ -173,8 +173,11 @@ def hemisphere_from_labels(
 
 def thickness_from_labels(
     surface: PialSurface, labels: Labels, affine: Floats, scheme: LabelScheme, smoothing_voxels: float = 1.0
-) -> tuple[Thickness, list[str]]:
-    """Returns the cortical thickness on the pial surface that `from_labels` made of the same volume, and warnings."""
+) -> Thickness:
+    """Returns the cortical thickness on the pial surface that `from_labels` made of the same volume.
+
+    Where the labels are too coarse for it, that is added to the report of the surface.
+    """
     affine = np.array(surface.report["pose"]) @ affine
     tissue = cerebrum_labels(labels, affine, scheme, {})
     box, first = cropped(np.isin(tissue, scheme.cerebrum))
@@ -183,10 +186,9 @@ def thickness_from_labels(
     thickness = cortical_thickness(surface.whole, cerebrum, cortex, shifted_affine(affine, first), smoothing_voxels)
     suggested, voxels = thickness.report["suggested_thickness_mm"], thickness.report["voxels_through_cortex"]
     log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
-    said: dict[str, Any] = {"warnings": []}
     if voxels < RESOLVED_VOXELS:
-        warn(said, f"the cortex's labels are {voxels:.1f} voxels thick: their thickness is a coarse one")
-    return thickness, said["warnings"]
+        warn(surface.report, f"the cortex's labels are {voxels:.1f} voxels thick: their thickness is a coarse one")
+    return thickness
 
 
 def _turn(labels: Labels, affine: Floats, scheme: LabelScheme, report: dict[str, Any]) -> Floats:

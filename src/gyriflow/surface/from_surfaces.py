@@ -4,6 +4,7 @@ import logging
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
@@ -77,12 +78,25 @@ def from_hemispheres(
         plane = mid_plane(merged(left, right))
     mesh = merged(left, right)
     surface = posed(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, report, week)
+    turn = np.array(report["pose"])
+    before = motion(CONVENTIONS["lps"]) if coordinates == "lps" else np.eye(4)
+    both_before = (before, before) if placing is None else (placing.left, placing.right)
+    report["motions"] = {
+        side: (turn @ shifted(sign * moved * to_right) @ one).tolist()
+        for side, sign, one in zip(("left", "right"), (-1.0, 1.0), both_before, strict=True)
+    }
     if placing:
-        turn = np.array(report["pose"])
         report["posing"] = placed(placing, turn, moved * to_right)
         if placing.report["together"]:
             report["pose"] = (turn @ placing.left).tolist()
     return surface
+
+
+def shifted(by: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the (4, 4) motion by (3,) mm."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = by
+    return matrix
 
 
 def from_pial(

@@ -72,8 +72,8 @@ def cortical_thickness(
     core = np.where(kept, np.maximum(core, LEVEL + 1e-3), np.minimum(core, LEVEL - 1e-3)).astype(np.float32)
     inner = isosurface(core, affine)
     points = pial.vertices
-    there, nearest = _nearest(points, inner)
-    back, _ = _nearest(nearest, pial)
+    there, nearest = nearest_on(points, inner)
+    back, _ = nearest_on(nearest, pial)
     values = 0.5 * (there + back)
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
     measured = _cortex_under(points, cerebrum, cortex, affine, voxel) & (values >= THINNEST_VOXELS * voxel)
@@ -87,10 +87,11 @@ def cortical_thickness(
     _, known = cKDTree(points[measured]).query(points[~measured])
     filled = values.copy()
     filled[~measured] = values[measured][known]
-    return Thickness(filled, measured, _described(values, measured, vertex_areas(pial), voxel))
+    report = summary(values, measured, vertex_areas(pial))
+    return Thickness(filled, measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
 
 
-def _nearest(points: Floats, surface: TriangleMesh) -> tuple[Floats, Floats]:
+def nearest_on(points: Floats, surface: TriangleMesh) -> tuple[Floats, Floats]:
     """Returns the (n,) distances of points from a surface, and the (n, 3) nearest points on it."""
     squared, _, nearest = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces)
     return np.sqrt(squared), nearest
@@ -104,7 +105,7 @@ def _cortex_under(points: Floats, cerebrum: Mask, cortex: Mask, affine: Floats, 
     return near & (sampled(to_outside, affine, points) < FARTHEST_VOXELS * voxel_mm)
 
 
-def _described(values: Floats, measured: Mask, areas: Floats, voxel_mm: float) -> dict[str, Any]:
+def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
     """Returns the summary of the thickness; means are weighted by area."""
     chosen, weights = values[measured], areas[measured]
     order = np.argsort(chosen)
@@ -118,6 +119,5 @@ def _described(values: Floats, measured: Mask, areas: Floats, voxel_mm: float) -
         "quantile95_mm": high,
         "sd_mm": float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))),
         "measured_area_share": float(weights.sum() / areas.sum()),
-        "voxels_through_cortex": mean / voxel_mm,
         "suggested_thickness_mm": round(mean, 2),
     }

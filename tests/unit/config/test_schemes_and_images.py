@@ -33,6 +33,10 @@ def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
         "cortex": (2,),
         "left": (),
         "right": (),
+        "white_matter": (),
+        "ventricles": (),
+        "cerebellum": (),
+        "brainstem": (),
         "known": {9: "outer CSF"},
     }
     plain = load(study({"phantom": {}}))

@@ -13,12 +13,12 @@ from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_
 from gyriflow.io.surfaces import declared, read_surface, write_surface
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.from_surfaces import from_hemispheres
 from gyriflow.surface.hemisphere_pose import about_x, pair_by_shape, pitch_deg
 from gyriflow.surface.hemispheres import least_gap
 from gyriflow.surface.labels import SCHEMES
-from gyriflow.surface.from_surfaces import from_hemispheres
-from gyriflow.surface.study_poses import as_poses, poses
 from gyriflow.surface.repair import pieces
+from gyriflow.surface.study_poses import as_poses, poses
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
 LPS = np.diag([-1.0, -1.0, 1.0, 1.0])

@@ -5,8 +5,8 @@ import pytest
 
 from gyriflow.geometry.triangles import area, corners, face_areas, signed_volume
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.from_labels import from_labels
+from gyriflow.surface.labels import label_scheme
 from gyriflow.surface.shrinkage import after_repairs, with_volume
 
 SIDED = label_scheme("sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
