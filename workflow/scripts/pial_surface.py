@@ -34,6 +34,7 @@ with step(snakemake.log[0], *given):
             thickness = thickness_from_white(surface, whites)
     if thickness:
         surface.report["cortical_thickness"] = thickness.report
+    if "thickness" in output.keys():  # noqa: SIM118
         write_vertex_maps(output.thickness, {"cortical thickness (mm)": thickness.values_mm})
     for part, structure in (("whole", None), ("left", "CortexLeft"), ("right", "CortexRight")):
         if getattr(surface, part):

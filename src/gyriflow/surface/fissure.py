@@ -165,6 +165,24 @@ def sampled(field: Floats, affine: Floats, points: Floats) -> Floats:
     return ndimage.map_coordinates(field, (points @ inverse[:3, :3].T + inverse[:3, 3]).T, order=1, mode="nearest")
 
 
+def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
+    """Returns the plane through the places half-way between the labels of the two sides, in and around a brain.
+
+    It is for brains whose hemispheres are too unequal for a plane of mirror symmetry. `side` is what `to_the_right`
+    returns, `brain` (i, j, k) where the brain is.
+    """
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    near = ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
+    places = np.argwhere(near & (np.abs(side) < size.max())) @ affine[:3, :3].T + affine[:3, 3]
+    centre = places.mean(axis=0)
+    _, axes = np.linalg.eigh(np.cov(places.T))
+    normal = axes[:, 0]
+    heights = (np.argwhere(near) @ affine[:3, :3].T + affine[:3, 3] - centre) @ normal
+    normal = normal * np.sign(np.corrcoef(heights, side[near])[0, 1])
+    scatter = float(np.sqrt(np.mean(((places - centre) @ normal) ** 2)))
+    return MidPlane(normal, float(normal @ centre), float("nan"), len(places), scatter)
+
+
 def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fissure:
     """Returns the mid-surface moved to half-way between the labels of the two sides.
 

@@ -29,6 +29,7 @@ from gyriflow.surface.fissure import (
     fissure_between,
     fissure_between_labels,
     opened,
+    plane_between_labels,
     sampled,
     to_the_right,
 )
@@ -56,6 +57,8 @@ Labels = NDArray[np.integer]
 RESOLVED_VOXELS = 1.5
 # slits this near to the mid-surface belong to the fissure
 FISSURE_REACH_MM = 3.0
+# cosine between the mid-plane's normal and the line from left to right labels: 45°
+SAME_AXIS = 0.7
 # of the larger hemisphere's volume
 SMALLEST_HEMISPHERE = 0.04
 
@@ -100,9 +103,12 @@ def from_labels(
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
     walls = isosurface(smoothed_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
     plane = mid_plane(walls)
+    to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
+    if to_right is not None and abs(plane.normal @ _between_sides(tissue, scheme, affine)) < SAME_AXIS:
+        plane = plane_between_labels(to_right, affine, mask)
+        warn(report, "the hemispheres are no mirror images of each other: the mid-plane is that of their labels")
     require_sides(tissue, scheme, affine, plane.normal)
     fissure = fissure_between(walls, plane)
-    to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
     if to_right is not None:
         fissure = fissure_between_labels(to_right, affine, fissure)
     if (shift := float(np.abs(fissure.heights).max())) > SHIFTED_MM:
@@ -201,6 +207,13 @@ def _turn(labels: Labels, affine: Floats, scheme: LabelScheme, report: dict[str,
     for warning in pose.warnings:
         warn(report, warning)
     return pose.rotation
+
+
+def _between_sides(tissue: Labels, scheme: LabelScheme, affine: Floats) -> Floats:
+    """Returns the unit vector (3,) from the middle of the left labels to that of the right ones."""
+    left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
+    vector = affine[:3, :3] @ (right - left)
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _require_both(
