@@ -150,7 +150,10 @@ BAD = {
         "labels of the left hemisphere lie on the right",
     ),
     "unit": (unit_of_no_meaning, "has a unit of length that NIfTI does not know; found xyzt_units 5"),
-    "scheme": (labelled(scheme="feta-7"), "does not lie around what it calls the cerebrum"),
+    "scheme": (
+        labelled(lambda labels, affine: np.where(labels == 8, 1, labels), "feta-7"),
+        "does not lie around what it calls the cerebrum",
+    ),
     "crossing": (both_sides(LEFT, RIGHT, white_mm=-1.5), "crosses the pial one"),
 }
 
