@@ -286,4 +286,4 @@ def test_a_small_hemisphere_that_labels_name_is_kept(study):
 def test_a_shifted_midline_is_followed(study):
     area = report(study, "shifted")["area_cm2"]
     assert area["left"] > 1.2 * area["right"]
-    assert report(study, "shifted")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0] + 8.0, abs=1.0)
+    assert report(study, "shifted")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0] + 8.0, abs=2.5)

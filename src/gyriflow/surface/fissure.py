@@ -88,19 +88,25 @@ def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
     flat = walls.vertices @ axes.T
     corner = flat.min(axis=0) - MARGIN_MM
     shape = tuple(np.ceil((flat.max(axis=0) + MARGIN_MM - corner) / SPACING_MM).astype(int) + 1)
+    return between(walls, Fissure(plane, axes, corner, np.zeros(shape)))
+
+
+def between(walls: TriangleMesh, start: Fissure) -> Fissure:
+    """Returns a mid-surface moved to half-way between walls that face each other; where there are none, it stays."""
+    plane, axes, corner, shape = start.plane, start.axes, start.corner, start.heights.shape
     middle = fissure_points(walls, plane.normal, plane.offset)
     height = middle @ plane.normal - plane.offset
-    fissure = Fissure(plane, axes, corner, np.zeros(shape))
+    fissure, ends = start, np.array(shape)[:, None] - 1
     bend = BEND_MM / SPACING_MM
     for _ in range(FOLLOWED):
         near = np.abs(fissure.height_above(middle)) < FURTHEST_MM
-        index = tuple(np.rint((middle[near] @ axes.T - corner) / SPACING_MM).astype(int).T)
+        index = tuple(np.clip(np.rint((middle[near] @ axes.T - corner) / SPACING_MM).astype(int).T, 0, ends))
         weight, total = np.zeros(shape), np.zeros(shape)
         np.add.at(weight, index, 1.0)
         np.add.at(total, index, height[near])
         weight, total = ndimage.gaussian_filter(weight, bend), ndimage.gaussian_filter(total, bend)
-        # a weight much below that of one point per cell draws the surface back to the plane
-        fissure = Fissure(plane, axes, corner, total / (weight + 0.02))
+        # a weight much below that of one point per cell draws the surface back to where it was
+        fissure = Fissure(plane, axes, corner, (total + 0.02 * start.heights) / (weight + 0.02))
     return fissure
 
 

@@ -26,6 +26,7 @@ from gyriflow.surface.extraction import (
 from gyriflow.surface.fissure import (
     SHIFTED_MM,
     Fissure,
+    between,
     fissure_between,
     fissure_between_labels,
     opened,
@@ -85,9 +86,9 @@ def from_labels(
     the surface stays tangled.
     """
     report: dict[str, Any] = {"source": "labels", "scheme": scheme.name}
+    tissue = cerebrum_labels(labels, affine, scheme, report, LEAST_CORTEX_OUTSIDE)
     rotation = _turn(labels, affine, scheme, report)
     affine = motion(rotation) @ affine
-    tissue = cerebrum_labels(labels, affine, scheme, report, LEAST_CORTEX_OUTSIDE)
     mask = np.isin(tissue, scheme.cerebrum)
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
     box, first = cropped(mask)
@@ -130,7 +131,9 @@ def from_labels(
     if abs(change := report["smoothing"]["volume_change"]) > KEPT:
         warn(report, f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it")
     centres = corners(mesh).mean(axis=1)
-    left = left_faces(mesh, fissure.height_above(centres) if to_right is None else sampled(to_right, grid, centres))
+    # between the walls of the surface itself: cortex may be thicker on one side than on the other
+    heights = between(mesh, fissure).height_above(centres) if to_right is None else sampled(to_right, grid, centres)
+    left = left_faces(mesh, heights)
     return posed(mesh, left, plane, report, week, rotation)
 
 
