@@ -23,6 +23,8 @@ FURTHEST_MM = 5.0
 FOLLOWED = 4
 # a mid-surface that is this far from its plane is told of
 SHIFTED_MM = 5.0
+# a fissure is shown where it is so wide a gap in its own plane: twice this many half millimetres
+SHOWN_CELLS = 8
 # cortex that stays on the tissue which joins the hemispheres
 FLOOR_MM = 1.2
 
@@ -69,8 +71,8 @@ class Fissure:
         for height in np.arange(-reach, reach + 0.25 * voxel, 0.5 * voxel):
             index = _index(self.places + height * self.plane.normal, affine)
             shown |= ndimage.map_coordinates(mask.astype(np.float32), index, order=0, mode="constant") < 0.5
-        # a single voxel's gap between touching walls shows no fissure, nor does a single bridge hide one
-        return ~ndimage.binary_closing(ndimage.binary_opening(shown, iterations=2), iterations=2)
+        # gaps here and there between touching walls show no fissure, but would leave tunnels in one that is opened
+        return ~ndimage.binary_opening(shown, iterations=SHOWN_CELLS)
 
     def near(self, shape: tuple[int, ...], affine: Floats, reach_mm: float, where: Mask) -> Mask:
         """Returns which voxels of an (i, j, k) volume are within a distance of the mid-surface, where (a, b) holds."""

@@ -115,7 +115,9 @@ def from_labels(
     if (shift := float(np.abs(fissure.heights).max())) > SHIFTED_MM:
         warn(report, f"the fissure bends away from its plane by up to {shift:.0f} mm: check it")
     grid, opens = affine, bool(scheme.cortex) and fissure_mm > 0
-    hidden = fissure.hidden(mask, affine, fissure_mm)
+    # what smoothing would shut, and reopened slits leave shut, is not shown
+    slit, _ = unbridged(mask, field, smoothing_voxels, np.zeros_like(mask))
+    hidden = fissure.hidden(slit > LEVEL, affine, fissure_mm)
     # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
     left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if opens else np.zeros_like(mask)
     field, report["slit_voxels_reopened"] = unbridged(mask, field, smoothing_voxels, left_shut)
