@@ -23,9 +23,8 @@ with step(snakemake.log[0], *given):
         if "thickness" in output.keys():  # noqa: SIM118
             thickness = thickness_from_labels(surface, *labels, params.settings["smoothing_voxels"])
     else:
-        make = {"pial": from_pial, "shape": from_shape, "hemisphere": from_hemisphere}.get(
-            params.source, from_hemispheres
-        )
+        single = {"pial": from_pial, "shape": from_shape, "hemisphere": from_hemisphere}
+        make = single.get(params.source, from_hemispheres)
         more = [params.side] if params.side else [read_json(files.pose)] if files.pose else []
         limits = {"limits": Limits(**params.limits)} if params.limits else {}
         surface = make(*map(read_surface, given), *more, **params.reading, **settings, **limits)
@@ -40,4 +39,4 @@ with step(snakemake.log[0], *given):
         if getattr(surface, part):
             write_surface(output[part], getattr(surface, part), structure)
     write_surface(output.stl, surface.whole)
-    write_json(output.report, {"week": params.week, "fissure_x_mm": surface.fissure_x_mm, **surface.report})
+    write_json(output.report, surface.report)
