@@ -6,8 +6,8 @@ import pytest
 from gyriflow.geometry.triangles import area, corners, face_areas, signed_volume
 from gyriflow.parameters.schemes import SCHEMES, LabelScheme
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.pial import from_labels
-from gyriflow.surface.volume import after_repairs, with_volume
+from gyriflow.surface.from_labels import from_labels
+from gyriflow.surface.shrinkage import after_repairs, with_volume
 
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
 
