@@ -205,11 +205,11 @@ def test_images_are_segmented_and_shown_where_they_are_given(workflow):
     ]
     study = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
     jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
-    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_from_labels"], jobs["pial_from_labels_alone"]) == (
+    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_from_labels"], jobs["cortical_thickness"]) == (
         1,
         2,
+        3,
         2,
-        1,
     )
 
 
