@@ -14,8 +14,8 @@ import time
 
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.metrics.measure import measure_brain
-from gyriflow.surface.labels import label_scheme
-from gyriflow.surface.pial import from_labels
+from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.surface.from_labels import from_labels
 
 
 def cpu_seconds() -> float:
@@ -34,7 +34,7 @@ def main() -> None:
     for brain in options.brains:
         path, week = brain.rsplit(":", 1)
         volume = read_label_volume(path)
-        scheme = label_scheme("spina-bifida-atlas")
+        scheme = SCHEMES["spina-bifida-atlas"]
         surface = from_labels(volume.labels, volume.affine, scheme, week=float(week), edge_length_mm=options.edge)
         clock, cpu = time.perf_counter(), cpu_seconds()
         found = measure_brain(

@@ -19,11 +19,11 @@ from gyriflow.errors import GyriflowError, InputError
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, signed_volume
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_hemispheres, read_surface
-from gyriflow.surface.halves import Pair, pair_by_shape
-from gyriflow.surface.pial import from_hemispheres, hemisphere
-from gyriflow.surface.posing import Poses, poses
+from gyriflow.surface.from_surfaces import from_hemispheres, hemisphere
+from gyriflow.surface.hemisphere_pose import Pair, pair_by_shape
 from gyriflow.surface.repair import pieces
 from gyriflow.surface.size import expected_volume_ml
+from gyriflow.surface.study_poses import Poses, poses
 
 Floats = NDArray[np.float64]
 Files = tuple[Path, Path]

@@ -75,7 +75,7 @@ BAD = {
     "series": (lambda: image(np.stack([LABELS] * 2, axis=-1)), "is not a volume of labels"),
     "fractions": (lambda: with_values(1.5), "gyriflow does not segment images"),
     "unknown": (lambda: relabelled([3], 30), "does not know; found 30 among"),
-    "missing": (lambda: relabelled([8], 1), "missing from the label volume"),
+    "missing": (lambda: relabelled([5], 1), "the cortex of the scheme 'spina-bifida-atlas' is missing"),
     "empty": (lambda: relabelled([1, 2, 5, 6, 8], 0), "no voxel belongs to the cerebrum"),
     "infinite": (lambda: with_values(np.inf, np.nan), "values that are NaN or infinite; found 2 voxels"),
 }
@@ -205,11 +205,11 @@ def test_images_are_segmented_and_shown_where_they_are_given(workflow):
     ]
     study = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
     jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
-    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_from_labels"], jobs["pial_from_labels_alone"]) == (
+    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_from_labels"], jobs["cortical_thickness"]) == (
         1,
         2,
+        3,
         2,
-        1,
     )
 
 

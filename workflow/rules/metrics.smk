@@ -25,7 +25,7 @@ def thickness_of(wildcards):
     """Returns the file with the thickness of a brain's cortex, where it is known."""
     folder = f"results/{surface_folder(wildcards.where)}"
     match wildcards.where.split("/"):
-        case ["brains", brain, "metrics"] if brain in WITH_CORTEX:
+        case ["brains", brain, "metrics"] if brain in (*WITH_CORTEX, *WITH_WHITE):
             return f"{folder}/measured_thickness.shape.gii"
         case ["runs", *_]:
             return f"{folder}/thickness.shape.gii"

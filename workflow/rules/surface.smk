@@ -7,6 +7,12 @@ PIAL = {
     "stl": f"{BRAIN}/surface/pial.stl",
     "report": f"{BRAIN}/surface/surface.json",
 }
+THICKNESS = {
+    "thickness": f"{BRAIN}/surface/thickness.shape.gii",
+    # not a number where it could not be measured
+    "measured": f"{BRAIN}/surface/measured_thickness.shape.gii",
+    "report": f"{BRAIN}/surface/thickness.json",
+}
 WITH_LABELS = ("labels", "segmentation", "phantom")
 # brains whose labels give the cortical thickness
 WITH_CORTEX = [
@@ -14,6 +20,10 @@ WITH_CORTEX = [
     for brain in CONFIG.brains
     if brain.source in WITH_LABELS and LabelScheme(**CONFIG.scheme(brain)).cortex
 ]
+# brains of which white surfaces are given
+WITH_WHITE = [brain.id for brain in CONFIG.brains if brain.white_files]
+# how unequal and how asymmetric hemispheres may be
+LIMITS = CONFIG.surface.model_dump(include={"max_hemisphere_ratio", "max_asymmetry"})
 # hemispheres whose pose has to be found, for the whole study at once
 TO_POSE = [
     brain
@@ -82,10 +92,7 @@ rule cortical_thickness:
         surface=rules.pial_from_labels.output.whole,
         report=rules.pial_from_labels.output.report,
     output:
-        thickness=f"{BRAIN}/surface/thickness.shape.gii",
-        # not a number where it could not be measured
-        measured=f"{BRAIN}/surface/measured_thickness.shape.gii",
-        report=f"{BRAIN}/surface/thickness.json",
+        **THICKNESS,
     log:
         f"{BRAIN}/logs/cortical_thickness.log",
     benchmark:
@@ -122,6 +129,7 @@ rule poses:
         # exchanged files are the same inputs to Snakemake
         order=[path for brain in TO_POSE for path in brain.files],
         max_hole_mm=CONFIG.surface.max_hole_mm,
+        limits=LIMITS,
     script:
         "../scripts/poses.py"
 
@@ -152,6 +160,7 @@ rule pial_from_hemispheres:
         settings=surface_settings(
             "gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"
         ),
+        limits=LIMITS,
     script:
         "../scripts/pial_from_hemispheres.py"
 
@@ -180,6 +189,31 @@ rule pial_from_surface:
         ),
     script:
         "../scripts/pial_from_surface.py"
+
+
+rule thickness_from_white:
+    input:
+        unpack(lambda wildcards: CONFIG.brain(wildcards.brain).white_files),
+        surface=PIAL["whole"],
+        report=PIAL["report"],
+    output:
+        **THICKNESS,
+    log:
+        f"{BRAIN}/logs/thickness_from_white.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/thickness_from_white.tsv"
+    wildcard_constraints:
+        brain=one_of(WITH_WHITE),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        # exchanged files are the same inputs to Snakemake
+        white=lambda wildcards: CONFIG.brain(wildcards.brain).white_files,
+    script:
+        "../scripts/thickness_from_white.py"
 
 
 rule pial_from_shape:
@@ -242,4 +276,4 @@ rule overlay_figure:
 rule surface:
     input:
         expand(list(PIAL.values()), brain=BRAINS),
-        expand(rules.cortical_thickness.output, brain=WITH_CORTEX),
+        expand(list(THICKNESS.values()), brain=[*WITH_CORTEX, *WITH_WHITE]),

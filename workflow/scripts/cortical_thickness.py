@@ -7,7 +7,7 @@ from gyriflow.io.surfaces import read_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.pial import thickness_from_labels
+from gyriflow.surface.from_labels import thickness_from_labels
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], files.labels):

@@ -11,7 +11,7 @@ from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
 from gyriflow.step import step
-from gyriflow.surface.pial import LPS_TO_RAS
+from gyriflow.surface.from_surfaces import LPS_TO_RAS
 
 files, reading, maps = snakemake.input, snakemake.params.reading, {}
 with step(snakemake.log[0]):

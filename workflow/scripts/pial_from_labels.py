@@ -5,7 +5,7 @@ from gyriflow.io.surfaces import write_brain
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.pial import from_labels
+from gyriflow.surface.from_labels import from_labels
 
 labels, output, params = snakemake.input.labels, snakemake.output, snakemake.params
 with step(snakemake.log[0], labels):

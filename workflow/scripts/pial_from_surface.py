@@ -3,11 +3,10 @@
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_surface, write_brain
 from gyriflow.step import step
-from gyriflow.surface.pial import from_pial
+from gyriflow.surface.from_surfaces import from_pial
 
 file, output, params = snakemake.input[0], snakemake.output, snakemake.params
 with step(snakemake.log[0], file):
-    coordinates = "ras" if params.coordinates == "auto" else params.coordinates
-    surface = from_pial(read_surface(file), week=params.week, coordinates=coordinates, **params.settings)
+    surface = from_pial(read_surface(file), week=params.week, coordinates=params.coordinates, **params.settings)
     write_brain(output, surface.whole, surface.left, surface.right)
     write_json(output.report, surface.report)

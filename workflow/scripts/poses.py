@@ -9,20 +9,25 @@ from gyriflow.errors import InputError, MeshError
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres
 from gyriflow.step import step
-from gyriflow.surface.halves import pair_by_shape
-from gyriflow.surface.pial import hemisphere
-from gyriflow.surface.posing import poses
+from gyriflow.surface.from_surfaces import hemisphere
+from gyriflow.surface.limits import Limits
+from gyriflow.surface.study_poses import pairs_by_shape, poses
 
-files = list(snakemake.input)
+files, params = list(snakemake.input), snakemake.params
 with step(snakemake.log[0]):
-    pairs, named = {}, []
-    for path, left, right in zip(snakemake.output, files[::2], files[1::2], strict=True):
+    brains, named, refused = {}, {}, {}
+    names = dict(zip(snakemake.output, zip(files[::2], files[1::2], strict=True), strict=True))
+    for path, sides in names.items():
         try:
-            *surfaces, same = read_hemispheres(left, right)
-            pairs[path] = pair_by_shape(*(hemisphere(side, snakemake.params.max_hole_mm)[0] for side in surfaces))
-            named.append(same)
+            *surfaces, named[path] = read_hemispheres(*sides)
+            brains[path] = tuple(hemisphere(side, params.max_hole_mm)[0] for side in surfaces)
         except (InputError, MeshError) as error:
-            logging.error("%s, %s: %s", left, right, error)
-            write_json(path, {"refused": str(error)})
-    for path, found in zip(pairs, poses(list(pairs.values()), named), strict=True):
+            refused[path] = error
+    pairs = dict(zip(brains, pairs_by_shape(list(brains.values()), Limits(**params.limits)), strict=True))
+    refused |= {path: pair for path, pair in pairs.items() if isinstance(pair, InputError)}
+    posed = {path: pair for path, pair in pairs.items() if path not in refused}
+    for path, found in zip(posed, poses(list(posed.values()), [named[path] for path in posed]), strict=True):
         write_json(path, found.report)
+    for path, error in refused.items():
+        logging.error("%s: %s", ", ".join(names[path]), error)
+        write_json(path, {"refused": str(error)})

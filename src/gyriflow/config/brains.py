@@ -27,6 +27,7 @@ VOLUMES = ("labels", "segmentation")
 MEANINGS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("scheme", "image", "affine_from"), VOLUMES),
     "coordinates": ("hemispheres", "pial"),
+    "white": ("pial",),
     "population": tuple(source for source in SOURCES if source not in ("phantom", "shape")),
 }
 """Keys that make sense only with some sources."""
@@ -56,11 +57,21 @@ class SegmentationSettings(Settings):
             yield Problem(text, ("command",))
 
 
+class WhiteFiles(Settings):
+    """The white surfaces of one brain's hemispheres: the inner borders of the cortex."""
+
+    left: InputFile = setting(..., "", "File of the left hemisphere.")
+    right: InputFile = setting(..., "", "File of the right hemisphere.")
+
+
 class HemisphereFiles(Settings):
     """The pial surfaces of one brain's hemispheres."""
 
-    left: InputFile = setting(..., "", "GIFTI, STL or PLY file of the left hemisphere.")
-    right: InputFile = setting(..., "", "GIFTI, STL or PLY file of the right hemisphere.")
+    left: InputFile = setting(..., "", "GIFTI, VTK, STL, PLY or FreeSurfer file of the left hemisphere.")
+    right: InputFile = setting(..., "", "GIFTI, VTK, STL, PLY or FreeSurfer file of the right hemisphere.")
+    white: WhiteFiles | None = setting(
+        None, "", "White surfaces in the same coordinates; the distance to them is the cortical thickness."
+    )
 
 
 class Brain(Settings):
@@ -95,10 +106,12 @@ class Brain(Settings):
     )
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
     pial: InputFile | None = setting(None, "", "Surface file of the whole brain, closed.")
+    white: InputFile | None = setting(
+        None, "", "White surface of `pial` in the same coordinates; the distance to it is the cortical thickness."
+    )
     coordinates: Literal["auto", "ras", "lps"] = setting(
         "auto", "",
-        "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose of `hemispheres`, whatever it "
-        "is, and takes `pial` as RAS+.",
+        "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose, whatever it is.",
     )  # fmt: skip
     phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
     shape: ShapeSettings | None = setting(None, "", "A simple geometry in place of a brain.")
@@ -121,6 +134,13 @@ class Brain(Settings):
         """The files that the surface is made from, the left hemisphere's first."""
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
         return [path for path in (self.labels, self.pial, *sides) if path is not None]
+
+    @property
+    def white_files(self) -> dict[str, str]:
+        """The white surfaces by what they are of: left, right, whole."""
+        pair = self.hemispheres.white if self.hemispheres else None
+        sides = {} if pair is None else {"left": pair.left, "right": pair.right}
+        return sides if self.white is None else {"whole": self.white}
 
     @check
     def _has_one_source(self) -> Iterator[Problem]:

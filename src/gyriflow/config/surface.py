@@ -22,6 +22,14 @@ class SurfaceSettings(Settings):
         "Width to which the fissure between the hemispheres is opened where a label volume shows none; 0: not opened.",
         ge=0, le=5,
     )  # fmt: skip
+    max_hemisphere_ratio: float = setting(
+        1.15, "", "Largest ratio of the volumes of two hemisphere surfaces of one brain; more is refused.", ge=1, le=20
+    )
+    max_asymmetry: float = setting(
+        0.02, "",
+        "Largest mean distance of two hemisphere surfaces from their mirror image, relative to the brain's length.",
+        gt=0, le=0.5,
+    )  # fmt: skip
     gap_mm: float = setting(
         0.5, "mm", "Width of the fissure that is kept where two hemisphere surfaces would touch.", ge=0, le=5
     )

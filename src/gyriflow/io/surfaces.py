@@ -1,7 +1,6 @@
-"""Triangle surfaces (GIFTI, STL, PLY, OBJ) and per-vertex maps (GIFTI), in mm."""
+"""Triangle surfaces (GIFTI, VTK, STL, PLY, OBJ, FreeSurfer) and per-vertex maps (GIFTI), in mm."""
 
 import binascii
-import logging
 import zlib
 from pathlib import Path
 from typing import Any, Literal
@@ -9,35 +8,44 @@ from xml.parsers.expat import ExpatError
 
 import nibabel as nib
 import numpy as np
+import pyvista as pv
 import trimesh
 from nibabel.filebasedimages import ImageFileError
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
-from nibabel.nifti1 import xform_codes
 from numpy.typing import NDArray
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, is_closed
 from gyriflow.io.files import AnyPath, replaced
-
-log = logging.getLogger(__name__)
+from gyriflow.io.spaces import coordinate_systems, freesurfer_space, read_freesurfer_surface, to_scanner_space
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 MESH_SUFFIXES = (".stl", ".ply", ".obj")
+VTK_SUFFIXES = (".vtk", ".vtp")
+SURFACE_KINDS = (".surf.gii", *MESH_SUFFIXES, *VTK_SUFFIXES, "FreeSurfer's lh.pial")
+FREESURFER_SIDES = {"lh": "CortexLeft", "rh": "CortexRight"}
+AGAIN = "The file may be truncated or of another kind: copy or export it again."
 
 
 def read_surface(path: AnyPath) -> TriangleMesh:
-    """Returns the surface of a .gii, .stl, .ply or .obj file, in the file's coordinates and order of corners.
+    """Returns the surface of a GIFTI, VTK, STL, PLY, OBJ or FreeSurfer file, in the order of corners of the file.
 
-    A GIFTI's coordinate-system matrix is applied. InputError for missing, truncated or empty files, NaN or infinite
-    coordinates, faces that name missing vertices.
+    Coordinates are the file's; where a GIFTI or FreeSurfer file says how they lie in scanner space, they are brought
+    there (`gyriflow.io.spaces`). InputError for missing, truncated or empty files, NaN or infinite coordinates, faces
+    that name missing vertices, and coordinates that are not those of the subject.
     """
     path = Path(path)
     if not path.exists():
-        raise InputError("no such file", path=path, expected="a surface (.surf.gii, .stl, .ply, .obj)")
-    if path.suffix.lower() in MESH_SUFFIXES:
+        raise InputError("no such file", path=path, expected=f"a surface ({', '.join(SURFACE_KINDS)})")
+    suffix = path.suffix.lower()
+    if suffix in MESH_SUFFIXES:
         vertices, faces = _read_with_trimesh(path)
-    else:
+    elif suffix in VTK_SUFFIXES:
+        vertices, faces = _read_with_pyvista(path)
+    elif suffix == ".gii" or path.name.endswith(".gii.gz"):
         vertices, faces = _read_gifti_surface(path)
+    else:
+        vertices, faces = read_freesurfer_surface(path)
     bad = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
     if bad:
         raise InputError("has NaN or infinite coordinates", path=path, found=f"{bad} vertices", expected="none")
@@ -53,21 +61,22 @@ def read_surface(path: AnyPath) -> TriangleMesh:
 
 
 def declared(path: AnyPath) -> tuple[str | None, str | None]:
-    """Returns what a surface's file says of itself: its coordinate system, and its anatomical structure.
+    """Returns what a surface's file says of itself: the space its coordinates are read in, and its structure.
 
-    Both are None where it does not say so, as in all files but GIFTI. The system is a NIfTI transform code's name, such
-    as "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
+    Both are None where it does not say so. The space is a NIfTI transform code's name, such as
+    "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
     """
-    if Path(path).suffix.lower() in MESH_SUFFIXES:
+    suffix = Path(path).suffix.lower()
+    if suffix in (*MESH_SUFFIXES, *VTK_SUFFIXES):
         return None, None
+    if suffix != ".gii" and not Path(path).name.endswith(".gii.gz"):
+        return freesurfer_space(path), FREESURFER_SIDES.get(Path(path).name.split(".")[0])
     image = load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     if not points:
         return None, None
-    system = points[0].coordsys
-    space = "NIFTI_XFORM_UNKNOWN" if system is None else str(xform_codes.niistring[system.xformspace])
     structure = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
-    return (None if space == "NIFTI_XFORM_UNKNOWN" else space), structure
+    return to_scanner_space(coordinate_systems(path), path)[1], structure
 
 
 def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
@@ -181,14 +190,20 @@ def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
             expected="one of each (.surf.gii)",
         )
     vertices = np.asarray(points[0].data, dtype=float)
-    matrix = points[0].coordsys.xform if points[0].coordsys is not None else None
-    if matrix is not None and not np.allclose(matrix, np.eye(4)):
-        matrix = np.asarray(matrix, dtype=float)
-        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        log.warning("%s: the coordinate-system matrix of the file was applied", path)
-        if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-3):
-            log.warning("%s: that matrix changes sizes (scale or shear)", path)
-    return vertices, np.asarray(triangles[0].data)
+    matrix, _ = to_scanner_space(coordinate_systems(path), path)
+    return vertices @ matrix[:3, :3].T + matrix[:3, 3], np.asarray(triangles[0].data)
+
+
+def _read_with_pyvista(path: Path) -> tuple[NDArray[np.float64], NDArray]:
+    try:
+        data = pv.read(path)
+    except Exception as error:  # VTK's readers raise whatever their parsing runs into
+        raise InputError(f"cannot be read as VTK: {error}", path=path, remedy=AGAIN) from error
+    surface = data.extract_surface(algorithm=None) if isinstance(data, pv.UnstructuredGrid) else data
+    if not isinstance(surface, pv.PolyData) or not surface.n_points or not surface.n_cells:
+        raise InputError("holds no surface", path=path, found=type(data).__name__, expected="polygons (PolyData)")
+    surface = surface.triangulate()
+    return np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
 
 
 def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:
@@ -200,7 +215,7 @@ def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:
         raise InputError(
             f"cannot be read as {path.suffix}: {error}",
             path=path,
-            remedy="The file may be truncated or of another kind: copy or export it again.",
+            remedy=AGAIN,
         ) from error
     if not len(vertices) or not len(faces):
         raise InputError("holds no surface", path=path, found=f"{len(vertices)} vertices, {len(faces)} faces")

@@ -115,7 +115,7 @@ def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPa
     except (HeaderDataError, ValueError) as error:
         raise InputError(f"has a broken qform: {error}", path=path, remedy="Set affine_from: sform.") from error
     codes = {"sform": int(header["sform_code"]), "qform": int(header["qform_code"])}
-    unit = header.get_xyzt_units()[0]
+    unit = _length_unit(header, path)
     if unit == "unknown":
         log.warning("%s: no unit of length in the header, mm taken", path)
     scale = np.diag([MM_PER_NIFTI_UNIT[unit]] * 3 + [1.0])
@@ -142,6 +142,24 @@ def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPa
                 remedy="Say which one holds with the brain's affine_from: qform or sform.",
             )
     return scale @ matrices[given[0]]
+
+
+def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
+    """Returns the header's unit of length: a key of MM_PER_NIFTI_UNIT."""
+    code = int(header["xyzt_units"])
+    try:
+        unit = str(header.get_xyzt_units()[0])
+    except KeyError:
+        unit = ""
+    if unit not in MM_PER_NIFTI_UNIT:
+        raise InputError(
+            "has a unit of length that NIfTI does not know",
+            path=path,
+            found=f"xyzt_units {code}",
+            expected="2 (mm), 1 (metres), 3 (micrometres) or 0 (not said), with a unit of time added or not",
+            remedy="Write the unit into the header, for example with nibabel's set_xyzt_units('mm').",
+        )
+    return unit
 
 
 def _farthest_corner(difference: NDArray[np.float64], shape: tuple[int, ...]) -> float:

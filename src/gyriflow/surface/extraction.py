@@ -80,7 +80,7 @@ def refined(field: NDArray, affine: NDArray[np.float64], factor: int) -> tuple[N
     return ndimage.zoom(field, factor, order=1, grid_mode=True, mode="nearest"), fine
 
 
-def main_parts(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int, int]:
+def main_parts(mask: NDArray[np.bool_], comparable: float = COMPARABLE) -> tuple[NDArray[np.bool_], int, int]:
     """Returns the mask's largest part and those of comparable size, filled, without the other parts.
 
     The second and third value are the number of parts dropped and the number of voxels in them.
@@ -88,21 +88,26 @@ def main_parts(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int, int]:
     number, count = ndimage.label(mask)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0
-    kept = sizes >= COMPARABLE * sizes.max()
+    kept = sizes >= comparable * sizes.max()
     kept[0] = False
     dropped = ~kept & (sizes > 0)
     return ndimage.binary_fill_holes(kept[number]), int(dropped.sum()), int(sizes[dropped].sum())
 
 
-def made_simple(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Returns the field with a level set of main parts only, without cavities and handles, and a report."""
+def made_simple(
+    field: NDArray[np.float32], comparable: float = COMPARABLE
+) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Returns the field with a level set of main parts only, without cavities and handles, and a report.
+
+    Main parts are those of `comparable` times the largest one's size and more.
+    """
     inside = field > LEVEL
     if not inside.any():
         raise MeshError(
             "nothing is left of the mask after smoothing",
             remedy="The structure is thinner than the smoothing: lower smoothing_voxels, or check the labels.",
         )
-    kept, parts, voxels = main_parts(inside)
+    kept, parts, voxels = main_parts(inside, comparable)
     field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)).astype(np.float32)
     repair = without_handles(field)
     return unambiguous(repair.field), {

@@ -7,37 +7,58 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas, signed_volume, submesh
+from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas, face_components, signed_volume, submesh
+from gyriflow.surface.limits import Limits
 
 Floats = NDArray[np.float64]
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
-MOST_UNEQUAL = 1.15
+DOUBTFUL_RATIO = 1.15
 FURTHEST_APART_MM = 10.0
-# distance to the mirror image, relative to the brain's length, beyond which hemispheres are not in one pose
-MOST_ASYMMETRIC = 0.02
+# a second closed piece of this part of the largest is a hemisphere
+COMPARABLE = 0.1
+# of a cut surface, patches on the wrong side of the cut up to this share are bulges over the fissure
+MOST_GIVEN_BACK = 0.05
 
 
 def left_faces(mesh: TriangleMesh, heights: Floats) -> NDArray[np.bool_]:
     """Returns the (m,) mask of the faces of the left hemisphere.
 
-    `heights` (m,) are the distances of the faces from the fissure, negative on the left. Patches that bulge over the
-    fissure are given back to the hemisphere that surrounds them, so that each hemisphere is in one piece for each
-    closed surface that it has a part of.
+    `heights` (m,) are the distances of the faces from the fissure, negative on the left. Two comparable closed pieces
+    on different sides are the hemispheres, wherever the fissure is thought to be. Else patches that bulge over the
+    fissure are given back to the hemisphere that surrounds them, so that each is in one piece. InputError where such
+    patches are too large: a cut there would not part the hemispheres.
     """
+    surface = face_components(mesh)
+    areas = face_areas(mesh)
+    sizes = np.bincount(surface, weights=areas)
+    middles = np.bincount(surface, weights=areas * heights) / sizes
+    if len(sizes) > 1 and sizes[1] >= COMPARABLE * sizes[0] and middles[0] * middles[1] < 0:
+        return np.asarray(middles < 0)[surface]
     side = heights < 0
     a, b = _neighbours(mesh)
-    surface = _components(a, b, len(side))
-    within = side[a] == side[b]
-    piece = _components(a[within], b[within], len(side))
-    size = np.bincount(piece, weights=face_areas(mesh))
-    result = side.copy()
-    for number in np.unique(surface):
-        for left in (True, False):
-            mine = np.unique(piece[(surface == number) & (side == left)])
-            if len(mine):
-                strays = mine[size[mine] < 0.2 * size[mine].max()]
-                result[np.isin(piece, strays)] = not left
-    return result
+    given_back = np.zeros(len(side), dtype=bool)
+    # what is given back may join pieces of the other side
+    for _ in range(3):
+        within = side[a] == side[b]
+        piece = _components(a[within], b[within], len(side))
+        area = np.bincount(piece, weights=areas)
+        largest = [
+            piece[side == left][area[piece[side == left]].argmax()] for left in (True, False) if (side == left).any()
+        ]
+        strays = ~np.isin(piece, largest)
+        if not strays.any():
+            break
+        given_back ^= strays
+        side = side ^ strays
+    share = float(areas[given_back].sum() / areas.sum())
+    if share > MOST_GIVEN_BACK:
+        raise InputError(
+            "the surface cannot be parted at the fissure",
+            found=f"a left and a right part in several pieces, {100 * share:.0f} % of the area beside the largest two",
+            expected=f"one piece for each hemisphere, {100 * MOST_GIVEN_BACK:.0f} % beside them",
+            remedy="Is the left-right axis that of the coordinates? Give the hemispheres as two closed surfaces.",
+        )
+    return side
 
 
 def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> NDArray[np.bool_]:
@@ -76,10 +97,10 @@ def parted(mesh: TriangleMesh, left: NDArray[np.bool_]) -> tuple[TriangleMesh, T
     return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
 
 
-def require_pair(left: TriangleMesh, right: TriangleMesh) -> None:
-    """Raises InputError where two surfaces in RAS+ can't be the left and right hemisphere of one brain.
+def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits) -> list[str]:
+    """Returns what is doubtful about two surfaces in RAS+ as the left and right hemisphere of one brain.
 
-    Their centroids must be in order (left is the smaller x), their volumes within 15 % of each other.
+    InputError where their centroids are not in order (left is the smaller x), or their volumes too different.
     """
     x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
     if x_left >= x_right:
@@ -90,13 +111,18 @@ def require_pair(left: TriangleMesh, right: TriangleMesh) -> None:
             remedy="The files are swapped, or their coordinates are LPS: set coordinates: lps.",
         )
     volumes = signed_volume(left), signed_volume(right)
-    if max(volumes) > MOST_UNEQUAL * min(volumes):
+    ratio = max(volumes) / min(volumes)
+    if ratio > limits.max_hemisphere_ratio:
         raise InputError(
             "the hemispheres are too different in size to be of one brain",
             found=f"{volumes[0] / 1e3:.1f} mL (left) and {volumes[1] / 1e3:.1f} mL (right)",
-            expected=f"volumes within {100 * (MOST_UNEQUAL - 1):.0f} % of each other",
-            remedy="Give both hemispheres of the same subject and week.",
+            expected=f"volumes within {100 * (limits.max_hemisphere_ratio - 1):.0f} % of each other",
+            remedy="Give both hemispheres of the same subject and week; if they are, raise "
+            "surface.max_hemisphere_ratio.",
         )
+    if ratio > DOUBTFUL_RATIO:
+        return [f"the hemispheres' volumes differ by {100 * (ratio - 1):.0f} %: are they of one brain?"]
+    return []
 
 
 def least_gap(left: TriangleMesh, right: TriangleMesh) -> float:
@@ -109,17 +135,18 @@ def least_gap(left: TriangleMesh, right: TriangleMesh) -> float:
     return min(gaps)
 
 
-def require_common_pose(asymmetry_mm: float, length_mm: float) -> None:
+def require_common_pose(asymmetry_mm: float, length_mm: float, limits: Limits) -> None:
     """Raises InputError where two hemispheres together are no mirror images of each other in any plane.
 
     `asymmetry_mm` is the mean distance to the mirror image, `length_mm` the brain's length.
     """
-    if asymmetry_mm > MOST_ASYMMETRIC * length_mm:
+    if asymmetry_mm > limits.max_asymmetry * length_mm:
         raise InputError(
             "the hemispheres are not posed as one brain",
             found=f"{asymmetry_mm:.1f} mm between the surface and its mirror image",
-            expected=f"at most {MOST_ASYMMETRIC * length_mm:.1f} mm",
-            remedy="Give both hemispheres of one subject in the same coordinates.",
+            expected=f"at most {limits.max_asymmetry * length_mm:.1f} mm",
+            remedy="Give both hemispheres of one subject in the same coordinates; if they are so asymmetric, raise "
+            "surface.max_asymmetry.",
         )
 
 

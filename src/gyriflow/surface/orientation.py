@@ -55,8 +55,8 @@ class MidPlane:
     scatter_mm: float
 
 
-def mid_plane(mesh: TriangleMesh) -> MidPlane:
-    """Returns the mid-sagittal plane of a closed, outward surface whose left-right axis is within 60° of x.
+def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG) -> MidPlane:
+    """Returns the mid-sagittal plane of a closed, outward surface whose left-right axis is within an angle of x.
 
     Planes of mirror symmetry are the candidates; each is fitted to the fissure, that is, to the middle between medial
     walls that face each other. The best has both little asymmetry and much fissure. In an asymmetric brain the plane
@@ -65,7 +65,7 @@ def mid_plane(mesh: TriangleMesh) -> MidPlane:
     weights = vertex_areas(mesh)
     chosen = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
     sample, tree = mesh.vertices[chosen], cKDTree(mesh.vertices)
-    candidates = [_fitted_to_fissure(mesh, *plane) for plane in _symmetry_planes(sample, tree)]
+    candidates = [_fitted_to_fissure(mesh, *plane) for plane in _symmetry_planes(sample, tree, search_deg)]
     return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))
 
 
@@ -133,12 +133,12 @@ def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
     return matrix, angle
 
 
-def _symmetry_planes(sample: Floats, tree: cKDTree) -> list[tuple[Floats, float, float]]:
-    """Returns normal, offset and asymmetry (mm) of planes of mirror symmetry with normals within 60° of x."""
+def _symmetry_planes(sample: Floats, tree: cKDTree, search_deg: float) -> list[tuple[Floats, float, float]]:
+    """Returns normal, offset and asymmetry (mm) of planes of mirror symmetry with normals within an angle of x."""
     centre = sample.mean(axis=0)
     # a Fibonacci lattice on the cap of directions around x
     index = np.arange(DIRECTIONS) + 0.5
-    along = 1.0 - (1.0 - np.cos(np.radians(SEARCH_DEG))) * index / DIRECTIONS
+    along = 1.0 - (1.0 - np.cos(np.radians(search_deg))) * index / DIRECTIONS
     turn = np.pi * (1.0 + 5.0**0.5) * index
     radius = np.sqrt(1.0 - along**2)
     directions = np.stack([along, radius * np.cos(turn), radius * np.sin(turn)], axis=1)

@@ -21,7 +21,8 @@ class PialSurface:
     whole
         The closed, outward surface of the brain: one piece, or one for each hemisphere.
     left, right
-        The hemispheres' parts of it, open where a connected brain is cut at the fissure.
+        The hemispheres' parts of it, open where a connected brain is cut at the fissure; None for one that is not
+        there.
     fissure_x_mm
         Where the interhemispheric fissure is: the plane x = const between the hemispheres.
     report
@@ -29,21 +30,26 @@ class PialSurface:
     """
 
     whole: TriangleMesh
-    left: TriangleMesh
-    right: TriangleMesh
+    left: TriangleMesh | None
+    right: TriangleMesh | None
     fissure_x_mm: float
     report: dict[str, Any]
 
 
 def described(
-    whole: TriangleMesh, left: TriangleMesh, right: TriangleMesh, fissure_x: float, report: dict[str, Any], week: float
+    whole: TriangleMesh,
+    left: TriangleMesh | None,
+    right: TriangleMesh | None,
+    fissure_x: float,
+    report: dict[str, Any],
+    week: float,
 ) -> PialSurface:
     """Returns the surface with what was measured on it added to the report."""
     parts = {"whole": whole, "left": left, "right": right}
     report |= {
         "week": week,
         "fissure_x_mm": fissure_x,
-        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items()},
+        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items() if part},
         "volume_mL": signed_volume(whole) * ML_PER_MM3,
         "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
         "vertices": len(whole.vertices),

@@ -12,7 +12,7 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.layers import layer_thickness
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
 from gyriflow.surface.extraction import LEVEL, isosurface, main_parts, smoothed_mask
-from gyriflow.surface.sides import sampled
+from gyriflow.surface.fissure import sampled
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -90,7 +90,8 @@ def cortical_thickness(
     _, known = cKDTree(points[measured]).query(points[~measured])
     filled = values.copy()
     filled[~measured] = values[measured][known]
-    return Thickness(filled, measured, _described(values, measured, vertex_areas(pial), voxel))
+    report = summary(values, measured, vertex_areas(pial))
+    return Thickness(filled, measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
 
 
 def _cortex_under(points: Floats, cerebrum: Mask, cortex: Mask, affine: Floats, voxel_mm: float) -> Mask:
@@ -101,7 +102,7 @@ def _cortex_under(points: Floats, cerebrum: Mask, cortex: Mask, affine: Floats, 
     return near & (sampled(to_outside, affine, points) < FARTHEST_VOXELS * voxel_mm)
 
 
-def _described(values: Floats, measured: Mask, areas: Floats, voxel_mm: float) -> dict[str, Any]:
+def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
     """Returns the summary of the thickness; means are weighted by area."""
     chosen, weights = values[measured], areas[measured]
     quantiles = np.quantile(chosen, [QUANTILES[0], 0.5, QUANTILES[1]], weights=weights, method="inverted_cdf")
@@ -114,6 +115,5 @@ def _described(values: Floats, measured: Mask, areas: Floats, voxel_mm: float) -
         "quantile95_mm": high,
         "sd_mm": float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))),
         "measured_area_share": float(weights.sum() / areas.sum()),
-        "voxels_through_cortex": mean / voxel_mm,
         "suggested_thickness_mm": round(mean, 2),
     }

@@ -203,6 +203,28 @@ def test_files_are_found_beside_the_configuration_and_missing_ones_named(tmp_pat
     assert config.brains[0].files == [str(tmp_path / "labels.nii.gz")]
 
 
+def test_white_surfaces_are_files_beside_the_pial_ones(tmp_path):
+    for name in ("l.gii", "r.gii", "lw.gii", "rw.gii", "all.stl", "white.stl"):
+        (tmp_path / name).touch()
+    sides = {"left": "l.gii", "right": "r.gii", "white": {"left": "lw.gii", "right": "rw.gii"}}
+    brains = [
+        {"id": "a", "week": 21, "hemispheres": sides},
+        {"id": "b", "week": 22, "pial": "all.stl", "white": "white.stl"},
+        {"id": "c", "week": 22, "pial": "all.stl"},
+    ]
+    config = load(study(brains=brains), tmp_path)
+    assert config.brains[0].files == [str(tmp_path / "l.gii"), str(tmp_path / "r.gii")]
+    assert config.brains[0].white_files == {"left": str(tmp_path / "lw.gii"), "right": str(tmp_path / "rw.gii")}
+    assert config.brains[1].white_files == {"whole": str(tmp_path / "white.stl")}
+    assert config.brains[2].white_files == {}
+    sides["white"]["right"] = "lost.gii"
+    brains[2] = {"id": "c", "week": 22, "phantom": {}, "white": "white.stl"}
+    assert problems(study(brains=brains), tmp_path) == [
+        f"brains[0].hemispheres.white.right: no such file: {tmp_path / 'lost.gii'}",
+        "brains[2].white: has no meaning with phantom; only with pial",
+    ]
+
+
 def test_keys_that_mean_nothing_for_a_source_are_refused():
     brains = [{"id": "a", "week": 21, "phantom": {}, "coordinates": "lps"}]
     assert "coordinates: has no meaning with phantom" in problems(study(brains=brains))[0]

@@ -34,6 +34,10 @@ def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
         "cortex": (2,),
         "left": (),
         "right": (),
+        "white_matter": (),
+        "ventricles": (),
+        "cerebellum": (),
+        "brainstem": (),
         "known": {9: "outer CSF"},
     }
     plain = load(study({"phantom": {}}))
@@ -59,8 +63,8 @@ def test_all_mistakes_in_schemes_are_named_at_once(folder):
         "schemes.c.left[0]: found 'x'; it should be a valid integer, unable to parse string as an integer",
         "schemes.e.cerebrum: found no labels; it should have one or more",
         "schemes.feta-7: the name is that of a scheme of gyriflow; choose another",
-        "brains[0].scheme: found 'd'; expected one of spina-bifida-atlas, dhcp-19, feta-7, binary, a, b, c, e, or a "
-        "name of schemes",
+        "brains[0].scheme: found 'd'; expected one of spina-bifida-atlas, dhcp-19, feta-7, drawem-9, multi-bounti-43, "
+        "freesurfer, crl, binary, a, b, c, e, or a name of schemes",
     ]
 
 

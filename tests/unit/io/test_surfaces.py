@@ -3,13 +3,15 @@
 import nibabel as nib
 import numpy as np
 import pytest
+import pyvista as pv
 import trimesh
+from nibabel.freesurfer.io import write_geometry
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
 from nibabel.nifti1 import data_type_codes, intent_codes
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, is_closed, signed_volume
-from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface, write_vertex_maps
+from gyriflow.io.surfaces import declared, read_surface, read_vertex_maps, write_surface, write_vertex_maps
 
 
 @pytest.fixture
@@ -46,10 +48,118 @@ def test_written_gifti_says_which_hemisphere(tmp_path, ball):
     assert image.darrays[1].data.dtype == np.int32
 
 
-def test_coordinate_system_matrix_is_applied(tmp_path, ball):
-    matrix = np.array([[0, -1, 0, 7], [1, 0, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1.0]])
-    back = read_surface(gifti(tmp_path / "a.gii", ball.vertices, ball.faces, matrix))
+TURN = np.array([[0, -1, 0, 7], [1, 0, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1.0]])
+SCALE = np.diag([1.16, 1.16, 1.16, 1.0])
+NAMES = dict(enumerate(("UNKNOWN", "SCANNER_ANAT", "ALIGNED_ANAT", "TALAIRACH", "MNI_152")))
+U, SCANNER, ALIGNED, TALAIRACH, MNI = NAMES
+
+
+def in_spaces(path, ball, *systems):
+    """Writes a surface whose points have one coordinate system or several, as (data space, space, matrix)."""
+    gifti(path, ball.vertices, ball.faces)
+    blocks = "".join(
+        f"<CoordinateSystemTransformMatrix><DataSpace><![CDATA[NIFTI_XFORM_{NAMES[data]}]]></DataSpace>"
+        f"<TransformedSpace><![CDATA[NIFTI_XFORM_{NAMES[to]}]]></TransformedSpace>"
+        f"<MatrixData>{' '.join(map(str, matrix.ravel()))}</MatrixData></CoordinateSystemTransformMatrix>"
+        for data, to, matrix in systems
+    )
+    head, points, *rest = path.read_text().split("<DataArray")
+    before, data = points.split("<Data>", 1)
+    before = before.split("<CoordinateSystemTransformMatrix")[0]
+    path.write_text("<DataArray".join([head, f"{before}{blocks}<Data>{data}", *rest]))
+    return path
+
+
+@pytest.mark.parametrize("to", [SCANNER, ALIGNED])
+def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
+    back = read_surface(in_spaces(tmp_path / "a.gii", ball, (U, to, TURN)))
+    assert back.vertices == pytest.approx(ball.vertices @ TURN[:3, :3].T + TURN[:3, 3], abs=1e-3)
+    assert declared(tmp_path / "a.gii")[0] == f"NIFTI_XFORM_{NAMES[to]}"
+
+
+@pytest.mark.parametrize(
+    ("systems", "said", "space"),
+    [
+        ([(U, TALAIRACH, SCALE)], "which scales by 1.16, was not applied", None),
+        ([(U, MNI, SCALE)], "which scales by 1.16, was not applied", None),
+        ([(U, U, TURN)], "to NIFTI_XFORM_UNKNOWN, which scales by 1, was not applied", None),
+        ([(SCANNER, U, TURN)], "are in NIFTI_XFORM_SCANNER_ANAT already", "NIFTI_XFORM_SCANNER_ANAT"),
+        ([(SCANNER, TALAIRACH, SCALE)], "are in NIFTI_XFORM_SCANNER_ANAT already", "NIFTI_XFORM_SCANNER_ANAT"),
+    ],
+)
+def test_other_matrices_leave_the_coordinates_and_that_is_said(tmp_path, ball, caplog, systems, said, space):
+    back = read_surface(in_spaces(tmp_path / "a.gii", ball, *systems))
+    assert back.vertices == pytest.approx(ball.vertices, abs=1e-4)
+    assert said in caplog.text
+    assert declared(tmp_path / "a.gii")[0] == space
+
+
+def test_of_several_matrices_the_one_into_scanner_space_counts_wherever_it_stands(tmp_path, ball):
+    for number, systems in enumerate(
+        ([(U, SCANNER, TURN), (U, TALAIRACH, SCALE)], [(U, MNI, SCALE), (U, SCANNER, TURN)])
+    ):
+        back = read_surface(in_spaces(tmp_path / f"{number}.gii", ball, *systems))
+        assert back.vertices == pytest.approx(ball.vertices @ TURN[:3, :3].T + TURN[:3, 3], abs=1e-3)
+
+
+@pytest.mark.parametrize("matrix", [SCALE, np.diag([-1.0, 1, 1, 1])])
+def test_matrix_into_scanner_space_that_is_not_rigid_is_refused(tmp_path, ball, matrix):
+    with pytest.raises(InputError, match=r"a\.gii.*changes sizes or mirrors"):
+        read_surface(in_spaces(tmp_path / "a.gii", ball, (U, SCANNER, matrix)))
+
+
+def test_identity_in_a_template_space_says_nothing(tmp_path, ball, caplog):
+    # as Connectome Workbench writes surfaces of subjects
+    read_surface(in_spaces(tmp_path / "a.gii", ball, (TALAIRACH, TALAIRACH, np.eye(4))))
+    assert caplog.text == ""
+    assert declared(tmp_path / "a.gii")[0] == "NIFTI_XFORM_TALAIRACH"
+
+
+@pytest.mark.parametrize("name", ["a.vtk", "a.vtp"])
+def test_vtk_surfaces_are_read(tmp_path, ball, name):
+    pv.PolyData.from_regular_faces(np.array(ball.vertices), np.array(ball.faces, dtype=int)).save(tmp_path / name)
+    back = read_surface(tmp_path / name)
+    assert back.vertices == pytest.approx(ball.vertices, abs=1e-4)
+    assert is_closed(back)
+    grid = tmp_path / f"grid.{name.split('.')[1].replace('vtk', 'vti').replace('vtp', 'vti')}"
+    pv.ImageData(dimensions=(3, 3, 3)).save(grid)
+    grid.rename(tmp_path / "grid.vtk")
+    with pytest.raises(InputError, match=r"grid\.vtk"):
+        read_surface(tmp_path / "grid.vtk")
+
+
+AXES = {"xras": [0.0, -1.0, 0.0], "yras": [0.0, 0.0, -1.0], "zras": [-1.0, 0.0, 0.0], "cras": [5.0, 6.0, 7.0]}
+
+
+def volume(**changed):
+    shape = {"head": [2, 0, 20], "valid": "1  # volume info valid", "filename": "orig.mgz", "volume": [256] * 3}
+    return shape | {"voxelsize": [1.0, 1.0, 1.0]} | AXES | changed
+
+
+def test_freesurfer_surface_is_brought_to_scanner_space(tmp_path, ball):
+    write_geometry(tmp_path / "lh.pial", ball.vertices, ball.faces, volume_info=volume())
+    back = read_surface(tmp_path / "lh.pial")
+    # Norig inv(Torig) of surfer.nmr.mgh.harvard.edu/fswiki/CoordinateSystems, voxels of 1 mm
+    torig = np.array([[-1, 0, 0, 128], [0, 0, 1, -128], [0, -1, 0, 128], [0, 0, 0, 1.0]])
+    norig = np.eye(4)
+    norig[:3, :3] = np.column_stack([AXES["xras"], AXES["yras"], AXES["zras"]])
+    norig[:3, 3] = np.array(AXES["cras"]) - norig[:3, :3] @ np.full(3, 128.0)
+    matrix = norig @ np.linalg.inv(torig)
     assert back.vertices == pytest.approx(ball.vertices @ matrix[:3, :3].T + matrix[:3, 3], abs=1e-3)
+    assert declared(tmp_path / "lh.pial") == ("NIFTI_XFORM_SCANNER_ANAT", "CortexLeft")
+
+
+def test_freesurfer_surface_without_its_volume_stays_and_that_is_said(tmp_path, ball, caplog):
+    write_geometry(tmp_path / "rh.white", ball.vertices, ball.faces)
+    assert read_surface(tmp_path / "rh.white").vertices == pytest.approx(ball.vertices, abs=1e-4)
+    assert "relative to its centre" in caplog.text
+    assert declared(tmp_path / "rh.white") == (None, "CortexRight")
+
+
+def test_file_of_no_known_kind_is_refused_with_those_known(tmp_path):
+    (tmp_path / "lh.pial").write_bytes(b"something else")
+    with pytest.raises(InputError, match=r"lh\.pial: cannot be read as a surface.*FreeSurfer"):
+        read_surface(tmp_path / "lh.pial")
 
 
 def test_triangles_stored_as_floats_are_read(tmp_path, ball):

@@ -57,6 +57,21 @@ def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
     assert volume.affine == pytest.approx(AFFINE, rel=1e-5)
 
 
+def test_unit_that_nifti_does_not_know_is_refused(tmp_path, labels):
+    image = nib.Nifti1Image(labels, AFFINE)
+    image.header["xyzt_units"] = 5
+    nib.save(image, tmp_path / "a.nii")
+    with pytest.raises(InputError, match=r"a\.nii: has a unit of length that NIfTI does not know; found xyzt_units 5"):
+        read_label_volume(tmp_path / "a.nii")
+
+
+def test_labels_of_freesurfer_volumes_are_read(tmp_path, labels):
+    nib.save(nib.MGHImage(labels.astype(np.int32), AFFINE.astype(np.float32)), tmp_path / "aseg.mgz")
+    volume = read_label_volume(tmp_path / "aseg.mgz")
+    assert np.array_equal(volume.labels, labels)
+    assert volume.affine == pytest.approx(AFFINE, abs=1e-4)
+
+
 def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     other = AFFINE.copy()
     other[0, 3] = 33.0

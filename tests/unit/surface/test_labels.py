@@ -5,7 +5,12 @@ import pytest
 
 from gyriflow.errors import InputError
 from gyriflow.parameters.schemes import SCHEMES
-from gyriflow.surface.labels import cerebrum_mask, require_sides
+from gyriflow.surface.labels import (
+    cerebrum_mask,
+    missing_tissues,
+    require_cortex_outside,
+    require_sides,
+)
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
 
@@ -17,9 +22,13 @@ def test_cerebrum_leaves_out_cerebellum_csf_and_brainstem():
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 def test_schemes_name_only_labels_that_they_have(scheme):
-    named = {*scheme.cerebrum, *scheme.cortex, *scheme.left, *scheme.right}
+    inside = {*scheme.cortex, *scheme.left, *scheme.right, *scheme.white_matter, *scheme.ventricles}
+    outside = {*scheme.cerebellum, *scheme.brainstem}
+    named = {*scheme.cerebrum, *inside, *outside}
     assert named <= set(scheme.labels)
-    assert set(scheme.cortex) <= set(scheme.cerebrum)
+    assert inside <= set(scheme.cerebrum)
+    assert not outside & set(scheme.cerebrum)
+    assert not set(scheme.cortex) & {*scheme.white_matter, *scheme.ventricles}
     assert not set(scheme.left) & set(scheme.right)
     assert len(scheme.left) == len(scheme.right)
 
@@ -30,10 +39,51 @@ def test_unknown_labels_are_named_beside_the_known():
         cerebrum_mask(labels, ATLAS)
 
 
-def test_missing_tissues_are_named():
-    labels = np.array([[[0, 1, 2, 3, 4, 6, 7]]])
-    with pytest.raises(InputError, match=r"missing.*also 5 cortex, 8 corpus callosum"):
+@pytest.mark.parametrize(("label", "tissue"), [(5, "cortex"), (1, "white matter")])
+def test_cortex_and_white_matter_are_required_by_name(label, tissue):
+    labels = np.array([[[n for n in range(9) if n != label]]])
+    with pytest.raises(InputError, match=f"the {tissue} of the scheme .* is missing.*{label} {tissue}"):
         cerebrum_mask(labels, ATLAS)
+
+
+@pytest.mark.parametrize("label", [2, 6, 8])
+def test_other_tissues_may_be_missing_and_are_named(label):
+    labels = np.array([[[n for n in range(9) if n != label]]])
+    assert cerebrum_mask(labels, ATLAS).sum() == 4
+    assert missing_tissues(labels, ATLAS) == [f"{label} {ATLAS.labels[label]}"]
+
+
+def test_transient_zones_stand_for_white_matter():
+    # CRL's volumes have white matter at late weeks only
+    labels = np.array([[[112, 113, 114, 115, 92, 93]]])
+    assert cerebrum_mask(labels, SCHEMES["crl"]).all()
+
+
+def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
+    labels = np.full((9, 9, 9), 1)
+    labels[2:7, 2:7, 2:7] = 5
+    with pytest.raises(InputError, match="does not lie around what it calls the cerebrum; found cortex at 0 %"):
+        require_cortex_outside(labels, ATLAS)
+    assert require_cortex_outside(6 - labels, ATLAS) == 1.0
+
+
+def test_labels_of_bounti_have_its_own_names():
+    # github.com/SVRTK/auto-proc-svrtk: Cavum 9, third ventricle 18, fourth ventricle 19
+    bounti = SCHEMES["dhcp-19"]
+    names = {9: "cavum septi pellucidi", 18: "third ventricle", 19: "fourth ventricle"}
+    assert {number: bounti.labels[number] for number in names} == names
+    assert 18 in bounti.cerebrum
+    assert 19 not in bounti.cerebrum
+
+
+def test_sides_of_parcellations_are_told_right():
+    left_cortex = {"multi-bounti-43": 2, "freesurfer": 1024, "crl": 1}
+    for name, number in left_cortex.items():
+        scheme = SCHEMES[name]
+        assert number in scheme.left
+        assert number in scheme.cortex
+        assert scheme.labels[number].endswith("left")
+    assert {2041, 12101, 43, 4012} & set(SCHEMES["freesurfer"].left) == set()
 
 
 @pytest.mark.parametrize("labels", [[0, 0], [3, 4]])

@@ -25,8 +25,9 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.from_labels import from_labels
+from gyriflow.surface.from_surfaces import from_hemispheres, from_pial
 from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
-from gyriflow.surface.pial import from_hemispheres, from_labels, from_pial
 from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.repair import pieces
 from gyriflow.surface.size import require_plausible_size

@@ -1,6 +1,7 @@
 """Hemispheres in any pose: found again by their shape or their files, or refused."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,14 @@ from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_
 from gyriflow.io.surfaces import declared, read_surface, write_surface
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.surface import hemisphere_pose
 from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
-from gyriflow.surface.halves import about_x, pair_by_shape, pitch_deg
+from gyriflow.surface.from_surfaces import from_hemispheres
+from gyriflow.surface.hemisphere_pose import about_x, pair_by_shape, pitch_deg
 from gyriflow.surface.hemispheres import least_gap
-from gyriflow.surface.pial import from_hemispheres
-from gyriflow.surface.posing import as_poses, poses
+from gyriflow.surface.limits import Limits
 from gyriflow.surface.repair import pieces
+from gyriflow.surface.study_poses import as_poses, pairs_by_shape, poses
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
 LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -224,3 +227,48 @@ def test_real_hemispheres_in_different_poses_are_posed_alike():
     for side in (0, 1):
         first, second = (brain[side].vertices for brain in posed)
         np.testing.assert_allclose(np.ptp(second, axis=0) / np.ptp(first, axis=0), 1.06, atol=0.05)
+
+
+@pytest.fixture
+def doubtful(monkeypatch):
+    """Has another pose of every hemisphere fit the reference nearly as well."""
+    by_shape = hemisphere_pose.hemisphere_by_shape
+    monkeypatch.setattr(hemisphere_pose, "hemisphere_by_shape", lambda mesh: replace(by_shape(mesh), confidence=1.05))
+
+
+@pytest.mark.usefixtures("doubtful")
+@pytest.mark.parametrize("frame", ["ras", "lps"])
+def test_a_doubtful_shape_near_the_axes_of_files_is_posed_as_these_say(halves, frame):
+    axes = (LPS if frame == "lps" else np.eye(4))[:3, :3]
+    turns = [axes @ Rotation.from_euler("xyz", tilt, degrees=True).as_matrix() for tilt in ((9, -14, 12), (-8, 10, 3))]
+    pair = pair_by_shape(*(linear(half, turn) for half, turn in zip(halves, turns, strict=True)))
+    mirrored = np.diag([-1.0, 1, 1]) @ turns[0] @ np.diag([-1.0, 1, 1])
+    for hemisphere, turn in ((pair.left, mirrored), (pair.right, turns[1])):
+        assert np.degrees(Rotation.from_matrix(hemisphere.rotation @ turn).magnitude()) < 5.0
+
+
+@pytest.mark.usefixtures("doubtful")
+def test_a_doubtful_shape_in_any_pose_is_posed_like_the_studys_others_or_refused(halves):
+    motions = rigid(31), rigid(32)
+    moved = tuple(transformed(half, motion) for half, motion in zip(halves, motions, strict=True))
+    with pytest.raises(InputError, match="cannot be told from its shape"):
+        pair_by_shape(*moved)
+    pairs = pairs_by_shape([moved, tuple(halves)])
+    posed, _ = poses(pairs, [False, False])
+    for side, motion in zip((posed.left, posed.right), motions, strict=True):
+        assert np.degrees(Rotation.from_matrix((side @ motion)[:3, :3]).magnitude()) < 3.0
+
+
+def test_declared_hemispheres_stay_together_however_they_lie(halves):
+    lower = np.eye(4)
+    lower[2, 3] = -4.0
+    pair = [transformed(halves[0], lower), halves[1]]
+    assert found(*pair, named=True).report["together"]
+    np.testing.assert_array_equal(found(*pair, named=True).left, np.eye(4))
+
+
+def test_how_asymmetric_hemispheres_may_be_is_the_users_choice(halves):
+    pair = [halves[0], linear(halves[1], np.diag([1.2, 1.0, 1.0]))]
+    assert pair_by_shape(*pair).fit.residual > 0.02
+    with pytest.raises(InputError, match=r"no mirror images.*surface\.max_asymmetry"):
+        pair_by_shape(*pair, Limits(max_asymmetry=0.005))

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from gyriflow.geometry.triangles import area, corners, face_areas, signed_volume
+from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged, signed_volume
 from gyriflow.parameters.schemes import SCHEMES, LabelScheme
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.pial import from_labels
-from gyriflow.surface.volume import after_repairs, with_volume
+from gyriflow.surface.from_labels import from_labels
+from gyriflow.surface.remeshing import self_intersecting_faces
+from gyriflow.surface.shrinkage import after_repairs, with_volume
 
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
 
@@ -61,8 +62,6 @@ def test_smoothing_keeps_volume_and_area(bent):
 def test_a_volume_that_is_far_off_is_told_and_not_hidden():
     from trimesh.creation import icosphere
 
-    from gyriflow.geometry.triangles import TriangleMesh
-
     ball = TriangleMesh(*(np.array(a) for a in (icosphere(3, 20.0).vertices, icosphere(3, 20.0).faces)))
     volume = signed_volume(ball)
     near, report = with_volume(ball, 1.02 * volume, area(ball))
@@ -71,6 +70,21 @@ def test_a_volume_that_is_far_off_is_told_and_not_hidden():
     far, report = with_volume(ball, 1.2 * volume, area(ball))
     assert far is ball
     assert report["volume_change"] == pytest.approx(1 / 1.2 - 1)
+
+
+def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
+    from trimesh.creation import icosphere
+
+    one = icosphere(3, 20.0)
+    shift = np.array([2 * one.vertices[:, 0].max() + 0.1, 0.0, 0.0])
+    balls = merged(*(TriangleMesh(np.array(one.vertices + k * shift), np.array(one.faces)) for k in (0, 1)))
+    wider, report = with_volume(balls, 1.02 * signed_volume(balls), area(balls))
+    assert report["volume_change"] == pytest.approx(0.0, abs=1e-4)
+    assert not self_intersecting_faces(wider).any()
+    still = np.all(wider.vertices == balls.vertices, axis=1)
+    assert 0 < still.mean() < 0.2
+    # at the place where the balls nearly touch
+    assert np.abs(balls.vertices[still, 0] - shift[0] / 2).max() < 5.0
 
 
 def test_repairs_count_for_the_volume():

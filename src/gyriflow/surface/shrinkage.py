@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.geometry.triangles import TriangleMesh, area, signed_volume, vertex_normals
+from gyriflow.geometry.triangles import TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
 from gyriflow.surface.outcome import faults
+from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
 log = logging.getLogger(__name__)
@@ -17,6 +18,8 @@ KEPT = 0.01
 # beyond this it has taken structures, not rounded them, and moving the whole surface would not bring them back
 MOST_GIVEN_BACK = 0.05
 ROUNDS = 2
+# walls that would cut each other are held back, with their neighbours, so many times
+HELD_BACK = 4
 
 
 def after_repairs(mask_mm3: float, topology: dict[str, Any], affine: NDArray[np.float64]) -> float:
@@ -29,8 +32,9 @@ def after_repairs(mask_mm3: float, topology: dict[str, Any], affine: NDArray[np.
 def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns a closed surface set along its normals so that it encloses a volume, and a report in plain values.
 
-    Smoothing and remeshing draw a convex surface inwards by some hundredths of a mm: ΔV/A is given back. The surface
-    stays as it is where that is more than 5 % of the volume, or would make it cut itself.
+    Smoothing and remeshing draw a convex surface inwards by some hundredths of a mm: ΔV/A is given back. Walls so near
+    to each other that they would cut stay where they are. So does the whole surface where more than 5 % of the volume
+    is missing, or where it would cut itself even so.
 
     Parameters
     ----------
@@ -40,13 +44,7 @@ def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple
         Area of the mask's isosurface before it was smoothed and remeshed.
     """
     before = signed_volume(mesh) / volume_mm3 - 1.0
-    moved = mesh
-    if abs(before) <= MOST_GIVEN_BACK:
-        for _ in range(ROUNDS):
-            offset = (volume_mm3 - signed_volume(moved)) / area(moved)
-            moved = TriangleMesh(moved.vertices + offset * vertex_normals(moved), moved.faces)
-        if faults(moved):
-            moved = mesh
+    moved = _set_along_normals(mesh, volume_mm3) if abs(before) <= MOST_GIVEN_BACK else mesh
     change = signed_volume(moved) / volume_mm3 - 1.0
     report = {
         "volume_expected_mL": volume_mm3 * ML_PER_MM3,
@@ -57,3 +55,21 @@ def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple
     }
     log.info("volume changed by %.2f %%, area by %.2f %% through smoothing", 100 * change, 100 * report["area_change"])
     return moved, report
+
+
+def _set_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+    """Returns the surface set along its normals to a volume, but for walls that would cut; unmoved where others do."""
+    free = np.ones(len(mesh.vertices), dtype=bool)
+    for _ in range(HELD_BACK + 1):
+        moved = mesh
+        for _ in range(ROUNDS):
+            share = float(vertex_areas(moved)[free].sum())
+            offset = (volume_mm3 - signed_volume(moved)) / share * free
+            moved = TriangleMesh(moved.vertices + offset[:, None] * vertex_normals(moved), moved.faces)
+        if not (cutting := self_intersecting_faces(moved)).any():
+            break
+        near = np.isin(mesh.faces, mesh.faces[cutting]).any(axis=1)
+        free[mesh.faces[near]] = False
+        if not free.any():
+            return mesh
+    return mesh if faults(moved) else moved

@@ -11,17 +11,20 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
-from gyriflow.surface.halves import MIRROR, SYLVIAN_AHEAD, Pair, about_x, pitch_deg
+from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.surface.hemisphere_pose import CONVENTIONS, MIRROR, SYLVIAN_AHEAD, Pair, about_x, pair_by_shape, pitch_deg
+from gyriflow.surface.limits import USUAL, Limits
 from gyriflow.surface.registration import Target, registered
 
 Floats = NDArray[np.float64]
 
-FRAMES = {"ras": np.eye(3), "lps": np.diag([-1.0, -1.0, 1.0])}
 # how well the shape has to agree with axes for the file to be in them: tilts (of the wall), and pitch, in degrees;
 # the first is per residual of the hemispheres' fit, as the shape of an asymmetric brain says less
 EXACT_DEG_PER_RESIDUAL, DECLARED_DEG, SAME_PITCH_DEG = 70.0, 10.0, 15.0
 # files of one brain share their coordinates where their poses differ by less; distances are relative to the size
 COMMON_DEG_PER_RESIDUAL, COMMON_OFFSET, COMMON_DISTANCE = 180.0, 0.08, 0.15
+# hemispheres of one declared coordinate system stay as they are in it, if they are turned by less than this
+DECLARED_TURN_DEG = 30.0
 # the medial walls' distance from the mid-sagittal plane where the files do not say it
 BESIDE_MM = 0.5
 # each brain is registered with so many that are smaller and larger
@@ -41,6 +44,27 @@ class Poses:
     report: dict[str, Any]
 
 
+def pairs_by_shape(
+    brains: Sequence[tuple[TriangleMesh, TriangleMesh]], limits: Limits = USUAL
+) -> list[Pair | InputError]:
+    """Returns what `pair_by_shape` says of each brain of a study, or why it is refused.
+
+    Those that are doubtful alone are posed like the others, once the poses of these are known.
+    """
+    found: list[Pair | InputError] = []
+    for others in ((), None):
+        known = [pair for pair in found if isinstance(pair, Pair)] if others is None else ()
+        for number, (left, right) in enumerate(brains):
+            if others is None and (not known or isinstance(found[number], Pair)):
+                continue
+            try:
+                pair: Pair | InputError = pair_by_shape(left, right, limits, known)
+            except InputError as error:
+                pair = error
+            found[number:] = [pair, *found[number + 1 :]]
+    return found
+
+
 def poses(pairs: Sequence[Pair], declared: Sequence[bool]) -> list[Poses]:
     """Returns the poses of the brains of one study, given what `pair_by_shape` says of each.
 
@@ -52,7 +76,7 @@ def poses(pairs: Sequence[Pair], declared: Sequence[bool]) -> list[Poses]:
     """
     frames = [_frame(pair, named) for pair, named in zip(pairs, declared, strict=True)]
     pitches, places = _pitches(pairs, frames), _places(pairs, frames)
-    return [_posed(*brain) for brain in zip(pairs, frames, pitches, places, strict=True)]
+    return [_posed(*brain) for brain in zip(pairs, frames, declared, pitches, places, strict=True)]
 
 
 def as_poses(report: dict[str, Any]) -> Poses:
@@ -73,16 +97,16 @@ def placed(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any]:
     return poses.report | {"matrices": matrices}
 
 
-def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
+def _posed(pair: Pair, frame: str | None, declared: bool, pitch: float, place: Floats) -> Poses:
     both = {"left": pair.left, "right": pair.right}
     report: dict[str, Any] = {
         "method": "file" if frame else "shape",
         "coordinates": frame,
         "pitch_deg": pitch,
-        "residual": {side: round(half.residual, DIGITS) for side, half in both.items()},
-        "confidence": {side: round(half.confidence, DIGITS) for side, half in both.items()},
+        "residual": {side: round(hemisphere.residual, DIGITS) for side, hemisphere in both.items()},
+        "confidence": {side: round(hemisphere.confidence, DIGITS) for side, hemisphere in both.items()},
         "mirror_residual": round(pair.fit.residual, DIGITS),
-        "sylvian_ahead": {side: round(half.sylvian, DIGITS) for side, half in both.items()},
+        "sylvian_ahead": {side: round(hemisphere.sylvian, DIGITS) for side, hemisphere in both.items()},
         "warnings": [],
     }
     if np.mean(list(report["sylvian_ahead"].values())) < SYLVIAN_AHEAD:
@@ -91,11 +115,11 @@ def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
         )
     if frame:
         motion = np.eye(4)
-        motion[:3, :3] = FRAMES[frame]
+        motion[:3, :3] = CONVENTIONS[frame]
         left = right = motion
     else:
         left, right = _separate(pair, pitch, place)
-        if _share_coordinates(pair):
+        if _share_coordinates(pair, declared):
             left = right = _mean_motion(left, right, pair)
     report["together"] = left is right
     # a pose that is the same but for round-off is the same file
@@ -107,20 +131,25 @@ def _posed(pair: Pair, frame: str | None, pitch: float, place: Floats) -> Poses:
 def _separate(pair: Pair, pitch: float, place: Floats) -> tuple[Floats, Floats]:
     """Returns the motions that put the medial walls beside x = 0 and the centres around `place` (y and z)."""
     motions = []
-    for half, sign in ((pair.left, 0.5), (pair.right, -0.5)):
+    for hemisphere, sign in ((pair.left, 0.5), (pair.right, -0.5)):
         motion = np.eye(4)
-        motion[:3, :3] = about_x(pitch) @ half.rotation
+        motion[:3, :3] = about_x(pitch) @ hemisphere.rotation
         target = np.zeros(3)
         target[1:] = place + sign * (about_x(pitch) @ pair.offset_mm)[1:]
-        target[0] = BESIDE_MM - half.wall_mm
-        motion[:3, 3] = target - motion[:3, :3] @ half.outline.centre
+        target[0] = BESIDE_MM - hemisphere.wall_mm
+        motion[:3, 3] = target - motion[:3, :3] @ hemisphere.outline.centre
         motions.append(motion)
     return MIRROR @ motions[0] @ MIRROR, motions[1]
 
 
-def _share_coordinates(pair: Pair) -> bool:
-    """Returns whether the files have both hemispheres where one rigid motion brings them to a brain."""
+def _share_coordinates(pair: Pair, declared: bool) -> bool:
+    """Returns whether the files have both hemispheres where one rigid motion brings them to a brain.
+
+    Files that name one coordinate system do, unless the shapes are turned against each other beyond doubt.
+    """
     left, right = _separate(pair, 0.0, np.zeros(2))
+    if declared and angle_deg(right[:3, :3].T @ left[:3, :3]) < DECLARED_TURN_DEG:
+        return True
     if angle_deg(right[:3, :3].T @ left[:3, :3]) > COMMON_DEG_PER_RESIDUAL * pair.fit.residual:
         return False
     centre = MIRROR[:3, :3] @ pair.left.outline.centre
@@ -140,10 +169,10 @@ def _mean_motion(left: Floats, right: Floats, pair: Pair) -> Floats:
 
 def _frame(pair: Pair, declared: bool) -> str | None:
     """Returns "ras" or "lps" where both files are in these coordinates, to the accuracy of the shape, else None."""
-    if not _share_coordinates(pair):
+    if not _share_coordinates(pair, declared):
         return None
-    for name, axes in FRAMES.items():
-        turns = [half.rotation @ axes.T for half in (pair.left, pair.right)]
+    for name, axes in CONVENTIONS.items():
+        turns = [hemisphere.rotation @ axes.T for hemisphere in (pair.left, pair.right)]
         # mirrored files have the same axes up to signs, which cancel
         tilts = [np.degrees(np.arccos(np.clip(turn[0, 0], -1.0, 1.0))) for turn in turns]
         most = max(DECLARED_DEG if declared else 0.0, EXACT_DEG_PER_RESIDUAL * pair.fit.residual)
@@ -186,7 +215,9 @@ def _pitches(pairs: Sequence[Pair], frames: list[str | None]) -> list[float]:
 
 
 def _pitch_in_file(pair: Pair, frame: str) -> float:
-    return float(np.mean([pitch_deg(FRAMES[frame] @ half.rotation.T) for half in (pair.left, pair.right)]))
+    return float(
+        np.mean([pitch_deg(CONVENTIONS[frame] @ hemisphere.rotation.T) for hemisphere in (pair.left, pair.right)])
+    )
 
 
 def _registered(one: Pair, other: Pair) -> tuple[float, float]:
@@ -215,9 +246,9 @@ def _places(pairs: Sequence[Pair], frames: list[str | None]) -> list[Floats]:
 
 def _centre(pair: Pair, frame: str) -> Floats:
     """Returns y and z of a brain's centre in RAS+, of files in these axes."""
-    centres = [FRAMES[frame] @ half.outline.centre for half in (pair.left, pair.right)]
+    centres = [CONVENTIONS[frame] @ hemisphere.outline.centre for hemisphere in (pair.left, pair.right)]
     return np.asarray(np.mean(centres, axis=0)[1:])
 
 
 def _size(pair: Pair) -> float:
-    return float(np.mean([half.outline.size_mm for half in (pair.left, pair.right)]))
+    return float(np.mean([hemisphere.outline.size_mm for hemisphere in (pair.left, pair.right)]))

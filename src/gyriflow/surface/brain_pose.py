@@ -1,0 +1,202 @@
+"""Whether a whole brain stands as its file says: by what lies below and behind it, by its sides, by its shape."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import angle_deg
+from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.surface.hemisphere_pose import (
+    CONVENTION_DEG,
+    CONVENTIONS,
+    LEAST_CONFIDENCE,
+    MIRROR,
+    SYLVIAN_AHEAD,
+    hemisphere_by_shape,
+)
+from gyriflow.surface.orientation import mid_plane
+from gyriflow.surface.outlines import reference
+from gyriflow.surface.registration import Target, registered
+
+Floats = NDArray[np.float64]
+
+# from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over weeks 21 to 34 of the example atlas
+TO_CEREBELLUM = np.array([0.0, -0.58, -0.81])
+TO_BRAINSTEM = np.array([0.0, -0.30, -0.95])
+# left and right of the labels weigh as much as the hindbrain does
+TO_RIGHT = np.array([1.0, 0.0, 0.0])
+# brains turned by less stand as their files say: this is how far atlases and scans differ
+LEAST_TURN_DEG = 60.0
+# two directions nearer to each other than this (in radians) say nothing of the turn about them
+LEAST_SPREAD = 0.06
+# the narrowest extent of a whole cerebrum is 0.61 of its longest and more, that of one hemisphere 0.46 and less
+NARROWEST_BRAIN, DOUBTFUL_BRAIN = 0.5, 0.56
+# a brain that is turned is turned by quarters, as wrong axis codes do, where these are as near as this
+QUARTERS_DEG = 15.0
+
+
+@dataclass(frozen=True, eq=False)
+class BrainPose:
+    """The rotation (3, 3) that makes a brain's axes RAS+, what told it, and what is to be said of it."""
+
+    rotation: Floats
+    by: str
+    warnings: tuple[str, ...] = ()
+
+
+def narrowness(mesh: TriangleMesh) -> float:
+    """Returns the shortest over the longest extent of a surface along the axes of inertia of its vertices."""
+    points = mesh.vertices - mesh.vertices.mean(axis=0)
+    _, axes = np.linalg.eigh(np.cov(points.T))
+    extents = np.ptp(points @ axes, axis=0)
+    return float(extents.min() / extents.max())
+
+
+def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> BrainPose | None:
+    """Returns the pose that cerebellum, brainstem and labelled sides tell; None where there are too few of them.
+
+    It is that of the file where the two differ by less than 60°. InputError where the labels of left and right are
+    mirrored: no rotation brings them to their sides.
+    """
+    centres = {
+        name: affine[:3, :3] @ np.argwhere(np.isin(labels, numbers)).mean(axis=0)
+        for name, numbers in (
+            ("cerebrum", scheme.cerebrum),
+            ("cerebellum", scheme.cerebellum),
+            ("brainstem", scheme.brainstem),
+            ("left", scheme.left),
+            ("right", scheme.right),
+        )
+        if np.isin(labels, numbers).any()
+    }
+    expected = {"cerebellum": TO_CEREBELLUM, "brainstem": TO_BRAINSTEM}
+    found = {name: centres[name] - centres["cerebrum"] for name in expected if name in centres}
+    rotation = _from_hindbrain(found, expected) if len(found) == 2 else None
+    sides = centres["right"] - centres["left"] if {"left", "right"} <= set(centres) else None
+    if sides is not None:
+        sides = sides / np.linalg.norm(sides)
+        if rotation is not None and (rotation @ sides)[0] < 0:
+            raise InputError(
+                "labels of the left hemisphere lie on the right",
+                found="the sides are the wrong way round where cerebellum and brainstem are below and behind",
+                expected="left at the smaller x (RAS+)",
+                remedy="The volume's affine mirrors the brain, or the scheme's sides are swapped.",
+            )
+        if found:
+            pairs = [(sides, TO_RIGHT), *((_unit(found[name]), expected[name]) for name in found)]
+            rotation = Rotation.align_vectors([ours for _, ours in pairs], [theirs for theirs, _ in pairs])[
+                0
+            ].as_matrix()
+    if rotation is None:
+        return None
+    by = " and ".join([*found, *(["the labelled sides"] if sides is not None else [])])
+    return _kept_or_turned(rotation, by)
+
+
+def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
+    """Returns the rotation (3, 3) to RAS+ that a whole brain's shape tells, and how sure that is.
+
+    The brain is cut in its plane of mirror symmetry and one side is posed as a hemisphere. The second value is how many
+    times worse the next best pose of it is, which tells up from down; the third how far the Sylvian fissures are in
+    front of the middle, in sizes, which tells front from back; the fourth how many times worse than the best pose
+    that of RAS+ coordinates is, infinite where it leads away from RAS+.
+    """
+    plane = mid_plane(mesh, search_deg=90.0)
+    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
+    cut = body.clip_closed_surface(normal=plane.normal, origin=plane.offset * plane.normal).triangulate().clean()
+    side = TriangleMesh(cut.points, cut.regular_faces)
+    one = hemisphere_by_shape(side)
+    mirrored = transformed(side, MIRROR)
+    is_right = float(side.vertices[:, 0].mean() - mesh.vertices[:, 0].mean()) > 0
+    as_given = one if is_right else hemisphere_by_shape(mirrored)
+    fit = registered(as_given.outline, Target(reference()), np.eye(3))
+    near = angle_deg(fit.rotation) < CONVENTION_DEG
+    ras = fit.residual / as_given.residual if near else float("inf")
+    rotation, sylvian = one.rotation, one.sylvian
+    if sylvian < 0:
+        # it is the left hemisphere: front and back change places
+        other = as_given if not is_right else hemisphere_by_shape(mirrored)
+        mirror = MIRROR[:3, :3]
+        rotation, sylvian = mirror @ other.rotation @ mirror, max(other.sylvian, -sylvian)
+        one = other
+    # its medial wall is the plane of symmetry
+    normal = plane.normal * np.sign((rotation @ plane.normal)[0])
+    turn, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [rotation @ normal])
+    return turn.as_matrix() @ rotation, one.confidence, sylvian, ras
+
+
+def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
+    """Returns the pose of a whole brain's surface, in coordinates that its user names or leaves to "auto".
+
+    What the user names is kept, and doubted in a warning where the shape clearly says otherwise. InputError where the
+    shape is to tell the pose and cannot.
+    """
+    rotation, confidence, sylvian, ras = pose_of_surface(mesh)
+    upright, ahead = confidence >= LEAST_CONFIDENCE, sylvian >= SYLVIAN_AHEAD
+    angles = {name: angle_deg(rotation @ axes.T) for name, axes in CONVENTIONS.items()}
+    nearest = min(angles, key=lambda name: angles[name])
+    if coordinates != "auto":
+        doubts: tuple[str, ...] = ()
+        if upright and ahead and angles[coordinates] > LEAST_TURN_DEG:
+            doubts = (f"the shape says that the brain is turned by {angles[coordinates]:.0f}° against the coordinates "
+                      f"{coordinates}: check them, or set coordinates: auto",)  # fmt: skip
+        return BrainPose(CONVENTIONS[coordinates], "configuration", doubts)
+    if angles[nearest] < CONVENTION_DEG:
+        if ahead:
+            said = () if nearest == "ras" else (f"the shape says that the coordinates are {nearest.upper()}",)
+            return BrainPose(CONVENTIONS[nearest], "shape", said)
+        return BrainPose(
+            np.eye(3),
+            "default",
+            ("the shape does not tell front from back: the coordinates were taken as RAS+; set coordinates",),
+        )
+    if not (upright and ahead) and ras < LEAST_CONFIDENCE:
+        doubt = "the shape fits other poses as well as RAS+, in which the coordinates were taken: check the pose"
+        return BrainPose(np.eye(3), "default", (doubt,))
+    if not (upright and ahead):
+        raise InputError(
+            "the pose of the brain cannot be told from its shape",
+            found=f"axes {angles[nearest]:.0f}° off {nearest.upper()}, the next best pose {confidence:.2f} times "
+            f"worse, the Sylvian fissures {sylvian:+.2f} of the size in front of the middle",
+            expected=f"RAS+ or LPS, or at least {LEAST_CONFIDENCE} times and {SYLVIAN_AHEAD:+.2f}",
+            remedy="Pose it and set coordinates: ras or lps.",
+        )
+    return BrainPose(rotation, "shape", (f"the brain was turned by {angles['ras']:.0f}°, as its shape says",))
+
+
+def _from_hindbrain(found: dict[str, Floats], expected: dict[str, Floats]) -> Floats | None:
+    """Returns the rotation that cerebellum and brainstem tell; None where they are in one direction."""
+    one, other = _unit(found["cerebellum"]), _unit(found["brainstem"])
+    # the brainstem is in front of the cerebellum, so that this points to the right
+    right = np.cross(one, other)
+    if np.linalg.norm(right) < LEAST_SPREAD:
+        return None
+    theirs, ours = (
+        np.stack([np.cross(a, b) / np.linalg.norm(np.cross(a, b)), _unit(a + b)])
+        for a, b in ((one, other), tuple(expected.values()))
+    )
+    return np.asarray(Rotation.align_vectors(ours, theirs)[0].as_matrix())
+
+
+def _quartered(rotation: Floats) -> Floats:
+    """Returns the rotation by quarter turns that is within 15° of a (3, 3) rotation, else the rotation."""
+    quarters = Rotation.create_group("O").as_matrix()
+    nearest = min(quarters, key=lambda turn: angle_deg(rotation @ turn.T))
+    return np.asarray(nearest.round() if angle_deg(rotation @ nearest.T) < QUARTERS_DEG else rotation)
+
+
+def _kept_or_turned(rotation: Floats, by: str) -> BrainPose:
+    rotation = _quartered(rotation)
+    angle = angle_deg(rotation)
+    if angle < LEAST_TURN_DEG:
+        return BrainPose(np.eye(3), "file")
+    return BrainPose(rotation, by, (f"the brain was turned by {angle:.0f}°, as {by} say: its affine has other axes",))
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / np.linalg.norm(vector))

@@ -1,0 +1,93 @@
+"""One hemisphere alone: posed by its file or its shape, of the side that it is said to be, or refused."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
+from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.surface.extraction import isosurface, made_simple, shifted_affine, smoothed_mask
+from gyriflow.surface.from_labels import from_labels, hemisphere_from_labels
+from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres
+from gyriflow.surface.white import thickness_from_white
+
+QUICK = {"week": 24.0, "edge_length_mm": 2.0}
+
+
+@pytest.fixture(scope="module")
+def brain():
+    return phantom_labels(24.0, voxel_mm=1.6)
+
+
+def surface_of(labels, affine):
+    mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
+    return isosurface(made_simple(smoothed_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+
+
+@pytest.fixture(scope="module")
+def sides(brain):
+    return {side: surface_of(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right")}
+
+
+def turned(*degrees):
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
+    return matrix
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize(("degrees", "by"), [((0, 0, 0), "file"), ((0, 0, 180), "file"), ((100, 40, -70), "shape")])
+def test_a_hemisphere_in_any_pose_is_posed(sides, side, degrees, by):
+    turn = turned(*degrees)
+    surface = from_hemisphere(transformed(sides[side], turn), side, **QUICK)
+    assert surface.report["pose_by"] == by
+    rest = np.array(surface.report["pose"])[:3, :3] @ turn[:3, :3]
+    assert np.degrees(Rotation.from_matrix(rest).magnitude()) < 5.0
+    there = getattr(surface, side)
+    assert there is surface.whole
+    assert getattr(surface, "left" if side == "right" else "right") is None
+    away = (there.vertices[:, 0] - surface.fissure_x_mm) * (1 if side == "right" else -1)
+    assert away.min() == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
+    with pytest.raises(InputError, match="seems to be the right one"):
+        from_hemisphere(sides["right"], "left", **QUICK)
+    with pytest.raises(InputError, match="this is no single hemisphere"):
+        from_hemisphere(surface_of(*brain), "left", **QUICK)
+
+
+def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
+    labels, affine = pathologies.sided(*brain), brain[1]
+    left = pathologies.one_hemisphere(labels, affine, "left")
+    surface = hemisphere_from_labels(left, affine, SCHEMES["dhcp-19"], "left", **QUICK)
+    assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5
+    assert surface.report["volume_mL"] == pytest.approx(surface.report["mask_volume_mL"], rel=0.01)
+    with pytest.raises(InputError, match="holds labels of another hemisphere than the right one"):
+        hemisphere_from_labels(left, affine, SCHEMES["dhcp-19"], "right", **QUICK)
+    with pytest.raises(
+        InputError, match=r"one hemisphere only; found labels of the left.*Give a volume with both hemispheres"
+    ):
+        from_labels(left, affine, SCHEMES["dhcp-19"], **QUICK)
+    unsided = pathologies.one_hemisphere(*brain, "left")
+    with pytest.raises(InputError, match=r"seems to hold one hemisphere only"):
+        from_labels(unsided, affine, SCHEMES["spina-bifida-atlas"], **QUICK)
+
+
+def inner(mesh, depth_mm):
+    return TriangleMesh(mesh.vertices - depth_mm * vertex_normals(mesh), mesh.faces)
+
+
+def test_white_surfaces_give_the_thickness_in_any_pose_and_may_not_cross(sides):
+    turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    moved = [transformed(sides[side], turn) for side in ("left", "right")]
+    surface = from_hemispheres(*moved, coordinates="lps", **QUICK)
+    whites = {side: inner(mesh, 1.5) for side, mesh in zip(("left", "right"), moved, strict=True)}
+    thickness = thickness_from_white(surface.whole, surface.report, whites)
+    assert thickness.report["mean_mm"] == pytest.approx(1.5, abs=0.15)
+    assert thickness.measured.mean() > 0.98
+    with pytest.raises(InputError, match=r"the white surface \(left\) crosses the pial one"):
+        thickness_from_white(surface.whole, surface.report, whites | {"left": inner(moved[0], -1.5)})

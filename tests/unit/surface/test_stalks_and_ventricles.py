@@ -1,0 +1,99 @@
+"""What hangs on a brain by a stalk is cut off; ventricles that its tissue does not enclose are no part of it."""
+
+import numpy as np
+import pytest
+
+from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
+from gyriflow.parameters.schemes import SCHEMES, LabelScheme
+from gyriflow.phantom.brain import phantom_labels
+from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
+from gyriflow.surface.extraction import isosurface, smoothed_mask
+from gyriflow.surface.stalks import surface_without_stalks, without_stalks
+from gyriflow.surface.ventricles import outside_ventricles
+
+AFFINE = np.diag([0.8, 0.8, 0.8, 1.0])
+
+
+def body(stalk_mm, ball_mm=4.0):
+    """Returns a ball of 15 mm radius from which a smaller one hangs by a stalk of a radius."""
+    x, y, z = (0.8 * np.indices((60, 60, 80)).astype(float)) - np.array([24, 24, 40])[:, None, None, None]
+    large = np.sqrt(x**2 + y**2 + z**2) < 15.0
+    stalk = (np.hypot(x, y) < stalk_mm) & (z < 0) & (z > -24.0)
+    small = np.sqrt(x**2 + y**2 + (z + 24.0) ** 2) < ball_mm
+    return large | stalk | small, large
+
+
+def test_a_ball_on_a_thin_stalk_is_cut_off_with_the_stalk():
+    mask, large = body(1.0)
+    left, stalks = without_stalks(mask, AFFINE)
+    assert (left ^ large).sum() < 30
+    (found,) = stalks
+    assert found["volume_mm3"] == pytest.approx((mask & ~large).sum() * 0.8**3, rel=0.1)
+    assert found["stalk_mm2"] == pytest.approx(np.pi, rel=0.6)
+    # the ball's, nearly: in the affine's mm
+    assert found["place_mm"] == pytest.approx([24.0, 24.0, 17.0], abs=1.5)
+
+
+@pytest.mark.parametrize("case", ["a thick stalk", "a blade"])
+def test_parts_that_are_joined_broadly_stay(case):
+    mask, _ = body(2.5)
+    if case == "a blade":
+        # a gyrus as thin as a stalk, but long, and thicker at its crown
+        mask, _ = body(0.0, 0.0)
+        mask[10:50, 29:32, 2:40] = True
+        mask[10:50, 27:34, 2:8] = True
+    left, stalks = without_stalks(mask, AFFINE)
+    assert stalks == []
+    assert (left == mask).all()
+
+
+def test_a_polyp_of_a_surface_is_cut_and_the_cut_closed():
+    mask, large = body(1.4)
+    mesh, stalks = surface_without_stalks(isosurface(smoothed_mask(mask, 0.7), AFFINE))
+    assert len(stalks) == 1
+    assert is_closed(mesh)
+    assert euler_number(mesh) == 2
+    assert signed_volume(mesh) == pytest.approx(signed_volume(isosurface(smoothed_mask(large, 0.7), AFFINE)), rel=0.01)
+
+
+def test_surfaces_without_stalks_are_the_same_objects():
+    mesh = isosurface(smoothed_mask(body(0.0, 0.0)[0], 0.7), AFFINE)
+    assert surface_without_stalks(mesh) == (mesh, [])
+
+
+@pytest.fixture(scope="module")
+def brain():
+    return phantom_labels(24.0, voxel_mm=1.2)
+
+
+def test_the_fourth_ventricle_is_outside_and_the_third_is_not(brain):
+    labels, affine = brain
+    made = with_fourth_ventricle(labels, affine)
+    x, y, z = positions(made, affine)
+    added = (made == VENTRICLES) & (labels != VENTRICLES)
+    below = z[np.isin(labels, CEREBRUM) & (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)].min()
+    out = outside_ventricles(made, SCHEMES["spina-bifida-atlas"])
+    assert out[added & (z < below - 2.0)].all()
+    assert not out[z > below + 5.0].any()
+
+
+def test_lateral_ventricles_are_enclosed(brain):
+    assert not outside_ventricles(brain[0], SCHEMES["spina-bifida-atlas"]).any()
+
+
+def test_a_ventricle_that_opens_to_the_outer_csf_stays_whole(brain):
+    labels, affine = brain
+    x, y, z = positions(labels, affine)
+    # a cleft as wide as the ventricle is long, through the whole mantle on the left
+    cleft = (x < -8.0) & (np.abs(y) < 9.0) & (np.abs(z - 2.0) < 7.0) & np.isin(labels, CEREBRUM)
+    split = np.where(cleft, VENTRICLES, labels)
+    assert not outside_ventricles(split, SCHEMES["spina-bifida-atlas"]).any()
+
+
+def test_without_labels_of_the_hindbrain_all_that_is_open_is_outside():
+    labels = np.zeros((40, 40, 40), dtype=int)
+    labels[5:35, 5:35, 20:36] = 1
+    labels[15:25, 15:25, 4:30] = 2
+    out = outside_ventricles(labels, LabelScheme(name="mine", cerebrum=(1, 2), ventricles=(2,)))
+    assert out[15:25, 15:25, 4:18].all()
+    assert not out[:, :, 24:].any()

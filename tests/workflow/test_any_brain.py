@@ -1,0 +1,274 @@
+"""Brains of clinics and labs in the real program: each ends right, or is refused with its true cause."""
+
+from types import SimpleNamespace
+
+import nibabel as nib
+import numpy as np
+import pytest
+import pyvista as pv
+from nibabel.freesurfer.io import write_geometry
+from scipy.spatial.transform import Rotation
+
+from gyriflow.geometry.triangles import TriangleMesh, merged, transformed, vertex_normals
+from gyriflow.io.files import read_json
+from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.surface.extraction import isosurface, made_simple, shifted_affine, smoothed_mask
+from gyriflow.surface.repair import pieces
+
+from .conftest import Workflow
+
+pytestmark = pytest.mark.slow
+
+LABELS, AFFINE = phantom_labels(24.0, voxel_mm=2.0)
+APART = pathologies.apart(LABELS, AFFINE)
+
+
+def motion(*degrees, shift=(0.0, 0.0, 0.0)):
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix().round(12)
+    matrix[:3, 3] = shift
+    return matrix
+
+
+def surface_of(labels):
+    mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
+    return isosurface(made_simple(smoothed_mask(mask, 1.0))[0], shifted_affine(AFFINE, np.full(3, -4)))
+
+
+LEFT, RIGHT = sorted(pieces(surface_of(APART)), key=lambda piece: piece.vertices[:, 0].mean())
+
+
+def inner(mesh, depth_mm):
+    return TriangleMesh(mesh.vertices - depth_mm * vertex_normals(mesh), mesh.faces)
+
+
+def with_polyp(mesh):
+    """Returns the surface with a ball of 4 mm radius on a stalk of 1 mm radius and 8 mm length below it."""
+    grid = np.indices((40, 40, 60)).reshape(3, -1).T * 0.4 - [8.0, 8.0, 18.0]
+    ball = np.linalg.norm(grid - [0, 0, -12.0], axis=1) < 4.0
+    stalk = (np.hypot(grid[:, 0], grid[:, 1]) < 1.1) & (grid[:, 2] > -12.0) & (grid[:, 2] < 4.0)
+    affine = np.diag([0.4, 0.4, 0.4, 1.0])
+    lowest = mesh.vertices[mesh.vertices[:, 2].argmin()]
+    affine[:3, 3] = lowest - [8.0, 8.0, 18.0]
+    polyp = isosurface(smoothed_mask((ball | stalk).reshape(40, 40, 60), 1.0), affine)
+    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
+    part = pv.PolyData.from_regular_faces(np.array(polyp.vertices), np.array(polyp.faces, dtype=int))
+    both = body.boolean_union(part).triangulate().clean()
+    return TriangleMesh(both.points, both.regular_faces)
+
+
+def labelled(change=lambda labels, affine: labels, scheme="spina-bifida-atlas", turn=None):
+    def made(folder, name):
+        labels = change(LABELS, AFFINE)
+        labels, affine = labels if isinstance(labels, tuple) else (labels, AFFINE)
+        image = nib.Nifti1Image(labels.astype(np.int16), (np.eye(4) if turn is None else turn) @ affine)
+        image.header.set_xyzt_units("mm")
+        nib.save(image, folder / f"{name}.nii.gz")
+        return {"labels": f"{name}.nii.gz", "scheme": scheme}
+
+    return made
+
+
+def whole(mesh, suffix="surf.gii", **more):
+    def made(folder, name):
+        if suffix == "vtk":
+            body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
+            body.save(folder / f"{name}.vtk")
+        else:
+            write_surface(folder / f"{name}.{suffix}", mesh)
+        return {"pial": f"{name}.{suffix}"} | more
+
+    return made
+
+
+def both_sides(left, right, *, white_mm=None, **more):
+    """Writes hemispheres as FreeSurfer does, and white surfaces inside the pial ones."""
+
+    def made(folder, name):
+        entry = {}
+        for side, mesh in (("left", left), ("right", right)):
+            write_geometry(folder / f"{name}.{side}.pial", mesh.vertices, mesh.faces)
+            entry[side] = f"{name}.{side}.pial"
+            if white_mm is not None:
+                write_surface(folder / f"{name}.{side}.white.stl", inner(mesh, white_mm))
+                entry.setdefault("white", {})[side] = f"{name}.{side}.white.stl"
+        return {"hemispheres": entry, "coordinates": "ras"} | more
+
+    return made
+
+
+def unit_of_no_meaning(folder, name):
+    entry = labelled()(folder, name)
+    image = nib.load(folder / entry["labels"])
+    image.header["xyzt_units"] = 5
+    nib.save(image, folder / entry["labels"])
+    return entry
+
+
+LARGER = transformed(RIGHT, np.diag([1.09, 1.09, 1.09, 1.0]))
+GOOD = {
+    "plain": labelled(),
+    "polyp": labelled(pathologies.with_fourth_ventricle),
+    "agenesis": labelled(pathologies.without_callosum),
+    "holoprosencephaly": labelled(pathologies.holoprosencephaly),
+    "wide": labelled(lambda labels, affine: pathologies.wide_hemisphere(labels, affine, ventricle=True)),
+    "hypoplasia": labelled(
+        lambda labels, affine: pathologies.sided(pathologies.small_hemisphere(labels, affine), affine), "dhcp-19"
+    ),
+    "shifted": labelled(pathologies.shifted_midline),
+    "cropped": labelled(pathologies.cropped),
+    "upside_down": labelled(turn=motion(180, 0, 0)),
+    "backwards": labelled(pathologies.sided, "dhcp-19", motion(0, 0, 180)),
+    "pial_backwards": whole(transformed(merged(LEFT, RIGHT), motion(0, 0, 180))),
+    "pial_vtk": whole(with_polyp(surface_of(LABELS)), "vtk"),
+    "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
+    "unequal": both_sides(LEFT, LARGER),
+}
+BAD = {
+    "half": (labelled(pathologies.one_hemisphere), "the volume seems to hold one hemisphere only"),
+    "small_half": (labelled(pathologies.small_hemisphere), "the volume seems to hold one hemisphere only"),
+    "pial_half": (whole(LEFT), "the surface seems to be one hemisphere only"),
+    "mirrored": (
+        labelled(pathologies.sided, "dhcp-19", np.diag([-1.0, 1, 1, 1])),
+        "labels of the left hemisphere lie on the right",
+    ),
+    "unit": (unit_of_no_meaning, "has a unit of length that NIfTI does not know; found xyzt_units 5"),
+    "scheme": (
+        labelled(lambda labels, affine: np.where(labels == 8, 1, labels), "feta-7"),
+        "does not lie around what it calls the cerebrum",
+    ),
+}
+CROSSING = both_sides(LEFT, RIGHT, white_mm=-1.5)
+
+
+@pytest.fixture(scope="module")
+def study(checkout_copy, tmp_path_factory):
+    """One run of the surface stage over all of them."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("any"))
+    makers = GOOD | {name: make for name, (make, _) in BAD.items()} | {"crossing": CROSSING}
+    brains = [{"id": name, "week": 24} | make(workflow.directory, name) for name, make in makers.items()]
+    surface = {"edge_length_mm": 2.5, "max_hemisphere_ratio": 1.4, "max_asymmetry": 0.05}
+    config = {"brains": brains, "start": "plain", "surface": surface, "folding": {"end_week": 25}}
+    name = workflow.write("study.yaml", config)
+    targets = [f"results/brains/{brain['id']}/surface/pial.surf.gii" for brain in brains]
+    targets += [f"results/brains/{name}/surface/thickness.shape.gii" for name in ("freesurfer", "crossing")]
+    # in parts: one call has five minutes
+    calls = [
+        workflow.run(*targets[first::3], "--cores", "2", "--keep-going", "--configfile", name) for first in range(3)
+    ]
+    said = "".join(call.stderr for call in calls)
+    codes = [call.returncode for call in calls]
+    return SimpleNamespace(codes=codes, stderr=said, results=workflow.directory / "results" / "brains")
+
+
+def report(study, name):
+    return read_json(study.results / name / "surface" / "surface.json")
+
+
+def log_of(study, name):
+    """Returns what the step that made a brain's surface, or refused to, has said."""
+    (log,) = (study.results / name / "logs").glob("pial_from_*.log")
+    return log.read_text()
+
+
+def warned(study, name, text):
+    return any(text in warning for warning in report(study, name)["warnings"]) and text in log_of(study, name)
+
+
+def test_the_run_ends_in_2_without_a_traceback(study):
+    assert study.codes == [2, 2, 2]
+    assert "Traceback" not in study.stderr
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_cannot_be_used_is_refused_with_its_cause_and_nothing_is_left(study, name):
+    assert BAD[name][1] in log_of(study, name)
+    assert BAD[name][1] in study.stderr
+    assert not [path for path in (study.results / name / "surface").rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_each_hemisphere_is_one_piece_on_its_side(study, name):
+    folder = study.results / name / "surface"
+    left, right = (read_surface(folder / f"{side}.pial.surf.gii") for side in ("left", "right"))
+    assert len(pieces(left)) == len(pieces(right)) == 1
+    assert left.vertices[:, 0].mean() < report(study, name)["fissure_x_mm"] < right.vertices[:, 0].mean()
+
+
+def test_a_fourth_ventricle_below_the_brain_is_left_out_and_told(study):
+    polyp, plain = report(study, "polyp"), report(study, "plain")
+    assert polyp["outside"]["ventricles_mL"] > 0.4
+    assert polyp["volume_mL"] == pytest.approx(plain["volume_mL"], rel=0.005)
+    assert polyp["extents_mm"][2] == pytest.approx(plain["extents_mm"][2], abs=1.0)
+    assert warned(study, "polyp", "lie outside it or hang on a thin stalk: left out")
+
+
+def test_tissues_and_ventricles_are_told_apart(study):
+    volumes = report(study, "plain")["label_volumes_mL"]
+    assert volumes["cerebrum"] == pytest.approx(volumes["tissue"] + volumes["ventricles"])
+    assert volumes["tissue"] == pytest.approx(volumes["cortex"] + volumes["inside_cortex"])
+    voxel_ml = 2.0**3 / 1e3
+    assert volumes["ventricles"] == pytest.approx((LABELS == 2).sum() * voxel_ml)
+
+
+def test_a_polyp_of_a_surface_is_cut_and_told(study):
+    assert len(report(study, "pial_vtk")["stalks"]) == 1
+    assert warned(study, "pial_vtk", "hung on a stalk")
+
+
+def test_missing_tissues_are_named_and_not_required(study):
+    assert report(study, "agenesis")["missing_tissues"] == ["8 corpus callosum"]
+    assert report(study, "agenesis")["pieces"] == 1
+
+
+def test_a_field_of_view_that_cuts_the_brain_is_warned_of(study):
+    assert warned(study, "cropped", "the cerebrum touches the border of the volume")
+    assert not any("border" in warning for warning in report(study, "plain")["warnings"])
+
+
+@pytest.mark.parametrize("name", ["upside_down", "backwards"])
+def test_turned_volumes_are_turned_back(study, name):
+    surface, plain = (read_surface(study.results / n / "surface" / "pial.surf.gii") for n in (name, "plain"))
+    turned, middle = np.array(report(study, name)["pose"])[:3, :3], plain.vertices.mean(axis=0)
+    expected = motion(180, 0, 0) if name == "upside_down" else motion(0, 0, 180)
+    assert np.degrees(Rotation.from_matrix(turned @ expected[:3, :3]).magnitude()) < 2.0
+    for end in (np.min, np.max):
+        there = end(surface.vertices - surface.vertices.mean(axis=0), axis=0)
+        np.testing.assert_allclose(there, end(plain.vertices - middle, axis=0), atol=1.5)
+    assert warned(study, name, "the brain was turned by 180°")
+
+
+def test_a_pial_surface_in_lps_is_recognised(study):
+    assert warned(study, "pial_backwards", "the shape says that the coordinates are LPS")
+    assert report(study, "pial_backwards")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0], abs=0.5)
+
+
+def test_thickness_is_the_distance_to_white_surfaces(study):
+    found = read_json(study.results / "freesurfer" / "surface" / "thickness.json")
+    assert found["mean_mm"] == pytest.approx(1.5, abs=0.15)
+    (values,) = read_vertex_maps(study.results / "freesurfer" / "surface" / "thickness.shape.gii").values()
+    assert len(values) == report(study, "freesurfer")["vertices"]
+
+
+def test_white_surfaces_outside_the_pial_ones_are_refused(study):
+    folder = study.results / "crossing"
+    assert "crosses the pial one" in (folder / "logs" / "thickness_from_white.log").read_text()
+    assert "crosses the pial one" in study.stderr
+    assert not list((folder / "surface").glob("*thickness*"))
+
+
+def test_unequal_hemispheres_within_the_limits_asked_for_are_doubted(study):
+    assert warned(study, "unequal", "the hemispheres' volumes differ by")
+
+
+def test_a_small_hemisphere_that_labels_name_is_kept(study):
+    area = report(study, "hypoplasia")["area_cm2"]
+    assert 0.1 < area["right"] / area["left"] < 0.4
+
+
+def test_a_shifted_midline_is_followed(study):
+    area = report(study, "shifted")["area_cm2"]
+    assert area["left"] > 1.2 * area["right"]
+    assert report(study, "shifted")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0] + 8.0, abs=2.5)
