@@ -76,9 +76,13 @@ def _complete_runs(runs: Any, folding: Any) -> Any:
 
 
 def _with_preset(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
-    """Returns the settings of a run: those of its preset, those of `base` over them, its own over both."""
-    preset = override.get("preset", base.get("preset"))
-    return _merge(_merge(PRESETS.get(str(preset), {}), base), override)
+    """Returns the settings of a run: those of `base`, its preset over them, its own over both.
+
+    A preset of `base` lies under the other settings of `base`.
+    """
+    if "preset" in override:
+        return _merge(_merge(base, PRESETS.get(str(override["preset"]), {})), override)
+    return _merge(_merge(PRESETS.get(str(base.get("preset")), {}), base), override)
 
 
 def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:

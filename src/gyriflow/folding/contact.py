@@ -255,7 +255,7 @@ class SelfContact:
         out.array.reshape(-1, 3)[self._owned_nodes] += self.forces()[self._owned_rows]
 
     def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
-        """Returns the second derivative in N/m, None without any pair; `convex` leaves out what is negative of each."""
+        """Returns the second derivative in N/m, None without any pair; `convex` leaves out the negative part of each."""
         positions, pairs = self._state()
         if not len(pairs):
             return None
@@ -298,9 +298,9 @@ class SelfContact:
     def smallest_distance_mm(self) -> float:
         """Returns the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""
         positions, pairs = self._state()
-        if not len(pairs):
-            return np.inf
-        return float(np.sqrt(pairs.compute_minimum_distance(self._surface, positions)))
+        nearest = float(np.sqrt(pairs.compute_minimum_distance(self._surface, positions))) if len(pairs) else np.inf
+        # the stiffness of the next step is decided by it, on every rank alike
+        return self.domain.comm.bcast(nearest, root=0)
 
     def pair_count(self) -> int:
         """Returns the number of pairs within the distance."""

@@ -199,6 +199,8 @@ class _System:
         multigrid = krylov.getPC()
         multigrid.setReusePreconditioner(reuse)
         if not reuse and self.problem.hierarchy is not None and multigrid.getType() == "mg":
+            # a copy, as with contact, has none of its own
+            matrix.setNearNullSpace(self.problem.near_null_space())
             self.problem.hierarchy.renew(multigrid, matrix)
         try:
             if fast:

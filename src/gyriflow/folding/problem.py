@@ -76,7 +76,7 @@ class Problem:
     contributions : list of Contribution
         Further parts of the energy.
     free : bool
-        Whether nothing holds the body.
+        Whether the body is unconstrained.
     hierarchy : OrderHierarchy or None
         The linear level below quadratic elements for multigrid, None for linear ones.
     points : IntegrationPoints
@@ -167,7 +167,7 @@ class Problem:
     def mesh_moved(self, part: NDArray[np.int64]) -> None:
         """Takes note of a mesh that has been placed anew.
 
-        Where nothing holds the body, the rigid motions are taken out of each of the parts that the (n,) numbers of
+        Where the body is unconstrained, its rigid motions are taken out of each of the parts that the (n,) numbers of
         all vertices name.
         """
         if self._free_operator is not None:
@@ -175,7 +175,7 @@ class Problem:
             self._free_operator.set_motions(self._motions)
 
     def admissible(self, values: Floats) -> Floats:
-        """Returns (k, 3) displacements of the local nodes in m less the rigid motions of a body that nothing holds."""
+        """Returns (k, 3) displacements of the local nodes in m without the rigid motions of an unconstrained body."""
         if self._motions is None:
             return values
         self.displacement[:] = values
@@ -272,7 +272,7 @@ class Problem:
         return self._blocks.assembled(), self._blocks.for_products()
 
     def convexify(self, tangent: Tangent) -> None:
-        """Takes from the present tangent what is negative of the contributions' terms."""
+        """Makes the contributions' terms in the present tangent positive semidefinite."""
         tangent.set_parts(self._further_parts(convex=True))
 
     def _further_parts(self, *, convex: bool) -> list[PETSc.Mat]:

@@ -52,8 +52,9 @@ def stiffness_warning(poisson_ratio: float) -> str:
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:
     """Returns what to say where the cortex has just come to be resolved too coarsely; empty where it has not."""
-    now = rows[-1]["elements_through_cortex"]
-    before = rows[-2]["elements_through_cortex"] if len(rows) > 1 else math.inf
+    # not a number where no element has its centre in the cortex: none lies through it
+    found = [0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]]
+    now, before = found[-1], found[0] if len(found) > 1 else math.inf
     if not now < NEEDED[order] <= before:
         return ""
     return (

@@ -1,4 +1,4 @@
-"""Rigid motions of the parts of a mesh: what multigrid should know, and what a body that nothing holds must not do."""
+"""Rigid motions of the parts of a mesh: for multigrid's coarse spaces, and removed from unconstrained bodies."""
 
 import numpy as np
 from mpi4py import MPI

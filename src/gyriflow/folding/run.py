@@ -48,7 +48,7 @@ def run(
         state = State.at_start(start, parameters.step_s)
         contact, elements = folding.contact_fields(parameters.fields), folding.element_fields(parameters.fields)
         if comm.rank == 0:
-            save_frame(folder, weeks[0], start, start, zones, parameters, maps, contact, elements)
+            save_frame(folder, weeks[0], start, start, zones, folding.present, maps, contact, elements)
     first, resumed = len(state.rows), time.monotonic()
     for week in weeks[1:]:
         until = seconds_to(week, parameters)

@@ -103,7 +103,9 @@ class Folding:
         self._start = self.domain.positions
         self._through = math.nan  # elements through the cortex in the last step
         self._start_size = size_of(mesh.vertices, zones)
-        self.present = parameters  # those of the last step, with its rates of growth
+        # those of the last step, with its rates of growth
+        growth = following_step(parameters, self._start_size, self._start_size, 0.0, parameters.step_s, {}, self.maps)
+        self.present = growth.parameters
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         self._through, self._part = math.nan, self.domain.part  # of its layers
@@ -343,7 +345,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
     whole = min(p.step_s, left) if state.step_s >= p.step_s else p.step_s
     smallest = whole / 2**p.solver.max_halvings
     while True:
-        # a remainder of a rounding error's length is no step of its own
+        # do not take a separate step for a remainder that is only round-off
         step_s = left if left < state.step_s * (1 + 1e-6) else state.step_s
         try:
             after = folding.step(state, step_s)

@@ -56,7 +56,7 @@ class Tangent:
         As given.
     smoothing : PETSc.Mat
         A matrix whose block diagonal bounds the tangent as Jacobi's smoother needs it: a positive semidefinite term
-        that couples k nodes is at most k times its own block diagonal. What is negative of the parts is left out.
+        that couples k nodes is at most k times its own block diagonal. The negative part of each is left out.
     """
 
     def __init__(

@@ -136,9 +136,9 @@ class FoldingSettings(Settings):
 
     preset: Literal["fetalfoldsim", "measured"] | None = setting(
         None, "",
-        "Parameters to start from; other keys come on top. `fetalfoldsim`: those of the paper; `measured`: growth that "
-        "follows the brains' areas and volumes, regional as registration measures it. All values stand in "
-        "`params.yaml`.",
+        "Parameters to start from; other keys come on top, for a preset of a run the run's own. `fetalfoldsim`: those "
+        "of the paper, whose linear elements are `mesh: {order: 1}`; `measured`: growth that follows the brains' areas "
+        "and volumes, regional as registration measures it. All values stand in `params.yaml`.",
     )  # fmt: skip
     end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
     step_s: float = setting(
@@ -339,3 +339,6 @@ def _scheme_problems(p: FoldingSettings, start_week: float, maps: Maps, start: s
         yield Problem(f"found {p.time_scheme}; with stress_memory_gw above 0 it should be implicit", ("time_scheme",))
     if p.contact.kind == "planes":
         yield Problem(f"found {p.time_scheme}; with contact.kind planes it should be implicit", ("time_scheme",))
+    if p.follow is not None and p.time_scheme == "adams-bashforth":
+        # the rate of the step before, which this scheme counts too, would swing against the one that is set
+        yield Problem(f"found {p.time_scheme}; with follow it should be implicit or midpoint", ("time_scheme",))

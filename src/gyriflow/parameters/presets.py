@@ -3,10 +3,14 @@
 from typing import Any
 
 PRESETS: dict[str, dict[str, Any]] = {
-    # the paper, whatever the defaults become
+    # the paper's model, whatever the defaults become; its linear elements are `order: 1` of the mesh
     "fetalfoldsim": {
         "step_s": 43_200.0,
+        "time_scheme": "implicit",
+        "follow": None,
+        "allow_negative_growth": False,
         "thickness_mm": 1.5,
+        "thickness_growth_mm_per_gw": 0.0,
         "shear_modulus_cortex_pa": 1500.0,
         "shear_modulus_core_pa": 300.0,
         "material": "neo-hookean",
