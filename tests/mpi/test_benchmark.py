@@ -28,7 +28,7 @@ def test_both_set_ups_do_the_same_steps(tmp_path):
     mesh = ellipsoid_mesh(6, (20.0, 26.0, 18.0))
     write_tetrahedral_mesh(tmp_path / "brain.xdmf", mesh)
     # a thick cortex, for which the two degrees of quadrature matter little on so coarse a mesh
-    (tmp_path / "params.yaml").write_text("thickness_mm: 12.0\n")
+    (tmp_path / "params.yaml").write_text("thickness_mm: 10.0\n")
     done = run(tmp_path / "brain.xdmf", "--steps", 2, "--paper-steps", 1, "--params", tmp_path / "params.yaml")
     assert done.returncode == 0, done.stdout + done.stderr
     result = json.loads(done.stdout.splitlines()[-1])

@@ -165,7 +165,7 @@ def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, 
 
 def test_memory_and_a_shortened_step_are_said_before_the_solve(default_run):
     before, _, _ = default_run[1].partition("step    1")
-    assert "3072 elements, 2187 unknowns, 2 ranks, about 369 MiB" in before
+    assert "3072 elements, 2187 unknowns, 2 ranks, about 516 MiB" in before
     assert "step_s 43200 does not divide the time from GW 21 to 21.25: the last step there is shortened" in before
 
 
@@ -238,7 +238,7 @@ def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
 
 
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_goes_on(mesh, tmp_path):
-    done = fold(mesh, tmp_path / "out", step_s=302400.0, growth_rate_per_s=3e-6, solver={"max_newton": 4})
+    done = fold(mesh, tmp_path / "out", step_s=302400.0, growth_rate_per_s=3e-6, solver={"max_newton": 1})
     assert done.returncode == 0, done.stdout + done.stderr
     assert "trying" in done.stdout
     steps = pd.read_csv(tmp_path / "out" / "steps.csv")
@@ -247,10 +247,10 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_goes_on(mesh, tmp_pat
 
 
 def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
-    hard = {"growth_rate_per_s": 2e-5, "solver": {"max_halvings": 0, "max_newton": 3}}
+    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_halvings": 0, "max_newton": 1}}
     done = fold(mesh, tmp_path / "out", 2, **hard)
     assert done.returncode == 4, done.stdout + done.stderr
-    assert "fails even with 43200 s" in done.stderr
+    assert "fails even with 86400 s" in done.stderr
     assert re.search(r"smallest det F \S+ in element \d+ at \[.*\] mm, largest residual .* at vertex \d+", done.stderr)
     assert not (tmp_path / "out" / "frames.h5").exists()
 

@@ -255,7 +255,7 @@ class SelfContact:
         out.array.reshape(-1, 3)[self._owned_nodes] += self.forces()[self._owned_rows]
 
     def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
-        """Returns the second derivative in N/m, None without any pair; `convex` leaves out the negative part of each."""
+        """Returns the second derivative in N/m, None without any pair; `convex` drops the negative part of each."""
         positions, pairs = self._state()
         if not len(pairs):
             return None
