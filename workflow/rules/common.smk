@@ -96,14 +96,46 @@ def of_weeks(pattern):
     ]
 
 
+def measured_of(run, brain):
+    """Returns, by output week of a run from a brain, the ids of the measured brains that it is compared with.
+
+    They are of the start brain's population, and phantoms or simple shapes where the start brain is one.
+    """
+    own = CONFIG.brain(brain)
+    alike = [
+        other
+        for other in CONFIG.brains
+        if other.population == own.population and other.synthetic == own.synthetic
+    ]
+    measured = {
+        tag: [other.id for other in alike if week_tag(other.week) == tag]
+        for tag in week_tags(run, brain)
+    }
+    return {tag: brains for tag, brains in measured.items() if brains}
+
+
+def measured_beside(run, brain):
+    """Returns, by output week, the one measured brain that a run's surface is shown beside: the start brain at its own."""
+    first = week_tags(run, brain)[0]
+    return {
+        week: brain if week == first else brains[0]
+        for week, brains in measured_of(run, brain).items()
+    }
+
+
+def after_start(run, brain, measured):
+    """Returns what belongs to output weeks after that of the start brain."""
+    first = week_tags(run, brain)[0]
+    return {week: value for week, value in measured.items() if week != first}
+
+
 def comparisons():
-    """Returns (run, brain, week, measured brain) for every output week after the start with a measured brain."""
+    """Returns (run, brain, week, measured brain) for every output week after the start with measured brains."""
     return [
-        (run, brain, week_tag(week), measured.id)
+        (run, brain, week, measured)
         for run, brain in FOLDED
-        for week in CONFIG.weeks(run, brain)[1:]
-        for measured in CONFIG.brains
-        if abs(measured.week - week) < 1e-6
+        for week, brains in after_start(run, brain, measured_of(run, brain)).items()
+        for measured in brains
     ]
 
 
