@@ -80,6 +80,19 @@ def test_the_example_of_labels_and_hemispheres_is_planned_once_these_are_made(wo
     assert jobs["atlas_file"] == jobs["overlay_figure"] == 5
 
 
+def test_runs_are_compared_with_the_population_of_their_start_only(workflow):
+    # both populations have a brain of 25 weeks; that of the other one stands first
+    atlas = {"name": "spina-bifida", "series": ["operated", "unoperated"]}
+    study = {"atlas": atlas, "start": "spina-bifida-unoperated-24", "folding": {"end_week": 25}}
+    named = ("--configfile", workflow.write("two.yaml", study))
+    assert workflow.jobs("results/study/similarity.csv", *named)["similarity"] == 1
+    run = "results/runs/reference/spina-bifida-unoperated-24"
+    for target in ("results/study/similarity.csv", f"{run}/figures/weekly.png", f"{run}/metrics/validation.csv"):
+        shown = workflow.run("-n", target, *named).stdout
+        assert "brains/spina-bifida-unoperated-25/surface/pial.surf.gii" in shown
+        assert "brains/spina-bifida-operated-25/surface/pial.surf.gii" not in shown
+
+
 def test_one_brain_alone_is_folded_without_growth_rates(workflow):
     alone = SMALL_STUDY | {"brains": SMALL_STUDY["brains"][:1]}
     jobs = workflow.jobs("--configfile", workflow.write("alone.yaml", alone))

@@ -96,37 +96,19 @@ def of_weeks(pattern):
     ]
 
 
-def measured_of(run, brain):
-    """Returns, by output week of a run from a brain, the ids of the measured brains that it is compared with.
+def comparable(brain):
+    """Returns the brains that a start brain may be compared with: those of its population where it has one, else all."""
+    population = CONFIG.brain(brain).population
+    return [other for other in CONFIG.brains if population in (None, other.population)]
 
-    They are of the start brain's population, and phantoms or simple shapes where the start brain is one.
-    """
-    own = CONFIG.brain(brain)
-    alike = [
-        other
-        for other in CONFIG.brains
-        if other.population == own.population and other.synthetic == own.synthetic
-    ]
-    measured = {
-        tag: [other.id for other in alike if week_tag(other.week) == tag]
-        for tag in week_tags(run, brain)
+
+def measured_after_start(run, brain):
+    """Returns, by output week after the start, the ids of the measured brains that a run is compared with."""
+    found = {
+        week: [other.id for other in comparable(brain) if week_tag(other.week) == week]
+        for week in week_tags(run, brain)[1:]
     }
-    return {tag: brains for tag, brains in measured.items() if brains}
-
-
-def measured_beside(run, brain):
-    """Returns, by output week, the one measured brain that a run's surface is shown beside: the start brain at its own."""
-    first = week_tags(run, brain)[0]
-    return {
-        week: brain if week == first else brains[0]
-        for week, brains in measured_of(run, brain).items()
-    }
-
-
-def after_start(run, brain, measured):
-    """Returns what belongs to output weeks after that of the start brain."""
-    first = week_tags(run, brain)[0]
-    return {week: value for week, value in measured.items() if week != first}
+    return {week: brains for week, brains in found.items() if brains}
 
 
 def comparisons():
@@ -134,7 +116,7 @@ def comparisons():
     return [
         (run, brain, week, measured)
         for run, brain in FOLDED
-        for week, brains in after_start(run, brain, measured_of(run, brain)).items()
+        for week, brains in measured_after_start(run, brain).items()
         for measured in brains
     ]
 
