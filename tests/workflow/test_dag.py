@@ -1,6 +1,7 @@
 """Which jobs the workflow plans, for whole studies and after one parameter changed."""
 
 import copy
+import re
 
 import pytest
 import yaml
@@ -85,12 +86,11 @@ def test_runs_are_compared_with_the_population_of_their_start_only(workflow):
     atlas = {"name": "spina-bifida", "series": ["operated", "unoperated"]}
     study = {"atlas": atlas, "start": "spina-bifida-unoperated-24", "folding": {"end_week": 25}}
     named = ("--configfile", workflow.write("two.yaml", study))
-    assert workflow.jobs("results/study/similarity.csv", *named)["similarity"] == 1
-    run = "results/runs/reference/spina-bifida-unoperated-24"
-    for target in ("results/study/similarity.csv", f"{run}/figures/weekly.png", f"{run}/metrics/validation.csv"):
-        shown = workflow.run("-n", target, *named).stdout
-        assert "brains/spina-bifida-unoperated-25/surface/pial.surf.gii" in shown
-        assert "brains/spina-bifida-operated-25/surface/pial.surf.gii" not in shown
+    shown = workflow.run("-n", "metrics", "figures", *named).stdout
+    for output in ("similarity.spina-bifida-", "figures/weekly.png", "metrics/validation.csv"):
+        (files,) = re.findall(rf"input: (.*)\n +output: \S*{output}", shown)
+        assert "brains/spina-bifida-unoperated-25/surface/pial.surf.gii" in files
+        assert "brains/spina-bifida-operated-25/surface/pial.surf.gii" not in files
 
 
 def test_one_brain_alone_is_folded_without_growth_rates(workflow):

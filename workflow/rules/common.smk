@@ -3,6 +3,7 @@ import re
 
 from gyriflow.errors import GyriflowError
 from gyriflow.launch import hold_lock
+from gyriflow.parameters.terms import SIDES
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
 
@@ -47,7 +48,6 @@ if workflow.is_main_process and not workflow.dryrun:
 BRAIN = "results/brains/{brain}"
 RUN = "results/runs/{run}/{brain}"
 STUDY = "results/study"
-SIDES = ("left", "right")
 # the surfaces of a brain, measured or simulated, by what their names begin with
 SURFACES = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
 
@@ -148,4 +148,4 @@ wildcard_constraints:
     brain=one_of(BRAINS),
     run=one_of(CONFIG.runs),
     week=r"\d+\.\d+",
-    side="left|right",
+    side="|".join(SIDES),
