@@ -44,6 +44,7 @@ localrules:
     mesh,
     growth,
     folding,
+    validate,
     metrics,
     figures,
     report,

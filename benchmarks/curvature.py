@@ -19,7 +19,8 @@ from curved_surfaces import Ellipsoid, Folded, Torus, meshed, noisy
 from gyriflow.geometry.remeshing import remeshed
 from gyriflow.geometry.triangles import Floats, TriangleMesh, mean_edge_length, vertex_areas
 from gyriflow.io.surfaces import read_surface
-from gyriflow.metrics.curvature import RADIUS_MM, Curvature, curvature
+from gyriflow.metrics.curvature import Curvature, curvature
+from gyriflow.parameters.metrics import CURVATURE_RADIUS_MM
 
 SURFACES = {
     "sphere": Ellipsoid((20.0, 20.0, 20.0)),
@@ -80,7 +81,7 @@ def main() -> None:
     print(
         json.dumps(
             {
-                "radius_mm": RADIUS_MM,
+                "radius_mm": CURVATURE_RADIUS_MM,
                 "noise_mm": NOISE_MM,
                 "edges_mm": EDGES_MM,
                 "clean_error_percent": errors["clean"],

@@ -11,7 +11,8 @@ import pyvista as pv
 from gyriflow.geometry.meshlab import pymeshlab
 from gyriflow.geometry.remeshing import in_meshlab
 from gyriflow.geometry.triangles import Floats, TriangleMesh, mean_edge_length
-from gyriflow.metrics.curvature import RADIUS_MM, curvature
+from gyriflow.metrics.curvature import curvature
+from gyriflow.parameters.metrics import CURVATURE_RADIUS_MM
 
 HARD_BALL_MM = 2.5
 """Radius of a ball with constant weights whose error on clean surfaces is that of gyriflow's default."""
@@ -81,7 +82,7 @@ def vtk_discrete(mesh: TriangleMesh) -> Pair:
 
 
 ESTIMATORS: dict[str, Estimator] = {
-    f"**gyriflow, {RADIUS_MM:g} mm**": gyriflow,
+    f"**gyriflow, {CURVATURE_RADIUS_MM:g} mm**": gyriflow,
     "libigl, 3 rings": lambda mesh: libigl(mesh, 3, True),
     f"libigl, rings nearest to {HARD_BALL_MM:g} mm": lambda mesh: libigl(mesh, as_many_edges(mesh), True),
     f"libigl, ball nearest to {HARD_BALL_MM:g} mm": lambda mesh: libigl(mesh, as_many_edges(mesh), False),

@@ -1,6 +1,7 @@
 """Which jobs the workflow plans, for whole studies and after one parameter changed."""
 
 import copy
+import re
 
 import pytest
 import yaml
@@ -78,6 +79,18 @@ def test_the_example_of_labels_and_hemispheres_is_planned_once_these_are_made(wo
     assert jobs["growth_figure"] == 1
     # the T2-weighted volumes of the overlays
     assert jobs["atlas_file"] == jobs["overlay_figure"] == 5
+
+
+def test_runs_are_compared_with_the_population_of_their_start_only(workflow):
+    # both populations have a brain of 25 weeks; that of the other one stands first
+    atlas = {"name": "spina-bifida", "series": ["operated", "unoperated"]}
+    study = {"atlas": atlas, "start": "spina-bifida-unoperated-24", "folding": {"end_week": 25}}
+    named = ("--configfile", workflow.write("two.yaml", study))
+    shown = workflow.run("-n", "metrics", "figures", *named).stdout
+    for output in ("similarity.spina-bifida-", "figures/weekly.png", "metrics/validation.csv"):
+        (files,) = re.findall(rf"input: (.*)\n +output: \S*{output}", shown)
+        assert "brains/spina-bifida-unoperated-25/surface/pial.surf.gii" in files
+        assert "brains/spina-bifida-operated-25/surface/pial.surf.gii" not in files
 
 
 def test_one_brain_alone_is_folded_without_growth_rates(workflow):

@@ -3,6 +3,7 @@ import re
 
 from gyriflow.errors import GyriflowError
 from gyriflow.launch import hold_lock
+from gyriflow.parameters.terms import SIDES
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
 
@@ -47,7 +48,6 @@ if workflow.is_main_process and not workflow.dryrun:
 BRAIN = "results/brains/{brain}"
 RUN = "results/runs/{run}/{brain}"
 STUDY = "results/study"
-SIDES = ("left", "right")
 # the surfaces of a brain, measured or simulated, by what their names begin with
 SURFACES = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
 
@@ -96,14 +96,28 @@ def of_weeks(pattern):
     ]
 
 
+def comparable(brain):
+    """Returns the brains that a start brain may be compared with: those of its population where it has one, else all."""
+    population = CONFIG.brain(brain).population
+    return [other for other in CONFIG.brains if population in (None, other.population)]
+
+
+def measured_after_start(run, brain):
+    """Returns, by output week after the start, the ids of the measured brains that a run is compared with."""
+    found = {
+        week: [other.id for other in comparable(brain) if week_tag(other.week) == week]
+        for week in week_tags(run, brain)[1:]
+    }
+    return {week: brains for week, brains in found.items() if brains}
+
+
 def comparisons():
-    """Returns (run, brain, week, measured brain) for every output week after the start with a measured brain."""
+    """Returns (run, brain, week, measured brain) for every output week after the start with measured brains."""
     return [
-        (run, brain, week_tag(week), measured.id)
+        (run, brain, week, measured)
         for run, brain in FOLDED
-        for week in CONFIG.weeks(run, brain)[1:]
-        for measured in CONFIG.brains
-        if abs(measured.week - week) < 1e-6
+        for week, brains in measured_after_start(run, brain).items()
+        for measured in brains
     ]
 
 
@@ -134,4 +148,4 @@ wildcard_constraints:
     brain=one_of(BRAINS),
     run=one_of(CONFIG.runs),
     week=r"\d+\.\d+",
-    side="left|right",
+    side="|".join(SIDES),

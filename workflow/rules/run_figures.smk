@@ -3,10 +3,11 @@ from gyriflow.parameters.measures import SHAPE_MEASURES
 
 
 def measured_beside(run, brain):
-    """Returns, by week, the measured brain that a run's surface of that week is shown beside."""
-    measured = {week_tag(one.week): one.id for one in reversed(CONFIG.brains)}
-    tags = week_tags(run, brain)
-    return {week: measured[week] for week in tags if week in measured}
+    """Returns, by week, the measured brain that a run's surface is shown beside, the start brain at its own week."""
+    later = {
+        week: brains[0] for week, brains in measured_after_start(run, brain).items()
+    }
+    return {week_tags(run, brain)[0]: brain, **later}
 
 
 def beside(wildcards):

@@ -1,26 +1,21 @@
 # What simulations are worth: each simulated brain beside the real one of its week, with the scaled start as baseline.
 def compared_with(run, brain):
-    """Returns, by week after the start, the measured brain of the start's population that a run is compared with."""
-    own = CONFIG.brain(brain)
-    measured = {
-        week_tag(other.week): other.id
-        for other in reversed(CONFIG.brains)
-        if other.population == own.population and not other.synthetic
+    """Returns, by week after the start, the real brain that a run is compared with; none where the start is synthetic."""
+    if CONFIG.brain(brain).synthetic:
+        return {}
+    real = {
+        week: [name for name in brains if not CONFIG.brain(name).synthetic]
+        for week, brains in measured_after_start(run, brain).items()
     }
-    return {
-        week: measured[week]
-        for week in week_tags(run, brain)[1:]
-        if week in measured and not own.synthetic
-    }
+    return {week: brains[0] for week, brains in real.items() if brains}
 
 
 def week_before(brain, week):
-    """Returns the measured brain of the latest week before one, of the same population as a start brain."""
-    own = CONFIG.brain(brain)
+    """Returns the real brain of the latest week before one that a start brain may be compared with."""
     known = {
         other.week: other.id
-        for other in reversed(CONFIG.brains)
-        if other.population == own.population and other.week < float(week)
+        for other in reversed(comparable(brain))
+        if other.week < float(week) and not other.synthetic
     }
     return known[max(known)]
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from ..parameters.settings import Settings, setting
+from ..parameters.terms import AffineSource, Coordinates
 from ..parameters.varying import Week
 
 ATLASES = Path(__file__).resolve().parents[3] / "atlases"
@@ -61,8 +62,8 @@ class AtlasSeries(Settings):
 
     population: str = setting(..., "", "Name of these brains in figures and tables.", min_length=1)
     scheme: str | None = setting(None, "", "Meaning of the labels, as for `brains`; required with `labels`.")
-    affine_from: Literal["auto", "sform", "qform"] = setting("auto", "", "As for `brains`, with `labels`.")
-    coordinates: Literal["auto", "ras", "lps"] = setting("auto", "", "As for `brains`, with surfaces.")
+    affine_from: AffineSource = setting("auto", "", "As for `brains`, with `labels`.")
+    coordinates: Coordinates = setting("auto", "", "As for `brains`, with surfaces.")
     files: dict[FileKey, str] = setting(
         ..., "",
         "Path of each file below the folder and the URL, with `{week}` for the week (`{week:05.2f}`: as 21.00): "

@@ -1,12 +1,12 @@
 """The brains of a study, and the data that their pial surfaces are made from."""
 
 from collections.abc import Iterator
-from typing import Literal
 
 from ..parameters.files import InputFile
 from ..parameters.schemes import SCHEMES
 from ..parameters.settings import NotValidError, Problem, Settings, check, setting
 from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
+from ..parameters.terms import AffineSource, Coordinates
 from ..parameters.varying import Week
 
 SOURCES = ("labels", "segmentation", "hemispheres", "pial", "phantom", "shape")
@@ -101,7 +101,7 @@ class Brain(Settings):
         f"Meaning of the labels: {', '.join(f'`{name}`' for name in SCHEMES)}, or a name of `schemes`. Needed with "
         "`labels` and `segmentation`.",
     )  # fmt: skip
-    affine_from: Literal["auto", "sform", "qform"] = setting(
+    affine_from: AffineSource = setting(
         "auto", "", "Which NIfTI affine of `labels` and `image` is used; `auto` refuses two that disagree."
     )
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
@@ -109,7 +109,7 @@ class Brain(Settings):
     white: InputFile | None = setting(
         None, "", "White surface of `pial` in the same coordinates; the distance to it is the cortical thickness."
     )
-    coordinates: Literal["auto", "ras", "lps"] = setting(
+    coordinates: Coordinates = setting(
         "auto", "",
         "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose, whatever it is.",
     )  # fmt: skip

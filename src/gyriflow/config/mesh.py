@@ -3,12 +3,13 @@
 from typing import Literal
 
 from ..parameters.settings import Settings, setting
+from ..parameters.terms import Mesher
 
 
 class MeshSettings(Settings):
     """How the start brain's pial surface is filled with tetrahedra."""
 
-    mesher: Literal["pytetwild", "tetgen"] = setting(
+    mesher: Mesher = setting(
         "pytetwild",
         "",
         "`pytetwild` (fTetWild): the best elements, with its own surface within `envelope_mm`; `tetgen`: a finer "

@@ -1,18 +1,26 @@
 """Settings of the metrics, and the brains from which the apparent age is estimated."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Discriminator, Field, Tag
 
+from ..parameters.metrics import (
+    CURVATURE_RADIUS_MM,
+    SPANGY_MODES,
+    SPANGY_PROXY,
+    SPANGY_WAVELENGTH,
+    ModesWord,
+    SpangyProxy,
+    WeylFormula,
+)
 from ..parameters.settings import Settings, setting
 from .brains import Brain
 
 LEAST_AGE_WEEKS = 5
 """Least number of weeks of reference brains for an age profile."""
 Modes = Annotated[
-    Annotated[int, Field(ge=2, le=20000), Tag("(number)")]
-    | Annotated[Literal["B4", "B5", "B6", "common", "own"], Tag("(word)")],
+    Annotated[int, Field(ge=2, le=20000), Tag("(number)")] | Annotated[ModesWord, Tag("(word)")],
     Discriminator(lambda value: "(word)" if isinstance(value, str) and not value.isdigit() else "(number)"),
 ]
 
@@ -21,22 +29,20 @@ class MetricsSettings(Settings):
     """How curvature and the spectral analysis of gyrification (SpAnGy) are measured, on real and simulated brains."""
 
     curvature_radius_mm: float = setting(
-        3.0, "mm",
+        CURVATURE_RADIUS_MM, "mm",
         "Radius of the neighbourhood in which curvature is fitted, at least two edges of the surfaces; the same for "
         "all brains that are compared.",
         ge=0.5, le=20,
     )  # fmt: skip
-    spangy_proxy: Literal["shape_index", "mean_curvature"] = setting(
-        "shape_index", "", "The map whose spectrum is analysed."
-    )
+    spangy_proxy: SpangyProxy = setting(SPANGY_PROXY, "", "The map whose spectrum is analysed.")
     spangy_modes: Modes = setting(
-        "B5", "",
+        SPANGY_MODES, "",
         "Number of eigenmodes: a number from 2 to 20000; the last complete band, `B4`, `B5` or `B6` (each needs four "
         "times as many modes as the one before); `common`: per hemisphere the largest Weyl number (modes needed for "
         "the shortest wavelength) of all measured and simulated brains of the study; `own`: that of each surface.",
     )  # fmt: skip
-    spangy_wavelength: Literal["paper", "textbook"] = setting(
-        "paper", "", "Relation between the shortest wavelength WL and λ: `paper` 2π/WL², `textbook` (2π/WL)²."
+    spangy_wavelength: WeylFormula = setting(
+        SPANGY_WAVELENGTH, "", "Relation between the shortest wavelength WL and λ: `paper` 2π/WL², `textbook` (2π/WL)²."
     )
     age_reference: tuple[str, ...] | None = setting(
         None, "",

@@ -1,7 +1,7 @@
 """Filling a closed surface with tetrahedra, and refusing a mesh that is not the inside of it."""
 
 import logging
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from ..geometry.crossings import crossing_faces
 from ..geometry.remeshing import remeshed, untangled
 from ..geometry.tetrahedra import PIECES_OF_ORDER, TetrahedralMesh, boundary_surface, signed_volumes
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
+from ..parameters.terms import Mesher
 from .curving import curved
 from .improvement import improved
 from .meshers import run_mesher
@@ -17,7 +18,6 @@ from .sizing import background_mesh, edge_length_for
 
 log = logging.getLogger(__name__)
 
-Mesher = Literal["pytetwild", "tetgen"]
 NEAR = 0.02
 """A remeshed surface has the number of faces that was asked for when it differs by this part."""
 ATTEMPTS = 4

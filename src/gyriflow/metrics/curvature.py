@@ -10,12 +10,10 @@ from scipy.sparse.linalg import spsolve
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, TriangleMesh, edges, mean_edge_length
+from ..parameters.metrics import CURVATURE_RADIUS_MM
 from .quadrics import fit_quadrics
 
 log = logging.getLogger(__name__)
-
-RADIUS_MM = 3.0
-"""At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
 
 EDGES_PER_RADIUS = 2.0
 """Radius of the smallest ball in edges: with fewer neighbours a quadric follows the noise."""
@@ -66,7 +64,7 @@ class Curvature:
         return np.sqrt(0.5 * (self.maximum**2 + self.minimum**2))
 
 
-def curvature(mesh: TriangleMesh, *, radius_mm: float = RADIUS_MM) -> Curvature:
+def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> Curvature:
     """Returns the curvature from quadrics fitted to the surface within `radius_mm` of each vertex.
 
     The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal

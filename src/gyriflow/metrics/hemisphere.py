@@ -1,7 +1,6 @@
 """Everything that is measured on one hemisphere."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -10,8 +9,16 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from ..geometry.crossings import crossing_faces
 from ..geometry.triangles import Floats, TriangleMesh, area, mean_edge_length, signed_volume, vertex_areas
+from ..parameters.metrics import (
+    CURVATURE_RADIUS_MM,
+    SPANGY_MODES,
+    SPANGY_PROXY,
+    SPANGY_WAVELENGTH,
+    SpangyProxy,
+    WeylFormula,
+)
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .curvature import RADIUS_MM, Curvature, continued, curvature
+from .curvature import Curvature, continued, curvature
 from .depth import convex_hull, sulcal_depth
 from .folding_measures import (
     folding_index,
@@ -24,10 +31,9 @@ from .folding_measures import (
 from .gyrification import Pieces, capped, envelope, gyrification_index, local_gyrification_index, pieces_over
 from .laplace_beltrami import laplacian
 from .mode_numbers import SpangyModes, modes_of
-from .spangy import Spectrum, WeylFormula, first_eigenvalue, spectrum, weyl_number
+from .spangy import Spectrum, first_eigenvalue, spectrum, weyl_number
 from .thickness import thickness_metrics
 
-SpangyProxy = Literal["shape_index", "mean_curvature"]
 Row = tuple[str, float, str]
 
 
@@ -35,10 +41,10 @@ Row = tuple[str, float, str]
 class Settings:
     """How hemispheres are measured; the names and values of the configuration's `metrics`."""
 
-    curvature_radius_mm: float = RADIUS_MM
-    spangy_proxy: SpangyProxy = "shape_index"
-    spangy_modes: SpangyModes = "B5"
-    spangy_wavelength: WeylFormula = "paper"
+    curvature_radius_mm: float = CURVATURE_RADIUS_MM
+    spangy_proxy: SpangyProxy = SPANGY_PROXY
+    spangy_modes: SpangyModes = SPANGY_MODES
+    spangy_wavelength: WeylFormula = SPANGY_WAVELENGTH
 
 
 @dataclass(frozen=True, eq=False)

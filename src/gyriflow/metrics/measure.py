@@ -12,13 +12,19 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from ..geometry.crossings import crossing_faces
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume
+from ..parameters.metrics import (
+    CURVATURE_RADIUS_MM,
+    SPANGY_MODES,
+    SPANGY_PROXY,
+    SPANGY_WAVELENGTH,
+    SpangyProxy,
+    WeylFormula,
+)
 from ..units import ML_PER_MM3
-from .curvature import RADIUS_MM
 from .gyrification import capped
 from .hemisphere import (
     Hemisphere,
     Settings,
-    SpangyProxy,
     coefficient_table,
     folding_rows,
     measured_hemisphere,
@@ -26,7 +32,6 @@ from .hemisphere import (
     spectrum_rows,
 )
 from .mode_numbers import SpangyModes
-from .spangy import WeylFormula
 from .thickness import at_part
 
 
@@ -62,10 +67,10 @@ def measure_brain(
     right: TriangleMesh,
     *,
     thickness_mm: Floats | None = None,
-    curvature_radius_mm: float = RADIUS_MM,
-    spangy_proxy: SpangyProxy = "shape_index",
-    spangy_modes: SpangyModes = "B5",
-    spangy_wavelength: WeylFormula = "paper",
+    curvature_radius_mm: float = CURVATURE_RADIUS_MM,
+    spangy_proxy: SpangyProxy = SPANGY_PROXY,
+    spangy_modes: SpangyModes = SPANGY_MODES,
+    spangy_wavelength: WeylFormula = SPANGY_WAVELENGTH,
     threads: int = 1,
 ) -> BrainMetrics:
     """Returns the metrics of a brain.

@@ -7,10 +7,10 @@ import pandas as pd
 from scipy import sparse
 
 from ..geometry.triangles import TriangleMesh, area
+from ..parameters.metrics import LastBand, WeylFormula
 from .laplace_beltrami import Modes, count_below, laplacian, lowest_modes, modes_below
-from .spangy import WeylFormula, band_limits, first_eigenvalue, weyl_number
+from .spangy import band_limits, first_eigenvalue, weyl_number
 
-LastBand = Literal["B4", "B5", "B6"]
 SpangyModes = int | LastBand | Literal["own"] | Mapping[str, int]
 
 

@@ -4,7 +4,6 @@ Germanaud et al. 2012, "Larger is twistier", NeuroImage 63, 1257-1272.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -12,6 +11,7 @@ from scipy import sparse
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints
+from ..parameters.metrics import WeylFormula
 from .laplace_beltrami import Modes, lowest_modes
 
 BANDS = 6
@@ -22,8 +22,6 @@ ROUNDING = 1e-9
 
 EDGES_PER_WAVELENGTH = 6
 """A band whose shortest wavelength spans fewer edges is not resolved by the mesh."""
-
-WeylFormula = Literal["paper", "textbook"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats
+from ..parameters.metrics import FOLD_BANDS
 from .spangy import BANDS
-
-FOLD_BANDS = (4, 5, 6)
-"""The bands of primary, secondary and tertiary folds."""
 
 _HEMISPHERE = ["subject", "run", "week", "hemisphere"]
 

@@ -26,6 +26,13 @@ REGION_FIELDS: tuple[VertexField, ...] = (
 )
 """Fields written with the regions, before the solve."""
 
+Mesher = Literal["pytetwild", "tetgen"]
+"""The programs that fill a surface with tetrahedra."""
+Coordinates = Literal["auto", "ras", "lps"]
+"""Axes of the coordinates in surface files; `auto`: to be found."""
+AffineSource = Literal["auto", "sform", "qform"]
+"""Which affine of a NIfTI file is used; `auto` refuses two that disagree."""
+
 MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
 """Names of the constitutive laws; each is a class of `mechanics.materials`."""
 

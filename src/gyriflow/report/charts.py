@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..parameters.terms import SIDES
 from .style import (
     FULL_WIDTH_IN,
     MEASURED,
@@ -61,7 +62,7 @@ QUALITY_GATES = {
 
 def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> set[str]:
     """Draws one metric, of the whole brain where it is known, else per hemisphere; returns the hemispheres drawn."""
-    drawn = {"whole"} if (rows["hemisphere"] == "whole").any() else {"left", "right"}
+    drawn: set[str] = {"whole"} if (rows["hemisphere"] == "whole").any() else set(SIDES)
     for (run, hemisphere), group in rows[rows["hemisphere"].isin(drawn)].groupby(["run", "hemisphere"], sort=False):
         ordered = group.sort_values("week")
         if run == MEASURED:
@@ -134,7 +135,7 @@ def metrics_chart(
         axes.remove()
     extra = [
         Line2D([], [], color=MUTED_COLOUR, linestyle=HEMISPHERE_LINES[side], label=f"{side} hemisphere")
-        for side in ("left", "right")
+        for side in SIDES
         if side in hemispheres
     ]
     run_legend(figure, runs, measured=measured if MEASURED in set(metrics["run"]) else "", extra=extra)

@@ -11,6 +11,8 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
+from ..parameters.metrics import FOLD_BANDS
+from ..parameters.terms import SIDES
 from .style import (
     FULL_WIDTH_IN,
     MEASURED,
@@ -28,8 +30,6 @@ from .style import (
     week_label,
 )
 
-FOLD_BANDS = (4, 5, 6)
-"""Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
 _FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
 _INCOMPLETE_HATCH = "//////"
 
@@ -102,7 +102,7 @@ def spectra_chart(
     figure = new_figure(FULL_WIDTH_IN, 3.0, title=title or week_label(week), synthetic=synthetic, measured=measured)
     panels = figure.subplots(1, 2, sharey=True)
     width = 0.8 / max(len(runs), 1)
-    for axes, hemisphere in zip(panels, ("left", "right"), strict=True):
+    for axes, hemisphere in zip(panels, SIDES, strict=True):
         side = rows[rows["hemisphere"] == hemisphere]
         for index, run in enumerate(runs):
             of_run = side[side["run"] == run]
@@ -154,7 +154,7 @@ def spectra_weeks_chart(
     colours = run_colours(runs)
     figure = new_figure(FULL_WIDTH_IN, 4.2, title=title, synthetic=synthetic, measured=measured)
     panels = figure.subplots(2, len(bands), sharex=True, sharey="col", squeeze=False)
-    for line, hemisphere in zip(panels, ("left", "right"), strict=True):
+    for line, hemisphere in zip(panels, SIDES, strict=True):
         for axes, band in zip(line, bands, strict=True):
             here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
             for run in [*runs, MEASURED]:
