@@ -7,11 +7,11 @@ import pytest
 import trimesh
 from shapes import HALF_AXES, hemisphere, save_gifti
 
+from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface
 from gyriflow.surface.extraction import isosurface, smoothed_mask
-from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.repair import pieces
 
 from .conftest import Workflow

@@ -10,8 +10,8 @@ import numpy as np
 from nibabel.freesurfer.io import read_geometry
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.io.files import AnyPath
+from ..errors import InputError
+from .files import AnyPath
 
 log = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.phantom.brain import (
+from .brain import (
     BRAINSTEM,
     CALLOSUM,
     CENTRE_MM,

@@ -7,11 +7,11 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.hemisphere_pose import (
+from ..errors import InputError
+from ..geometry.alignment import angle_deg
+from ..geometry.triangles import TriangleMesh, transformed
+from ..parameters.schemes import LabelScheme
+from .hemisphere_pose import (
     CONVENTION_DEG,
     CONVENTIONS,
     LEAST_CONFIDENCE,
@@ -19,9 +19,9 @@ from gyriflow.surface.hemisphere_pose import (
     SYLVIAN_AHEAD,
     hemisphere_by_shape,
 )
-from gyriflow.surface.orientation import mid_plane
-from gyriflow.surface.outlines import reference
-from gyriflow.surface.registration import Target, registered
+from .orientation import mid_plane
+from .outlines import reference
+from .registration import Target, registered
 
 Floats = NDArray[np.float64]
 

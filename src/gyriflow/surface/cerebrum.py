@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.labels import cerebrum_mask, missing_tissues, require_cortex_outside
-from gyriflow.surface.pial import TOLD_LOSS, warn
-from gyriflow.surface.stalks import without_stalks
-from gyriflow.surface.ventricles import outside_ventricles
-from gyriflow.units import ML_PER_MM3
+from ..parameters.schemes import LabelScheme
+from ..units import ML_PER_MM3
+from .labels import cerebrum_mask, missing_tissues, require_cortex_outside
+from .pial import TOLD_LOSS, warn
+from .stalks import without_stalks
+from .ventricles import outside_ventricles
 
 log = logging.getLogger(__name__)
 

@@ -8,9 +8,9 @@ from scipy import ndimage
 from scipy.special import ndtr
 from skimage.measure import marching_cubes
 
-from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
-from gyriflow.surface.topology import euler_gain, unambiguous, without_handles
+from ..errors import MeshError
+from ..geometry.triangles import TriangleMesh, signed_volume, transformed
+from .topology import euler_gain, unambiguous, without_handles
 
 PAD_VOXELS = 6
 LEVEL = 0.5

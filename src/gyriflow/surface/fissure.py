@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.extraction import EDGE_SLOPE
-from gyriflow.surface.orientation import MidPlane, fissure_points
+from ..geometry.triangles import TriangleMesh
+from ..parameters.schemes import LabelScheme
+from .extraction import EDGE_SLOPE
+from .orientation import MidPlane, fissure_points
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, area, corners
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, pose_of_labels
-from gyriflow.surface.cerebrum import cerebrum_labels, tell_of_border, tell_of_dropped
-from gyriflow.surface.extraction import (
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, area, corners
+from ..parameters.schemes import LabelScheme
+from ..units import ML_PER_MM3
+from .brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, pose_of_labels
+from .cerebrum import cerebrum_labels, tell_of_border, tell_of_dropped
+from .extraction import (
     COMPARABLE,
     LEVEL,
     PAD_VOXELS,
@@ -24,7 +25,7 @@ from gyriflow.surface.extraction import (
     smoothed_mask,
     unbridged,
 )
-from gyriflow.surface.fissure import (
+from .fissure import (
     SHIFTED_MM,
     Fissure,
     between,
@@ -35,19 +36,18 @@ from gyriflow.surface.fissure import (
     sampled,
     to_the_right,
 )
-from gyriflow.surface.hemispheres import left_faces
-from gyriflow.surface.labels import (
+from .hemispheres import left_faces
+from .labels import (
     LEAST_CORTEX_OUTSIDE,
     require_sides,
 )
-from gyriflow.surface.orientation import mid_plane
-from gyriflow.surface.outcome import PialSurface
-from gyriflow.surface.pial import TOLD_LOSS, even, motion, posed, warn
-from gyriflow.surface.shrinkage import KEPT, after_repairs, with_volume
-from gyriflow.surface.single_hemisphere import require_one, single_hemisphere
-from gyriflow.surface.size import require_plausible_size
-from gyriflow.surface.thickness import Thickness, cortical_thickness
-from gyriflow.units import ML_PER_MM3
+from .orientation import mid_plane
+from .outcome import PialSurface
+from .pial import TOLD_LOSS, even, motion, posed, warn
+from .shrinkage import KEPT, after_repairs, with_volume
+from .single_hemisphere import require_one, single_hemisphere
+from .size import require_plausible_size
+from .thickness import Thickness, cortical_thickness
 
 log = logging.getLogger(__name__)
 

@@ -6,21 +6,21 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
-from gyriflow.surface.brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, posed_surface
-from gyriflow.surface.fissure import SHIFTED_MM, fissure_between
-from gyriflow.surface.hemisphere_pose import CONVENTIONS, pair_by_shape
-from gyriflow.surface.hemispheres import least_gap, left_faces, require_common_pose, require_pair, set_apart
-from gyriflow.surface.limits import USUAL, Limits
-from gyriflow.surface.orientation import mid_plane
-from gyriflow.surface.outcome import PialSurface
-from gyriflow.surface.pial import TOLD_LOSS, even, motion, posed, warn
-from gyriflow.surface.repair import cleaned, pieces
-from gyriflow.surface.single_hemisphere import require_one, single_hemisphere
-from gyriflow.surface.size import require_plausible_size
-from gyriflow.surface.stalks import surface_without_stalks
-from gyriflow.surface.study_poses import as_poses, placed, poses
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
+from .brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, posed_surface
+from .fissure import SHIFTED_MM, fissure_between
+from .hemisphere_pose import CONVENTIONS, pair_by_shape
+from .hemispheres import least_gap, left_faces, require_common_pose, require_pair, set_apart
+from .limits import USUAL, Limits
+from .orientation import mid_plane
+from .outcome import PialSurface
+from .pial import TOLD_LOSS, even, motion, posed, warn
+from .repair import cleaned, pieces
+from .single_hemisphere import require_one, single_hemisphere
+from .size import require_plausible_size
+from .stalks import surface_without_stalks
+from .study_poses import as_poses, placed, poses
 
 log = logging.getLogger(__name__)
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import Fit, angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
-from gyriflow.surface.limits import USUAL, Limits
-from gyriflow.surface.medial_wall import medial_wall
-from gyriflow.surface.outlines import Outline, outline, reference
-from gyriflow.surface.registration import Target, found, matched, registered
+from ..errors import InputError
+from ..geometry.alignment import Fit, angle_deg
+from ..geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
+from .limits import USUAL, Limits
+from .medial_wall import medial_wall
+from .outlines import Outline, outline, reference
+from .registration import Target, found, matched, registered
 
 Floats = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas, face_components, signed_volume, submesh
-from gyriflow.surface.limits import Limits
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, corners, face_areas, face_components, signed_volume, submesh
+from .limits import Limits
 
 Floats = NDArray[np.float64]
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gyriflow.geometry.triangles import TriangleMesh, vertex_areas, vertex_normals
+from ..geometry.triangles import TriangleMesh, vertex_areas, vertex_normals
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.surface.hemispheres import parted, split
-from gyriflow.surface.orientation import MidPlane, upright
-from gyriflow.surface.outcome import PialSurface, described, faults, require_sound
-from gyriflow.surface.remaking import remade
-from gyriflow.surface.remeshing import evened
+from ..geometry.triangles import TriangleMesh, transformed
+from .hemispheres import parted, split
+from .orientation import MidPlane, upright
+from .outcome import PialSurface, described, faults, require_sound
+from .remaking import remade
+from .remeshing import evened
 
 log = logging.getLogger(__name__)
 

@@ -5,15 +5,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gyriflow.geometry.alignment import (
+from ..geometry.alignment import (
     CUBE_ROTATIONS,
     Fit,
     fits_from_all_sides,
     margin,
     step_towards_planes,
 )
-from gyriflow.geometry.triangles import unit
-from gyriflow.surface.outlines import Outline
+from ..geometry.triangles import unit
+from .outlines import Outline
 
 Floats = NDArray[np.float64]
 

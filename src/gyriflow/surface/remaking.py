@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.surface.extraction import EDGE_SLOPE, isosurface, made_simple
+from ..geometry.triangles import TriangleMesh
+from .extraction import EDGE_SLOPE, isosurface, made_simple
 
 MARGIN_VOXELS = 6
 

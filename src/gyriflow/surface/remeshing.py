@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from gyriflow.geometry.remeshing import from_meshlab, in_meshlab, remeshed, self_intersecting_faces, untangled
-from gyriflow.geometry.triangles import TriangleMesh
+from ..geometry.remeshing import from_meshlab, in_meshlab, remeshed, self_intersecting_faces, untangled
+from ..geometry.triangles import TriangleMesh
 
 
 def smoothed(mesh: TriangleMesh, iterations: int) -> TriangleMesh:

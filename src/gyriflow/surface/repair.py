@@ -5,9 +5,10 @@ from typing import Any
 import igl
 import numpy as np
 
-from gyriflow.errors import MeshError
-from gyriflow.geometry.meshlab import pymeshlab
-from gyriflow.geometry.triangles import (
+from ..errors import MeshError
+from ..geometry.meshlab import pymeshlab
+from ..geometry.remeshing import self_intersecting_faces
+from ..geometry.triangles import (
     TriangleMesh,
     area_vectors,
     edges,
@@ -19,7 +20,6 @@ from gyriflow.geometry.triangles import (
     signed_volume,
     submesh,
 )
-from gyriflow.surface.remeshing import self_intersecting_faces
 
 # vertices closer than this are one vertex
 SAME_MM = 1e-5

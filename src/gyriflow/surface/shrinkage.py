@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.geometry.triangles import TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
-from gyriflow.surface.outcome import faults
-from gyriflow.surface.remeshing import self_intersecting_faces
-from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
+from ..geometry.remeshing import self_intersecting_faces
+from ..geometry.triangles import TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .outcome import faults
 
 log = logging.getLogger(__name__)
 

@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.surface.brain_pose import (
+from ..errors import InputError
+from ..geometry.alignment import angle_deg
+from ..geometry.triangles import TriangleMesh, transformed
+from .brain_pose import (
     DOUBTFUL_BRAIN,
     LEAST_TURN_DEG,
     narrowness,
 )
-from gyriflow.surface.hemisphere_pose import (
+from .hemisphere_pose import (
     CONVENTION_DEG,
     CONVENTIONS,
     LEAST_CONFIDENCE,
@@ -21,8 +21,8 @@ from gyriflow.surface.hemisphere_pose import (
     SYLVIAN_AHEAD,
     hemisphere_by_shape,
 )
-from gyriflow.surface.outcome import PialSurface, described
-from gyriflow.surface.pial import motion, warn
+from .outcome import PialSurface, described
+from .pial import motion, warn
 
 # the medial wall's distance from the mid-sagittal plane
 BESIDE_MM = 0.5

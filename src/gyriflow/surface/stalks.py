@@ -7,8 +7,8 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.geometry.triangles import TriangleMesh, corners, submesh
-from gyriflow.surface.repair import cleaned
+from ..geometry.triangles import TriangleMesh, corners, submesh
+from .repair import cleaned
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.surface.hemisphere_pose import CONVENTIONS, MIRROR, SYLVIAN_AHEAD, Pair, about_x, pair_by_shape, pitch_deg
-from gyriflow.surface.limits import USUAL, Limits
-from gyriflow.surface.registration import Target, registered
+from ..errors import InputError
+from ..geometry.alignment import angle_deg
+from ..geometry.triangles import TriangleMesh
+from .hemisphere_pose import CONVENTIONS, MIRROR, SYLVIAN_AHEAD, Pair, about_x, pair_by_shape, pitch_deg
+from .limits import USUAL, Limits
+from .registration import Target, registered
 
 Floats = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.layers import layer_thickness
-from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
-from gyriflow.surface.extraction import LEVEL, isosurface, main_parts, smoothed_mask
-from gyriflow.surface.fissure import sampled
+from ..errors import InputError
+from ..geometry.layers import layer_thickness
+from ..geometry.triangles import TriangleMesh, vertex_areas
+from .extraction import LEVEL, isosurface, main_parts, smoothed_mask
+from .fissure import sampled
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

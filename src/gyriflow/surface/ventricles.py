@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.parameters.schemes import LabelScheme
+from ..parameters.schemes import LabelScheme
 
 Mask = NDArray[np.bool_]
 

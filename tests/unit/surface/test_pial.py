@@ -10,6 +10,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
@@ -28,7 +29,6 @@ from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
 from gyriflow.surface.from_labels import from_labels
 from gyriflow.surface.from_surfaces import from_hemispheres, from_pial
 from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
-from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.repair import pieces
 from gyriflow.surface.size import require_plausible_size
 
