@@ -20,8 +20,8 @@ from .hemisphere_pose import (
     hemisphere_by_shape,
 )
 from .orientation import mid_plane
+from .outline_fit import Target, registered
 from .outlines import reference
-from .registration import Target, registered
 
 Floats = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from ..geometry.alignment import Fit, angle_deg
 from ..geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
 from .limits import USUAL, Limits
 from .medial_wall import medial_wall
+from .outline_fit import Target, found, matched, registered
 from .outlines import Outline, outline, reference
-from .registration import Target, found, matched, registered
 
 Floats = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.triangles import TriangleMesh, transformed
+from .even_triangles import evened
 from .hemispheres import parted, split
 from .orientation import MidPlane, upright
 from .outcome import PialSurface, described, faults, require_sound
-from .remaking import remade
-from .remeshing import evened
+from .rebuilding import remade
 
 log = logging.getLogger(__name__)
 

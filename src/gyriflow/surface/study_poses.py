@@ -14,7 +14,7 @@ from ..geometry.alignment import angle_deg
 from ..geometry.triangles import TriangleMesh
 from .hemisphere_pose import CONVENTIONS, MIRROR, SYLVIAN_AHEAD, Pair, about_x, pair_by_shape, pitch_deg
 from .limits import USUAL, Limits
-from .registration import Target, registered
+from .outline_fit import Target, registered
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.registrations import CarriedMesh, read_carried_mesh, write_carried_mesh
 from gyriflow.registration.growth import local_growth
-from gyriflow.registration.matched import filled, followed, positions_by_week
+from gyriflow.registration.matched_surfaces import filled, followed, positions_by_week
 
 ATLAS = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
 FACES = np.asarray(ATLAS.faces)

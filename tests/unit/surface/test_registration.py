@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import unit
+from gyriflow.surface.outline_fit import Target, matched, registered
 from gyriflow.surface.outlines import reference
-from gyriflow.surface.registration import Target, matched, registered
 
 
 def bent(outline, seed):

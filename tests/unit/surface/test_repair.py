@@ -7,8 +7,8 @@ import trimesh
 from gyriflow.errors import MeshError
 from gyriflow.geometry.remeshing import remeshed, self_intersecting_faces, untangled
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume, submesh
-from gyriflow.surface.remaking import remade
-from gyriflow.surface.remeshing import evened, smoothed
+from gyriflow.surface.even_triangles import evened, smoothed
+from gyriflow.surface.rebuilding import remade
 from gyriflow.surface.repair import cleaned, pieces
 
 RADIUS = 10.0

@@ -8,8 +8,8 @@ from skimage.measure import marching_cubes
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import transformed
+from gyriflow.surface.even_triangles import evened
 from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
-from gyriflow.surface.remeshing import evened
 from gyriflow.surface.thickness import cortical_thickness
 
 FOLDS_MM = 2.0
