@@ -103,7 +103,7 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
         factors.getPC().setType(PETSc.PC.Type.CHOLESKY)
         factors.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         solver.solve()
-        return _found(solver, operators[0], count_below(stiffness, mass, value))
+        return _converged_modes(solver, operators[0], count_below(stiffness, mass, value))
     except PETSc.Error as error:
         raise SolverError(
             f"the modes up to λ = {value:g} mm⁻² could not be found",
@@ -115,7 +115,7 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
             thing.destroy()
 
 
-def _found(solver: Any, operator: Any, number: int) -> Modes:
+def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
     """Returns the modes that a solver has found; SolverError where they are not the number that there is."""
     if (found := solver.getConverged()) != number:
         raise SolverError(

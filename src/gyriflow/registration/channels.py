@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import affine_transform, gaussian_filter
 
 from ..errors import InputError
-from ..geometry.deformations import moved
+from ..geometry.deformations import transform_points
 from ..geometry.triangles import Floats
 
 SMOOTHING_MM = 0.8
@@ -83,10 +83,10 @@ def channels(
     _require_whole(inside)
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
     voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
-    centres = moved(np.argwhere(inside), affine)
+    centres = transform_points(np.argwhere(inside), affine)
     low, high = centres.min(axis=0) - MARGIN_MM, centres.max(axis=0) + MARGIN_MM
     # on a voxel's centre, so that a grid that needs no resampling gets none
-    low = moved(np.rint(moved(low, np.linalg.inv(affine))), affine)
+    low = transform_points(np.rint(transform_points(low, np.linalg.inv(affine))), affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
     grid[:3, 3] = low

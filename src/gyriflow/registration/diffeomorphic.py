@@ -13,7 +13,7 @@ from scipy.ndimage import binary_dilation, map_coordinates
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.deformations import Deformation, moved
+from ..geometry.deformations import Deformation, transform_points
 from ..geometry.triangles import Floats
 from .channels import CEREBRUM, Channels
 
@@ -69,7 +69,7 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
     cross-correlation for the deformation. It begins where centroids and volumes of the cerebra match, turned by that
     of the cube's rotations which fits clearly better than none. The same input gives the same result. InputError where
-    greedy fails; whether the result is good is for `quality.judged` to say.
+    greedy fails; whether the result is good is for `quality.judge` to say.
     """
     began, busy = time.perf_counter(), time.process_time()
     names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
@@ -128,13 +128,13 @@ def _started(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tupl
     scale = (other_size / size) ** (1 / 3)
     index = np.argwhere(earlier.cerebrum > 0.01)
     index = index[:: max(1, len(index) // POINTS)]
-    points = moved(index, earlier.affine)
+    points = transform_points(index, earlier.affine)
     tried, differences = [], []
     for turn in TURNS:
         matrix = np.eye(4)
         matrix[:3, :3] = scale * turn
         matrix[:3, 3] = second - matrix[:3, :3] @ first
-        at = moved(moved(points, matrix), np.linalg.inv(later.affine)).T
+        at = transform_points(transform_points(points, matrix), np.linalg.inv(later.affine)).T
         squares = [
             WEIGHTS[name]
             * np.square(getattr(earlier, name)[tuple(index.T)] - map_coordinates(getattr(later, name), at, order=1))
@@ -150,4 +150,4 @@ def _started(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tupl
 def _place(brain: Channels) -> tuple[Floats, float]:
     """Returns the (3,) centroid in mm and the volume in mm³ of a cerebrum."""
     index = np.argwhere(brain.tissue & CEREBRUM > 0)
-    return moved(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3
+    return transform_points(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3

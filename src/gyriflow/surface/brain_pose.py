@@ -20,7 +20,7 @@ from .hemisphere_pose import (
     hemisphere_by_shape,
 )
 from .orientation import mid_plane
-from .outline_fit import Target, registered
+from .outline_fit import Target, register
 from .outlines import reference
 
 Floats = NDArray[np.float64]
@@ -114,7 +114,7 @@ def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
     mirrored = transformed(side, MIRROR)
     is_right = float(side.vertices[:, 0].mean() - mesh.vertices[:, 0].mean()) > 0
     as_given = one if is_right else hemisphere_by_shape(mirrored)
-    fit = registered(as_given.outline, Target(reference()), np.eye(3))
+    fit = register(as_given.outline, Target(reference()), np.eye(3))
     near = angle_deg(fit.rotation) < CONVENTION_DEG
     ras = fit.residual / as_given.residual if near else float("inf")
     rotation, sylvian = one.rotation, one.sylvian

@@ -20,7 +20,7 @@ from .repair import cleaned, pieces
 from .single_hemisphere import require_one, single_hemisphere
 from .size import require_plausible_size
 from .stalks import surface_without_stalks
-from .study_poses import as_poses, placed, poses
+from .study_poses import as_poses, poses, report_placement
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ def from_hemispheres(
         for side, sign, one in zip(("left", "right"), (-1.0, 1.0), both_before, strict=True)
     }
     if placing:
-        report["posing"] = placed(placing, turn, moved * to_right)
+        report["posing"] = report_placement(placing, turn, moved * to_right)
         if placing.report["together"]:
             report["pose"] = (turn @ placing.left).tolist()
     return surface

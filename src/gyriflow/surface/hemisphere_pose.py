@@ -16,7 +16,7 @@ from ..geometry.alignment import Fit, angle_deg
 from ..geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
 from .limits import USUAL, Limits
 from .medial_wall import medial_wall
-from .outline_fit import Target, found, matched, registered
+from .outline_fit import Target, register, register_deformed, register_from_all_sides
 from .outlines import Outline, outline, reference
 
 Floats = NDArray[np.float64]
@@ -100,7 +100,7 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUA
             or [_require_clear(hemisphere, side) for hemisphere, side in zip(hemispheres, SIDES, strict=True)]
         )
     one, other = hemispheres
-    fit = matched(Target(one.outline), Target(other.outline), other.rotation.T @ one.rotation)
+    fit = register_deformed(Target(one.outline), Target(other.outline), other.rotation.T @ one.rotation)
     worst = PAIR_RESIDUAL_PER_ASYMMETRY * limits.max_asymmetry
     if fit.residual > worst:
         raise InputError(
@@ -181,7 +181,7 @@ def _near_a_convention(meshes: list[TriangleMesh], hemispheres: list[Hemisphere]
     for axes in CONVENTIONS.values():
         posed = []
         for mesh, best in zip(meshes, hemispheres, strict=True):
-            fit = registered(best.outline, Target(reference()), axes)
+            fit = register(best.outline, Target(reference()), axes)
             nearly = fit.residual < LEAST_CONFIDENCE * best.residual and fit.residual <= WORST_RESIDUAL
             if nearly and angle_deg(fit.rotation @ axes.T) < CONVENTION_DEG:
                 posed.append(_described(mesh, best.outline, fit, best.confidence))
@@ -202,7 +202,7 @@ def _like_others(meshes: list[TriangleMesh], hemispheres: list[Hemisphere], othe
         known = [getattr(pair, side) for pair in others]
         known.sort(key=lambda hemisphere: abs(np.log(hemisphere.outline.size_mm / best.outline.size_mm)))
         for other in known[:OTHERS]:
-            fit, confidence = found(best.outline, Target(other.outline))
+            fit, confidence = register_from_all_sides(best.outline, Target(other.outline))
             if confidence >= LEAST_CONFIDENCE and fit.residual <= WORST_RESIDUAL:
                 turned = Fit(other.rotation @ fit.rotation, fit.shift, fit.residual)
                 posed.append(_described(mesh, best.outline, turned, confidence))
@@ -213,7 +213,7 @@ def _like_others(meshes: list[TriangleMesh], hemispheres: list[Hemisphere], othe
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
     """Returns the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
     shape = outline(mesh)
-    return _described(mesh, shape, *found(shape, Target(reference())))
+    return _described(mesh, shape, *register_from_all_sides(shape, Target(reference())))
 
 
 def _described(mesh: TriangleMesh, shape: Outline, fit: Fit, confidence: float) -> Hemisphere:

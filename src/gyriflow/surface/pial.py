@@ -1,4 +1,4 @@
-"""What the surfaces of all kinds of brains go through: evened, posed, parted, measured."""
+"""What the surfaces of all kinds of brains go through: even triangles, a pose, two sides, measures."""
 
 import logging
 from typing import Any
@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.triangles import TriangleMesh, transformed
-from .even_triangles import evened
+from .even_triangles import make_even
 from .hemispheres import parted, split
 from .orientation import MidPlane, upright
 from .outcome import PialSurface, described, faults, require_sound
-from .rebuilding import remade
+from .rebuilding import rebuild
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +39,11 @@ def even(
 
     Where the triangles can't be repaired, the surface is made anew through voxels of half an edge length.
     """
-    smooth, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
+    smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
     if faults(smooth):
         warn(report, f"the surface was made anew through voxels, since it had {faults(smooth)}")
-        mesh, report[name.replace("mesh", "remade")] = remade(mesh, 0.5 * edge_length_mm)
-        smooth, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
+        mesh, report[name.replace("mesh", "remade")] = rebuild(mesh, 0.5 * edge_length_mm)
+        smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
     require_sound(smooth)
     return smooth
 

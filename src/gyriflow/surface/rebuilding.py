@@ -14,7 +14,7 @@ from .extraction import EDGE_SLOPE, isosurface, made_simple
 MARGIN_VOXELS = 6
 
 
-def remade(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the surface of the region that `mesh` winds around, without handles or intersections, and a report.
 
     The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) tells inside from outside even
@@ -26,7 +26,7 @@ def remade(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str,
     affine[:3, 3] = first
     points = np.indices(shape).reshape(3, -1).T * voxel_mm + first
     # every face lies within a voxel of one of these points
-    near, _ = cKDTree(_spread(mesh, voxel_mm)).query(points, distance_upper_bound=3.0 * voxel_mm, workers=-1)
+    near, _ = cKDTree(_spread_points(mesh, voxel_mm)).query(points, distance_upper_bound=3.0 * voxel_mm, workers=-1)
     band = np.isfinite(near)
     distance = np.full(len(points), np.inf)
     distance[band] = np.sqrt(igl.point_mesh_squared_distance(points[band], mesh.vertices, mesh.faces)[0])
@@ -39,7 +39,7 @@ def remade(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str,
     return isosurface(field, affine), {"remade_with_voxels_mm": voxel_mm} | report
 
 
-def _spread(mesh: TriangleMesh, voxel_mm: float) -> NDArray[np.float64]:
+def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> NDArray[np.float64]:
     """Returns points on the surface, none of its places further than about a voxel from one of them."""
     a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
     longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=-1).max()

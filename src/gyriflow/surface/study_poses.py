@@ -14,7 +14,7 @@ from ..geometry.alignment import angle_deg
 from ..geometry.triangles import TriangleMesh
 from .hemisphere_pose import CONVENTIONS, MIRROR, SYLVIAN_AHEAD, Pair, about_x, pair_by_shape, pitch_deg
 from .limits import USUAL, Limits
-from .outline_fit import Target, registered
+from .outline_fit import Target, register
 
 Floats = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def as_poses(report: dict[str, Any]) -> Poses:
     return Poses(np.array(matrices["left"]), np.array(matrices["right"]), report)
 
 
-def placed(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any]:
+def report_placement(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any]:
     """Returns the report with the whole motions: the pose, then left by −`moved` and right by +`moved`, then `turn`."""
     matrices = {}
     for side, motion, sign in (("left", poses.left, -1.0), ("right", poses.right, 1.0)):
@@ -224,7 +224,7 @@ def _registered(one: Pair, other: Pair) -> tuple[float, float]:
     """Returns by how much more than the other brain the one is to be pitched to lie alike, and the result's weight."""
     turns, residuals = [], []
     for a, b in ((one.left, other.left), (one.right, other.right)):
-        fit = registered(a.outline, Target(b.outline), b.rotation.T @ a.rotation)
+        fit = register(a.outline, Target(b.outline), b.rotation.T @ a.rotation)
         turns.append(pitch_deg(b.rotation @ fit.rotation @ a.rotation.T))
         residuals.append(fit.residual)
     return float(np.mean(turns)), float(np.mean(residuals)) ** -2

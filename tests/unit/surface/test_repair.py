@@ -5,10 +5,10 @@ import pytest
 import trimesh
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.remeshing import remeshed, self_intersecting_faces, untangled
+from gyriflow.geometry.remeshing import remesh, self_intersecting_faces, untangle
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume, submesh
-from gyriflow.surface.even_triangles import evened, smoothed
-from gyriflow.surface.rebuilding import remade
+from gyriflow.surface.even_triangles import make_even, smooth_taubin
+from gyriflow.surface.rebuilding import rebuild
 from gyriflow.surface.repair import cleaned, pieces
 
 RADIUS = 10.0
@@ -95,7 +95,7 @@ def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
 
 
 def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
-    even, report = evened(ball(), 10, 1.0)
+    even, report = make_even(ball(), 10, 1.0)
     assert is_closed(even)
     lengths = np.linalg.norm(np.diff(even.vertices[even.faces[:, :2]], axis=1), axis=-1)
     assert lengths.mean() == pytest.approx(1.0, rel=0.1)
@@ -106,7 +106,7 @@ def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
 def test_smoothing_removes_noise_but_not_volume():
     noise = np.random.default_rng(0).normal(scale=0.1, size=ball().vertices.shape)
     rough = TriangleMesh(ball().vertices + noise, ball().faces)
-    smooth = smoothed(rough, 10)
+    smooth = smooth_taubin(rough, 10)
     assert signed_volume(smooth) == pytest.approx(VOLUME, rel=0.01)
     assert np.linalg.norm(smooth.vertices, axis=1).std() < 0.5 * np.linalg.norm(rough.vertices, axis=1).std()
 
@@ -118,7 +118,7 @@ def test_tangle_is_counted_and_relaxed():
     vertices[np.argsort(-vertices[:, 2])[1]] += [0.0, 2.5, -1.5]
     tangled = TriangleMesh(vertices, ball().faces)
     assert self_intersecting_faces(tangled).sum() > 0
-    free = untangled(tangled)
+    free = untangle(tangled)
     assert self_intersecting_faces(free).sum() == 0
     assert euler_number(free) == 2
     assert signed_volume(free) == pytest.approx(VOLUME, rel=0.01)
@@ -127,7 +127,7 @@ def test_tangle_is_counted_and_relaxed():
 def test_overlapping_balls_are_made_one_surface():
     both = merged(ball((-6, 0, 0)), ball((6, 0, 0)))
     assert self_intersecting_faces(both).any()
-    one, report = remade(both, 0.7)
+    one, report = rebuild(both, 0.7)
     assert is_closed(one)
     assert euler_number(one) == 2
     # two balls less the lens that they share: two caps of height 4
@@ -140,6 +140,6 @@ def test_handle_of_a_torus_is_closed_when_remade():
     ring = trimesh.creation.torus(major_radius=10.0, minor_radius=7.5, major_sections=60, minor_sections=40)
     mesh, report = cleaned(TriangleMesh(ring.vertices, ring.faces), 3.0)
     assert euler_number(mesh) == 0
-    simple, report = remade(remeshed(mesh, 1.0), 0.8)
+    simple, report = rebuild(remesh(mesh, 1.0), 0.8)
     assert euler_number(simple) == 2
     assert report["tunnels_filled"] + report["bridges_cut"] == 1
