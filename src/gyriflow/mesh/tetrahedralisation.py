@@ -10,7 +10,7 @@ from ..geometry.crossings import crossing_faces
 from ..geometry.remeshing import remesh, untangle
 from ..geometry.tetrahedra import PIECES_OF_ORDER, TetrahedralMesh, boundary_surface, signed_volumes
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
-from .curving import curved
+from .curving import curve_edges
 from .improvement import improve
 from .meshers import run_mesher
 from .sizing import background_mesh, edge_length_for
@@ -99,7 +99,7 @@ def tetrahedralise(
     _refuse_other_shape(mesh, surface)
     # fTetWild has optimised its elements itself
     mesh = improve(mesh) if mesher == "tetgen" else mesh
-    return curved(mesh, surface) if order == 2 else mesh
+    return curve_edges(mesh, surface) if order == 2 else mesh
 
 
 def even_surface(surface: TriangleMesh, edge_mm: float, faces: int | None) -> TriangleMesh:

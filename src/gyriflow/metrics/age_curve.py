@@ -141,7 +141,7 @@ def _rising(weeks: Floats, knots: Floats, degree: int) -> Floats:
     return np.column_stack([np.ones(len(weeks)), -np.ones(len(weeks)), steps])
 
 
-def estimated_age(curve: AgeCurve, value: float, noise: float) -> AgeEstimate:
+def estimate_age(curve: AgeCurve, value: float, noise: float) -> AgeEstimate:
     """Returns the week at which the curve has the value, between those at which it has value ∓ noise.
 
     Where the curve is level the middle of that part is taken. A value beyond an end by more than the noise is outside;
@@ -179,7 +179,7 @@ def leave_one_week_out(weeks: Floats, values: Floats) -> LeftOut:
         curve = age_curve(weeks[~out], values[~out])
         expected = curve.sign * np.interp(week, curve.weeks, curve.values)
         for value in values[out]:
-            errors.append(estimated_age(curve, value, 0.0).week - week)
+            errors.append(estimate_age(curve, value, 0.0).week - week)
             guesses.append(0.5 * (curve.weeks[0] + curve.weeks[-1]) - week)
             differences.append(value - expected)
     return LeftOut(

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .age_curve import AgeCurve, AgeEstimate, age_curve, estimated_age, leave_one_week_out, weights
+from .age_curve import AgeCurve, AgeEstimate, age_curve, estimate_age, leave_one_week_out, weights
 from .age_metrics import BRAIN, comparable_metrics, family
 
 LEAST_WEEKS = 5
@@ -233,7 +233,7 @@ def _ages(
 ) -> Iterator[tuple[str, str, float, float, float, float, float, float, str]]:
     """Yields a row of `age_profile` from metric on, for the metrics and for combinations of them."""
     said = {"younger": f"younger than {ends[0]:g}", "older": f"older than {ends[1]:g}", "": INSIDE}
-    ages = [(c, estimated_age(c.curve, float(measured.get(c.metric, np.nan)), c.noise)) for c in calibrations]
+    ages = [(c, estimate_age(c.curve, float(measured.get(c.metric, np.nan)), c.noise)) for c in calibrations]
     for metric, age in ages:
         flag = NO_SIGNAL if not metric.weight else CLIPPED if age.clipped and not age.outside else said[age.outside]
         flag = FOLLOWED if _is_followed(metric.metric, followed) else NOT_MEASURED if np.isnan(age.week) else flag

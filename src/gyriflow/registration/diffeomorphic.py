@@ -73,7 +73,7 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     """
     began, busy = time.perf_counter(), time.process_time()
     names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
-    turn, start = _started(earlier, later, names)
+    turn, start = _find_start(earlier, later, names)
     images = {f"fixed_{name}": _image(getattr(earlier, name), earlier.affine) for name in names}
     # greedy begins at the identity, so the later brain is handed over where the start puts it
     placed = np.linalg.inv(start) @ later.affine
@@ -122,7 +122,7 @@ def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
     return binary_dilation(brain.tissue & CEREBRUM > 0, iterations=rounds).astype(np.float32)
 
 
-def _started(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
+def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
     """Returns the (3, 3) turn and the (4, 4) similarity, from earlier to later, that registration begins with."""
     (first, size), (second, other_size) = _place(earlier), _place(later)
     scale = (other_size / size) ** (1 / 3)

@@ -95,7 +95,7 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     if rotation is None:
         return None
     by = " and ".join([*found, *(["the labelled sides"] if sides is not None else [])])
-    return _kept_or_turned(rotation, by)
+    return _keep_or_turn(rotation, by)
 
 
 def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
@@ -130,7 +130,7 @@ def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
     return turn.as_matrix() @ rotation, one.confidence, sylvian, ras
 
 
-def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
+def pose_surface_by_shape(mesh: TriangleMesh, coordinates: str) -> BrainPose:
     """Returns the pose of a whole brain's surface, in coordinates that its user names or leaves to "auto".
 
     What the user names is kept, and doubted in a warning where the shape clearly says otherwise. InputError where the
@@ -183,15 +183,15 @@ def _from_hindbrain(found: dict[str, Floats], expected: dict[str, Floats]) -> Fl
     return np.asarray(Rotation.align_vectors(ours, theirs)[0].as_matrix())
 
 
-def _quartered(rotation: Floats) -> Floats:
+def _turn_by_quarters(rotation: Floats) -> Floats:
     """Returns the rotation by quarter turns that is within 15° of a (3, 3) rotation, else the rotation."""
     quarters = Rotation.create_group("O").as_matrix()
     nearest = min(quarters, key=lambda turn: angle_deg(rotation @ turn.T))
     return np.asarray(nearest.round() if angle_deg(rotation @ nearest.T) < QUARTERS_DEG else rotation)
 
 
-def _kept_or_turned(rotation: Floats, by: str) -> BrainPose:
-    rotation = _quartered(rotation)
+def _keep_or_turn(rotation: Floats, by: str) -> BrainPose:
+    rotation = _turn_by_quarters(rotation)
     angle = angle_deg(rotation)
     if angle < LEAST_TURN_DEG:
         return BrainPose(np.eye(3), "file")

@@ -58,7 +58,7 @@ def cerebrum_labels(
     return tissue
 
 
-def tell_of_border(mask: NDArray[np.bool_], report: dict[str, Any]) -> None:
+def report_border(mask: NDArray[np.bool_], report: dict[str, Any]) -> None:
     """Warns where a mask touches the border of its volume: what is beyond it is missing."""
     surface = mask & ~ndimage.binary_erosion(mask, border_value=1)
     ends = [np.moveaxis(mask, axis, 0)[end] for axis in range(3) for end in (0, -1)]
@@ -70,7 +70,7 @@ def tell_of_border(mask: NDArray[np.bool_], report: dict[str, Any]) -> None:
              "lies beyond is missing, and the surface is flat there")  # fmt: skip
 
 
-def tell_of_dropped(topology: dict[str, Any], affine: Floats, volume_mm3: float, report: dict[str, Any]) -> None:
+def report_dropped(topology: dict[str, Any], affine: Floats, volume_mm3: float, report: dict[str, Any]) -> None:
     """Warns where the repair of a mask's topology has dropped parts of a volume."""
     dropped = topology["voxels_dropped"] * float(abs(np.linalg.det(affine[:3, :3])))
     if dropped > TOLD_LOSS * volume_mm3:

@@ -127,12 +127,12 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUA
         )
     one, other = (
         replace(hemisphere, rotation=turn.as_matrix() @ hemisphere.rotation)
-        for hemisphere, turn in zip(hemispheres, _reconciled(one, other, fit), strict=True)
+        for hemisphere, turn in zip(hemispheres, _reconcile(one, other, fit), strict=True)
     )
     return Pair(one, other, fit)
 
 
-def _reconciled(one: Hemisphere, other: Hemisphere, fit: Fit) -> tuple[Rotation, Rotation]:
+def _reconcile(one: Hemisphere, other: Hemisphere, fit: Fit) -> tuple[Rotation, Rotation]:
     """Returns by which rotations both hemispheres are to be turned to lie as the fit and their walls say.
 
     Least squares of three measures: each wall's tilts and the fit, by their errors. Of the pitch the walls say nothing:
@@ -184,7 +184,7 @@ def _near_a_convention(meshes: list[TriangleMesh], hemispheres: list[Hemisphere]
             fit = register(best.outline, Target(reference()), axes)
             nearly = fit.residual < LEAST_CONFIDENCE * best.residual and fit.residual <= WORST_RESIDUAL
             if nearly and angle_deg(fit.rotation @ axes.T) < CONVENTION_DEG:
-                posed.append(_described(mesh, best.outline, fit, best.confidence))
+                posed.append(_describe(mesh, best.outline, fit, best.confidence))
         # the left one is mirrored, so that both are to be right of the middle
         across = [(axes @ hemisphere.outline.centre)[0] for hemisphere in posed]
         if len(posed) == 2 and sum(across) > APART * posed[0].outline.size_mm:
@@ -205,7 +205,7 @@ def _like_others(meshes: list[TriangleMesh], hemispheres: list[Hemisphere], othe
             fit, confidence = register_from_all_sides(best.outline, Target(other.outline))
             if confidence >= LEAST_CONFIDENCE and fit.residual <= WORST_RESIDUAL:
                 turned = Fit(other.rotation @ fit.rotation, fit.shift, fit.residual)
-                posed.append(_described(mesh, best.outline, turned, confidence))
+                posed.append(_describe(mesh, best.outline, turned, confidence))
                 break
     return posed if len(posed) == 2 else []
 
@@ -213,10 +213,10 @@ def _like_others(meshes: list[TriangleMesh], hemispheres: list[Hemisphere], othe
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
     """Returns the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
     shape = outline(mesh)
-    return _described(mesh, shape, *register_from_all_sides(shape, Target(reference())))
+    return _describe(mesh, shape, *register_from_all_sides(shape, Target(reference())))
 
 
-def _described(mesh: TriangleMesh, shape: Outline, fit: Fit, confidence: float) -> Hemisphere:
+def _describe(mesh: TriangleMesh, shape: Outline, fit: Fit, confidence: float) -> Hemisphere:
     """Returns a hemisphere whose fit on the reference is known, its medial wall upright."""
     points = np.asarray((mesh.vertices - shape.centre) / shape.size_mm, dtype=np.float64)
     start = np.asarray(-fit.rotation[0], dtype=np.float64)

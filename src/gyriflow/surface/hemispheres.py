@@ -79,10 +79,10 @@ def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, Triang
 
     The fissure is the plane x = `fissure_x_mm` in RAS+. The parts are open where a connected brain is cut.
     """
-    return parted(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
+    return cut_sides(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
 
 
-def parted(mesh: TriangleMesh, left: NDArray[np.bool_]) -> tuple[TriangleMesh, TriangleMesh]:
+def cut_sides(mesh: TriangleMesh, left: NDArray[np.bool_]) -> tuple[TriangleMesh, TriangleMesh]:
     """Returns the surfaces of the faces where the (m,) mask holds, and of the others.
 
     InputError where one of the two has no face.

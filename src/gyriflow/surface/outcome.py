@@ -36,7 +36,7 @@ class PialSurface:
     report: dict[str, Any]
 
 
-def described(
+def describe(
     whole: TriangleMesh,
     left: TriangleMesh | None,
     right: TriangleMesh | None,

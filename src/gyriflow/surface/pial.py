@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from ..geometry.triangles import TriangleMesh, transformed
 from .even_triangles import make_even
-from .hemispheres import parted, split
+from .hemispheres import cut_sides, split
 from .orientation import MidPlane, upright
-from .outcome import PialSurface, described, faults, require_sound
+from .outcome import PialSurface, describe, faults, require_sound
 from .rebuilding import rebuild
 
 log = logging.getLogger(__name__)
@@ -29,10 +29,10 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
     """
     require_sound(mesh)
     pose = {"pose": np.eye(4).tolist(), "rotation_deg": 0.0}
-    return described(mesh, *split(mesh, 0.0), 0.0, {"source": "shape", **pose}, week)
+    return describe(mesh, *split(mesh, 0.0), 0.0, {"source": "shape", **pose}, week)
 
 
-def even(
+def make_sound(
     mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float, report: dict[str, Any], name: str = "mesh"
 ) -> TriangleMesh:
     """Returns the surface smoothed and remeshed, each piece a sphere that does not cut itself.
@@ -48,7 +48,7 @@ def even(
     return smooth
 
 
-def posed(
+def pose_surface(
     mesh: TriangleMesh,
     is_left: NDArray[np.bool_],
     plane: MidPlane,
@@ -63,7 +63,7 @@ def posed(
     """
     matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
     whole = transformed(mesh, matrix)
-    left, right = parted(whole, is_left)
+    left, right = cut_sides(whole, is_left)
     # where the plane, which may have kept a tilt below half a degree, passes the brain's centre
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
@@ -80,7 +80,7 @@ def posed(
         "fissure_scatter_mm": plane.scatter_mm,
         "asymmetry_mm": plane.asymmetry_mm,
     }
-    return described(whole, left, right, fissure_x, report, week)
+    return describe(whole, left, right, fissure_x, report, week)
 
 
 def motion(rotation: NDArray[np.float64] | None) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh
-from .extraction import EDGE_SLOPE, isosurface, made_simple
+from .extraction import EDGE_SLOPE, isosurface, make_simple
 
 MARGIN_VOXELS = 6
 
@@ -35,7 +35,7 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
     inside = _inside_beyond_band(wound.reshape(shape), band.reshape(shape), mesh, affine)
     signed = np.where(inside, distance.reshape(shape), -distance.reshape(shape))
     field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)
-    field, report = made_simple(field)
+    field, report = make_simple(field)
     return isosurface(field, affine), {"remade_with_voxels_mm": voxel_mm} | report
 
 

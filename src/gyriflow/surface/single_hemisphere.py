@@ -21,7 +21,7 @@ from .hemisphere_pose import (
     SYLVIAN_AHEAD,
     hemisphere_by_shape,
 )
-from .outcome import PialSurface, described
+from .outcome import PialSurface, describe
 from .pial import motion, warn
 
 # the medial wall's distance from the mid-sagittal plane
@@ -95,4 +95,4 @@ def single_hemisphere(
         "sylvian_ahead": shape.sylvian,
     }
     left, right = (whole, None) if mirrored else (None, whole)
-    return described(whole, left, right, fissure_x, report, week)
+    return describe(whole, left, right, fissure_x, report, week)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..geometry.triangles import TriangleMesh, corners, submesh
-from .repair import cleaned
+from .repair import clean
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -94,7 +94,7 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
     at = np.clip(np.rint((corners(mesh).mean(axis=1) - first) / size).astype(int), 0, shape - 1)
     kept = left[tuple(nearest[(slice(None), *at.T)])]
     open_, _ = submesh(mesh, kept)
-    return cleaned(open_, WIDEST_CUT_MM)[0], report
+    return clean(open_, WIDEST_CUT_MM)[0], report
 
 
 def _contact_mm2(one: Mask, other: Mask, size_mm: Floats) -> float:

@@ -76,7 +76,7 @@ def poses(pairs: Sequence[Pair], declared: Sequence[bool]) -> list[Poses]:
     """
     frames = [_frame(pair, named) for pair, named in zip(pairs, declared, strict=True)]
     pitches, places = _pitches(pairs, frames), _places(pairs, frames)
-    return [_posed(*brain) for brain in zip(pairs, frames, declared, pitches, places, strict=True)]
+    return [_make_poses(*brain) for brain in zip(pairs, frames, declared, pitches, places, strict=True)]
 
 
 def as_poses(report: dict[str, Any]) -> Poses:
@@ -97,7 +97,7 @@ def report_placement(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any
     return poses.report | {"matrices": matrices}
 
 
-def _posed(pair: Pair, frame: str | None, declared: bool, pitch: float, place: Floats) -> Poses:
+def _make_poses(pair: Pair, frame: str | None, declared: bool, pitch: float, place: Floats) -> Poses:
     both = {"left": pair.left, "right": pair.right}
     report: dict[str, Any] = {
         "method": "file" if frame else "shape",
@@ -196,7 +196,7 @@ def _pitches(pairs: Sequence[Pair], frames: list[str | None]) -> list[float]:
     unit_rows = np.eye(len(pairs))
     for i, j in combinations(range(len(pairs)), 2):
         if abs(rank[i] - rank[j]) <= NEIGHBOURS:
-            turn, weight = _registered(pairs[i], pairs[j])
+            turn, weight = _register_pair(pairs[i], pairs[j])
             rows.append(weight * (unit_rows[i] - unit_rows[j]))
             values.append(weight * turn)
     for row, pair in zip(unit_rows, pairs, strict=True):
@@ -220,7 +220,7 @@ def _pitch_in_file(pair: Pair, frame: str) -> float:
     )
 
 
-def _registered(one: Pair, other: Pair) -> tuple[float, float]:
+def _register_pair(one: Pair, other: Pair) -> tuple[float, float]:
     """Returns by how much more than the other brain the one is to be pitched to lie alike, and the result's weight."""
     turns, residuals = [], []
     for a, b in ((one.left, other.left), (one.right, other.right)):

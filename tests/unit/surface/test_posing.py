@@ -15,7 +15,7 @@ from gyriflow.io.surfaces import declared, read_surface, write_surface
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface import hemisphere_pose
-from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.surface.from_surfaces import from_hemispheres
 from gyriflow.surface.hemisphere_pose import about_x, pair_by_shape, pitch_deg
 from gyriflow.surface.hemispheres import least_gap
@@ -35,7 +35,7 @@ def halves():
     cerebrum = np.isin(labels, SCHEMES["spina-bifida-atlas"].cerebrum)
     centred = affine.copy()
     centred[:3, 3] -= CENTRE_MM
-    return [isosurface(made_simple(smoothed_mask(cerebrum & side, 1.0))[0], centred) for side in (x < -0.6, x > 0.6)]
+    return [isosurface(make_simple(smooth_mask(cerebrum & side, 1.0))[0], centred) for side in (x < -0.6, x > 0.6)]
 
 
 def rigid(seed):
