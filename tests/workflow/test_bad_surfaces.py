@@ -194,4 +194,4 @@ def test_a_handle_of_each_hemisphere_is_closed_and_reported(study):
     for side in ("left", "right"):
         assert report[f"remade_{side}"]["tunnels_filled"] == 1
         assert report[f"remade_{side}"]["handles_left"] == 0
-    assert sum("made anew through voxels, since it had Euler numbers [0]" in text for text in report["warnings"]) == 2
+    assert sum("rebuilt through voxels, since it had Euler numbers [0]" in text for text in report["warnings"]) == 2

@@ -105,7 +105,7 @@ def tetrahedralise(
 def even_surface(surface: TriangleMesh, edge_mm: float, faces: int | None) -> TriangleMesh:
     """Returns a surface remeshed with even triangles, fit to be the boundary of a mesh as it is.
 
-    Its edges are `edge_mm` long, or such that it has about so many faces. MeshError where it cuts itself.
+    Its edges are `edge_mm` long, or such that it has about the given number of faces. MeshError where it cuts itself.
     """
     even = remesh(surface, edge_mm)
     for _ in range(ATTEMPTS if faces else 0):

@@ -123,10 +123,11 @@ def week_similarity(
 ) -> pd.DataFrame:
     """Returns how similar each brain is to the reference at each of its weeks, between 0 and 1.
 
-    The similarity is the mean of exp(−z²/2) over the metrics that tell the age, families alike, with z the difference
-    from the metric's curve at that week over its noise: the form of FetoMorph's GASP (github.com/SaeedZarzor/FetoMorph,
-    `compute_similarity_scores`, "gaussian"), which has the mean and the standard deviation of many brains of a week in
-    place of curve and noise. Unlike an age, it says when a brain looks like no week at all.
+    The similarity is the mean of exp(−z²/2) over the metrics that predict age, families weighted alike, with z the
+    difference from the metric's curve at that week over its noise: the form of FetoMorph's GASP
+    (github.com/SaeedZarzor/FetoMorph, `compute_similarity_scores`, "gaussian"), which has the mean and the standard
+    deviation of many brains of a week in place of curve and noise. Unlike an age, it says when a brain looks like no
+    week at all.
 
     Parameters
     ----------
@@ -219,7 +220,7 @@ def _calibrations(known: pd.DataFrame) -> list[_Calibration]:
     skills = {metric: leave_one_week_out(weeks, values) for metric, (weeks, values, _) in series.items()}
     weight = pd.Series(weights(list(skills.values())), index=list(skills))
     families = pd.Series([family(metric) for metric in weight.index], index=weight.index)
-    # a family has the mean weight of those of its metrics that tell the age, however many there are
+    # a family has the mean weight of its metrics that predict age, however many there are
     weight /= weight.gt(0).groupby(families).transform("sum").clip(lower=1)
     weight /= weight.sum() or 1.0
     return [

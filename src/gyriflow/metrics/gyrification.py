@@ -20,7 +20,7 @@ ENVELOPE_OFFSET_MM = 0.1
 """Distance at which the envelope is first wrapped round the surface."""
 
 PIECE_MM = 2.0
-"""Size of the pieces that are told apart as lying over the cut or over the pial surface."""
+"""Size of the pieces that are classed as lying over the cut or over the pial surface."""
 
 LOCAL_RADIUS_MM = 10.0
 """Radius of the patches of the local index: two of the widest sulci that the envelope bridges."""

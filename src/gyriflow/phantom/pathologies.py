@@ -61,7 +61,7 @@ def without_callosum(labels: Labels, affine: Floats) -> Labels:
 
 
 def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0) -> Labels:
-    """Returns hemispheres that nothing joins, with a gap of CSF between them."""
+    """Returns unconnected hemispheres, with a gap of CSF between them."""
     x, _, _ = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
     return np.where(np.isin(labels, CEREBRUM) & (np.abs(x) < 0.5 * gap_mm), CSF, made).astype(np.int32)

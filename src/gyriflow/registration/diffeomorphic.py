@@ -69,7 +69,7 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
     cross-correlation for the deformation. It begins where centroids and volumes of the cerebra match, turned by that
     of the cube's rotations which fits clearly better than none. The same input gives the same result. InputError where
-    greedy fails; whether the result is good is for `quality.judge` to say.
+    greedy fails; `quality.judge` says whether the result is good.
     """
     began, busy = time.perf_counter(), time.process_time()
     names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
@@ -117,7 +117,7 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
 
 
 def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
-    """Returns 1 in the cerebrum and near it: what surrounds the brain is not to pull on it."""
+    """Returns 1 in the cerebrum and near it: the surroundings of the brain must not pull on it."""
     rounds = int(np.ceil(NEAR_MM / brain.voxel_mm))
     return binary_dilation(brain.tissue & CEREBRUM > 0, iterations=rounds).astype(np.float32)
 

@@ -1,4 +1,4 @@
-"""What a mesh that was carried over weeks tells: local growth, and the displacement of every vertex."""
+"""Local growth and the displacement of every vertex, from a mesh that was carried over weeks."""
 
 from collections.abc import Sequence
 

@@ -33,7 +33,7 @@ LIMITS = Limits()
 
 @dataclass(frozen=True)
 class Quality:
-    """Numbers that tell how good a registration is.
+    """Measures of how good a registration is.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Where a label volume's cerebrum is: what its labels enclose, and what is told of labels that are lost."""
+"""Where a label volume's cerebrum is: what its labels enclose, and reports of labels that are lost."""
 
 import logging
 from typing import Any
@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
 Labels = NDArray[np.integer]
 
-# cortex at less than this part of the cerebrum's surface is told of
+# cortex at less than this fraction of the cerebrum's surface is reported
 LITTLE_CORTEX = 0.7
 
 

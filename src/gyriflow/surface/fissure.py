@@ -19,9 +19,9 @@ MARGIN_MM = 5.0
 # the mid-surface follows the walls over this distance, and returns to the plane where there are none
 BEND_MM = 4.0
 FURTHEST_MM = 5.0
-# the mid-surface is looked for around the last one so many times, so that it follows a midline that is shifted far
+# how often the mid-surface is searched for around the last one, so that it follows a midline that is shifted far
 FOLLOWED = 4
-# a mid-surface that is this far from its plane is told of
+# a mid-surface that is this far from its plane is reported
 SHIFTED_MM = 5.0
 # a fissure is shown where it is so wide a gap in its own plane: twice this many half millimetres
 SHOWN_CELLS = 8

@@ -80,10 +80,10 @@ def from_labels(
     A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say. The cerebrum's mask is smoothed
     (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an isosurface, which is smoothed, remeshed to
     `edge_length_mm` and turned so that the mid-sagittal plane is x = const, and set outwards by what smoothing took of
-    the volume. Where the scheme tells cortex from the tissue inside and cortex labels of both sides touch, the fissure
-    is opened there to `fissure_mm` (0: left shut). It is half-way between the labels of the two sides where the scheme
-    has them. InputError for labels that don't fit the scheme or the week and for one hemisphere alone, MeshError where
-    the surface stays tangled.
+    the volume. Where the scheme separates cortex from the tissue inside and cortex labels of both sides touch, the
+    fissure is opened there to `fissure_mm` (0: left shut). It is half-way between the labels of the two sides where the
+    scheme has them. InputError for labels that don't fit the scheme or the week and for one hemisphere alone, MeshError
+    where the surface stays tangled.
     """
     report: dict[str, Any] = {"source": "labels", "scheme": scheme.name}
     tissue = cerebrum_labels(labels, affine, scheme, report, LEAST_CORTEX_OUTSIDE)
@@ -196,7 +196,7 @@ def thickness_from_labels(
     Parameters
     ----------
     labels, affine, scheme, smoothing_voxels
-        As for `from_labels`; the scheme has to tell cortex from the tissue inside.
+        As for `from_labels`; the scheme has to separate cortex from the tissue inside.
     surface
         The whole pial surface, posed.
     pose : (4, 4) float
@@ -255,7 +255,7 @@ def _require_both(
     # a part that is left out below, for its size, makes no second hemisphere
     parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
     shape = narrowness(isosurface(smooth_mask(parts, 1.0), affine))
-    # a brain that the field of view cuts off may be as flat, which is told already
+    # a brain that the field of view cuts off may be as flat, which has been reported already
     if shape < NARROWEST_BRAIN and report["border_share"] <= TOLD_LOSS:
         raise InputError(
             "the volume seems to hold one hemisphere only",

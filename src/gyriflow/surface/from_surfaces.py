@@ -46,10 +46,10 @@ def from_hemispheres(
 
     The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
-    other. With coordinates "auto" each may be in any rigid pose; `posing` is then the report of the pose if it is
-    known already, as from all brains of a study. InputError where the pose cannot be told, where they are swapped, of
-    different size or not of the week's size; MeshError where one can't be made a closed surface without handles and
-    intersections.
+    other. With coordinates "auto" each may be in any rigid pose; `posing` is then the report of the pose if it is known
+    already, as from all brains of a study. InputError where the pose cannot be determined, or the hemispheres are
+    swapped, of different size or not of the week's size; MeshError where one can't be made a closed surface without
+    handles and intersections.
     """
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
     left, report["repair_left"] = hemisphere(in_ras(left, coordinates), max_hole_mm, report)
@@ -161,9 +161,9 @@ def from_hemisphere(
 def hemisphere(
     mesh: TriangleMesh, max_hole_mm: float, report: dict[str, Any] | None = None
 ) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Returns the largest piece of a surface, clean and without what hangs on it by stalks, and the repairs.
+    """Returns the largest piece of a surface, repaired and without parts that hang on stalks, and the repairs.
 
-    What was lost of it is told in the warnings of `report`.
+    The warnings of `report` say what was removed.
     """
     said = {} if report is None else report
     mesh, repairs = clean(mesh, max_hole_mm)

@@ -26,17 +26,17 @@ MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 LEAST_CONFIDENCE, WORST_RESIDUAL = 1.1, 0.085
 # two sides of one brain are mirror images as well as this times the asymmetry allowed
 PAIR_RESIDUAL_PER_ASYMMETRY = 3.5
-# a fit of one side on the other is off by about so many degrees per residual, about each axis
+# a fit of one side on the other is off by about this many degrees per residual, about each axis
 ERROR_DEG_PER_RESIDUAL = 50.0
 # beside the shape, poses near these axes of files are likely
 CONVENTIONS = {"ras": np.eye(3), "lps": np.diag([-1.0, -1.0, 1.0])}
 CONVENTION_DEG = 35.0
-# two hemispheres side by side have their centres so far apart, in sizes
+# two hemispheres side by side have their centres this far apart, in sizes
 APART = 0.4
-# so many brains of the study are asked for the pose of a doubtful one
+# how many other brains of the study are consulted for the pose of a doubtful one
 OTHERS = 2
 SIDES = ("left", "right")
-# the Sylvian dent is in front of the middle by so much of the hemisphere's size where it is to be told from the back
+# how far, in sizes of the hemisphere, the Sylvian dent must be in front of the middle for front and back to be clear
 SYLVIAN_AHEAD = 0.05
 
 
@@ -133,10 +133,10 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUA
 
 
 def _reconcile(one: Hemisphere, other: Hemisphere, fit: Fit) -> tuple[Rotation, Rotation]:
-    """Returns by which rotations both hemispheres are to be turned to lie as the fit and their walls say.
+    """Returns the rotations of both hemispheres that agree best with the fit and their medial walls.
 
-    Least squares of three measures: each wall's tilts and the fit, by their errors. Of the pitch the walls say nothing:
-    each hemisphere gets one half-way between what the two say.
+    Least squares of three measures: each wall's tilts and the fit, by their errors. The walls say nothing about the
+    pitch: each hemisphere gets the one half-way between the two.
     """
     apart = Rotation.from_matrix(other.rotation @ fit.rotation @ one.rotation.T).as_rotvec()
     walls = np.array([one.wall_error_deg, other.wall_error_deg]) ** 2
@@ -165,7 +165,7 @@ def _require_clear(hemisphere: Hemisphere, side: str) -> Hemisphere:
     if _is_clear(hemisphere):
         return hemisphere
     raise InputError(
-        f"the pose of the {side} hemisphere cannot be told from its shape",
+        f"the pose of the {side} hemisphere cannot be determined from its shape",
         found=f"a residual of {hemisphere.residual:.3f}, the next best pose {hemisphere.confidence:.2f} times worse",
         expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times; or a pose near RAS or LPS",
         remedy="Is it a cerebral hemisphere's closed pial surface? If so, pose it and set coordinates: ras or lps.",

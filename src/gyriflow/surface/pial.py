@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
-# what is lost beyond this part of a brain is told of
+# a loss beyond this fraction of a brain is reported
 TOLD_LOSS = 0.005
 
 
@@ -37,11 +37,11 @@ def make_sound(
 ) -> TriangleMesh:
     """Returns the surface smoothed and remeshed, each piece a sphere that does not cut itself.
 
-    Where the triangles can't be repaired, the surface is made anew through voxels of half an edge length.
+    Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length.
     """
     smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
     if faults(smooth):
-        warn(report, f"the surface was made anew through voxels, since it had {faults(smooth)}")
+        warn(report, f"the surface was rebuilt through voxels, since it had {faults(smooth)}")
         mesh, report[name.replace("mesh", "remade")] = rebuild(mesh, 0.5 * edge_length_mm)
         smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
     require_sound(smooth)

@@ -1,4 +1,4 @@
-"""A surface made anew through a voxel grid: what is left where repair of the triangles is not enough."""
+"""A surface rebuilt through a voxel grid, for where repair of the triangles is not enough."""
 
 from typing import Any
 
@@ -17,8 +17,8 @@ MARGIN_VOXELS = 6
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the surface of the region that `mesh` winds around, without handles or intersections, and a report.
 
-    The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) tells inside from outside even
-    where the surface cuts itself. Details below the voxel size are lost.
+    The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) separates inside from outside
+    even where the surface cuts itself. Details below the voxel size are lost.
     """
     first = mesh.vertices.min(axis=0) - MARGIN_VOXELS * voxel_mm
     shape = np.ceil(np.ptp(mesh.vertices, axis=0) / voxel_mm).astype(int) + 2 * MARGIN_VOXELS
@@ -40,7 +40,7 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
 
 
 def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> NDArray[np.float64]:
-    """Returns points on the surface, none of its places further than about a voxel from one of them."""
+    """Returns points on the surface, so dense that no place on it is further than about a voxel from one."""
     a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
     longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=-1).max()
     steps = max(int(np.ceil(longest / voxel_mm)), 1)

@@ -18,7 +18,7 @@ KEPT = 0.01
 # beyond this it has taken structures, not rounded them, and moving the whole surface would not bring them back
 MOST_GIVEN_BACK = 0.05
 ROUNDS = 2
-# walls that would cut each other are held back, with their neighbours, so many times
+# how many times walls that would cut each other are held back, with their neighbours
 HELD_BACK = 4
 
 

@@ -23,7 +23,7 @@ def expected_volume_ml(week: float) -> float:
 def require_plausible_size(volume_mm3: float, extents_mm: NDArray[np.float64], week: float) -> None:
     """Raises InputError where a cerebrum's volume is out of all proportion for its week, with a guess of the unit.
 
-    `extents_mm` (3,) is only told. The bounds are wide: a fifth to six times the published volume.
+    `extents_mm` (3,) only appears in the message. The bounds are wide: a fifth to six times the published volume.
     """
     expected = expected_volume_ml(week)
     volume = volume_mm3 * ML_PER_MM3

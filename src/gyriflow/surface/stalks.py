@@ -75,7 +75,7 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
 def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
     """Returns a closed surface without what hangs on it by stalks, closed where these were cut, and the parts."""
     if not SMALLEST_MM < np.ptp(mesh.vertices, axis=0).max() < LARGEST_MM:
-        # in another unit, which is told elsewhere
+        # in another unit, which is reported elsewhere
         return mesh, []
     size = np.full(3, SURFACE_VOXEL_MM)
     first = mesh.vertices.min(axis=0) - 2.0 * size

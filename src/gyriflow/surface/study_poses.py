@@ -27,7 +27,7 @@ COMMON_DEG_PER_RESIDUAL, COMMON_OFFSET, COMMON_DISTANCE = 180.0, 0.08, 0.15
 DECLARED_TURN_DEG = 30.0
 # the medial walls' distance from the mid-sagittal plane where the files do not say it
 BESIDE_MM = 0.5
-# each brain is registered with so many that are smaller and larger
+# how many smaller and larger brains each brain is registered with
 NEIGHBOURS = 4
 # the pitch is known to a degree or two
 PITCH_STEP_DEG = 0.5
@@ -68,11 +68,11 @@ def pairs_by_shape(
 def poses(pairs: Sequence[Pair], declared: Sequence[bool]) -> list[Poses]:
     """Returns the poses of the brains of one study, given what `pair_by_shape` says of each.
 
-    Shape tells each hemisphere's pose but for the pitch, in which brains of different age differ: there they are
-    registered with each other. Where hemispheres share coordinates of which one axis is exactly left-right, and shape
-    says that these are RAS or LPS, they keep the file's pose, and the other brains follow them; else the reference
-    shape's pitch is zero. The mid-sagittal plane is x = 0. For brains where `declared` holds, whose files name their
-    coordinate system, the axis need not be exact.
+    Shape gives each hemisphere's pose except for the pitch, in which brains of different age differ: for the pitch they
+    are registered with each other. Where hemispheres share coordinates of which one axis is exactly left-right, and
+    shape says that these are RAS or LPS, they keep the file's pose, and the other brains follow them; else the
+    reference shape's pitch is zero. The mid-sagittal plane is x = 0. For brains where `declared` holds, whose files
+    name their coordinate system, the axis need not be exact.
     """
     frames = [_frame(pair, named) for pair, named in zip(pairs, declared, strict=True)]
     pitches, places = _pitches(pairs, frames), _places(pairs, frames)
@@ -111,7 +111,7 @@ def _make_poses(pair: Pair, frame: str | None, declared: bool, pitch: float, pla
     }
     if np.mean(list(report["sylvian_ahead"].values())) < SYLVIAN_AHEAD:
         report["warnings"].append(
-            "left and right are what the configuration says: the shapes do not tell whether the files are swapped"
+            "left and right are taken from the configuration: the shapes do not show whether the files are swapped"
         )
     if frame:
         motion = np.eye(4)
@@ -221,7 +221,7 @@ def _pitch_in_file(pair: Pair, frame: str) -> float:
 
 
 def _register_pair(one: Pair, other: Pair) -> tuple[float, float]:
-    """Returns by how much more than the other brain the one is to be pitched to lie alike, and the result's weight."""
+    """Returns the pitch of one brain beyond the other's with which they lie alike, and the result's weight."""
     turns, residuals = [], []
     for a, b in ((one.left, other.left), (one.right, other.right)):
         fit = register(a.outline, Target(b.outline), b.rotation.T @ a.rotation)

@@ -95,7 +95,7 @@ def test_a_shape_without_a_pose_is_refused():
     # neither front nor back, up nor down, and its axes are no file's
     ball = trimesh.creation.icosphere(subdivisions=4)
     mesh = transformed(TriangleMesh(ball.vertices * [24, 33, 22], ball.faces), turned((50, 40, 30)))
-    with pytest.raises(InputError, match="cannot be told from its shape"):
+    with pytest.raises(InputError, match="cannot be determined from its shape"):
         pose_surface_by_shape(mesh, "auto")
 
 
