@@ -23,7 +23,7 @@ from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.metrics.curvature import curvature
 from gyriflow.registration.carrying import carry_over_weeks
-from gyriflow.surface.pial import from_labels
+from gyriflow.surface.from_labels import from_labels
 from gyriflow.validation.nulls import spin_test
 from gyriflow.validation.shapes import Shape, ready
 from gyriflow.validation.tables import Comparison, ordered, validation_row
