@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from sklearn.isotonic import IsotonicRegression
 
-from gyriflow.metrics.age_curve import AgeCurve, age_curve, estimated_age
+from gyriflow.metrics.age_curve import AgeCurve, age_curve, estimate_age
 
 WEEKS = np.arange(21.0, 30.0)
 SHAPES: dict[str, Callable] = {
@@ -65,7 +65,7 @@ def main() -> None:
                     curve = fit(WEEKS, metric(WEEKS) + noise * random.standard_normal(len(WEEKS)))
                     for week in WEEKS[1:-1]:
                         value = float(metric(week) + noise * random.standard_normal())
-                        errors[shape].append(estimated_age(curve, value, 0.0).week - week)
+                        errors[shape].append(estimate_age(curve, value, 0.0).week - week)
         every = np.concatenate(list(errors.values()))
         result[name] = {
             "error_gw": round(float(np.sqrt(np.mean(every**2))), 3),

@@ -16,7 +16,7 @@ import numpy as np
 from curvature_estimators import ESTIMATORS, gyriflow
 from curved_surfaces import Ellipsoid, Folded, Torus, meshed, noisy
 
-from gyriflow.geometry.remeshing import remeshed
+from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import Floats, TriangleMesh, mean_edge_length, vertex_areas
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import Curvature, curvature
@@ -196,7 +196,7 @@ def real_table(surface: TriangleMesh) -> list[str]:
         "",
     ]
     lines += heading("mean edge", ["vertices", "shape index", "curvedness (1/mm)", "sulcal share"])
-    for mesh in (surface, *(remeshed(surface, edge) for edge in REAL_EDGES_MM)):
+    for mesh in (surface, *(remesh(surface, edge) for edge in REAL_EDGES_MM)):
         found, weights = curvature(mesh), vertex_areas(mesh)
         means = [np.average(values, weights=weights) for values in (found.shape_index, found.curvedness)]
         values = [*means, np.average(found.shape_index < 0, weights=weights)]

@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from gyriflow.geometry.remeshing import remeshed
+from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import TriangleMesh, unit, vertex_normals
 
 Floats = NDArray[np.float64]
@@ -118,7 +118,7 @@ def meshed(surface: Surface, edge_length_mm: float) -> TriangleMesh:
     mesh = surface.start()
     mesh = TriangleMesh(surface.projected(mesh.vertices), mesh.faces)
     for _ in range(2):
-        mesh = remeshed(mesh, edge_length_mm)
+        mesh = remesh(mesh, edge_length_mm)
         mesh = TriangleMesh(surface.projected(mesh.vertices), mesh.faces)
     return mesh
 

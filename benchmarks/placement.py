@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 from registration import POPULATIONS, SCHEME
 
-from gyriflow.geometry.matching import matched, values_at
+from gyriflow.geometry.matching import match_points, values_at
 from gyriflow.geometry.triangles import TriangleMesh, area, signed_volume, transformed, vertex_normals
 from gyriflow.io.registrations import read_deformation
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.metrics.curvature import curvature
-from gyriflow.registration.carrying import over_weeks
-from gyriflow.surface.pial import from_labels
+from gyriflow.registration.carrying import carry_over_weeks
+from gyriflow.surface.from_labels import from_labels
 from gyriflow.validation.nulls import spin_test
 from gyriflow.validation.shapes import Shape, ready
 from gyriflow.validation.tables import Comparison, ordered, validation_row
@@ -61,7 +61,7 @@ def main() -> None:
         surfaces = {week: pial(arguments, population, week) for week in weeks}
         files = [arguments.deformations / f"{population}-{week}-{week + 1}.h5" for week in weeks[:-1]]
         start = surfaces[weeks[0]]
-        positions = over_weeks(start.vertices, [read_deformation(file)[0] for file in files])
+        positions = carry_over_weeks(start.vertices, [read_deformation(file)[0] for file in files])
         own = []
         for number, week in enumerate(weeks[1:], start=1):
             began = time.perf_counter()
@@ -79,7 +79,7 @@ def main() -> None:
                 real=real,
                 **shapes,
             )
-            match = matched(real.mesh.vertices, vertex_normals(real.mesh), shapes["run"].mesh)
+            match = match_points(real.mesh.vertices, vertex_normals(real.mesh), shapes["run"].mesh)
             spin = spin_test(
                 real.mesh.vertices,
                 real.areas,

@@ -17,16 +17,16 @@ import numpy as np
 import pandas as pd
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.deformations import moved
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, connected_parts, grid, volumes_between
 from gyriflow.io.registrations import read_deformation, write_deformation
 from gyriflow.io.volumes import read_label_volume, read_values
-from gyriflow.registration.carrying import over_weeks
+from gyriflow.registration.carrying import carry_over_weeks
 from gyriflow.registration.channels import Channels, channels
 from gyriflow.registration.diffeomorphic import register
 from gyriflow.registration.growth import local_growth, weekly_displacements
-from gyriflow.registration.quality import judged, require_good
+from gyriflow.registration.quality import judge, require_good
 from gyriflow.surface.labels import SCHEMES
 
 POPULATIONS = {
@@ -60,7 +60,7 @@ def solid(brain: Channels) -> TetrahedralMesh:
     ends = [brain.affine[axis, 3] + np.array([0, n - 1]) * brain.voxel_mm for axis, n in enumerate(brain.tissue.shape)]
     cubes = grid([np.arange(low, high, TETS_MM) for low, high in ends])
     centres = cubes.vertices[cubes.tets].mean(axis=1)
-    index = np.rint(moved(centres, np.linalg.inv(brain.affine))).astype(int)
+    index = np.rint(transform_points(centres, np.linalg.inv(brain.affine))).astype(int)
     tets = cubes.tets[brain.tissue[tuple(index.T)] > 0]
     used, numbers = np.unique(tets, return_inverse=True)
     mesh = TetrahedralMesh(cubes.vertices[used], numbers.reshape(-1, 4))
@@ -80,7 +80,7 @@ def main() -> None:
             path = arguments.out / f"{population}-{first}-{second}.h5"
             if not path.exists():
                 found = register(brains[first], brains[second], threads=arguments.threads)
-                quality = judged(brains[first], brains[second], found.deformation)
+                quality = judge(brains[first], brains[second], found.deformation)
                 times = {"seconds": found.seconds, "cpu_seconds": found.cpu_seconds}
                 report = {**times, "channels": list(found.channels), **asdict(quality)}
                 try:
@@ -94,7 +94,7 @@ def main() -> None:
             pairs.append({"population": population, "from": first, "to": second, **report})
             print(json.dumps(pairs[-1]), flush=True)
         mesh = solid(brains[weeks[0]])
-        positions = over_weeks(mesh.vertices, deformations)
+        positions = carry_over_weeks(mesh.vertices, deformations)
         volumes = np.stack([volumes_between(position, mesh.tets) for position in positions])
         sizes = vertex_sizes(mesh.vertices, mesh.tets)
         for sigma in SIGMAS_MM:

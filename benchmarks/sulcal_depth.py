@@ -27,7 +27,7 @@ import trimesh
 from gyriflow.geometry.triangles import Floats, TriangleMesh, vertex_areas
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.depth import convex_hull, sulcal_depth
-from gyriflow.metrics.gyrification import capped, envelope
+from gyriflow.metrics.gyrification import cap, envelope
 
 DEPTH_MM = 8.0
 SEMI_AXES_MM = np.array([30.0, 22.0, 18.0])
@@ -138,7 +138,7 @@ def mean_depths(measure: Callable[[TriangleMesh], Floats], surfaces: list[str]) 
     for path in surfaces:
         mesh = read_surface(path)
         # the caps' centres come last and have no part in the mean
-        depth = measure(capped(mesh))[: len(mesh.vertices)]
+        depth = measure(cap(mesh))[: len(mesh.vertices)]
         means.append(round(float(np.average(depth, weights=vertex_areas(mesh))), 2))
     return means
 

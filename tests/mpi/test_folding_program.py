@@ -29,7 +29,7 @@ from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_cell_field, read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
-from gyriflow.mesh.curving import curved
+from gyriflow.mesh.curving import curve_edges
 from gyriflow.parameters.reading import parameters_from
 
 pytestmark = pytest.mark.slow
@@ -112,7 +112,7 @@ def curved_brain(path):
     """Writes an ellipsoid of quadratic elements that follow it."""
     ball = icosphere(subdivisions=4)
     surface = TriangleMesh(ball.vertices * [20.0, 26.0, 18.0], ball.faces)
-    write_tetrahedral_mesh(path, curved(ellipsoid_mesh(4, (20.0, 26.0, 18.0)), surface))
+    write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, (20.0, 26.0, 18.0)), surface))
     return path
 
 

@@ -14,7 +14,7 @@ from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface
 from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, made_simple, shifted_affine, smoothed_mask
+from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 from gyriflow.surface.repair import pieces
 
 from .conftest import Workflow
@@ -34,7 +34,7 @@ def motion(*degrees, shift=(0.0, 0.0, 0.0)):
 
 def surface_of(labels):
     mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
-    return isosurface(made_simple(smoothed_mask(mask, 1.0))[0], shifted_affine(AFFINE, np.full(3, -4)))
+    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(AFFINE, np.full(3, -4)))
 
 
 LEFT, RIGHT = sorted(pieces(surface_of(APART)), key=lambda piece: piece.vertices[:, 0].mean())
@@ -52,7 +52,7 @@ def with_polyp(mesh):
     affine = np.diag([0.4, 0.4, 0.4, 1.0])
     lowest = mesh.vertices[mesh.vertices[:, 2].argmin()]
     affine[:3, 3] = lowest - [8.0, 8.0, 18.0]
-    polyp = isosurface(smoothed_mask((ball | stalk).reshape(40, 40, 60), 1.0), affine)
+    polyp = isosurface(smooth_mask((ball | stalk).reshape(40, 40, 60), 1.0), affine)
     body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     part = pv.PolyData.from_regular_faces(np.array(polyp.vertices), np.array(polyp.faces, dtype=int))
     both = body.boolean_union(part).triangulate().clean()
@@ -115,12 +115,12 @@ GOOD = {
     "holoprosencephaly": labelled(pathologies.holoprosencephaly),
     "wide": labelled(lambda labels, affine: pathologies.wide_hemisphere(labels, affine, ventricle=True)),
     "hypoplasia": labelled(
-        lambda labels, affine: pathologies.sided(pathologies.small_hemisphere(labels, affine), affine), "dhcp-19"
+        lambda labels, affine: pathologies.add_sides(pathologies.small_hemisphere(labels, affine), affine), "dhcp-19"
     ),
     "shifted": labelled(pathologies.shifted_midline),
-    "cropped": labelled(pathologies.cropped),
+    "cropped": labelled(pathologies.crop),
     "upside_down": labelled(turn=motion(180, 0, 0)),
-    "backwards": labelled(pathologies.sided, "dhcp-19", motion(0, 0, 180)),
+    "backwards": labelled(pathologies.add_sides, "dhcp-19", motion(0, 0, 180)),
     "pial_backwards": whole(transformed(merged(LEFT, RIGHT), motion(0, 0, 180))),
     "pial_vtk": whole(with_polyp(surface_of(LABELS)), "vtk"),
     "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
@@ -131,7 +131,7 @@ BAD = {
     "small_half": (labelled(pathologies.small_hemisphere), "the volume seems to hold one hemisphere only"),
     "pial_half": (whole(LEFT), "the surface seems to be one hemisphere only"),
     "mirrored": (
-        labelled(pathologies.sided, "dhcp-19", np.diag([-1.0, 1, 1, 1])),
+        labelled(pathologies.add_sides, "dhcp-19", np.diag([-1.0, 1, 1, 1])),
         "labels of the left hemisphere lie on the right",
     ),
     "unit": (unit_of_no_meaning, "has a unit of length that NIfTI does not know; found xyzt_units 5"),

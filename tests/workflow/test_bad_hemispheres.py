@@ -9,7 +9,7 @@ from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 
 from .conftest import Workflow
 
@@ -108,7 +108,7 @@ def halves():
     x = affine[0, 2] * np.arange(labels.shape[2]) + affine[0, 3] - CENTRE_MM[0]
     affine[:3, 3] -= CENTRE_MM
     masks = [np.isin(labels, (1, 2, 5, 6, 8)) & side for side in (x < -0.6, x > 0.6)]
-    return [isosurface(made_simple(smoothed_mask(mask, 1.0))[0], affine) for mask in masks]
+    return [isosurface(make_simple(smooth_mask(mask, 1.0))[0], affine) for mask in masks]
 
 
 def test_hemispheres_in_any_pose_are_posed_and_a_swapped_pair_alone_is_refused(workflow):

@@ -7,11 +7,11 @@ import pytest
 import trimesh
 from shapes import HALF_AXES, hemisphere, save_gifti
 
+from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface
-from gyriflow.surface.extraction import isosurface, smoothed_mask
-from gyriflow.surface.remeshing import self_intersecting_faces
+from gyriflow.surface.extraction import isosurface, smooth_mask
 from gyriflow.surface.repair import pieces
 
 from .conftest import Workflow
@@ -77,7 +77,7 @@ def pierced(side):
     mask &= np.hypot(place[..., 0], place[..., 1]) > 2.0
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = [12.5 * side, 0.0, 0.0] - middle * voxel_mm
-    return isosurface(smoothed_mask(mask, 0.7), affine)
+    return isosurface(smooth_mask(mask, 0.7), affine)
 
 
 # brains that are mended
@@ -194,4 +194,4 @@ def test_a_handle_of_each_hemisphere_is_closed_and_reported(study):
     for side in ("left", "right"):
         assert report[f"remade_{side}"]["tunnels_filled"] == 1
         assert report[f"remade_{side}"]["handles_left"] == 0
-    assert sum("made anew through voxels, since it had Euler numbers [0]" in text for text in report["warnings"]) == 2
+    assert sum("rebuilt through voxels, since it had Euler numbers [0]" in text for text in report["warnings"]) == 2

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from gyriflow.geometry.deformations import moved
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import linear_pieces
 from gyriflow.io.files import read_json
 from gyriflow.io.registrations import CarriedMesh, read_deformation, write_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.registration.carrying import over_weeks
+from gyriflow.registration.carrying import carry_over_weeks
 from gyriflow.registration.growth import local_growth
 from gyriflow.step import step
 
@@ -16,8 +16,8 @@ with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
     pose = np.array(read_json(files.report)["pose"])
     # the labels' world, in which brains were registered, is not the pose of the mesh
-    start = moved(mesh.vertices, np.linalg.inv(pose))
-    positions = over_weeks(start, [read_deformation(path)[0] for path in files.registrations])
+    start = transform_points(mesh.vertices, np.linalg.inv(pose))
+    positions = carry_over_weeks(start, [read_deformation(path)[0] for path in files.registrations])
     growth = {
         length: {"volume": local_growth(positions, linear_pieces(mesh), params.weeks, length)}
         for length in params.smoothing_mm

@@ -9,7 +9,7 @@ from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
 from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
+from gyriflow.mesh.maps import move_nearest, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
 from gyriflow.step import step
 from gyriflow.surface.from_surfaces import LPS_TO_RAS
 
@@ -23,7 +23,7 @@ with step(snakemake.log[0]):
         path = ", ".join(source["map"])
         if source["surface"]:
             surface, values = read_surface_maps(source["map"], source["surface"])
-            surface = placed(mesh.vertices[np.unique(facets)], surface, poses)
+            surface = move_nearest(mesh.vertices[np.unique(facets)], surface, poses)
             maps[name] = vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
         else:
             volume, motion = read_volume_map(path, reading["affine_from"]), volume_pose(report, path)

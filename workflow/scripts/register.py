@@ -7,7 +7,7 @@ from gyriflow.io.volumes import read_label_volume, read_values
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.registration.channels import channels
 from gyriflow.registration.diffeomorphic import register
-from gyriflow.registration.quality import judged, require_good
+from gyriflow.registration.quality import judge, require_good
 from gyriflow.step import step
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
@@ -21,7 +21,7 @@ with step(snakemake.log[0], files.earlier, files.later):
             channels(volume.labels, volume.affine, cerebrum=scheme.cerebrum, cortex=scheme.cortex, image=intensity)
         )
     found = register(*brains, threads=snakemake.threads)
-    quality = judged(*brains, found.deformation)
+    quality = judge(*brains, found.deformation)
     require_good(quality, pair=f"{names.earlier} to {names.later}")
     report = {"seconds": found.seconds, "channels": list(found.channels), "turned_deg": found.turned_deg}
     write_deformation(snakemake.output[0], found.deformation, report | asdict(quality))

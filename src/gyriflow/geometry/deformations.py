@@ -37,30 +37,30 @@ class Deformation:
             raise ValueError(f"expected an (i, j, k, 3) displacement, found shape {self.displacement.shape}")
 
 
-def moved(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
+def transform_points(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
     """Returns (n, 3) points under a (4, 4) affine map."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
 
 
 def displacement_at(deformation: Deformation, points: Floats) -> Floats:
     """Returns the (n, 3) displacement u in mm at points in mm."""
-    index = moved(points, np.linalg.inv(deformation.affine)).T
+    index = transform_points(points, np.linalg.inv(deformation.affine)).T
     parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
     return np.stack(parts, axis=1).astype(np.float64)
 
 
-def carried(deformation: Deformation, points: Floats) -> Floats:
+def carry(deformation: Deformation, points: Floats) -> Floats:
     """Returns where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
-    return moved(points + displacement_at(deformation, points), deformation.matrix)
+    return transform_points(points + displacement_at(deformation, points), deformation.matrix)
 
 
-def carried_back(deformation: Deformation, points: Floats) -> Floats:
+def carry_back(deformation: Deformation, points: Floats) -> Floats:
     """Returns which (n, 3) points of the first brain come to lie at given points of the second, in mm.
 
     By fixed-point iteration p ← A⁻¹(q) − u(p), which halves its steps where they grow (Chen et al. 2008, doi
     10.1118/1.2816107). Where the map folds there is no inverse, and the nearest approach found is returned.
     """
-    aim = moved(points, np.linalg.inv(deformation.matrix))
+    aim = transform_points(points, np.linalg.inv(deformation.matrix))
     found = aim.copy()
     left = np.full(len(aim), np.inf)
     share = np.ones(len(aim))

@@ -26,7 +26,7 @@ def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
     return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
 
 
-def diffused(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:
+def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:
     """Returns (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
 
     Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2. The integral of
@@ -56,7 +56,9 @@ def diffused(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma
     return np.stack(smooth, axis=1).reshape(values.shape)
 
 
-def harmonic(vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats) -> Floats:
+def continue_harmonically(
+    vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats
+) -> Floats:
     """Returns (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
     stiffness = _stiffness(vertices, cells)
     unknown = np.setdiff1d(np.unique(cells), known)

@@ -25,7 +25,7 @@ POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(power
 SLOPES = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 """Gradients of the barycentric coordinates in the regular element."""
 DEPTH = 3
-"""How often an element that the bounds leave open is parted."""
+"""How often an element that the bounds leave undecided is subdivided."""
 CHUNK = 4096
 """Elements at a time, which the processor's cache holds."""
 
@@ -91,7 +91,7 @@ def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
     """Returns for (m, 10) elements a number that the determinant of the map is nowhere below.
 
     It is positive only where the element is folded over nowhere. Elements for which it might be so, though the
-    coefficients do not show it, are parted up to three times; a smaller part's bounds are closer.
+    coefficients do not show it, are subdivided up to three times; a smaller part's bounds are closer.
     """
     found = coefficients(vertices, tets)
     bounds = found.min(axis=1)

@@ -37,7 +37,7 @@ class Match:
     agrees: NDArray[np.bool_]
 
 
-def matched(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
+def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
     """Returns for (n, 3) points with unit normals the nearest points of a surface whose normal agrees.
 
     That is the nearest point of all where the face there agrees; else the nearest of the 256 nearest vertices that

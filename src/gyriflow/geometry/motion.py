@@ -4,6 +4,7 @@ import igl
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .alignment import step_towards_planes
 from .triangles import Floats, TriangleMesh, face_normals
 
 POINTS = 4000
@@ -27,7 +28,7 @@ def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floa
     return np.asarray(second @ motion[:3, :3].T + motion[:3, 3] - first)
 
 
-def fitted_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
+def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
     """Returns the (4, 4) rigid motion of a surface onto another in nearly the same pose, by iterative closest points.
 
     Each round moves points of both surfaces towards the planes of their nearest faces on the other one (Chen and
@@ -44,12 +45,8 @@ def fitted_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         places = np.concatenate([there, back @ rotation.T + shift])
         ahead = np.concatenate([on, others]) - places
         facing = np.concatenate([other_normals[face], normals[back_face] @ rotation.T])
-        centre = places.mean(axis=0)
-        rows = np.hstack([np.cross(places - centre, facing), facing])
-        pull = np.einsum("ij,ij->i", ahead, facing)
-        turn, move = np.split(np.linalg.lstsq(rows, pull, rcond=1e-6)[0], 2)
-        step = Rotation.from_rotvec(turn).as_matrix()
-        motion = _motion(step, centre + move - step @ centre) @ motion
+        step = step_towards_planes(places, facing, np.einsum("ij,ij->i", ahead, facing))
+        motion = _motion(*step) @ motion
         if np.linalg.norm(points @ motion[:3, :3].T + motion[:3, 3] - there, axis=1).max() < CONVERGED_MM:
             break
     return motion

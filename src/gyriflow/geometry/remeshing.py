@@ -17,7 +17,7 @@ def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
     return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
 
 
-def remeshed(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
+def remesh(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
     """Returns the surface with triangles close to equilateral, edges of about `edge_length_mm`."""
     document = in_meshlab(mesh)
     document.meshing_isotropic_explicit_remeshing(
@@ -26,7 +26,7 @@ def remeshed(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
     return from_meshlab(document)
 
 
-def untangled(mesh: TriangleMesh) -> TriangleMesh:
+def untangle(mesh: TriangleMesh) -> TriangleMesh:
     """Returns the surface with places that cut each other relaxed (Laplacian smoothing of these places alone).
 
     The number of vertices and the topology stay; each round takes in a wider neighbourhood.

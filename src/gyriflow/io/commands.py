@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 
-from gyriflow.errors import InputError
-from gyriflow.io.files import AnyPath
+from ..errors import InputError
+from .files import AnyPath
 
 log = logging.getLogger(__name__)
 

@@ -15,8 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from gyriflow.errors import StorageError
-from gyriflow.io.files import AnyPath
+from ..errors import StorageError
+from .files import AnyPath
 
 if TYPE_CHECKING:
     import requests

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from gyriflow.errors import InputError, StorageError
+from ..errors import InputError, StorageError
 
 AnyPath = str | PathLike[str]
 

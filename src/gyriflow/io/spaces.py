@@ -10,8 +10,8 @@ import numpy as np
 from nibabel.freesurfer.io import read_geometry
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.io.files import AnyPath
+from ..errors import InputError
+from .files import AnyPath
 
 log = logging.getLogger(__name__)
 
@@ -56,9 +56,9 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
     """Returns the (4, 4) matrix that brings coordinates to scanner space, and the space they are in then.
 
     A rigid matrix into scanner or aligned space is applied. None is where the coordinates are in one of these already.
-    Those that lead to Talairach or MNI space are not, since these have other sizes; each that is not applied is told
-    of. The space is None where the file does not say it. InputError for matrices into scanner space that change sizes,
-    and for coordinates in Talairach or MNI space that a matrix leads out of.
+    Those that lead to Talairach or MNI space are not, since these have other sizes; each that is not applied is logged.
+    The space is None where the file does not say it. InputError for matrices into scanner space that change sizes, and
+    for coordinates in Talairach or MNI space that a matrix leads out of.
     """
     nothing = np.eye(4)
     moving = [system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)]
@@ -101,8 +101,8 @@ def freesurfer_space(path: AnyPath) -> str | None:
 def read_freesurfer_surface(path: AnyPath) -> tuple[Floats, NDArray[np.int64]]:
     """Returns vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, in scanner space.
 
-    Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry stands at the end of the file.
-    Where it is not there, they stay relative to it, and that is told. InputError where it is no such file.
+    Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file.
+    Without it they stay relative to that centre, and a warning says so. InputError for any other kind of file.
     """
     vertices, faces, matrix = _volume(path)
     if matrix is None:
@@ -115,7 +115,7 @@ def _volume(path: AnyPath) -> tuple[Floats, NDArray[np.int64], Floats | None]:
     """Returns vertices, faces and the (4, 4) matrix to scanner space, or None where the file does not say it."""
     try:
         with warnings.catch_warnings():
-            # of what is not there, which is told below
+            # about missing geometry, which is reported below
             warnings.simplefilter("ignore", UserWarning)
             vertices, faces, info = read_geometry(str(path), read_metadata=True)
     except FileNotFoundError as error:

@@ -14,10 +14,10 @@ from nibabel.filebasedimages import ImageFileError
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, is_closed
-from gyriflow.io.files import AnyPath, replaced
-from gyriflow.io.spaces import coordinate_systems, freesurfer_space, read_freesurfer_surface, to_scanner_space
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, is_closed
+from .files import AnyPath, replaced
+from .spaces import coordinate_systems, freesurfer_space, read_freesurfer_surface, to_scanner_space
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 MESH_SUFFIXES = (".stl", ".ply", ".obj")

@@ -11,8 +11,8 @@ from nibabel.filebasedimages import ImageFileError
 from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.io.files import AnyPath, replaced
+from ..errors import InputError
+from .files import AnyPath, replaced
 
 log = logging.getLogger(__name__)
 

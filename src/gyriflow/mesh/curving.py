@@ -36,7 +36,7 @@ WORSE = 0.5
 """Part of its radius ratio that an element keeps at least when its corners move."""
 
 
-def curved(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
+def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
     """Returns a linear mesh as quadratic elements whose outer nodes lie on a smooth surface where they can.
 
     Corners move first, with straight sides; then the nodes on the middles of outer edges leave their chords. Where
@@ -49,16 +49,16 @@ def curved(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
     surface
         The smooth surface, closed and outward, near to that of the mesh; both in mm.
     """
-    corners = _settled(mesh, surface)
+    corners = _settle(mesh, surface)
     straight = quadratic(corners)
-    target, way = _projected(straight, surface)
+    target, way = _project(straight, surface)
     middles = way & (np.arange(len(way)) >= len(mesh.vertices))
 
     def unsound(placed: TetrahedralMesh) -> Mask:
         values = coefficients(placed.vertices, placed.tets)
         return np.asarray(values.min(axis=1) < SOUND * values.mean(axis=1))
 
-    result, left = _moved(straight, target, middles, unsound)
+    result, left = _move(straight, target, middles, unsound)
     log.info(
         "quadratic elements: %d of %d nodes on middles of outer edges on the surface, least ratio of Jacobians %.2f",
         int(left.sum()),
@@ -68,18 +68,18 @@ def curved(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
     return result
 
 
-def _settled(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
+def _settle(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
     """Returns the linear mesh with its outer corners on the surface where their elements stay sound."""
-    target, way = _projected(mesh, surface)
+    target, way = _project(mesh, surface)
     before = radius_ratios(mesh)
 
     def unsound(placed: TetrahedralMesh) -> Mask:
         return np.asarray((signed_volumes(placed) <= 0) | (radius_ratios(placed) < WORSE * before))
 
-    return _moved(mesh, target, way, unsound)[0]
+    return _move(mesh, target, way, unsound)[0]
 
 
-def _projected(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask]:
+def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask]:
     """Returns the (n, 3) places to which nodes are to go, and which of them have one: outer nodes near the surface."""
     own, outer = boundary_surface(mesh)
     squared, face, place = igl.point_mesh_squared_distance(
@@ -97,7 +97,7 @@ def _projected(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Ma
     return target, way
 
 
-def _moved(
+def _move(
     mesh: TetrahedralMesh, target: Floats, way: Mask, unsound: Callable[[TetrahedralMesh], Mask]
 ) -> tuple[TetrahedralMesh, Mask]:
     """Returns the mesh with its nodes as far on their way as its elements and faces allow, and which nodes moved."""

@@ -23,7 +23,7 @@ STEPS = (0.05, 0.4, 0.1, 0.2)
 DIRECTIONS = unit(np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)]))
 
 
-def improved(mesh: TetrahedralMesh) -> TetrahedralMesh:
+def improve(mesh: TetrahedralMesh) -> TetrahedralMesh:
     """Returns the mesh with inner vertices of poor elements moved, each to the best of some places around it.
 
     The worst radius ratio around a vertex never falls. In a round no two vertices of one element move; those of the

@@ -161,7 +161,7 @@ def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> No
         )
 
 
-def placed(points: Floats, surface: TriangleMesh, matrices: Sequence[ArrayLike]) -> TriangleMesh:
+def move_nearest(points: Floats, surface: TriangleMesh, matrices: Sequence[ArrayLike]) -> TriangleMesh:
     """Returns the surface moved by that of the (4, 4) matrices which brings it nearest to (k, 3) points on average."""
     moved = [transformed(surface, matrix) for matrix in matrices]
     return min(moved, key=lambda candidate: _nearest_points(points, candidate)[0].mean())

@@ -12,7 +12,7 @@ FACE_AREA = np.sqrt(3) / 4
 
 
 def edge_length_for(surface: TriangleMesh, faces: int) -> float:
-    """Returns the edge length in mm with which equilateral triangles on a surface are so many."""
+    """Returns the edge length in mm of equilateral triangles that cover a surface in a given number."""
     return float(np.sqrt(area(surface) / (FACE_AREA * faces)))
 
 

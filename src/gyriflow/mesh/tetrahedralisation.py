@@ -7,12 +7,12 @@ import numpy as np
 
 from ..errors import MeshError
 from ..geometry.crossings import crossing_faces
-from ..geometry.remeshing import remeshed, untangled
+from ..geometry.remeshing import remesh, untangle
 from ..geometry.tetrahedra import PIECES_OF_ORDER, TetrahedralMesh, boundary_surface, signed_volumes
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
 from ..parameters.terms import Mesher
-from .curving import curved
-from .improvement import improved
+from .curving import curve_edges
+from .improvement import improve
 from .meshers import run_mesher
 from .sizing import background_mesh, edge_length_for
 
@@ -98,23 +98,23 @@ def tetrahedralise(
     mesh = run_mesher(mesher, arrays, time_limit_s)
     _refuse_other_shape(mesh, surface)
     # fTetWild has optimised its elements itself
-    mesh = improved(mesh) if mesher == "tetgen" else mesh
-    return curved(mesh, surface) if order == 2 else mesh
+    mesh = improve(mesh) if mesher == "tetgen" else mesh
+    return curve_edges(mesh, surface) if order == 2 else mesh
 
 
 def even_surface(surface: TriangleMesh, edge_mm: float, faces: int | None) -> TriangleMesh:
     """Returns a surface remeshed with even triangles, fit to be the boundary of a mesh as it is.
 
-    Its edges are `edge_mm` long, or such that it has about so many faces. MeshError where it cuts itself.
+    Its edges are `edge_mm` long, or such that it has about the given number of faces. MeshError where it cuts itself.
     """
-    even = remeshed(surface, edge_mm)
+    even = remesh(surface, edge_mm)
     for _ in range(ATTEMPTS if faces else 0):
         if abs(len(even.faces) - faces) <= NEAR * faces:  # type: ignore[operator]
             break
         edge_mm *= float(np.sqrt(len(even.faces) / faces))  # type: ignore[operator]
-        even = remeshed(surface, edge_mm)
+        even = remesh(surface, edge_mm)
     if crossing_faces(even):
-        even = untangled(even)
+        even = untangle(even)
     crossing = crossing_faces(even)
     log.info("surface remeshed to %d faces, edges of %.3f mm, %d faces cross", len(even.faces), edge_mm, crossing)
     if crossing:

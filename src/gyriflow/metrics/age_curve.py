@@ -14,13 +14,13 @@ GRID_GW = 0.01
 """Spacing of the weeks at which a curve is kept."""
 
 WEEKS_PER_KNOT = 5
-"""A curve bends once more for every so many weeks with brains."""
+"""A curve has one more inner knot for this many further weeks with brains."""
 
 ROUNDING = 1e-9
 """Values that differ by less, relative to their size, are equal."""
 
 LEAST_ERROR_GW = 0.1
-"""No metric counts as if it told the age better than this."""
+"""Least error of an apparent age: no metric counts as more accurate than this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class AgeCurve:
 
 @dataclass(frozen=True)
 class AgeEstimate:
-    """A gestational age in GW as told from a curve.
+    """An apparent age in GW, read from a curve.
 
     Attributes
     ----------
@@ -65,14 +65,14 @@ class AgeEstimate:
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """What a metric says of the age of brains whose week was left out of its curve.
+    """How well a metric gives the age of brains whose week was left out of its curve.
 
     Attributes
     ----------
     error_gw : float
         Root mean square error over brains with younger and older ones beside them, at least `LEAST_ERROR_GW`.
     guess_gw : float
-        The same for the middle of the other brains' weeks, a guess that knows no metric.
+        The same for the middle of the other brains' weeks, a guess without any metric.
     noise : float
         Root mean square difference between these brains' values and the curves without them.
     number : int
@@ -86,7 +86,7 @@ class LeftOut:
 
     @property
     def tells_age(self) -> bool:
-        """Whether the metric tells the age better than guessing."""
+        """Whether the metric gives the age better than guessing does."""
         return self.error_gw < self.guess_gw
 
 
@@ -141,11 +141,11 @@ def _rising(weeks: Floats, knots: Floats, degree: int) -> Floats:
     return np.column_stack([np.ones(len(weeks)), -np.ones(len(weeks)), steps])
 
 
-def estimated_age(curve: AgeCurve, value: float, noise: float) -> AgeEstimate:
+def estimate_age(curve: AgeCurve, value: float, noise: float) -> AgeEstimate:
     """Returns the week at which the curve has the value, between those at which it has value ∓ noise.
 
     Where the curve is level the middle of that part is taken. A value beyond an end by more than the noise is outside;
-    its week is that of the end. All is NaN for a value that is NaN.
+    its week is that of the end. A NaN value gives NaN.
     """
     if np.isnan(value):
         return AgeEstimate(np.nan, np.nan, np.nan, "", False)
@@ -172,14 +172,14 @@ def _level_part(curve: AgeCurve, risen: float) -> tuple[float, float]:
 
 
 def leave_one_week_out(weeks: Floats, values: Floats) -> LeftOut:
-    """Returns how well a metric tells the age of brains of three weeks or more, each week left out in turn."""
+    """Returns how well a metric gives the age of brains of three weeks or more, each week left out in turn."""
     errors, guesses, differences = [], [], []
     for week in np.unique(weeks)[1:-1]:
         out = weeks == week
         curve = age_curve(weeks[~out], values[~out])
         expected = curve.sign * np.interp(week, curve.weeks, curve.values)
         for value in values[out]:
-            errors.append(estimated_age(curve, value, 0.0).week - week)
+            errors.append(estimate_age(curve, value, 0.0).week - week)
             guesses.append(0.5 * (curve.weeks[0] + curve.weeks[-1]) - week)
             differences.append(value - expected)
     return LeftOut(

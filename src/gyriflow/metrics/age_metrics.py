@@ -1,4 +1,4 @@
-"""The metrics that ages are told from: comparable between brains, of size or free of it."""
+"""The metrics for apparent age: comparable between brains, of size or free of it."""
 
 from collections.abc import Sequence
 
@@ -41,19 +41,19 @@ DIMENSIONS = {"mm": 1, "cm": 1, "mm2": 2, "cm2": 2, "mm3": 3, "mL": 3, "1/mm": -
 
 
 def comparable_metrics(metrics: pd.DataFrame, spectra: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    """Returns the metrics that can be compared between brains, each brain's own and made of them.
+    """Returns the metrics that can be compared between brains, as measured and derived from those.
 
-    Powers of bands that are cut off or not resolved are left out. Added are, both free of size: `…_scaled`, each
-    metric with a length in its unit divided by that power of the cube root of the volume; and `spangy_B…_share`, the
-    share that a band has of the power of the bands from B1 to the highest that is complete and resolved in all
-    reference brains. What hemispheres alone have is given to the whole as their mean.
+    Powers of bands that are cut off or not resolved are left out. Two kinds, both free of size, are added:
+    `…_scaled`, each metric with a length in its unit divided by that power of the cube root of the volume; and
+    `spangy_B…_share`, a band's fraction of the power of the bands from B1 to the highest that is complete and resolved
+    in all reference brains. Metrics that only hemispheres have are given to the whole brain as their mean.
 
     Parameters
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
     spectra : columns subject, run, week, hemisphere, band, complete, resolved
     reference
-        Subjects; of their measured brains all have all metrics that are returned.
+        Subjects. All their measured brains have every metric that is returned.
 
     Returns
     -------

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .age_curve import AgeCurve, AgeEstimate, age_curve, estimated_age, leave_one_week_out, weights
+from .age_curve import AgeCurve, AgeEstimate, age_curve, estimate_age, leave_one_week_out, weights
 from .age_metrics import BRAIN, comparable_metrics, family
 
 LEAST_WEEKS = 5
@@ -123,10 +123,11 @@ def week_similarity(
 ) -> pd.DataFrame:
     """Returns how similar each brain is to the reference at each of its weeks, between 0 and 1.
 
-    The similarity is the mean of exp(−z²/2) over the metrics that tell the age, families alike, with z the difference
-    from the metric's curve at that week over its noise: the form of FetoMorph's GASP (github.com/SaeedZarzor/FetoMorph,
-    `compute_similarity_scores`, "gaussian"), which has the mean and the standard deviation of many brains of a week in
-    place of curve and noise. Unlike an age, it says when a brain looks like no week at all.
+    The similarity is the mean of exp(−z²/2) over the metrics that predict age, families weighted alike, with z the
+    difference from the metric's curve at that week over its noise: the form of FetoMorph's GASP
+    (github.com/SaeedZarzor/FetoMorph, `compute_similarity_scores`, "gaussian"), which has the mean and the standard
+    deviation of many brains of a week in place of curve and noise. Unlike an age, it says when a brain looks like no
+    week at all.
 
     Parameters
     ----------
@@ -219,7 +220,7 @@ def _calibrations(known: pd.DataFrame) -> list[_Calibration]:
     skills = {metric: leave_one_week_out(weeks, values) for metric, (weeks, values, _) in series.items()}
     weight = pd.Series(weights(list(skills.values())), index=list(skills))
     families = pd.Series([family(metric) for metric in weight.index], index=weight.index)
-    # a family has the mean weight of those of its metrics that tell the age, however many there are
+    # a family has the mean weight of its metrics that predict age, however many there are
     weight /= weight.gt(0).groupby(families).transform("sum").clip(lower=1)
     weight /= weight.sum() or 1.0
     return [
@@ -233,7 +234,7 @@ def _ages(
 ) -> Iterator[tuple[str, str, float, float, float, float, float, float, str]]:
     """Yields a row of `age_profile` from metric on, for the metrics and for combinations of them."""
     said = {"younger": f"younger than {ends[0]:g}", "older": f"older than {ends[1]:g}", "": INSIDE}
-    ages = [(c, estimated_age(c.curve, float(measured.get(c.metric, np.nan)), c.noise)) for c in calibrations]
+    ages = [(c, estimate_age(c.curve, float(measured.get(c.metric, np.nan)), c.noise)) for c in calibrations]
     for metric, age in ages:
         flag = NO_SIGNAL if not metric.weight else CLIPPED if age.clipped and not age.outside else said[age.outside]
         flag = FOLLOWED if _is_followed(metric.metric, followed) else NOT_MEASURED if np.isnan(age.week) else flag

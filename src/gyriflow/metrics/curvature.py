@@ -111,7 +111,7 @@ def _edge_lengths(mesh: TriangleMesh) -> Floats:
     return np.bincount(pairs.ravel(), lengths, size) / np.maximum(np.bincount(pairs.ravel(), minlength=size), 1)
 
 
-def continued(values: Floats, known: NDArray[np.bool_], stiffness: sparse.csc_matrix) -> Floats:
+def continue_smoothly(values: Floats, known: NDArray[np.bool_], stiffness: sparse.csc_matrix) -> Floats:
     """Returns (n,) values with the unknown ones replaced by the smoothest continuation of the known ones.
 
     The continuation is harmonic (K f = 0 with the (n, n) stiffness matrix K) with a free boundary.

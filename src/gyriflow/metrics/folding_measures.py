@@ -52,7 +52,7 @@ def mean_curvature_quantiles(bend: Curvature, areas: Floats) -> dict[str, float]
     }
 
 
-def joined(bends: list[Curvature]) -> Curvature:
+def join(bends: list[Curvature]) -> Curvature:
     """Returns the curvature of surfaces side by side."""
     return Curvature(
         *(np.concatenate([getattr(bend, name) for bend in bends]) for name in Curvature.__dataclass_fields__)

@@ -20,13 +20,13 @@ ENVELOPE_OFFSET_MM = 0.1
 """Distance at which the envelope is first wrapped round the surface."""
 
 PIECE_MM = 2.0
-"""Size of the pieces that are told apart as lying over the cut or over the pial surface."""
+"""Size of the pieces that are classed as lying over the cut or over the pial surface."""
 
 LOCAL_RADIUS_MM = 10.0
 """Radius of the patches of the local index: two of the widest sulci that the envelope bridges."""
 
 
-def capped(mesh: TriangleMesh) -> TriangleMesh:
+def cap(mesh: TriangleMesh) -> TriangleMesh:
     """Returns the surface with every boundary closed, the faces that close it after its own.
 
     Each boundary gets a fan of faces from its centroid. A cut in a plane is closed by that part of the plane. A closed
@@ -55,7 +55,7 @@ def envelope(mesh: TriangleMesh, *, radius_mm: float = ENVELOPE_RADIUS_MM) -> Tr
     It is an alpha wrap (Portaneri et al. 2022, in pymeshlab) of the capped surface, moved back onto it by the offset
     that the wrap needs. The area of a sphere comes out 0.3 % small.
     """
-    closed = capped(mesh)
+    closed = cap(mesh)
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(closed.vertices, closed.faces))
     meshes.generate_alpha_wrap(alpha=pymeshlab.PureValue(radius_mm), offset=pymeshlab.PureValue(ENVELOPE_OFFSET_MM))
@@ -88,7 +88,7 @@ def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     vertices, faces = trimesh.remesh.subdivide_to_size(surface.vertices, surface.faces, PIECE_MM, max_iter=20)
     small = TriangleMesh(vertices, faces)
     centres, areas = corners(small).mean(axis=1), face_areas(small)
-    closed = capped(mesh)
+    closed = cap(mesh)
     if len(closed.faces) == len(mesh.faces):
         return Pieces(centres, areas)
     _, nearest, _ = igl.point_mesh_squared_distance(centres, closed.vertices, closed.faces)

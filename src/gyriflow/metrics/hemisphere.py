@@ -18,17 +18,17 @@ from ..parameters.metrics import (
     WeylFormula,
 )
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .curvature import Curvature, continued, curvature
+from .curvature import Curvature, continue_smoothly, curvature
 from .depth import convex_hull, sulcal_depth
 from .folding_measures import (
     folding_index,
     gaussian_curvature_norm,
     intrinsic_curvature_index,
-    joined,
+    join,
     mean_curvature_norm,
     mean_curvature_quantiles,
 )
-from .gyrification import Pieces, capped, envelope, gyrification_index, local_gyrification_index, pieces_over
+from .gyrification import Pieces, cap, envelope, gyrification_index, local_gyrification_index, pieces_over
 from .laplace_beltrami import laplacian
 from .mode_numbers import SpangyModes, modes_of
 from .spangy import Spectrum, first_eigenvalue, spectrum, weyl_number
@@ -93,7 +93,7 @@ class Hemisphere:
         }
 
 
-def measured_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, settings: Settings) -> Hemisphere:
+def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, settings: Settings) -> Hemisphere:
     """Returns what is measured on a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
     hull, wrap = convex_hull(mesh), envelope(mesh)
     bend = curvature(mesh, radius_mm=settings.curvature_radius_mm)
@@ -121,7 +121,7 @@ def _spectrum(name: str, mesh: TriangleMesh, bend: Curvature, settings: Settings
     first = first_eigenvalue(stiffness, mass)
     modes, reach = modes_of(settings.spangy_modes, name, mesh, stiffness, mass, first, formula)
     proxy = bend.shape_index if settings.spangy_proxy == "shape_index" else bend.mean
-    values = continued(proxy, bend.reliable, stiffness)
+    values = continue_smoothly(proxy, bend.reliable, stiffness)
     analysis = spectrum(values, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach)
     return analysis, weyl_number(area(mesh), first, formula)
 
@@ -129,7 +129,7 @@ def _spectrum(name: str, mesh: TriangleMesh, bend: Curvature, settings: Settings
 def size_rows(mesh: TriangleMesh, crossing: int) -> list[Row]:
     """Returns the rows of size of a hemisphere or of the whole, and the number of faces that cut others."""
     return [
-        ("volume", signed_volume(capped(mesh)) * ML_PER_MM3, "mL"),
+        ("volume", signed_volume(cap(mesh)) * ML_PER_MM3, "mL"),
         ("area", area(mesh) * CM2_PER_MM2, "cm2"),
         ("crossing_faces", float(crossing), "1"),
     ]
@@ -142,7 +142,7 @@ def folding_rows(sides: list[Hemisphere]) -> list[Row]:
     """
     meshes = [side.mesh for side in sides]
     areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
-    bend = joined([side.bend for side in sides])
+    bend = join([side.bend for side in sides])
     weights = areas * bend.reliable
     if not weights.any():
         raise MeshError(

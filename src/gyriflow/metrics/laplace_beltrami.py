@@ -55,7 +55,7 @@ def laplacian(mesh: TriangleMesh) -> tuple[sparse.csc_matrix, sparse.csc_matrix]
 def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int) -> Modes:
     """Returns the `count` lowest modes of K φ = λ M φ, by `modes_below` a limit that has at least as many below it.
 
-    SolverError for a count that the surface does not have, and where a mode that is there is not found.
+    SolverError for a count that the surface does not have, and where a mode is missed.
     """
     size = stiffness.shape[0]
     largest = size if size <= DENSE_VERTICES_MANY_MODES else size // 2
@@ -75,8 +75,8 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
     """Returns all modes of K φ = λ M φ with λ below `value` (mm⁻²).
 
     SLEPc's spectrum slicing with shift-and-invert Krylov-Schur (Campos and Roman 2012, Numer. Algorithms 60, 279-295):
-    the inertia of K − σM at each shift tells how many eigenvalues lie between shifts, so that none can be missing.
-    SolverError where one that is there is not found.
+    the inertia of K − σM at each shift gives the number of eigenvalues between shifts, so that none can be missed.
+    SolverError where a mode is missed.
     """
     size = stiffness.shape[0]
     if size <= DENSE_VERTICES:
@@ -103,7 +103,7 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
         factors.getPC().setType(PETSc.PC.Type.CHOLESKY)
         factors.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         solver.solve()
-        return _found(solver, operators[0], count_below(stiffness, mass, value))
+        return _converged_modes(solver, operators[0], count_below(stiffness, mass, value))
     except PETSc.Error as error:
         raise SolverError(
             f"the modes up to λ = {value:g} mm⁻² could not be found",
@@ -115,8 +115,8 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
             thing.destroy()
 
 
-def _found(solver: Any, operator: Any, number: int) -> Modes:
-    """Returns the modes that a solver has found; SolverError where they are not the number that there is."""
+def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
+    """Returns the modes on which a solver has converged; SolverError where their number is not `number`."""
     if (found := solver.getConverged()) != number:
         raise SolverError(
             "the number of modes is wrong",

@@ -21,13 +21,13 @@ from ..parameters.metrics import (
     WeylFormula,
 )
 from ..units import ML_PER_MM3
-from .gyrification import capped
+from .gyrification import cap
 from .hemisphere import (
     Hemisphere,
     Settings,
     coefficient_table,
     folding_rows,
-    measured_hemisphere,
+    measure_hemisphere,
     size_rows,
     spectrum_rows,
 )
@@ -106,7 +106,7 @@ def measure_brain(
         name: None if thickness_mm is None else at_part(thickness_mm, whole, mesh) for name, mesh in meshes.items()
     }
     jobs = [(name, mesh, thicknesses[name], settings) for name, mesh in meshes.items()]
-    sides = _measured(jobs, threads)
+    sides = _measure_sides(jobs, threads)
     rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + folding_rows(sides)]
     for side in sides:
         own = size_rows(side.mesh, side.crossing) + folding_rows([side]) + spectrum_rows(side, spangy_proxy)
@@ -121,10 +121,10 @@ def measure_brain(
     )
 
 
-def _measured(jobs: list[tuple[str, TriangleMesh, Floats | None, Settings]], threads: int) -> list[Hemisphere]:
+def _measure_sides(jobs: list[tuple[str, TriangleMesh, Floats | None, Settings]], threads: int) -> list[Hemisphere]:
     """Returns the hemispheres, measured one after the other or each in a process: PETSc cannot be used by threads."""
     if threads == 1:
-        return [measured_hemisphere(*job) for job in jobs]
+        return [measure_hemisphere(*job) for job in jobs]
     # forked, since a new interpreter would run the calling script again; what MPI leaves behind goes with the folder
     with (
         TemporaryDirectory(prefix="gyriflow-") as folder,
@@ -132,12 +132,12 @@ def _measured(jobs: list[tuple[str, TriangleMesh, Floats | None, Settings]], thr
             min(threads, len(jobs)), get_context("fork"), os.environ.update, ({"TMPDIR": folder},)
         ) as pool,
     ):
-        return list(pool.map(measured_hemisphere, *zip(*jobs, strict=True)))
+        return list(pool.map(measure_hemisphere, *zip(*jobs, strict=True)))
 
 
 def _check_outward(meshes: tuple[TriangleMesh, ...]) -> None:
     for mesh in meshes:
-        volume_mm3 = signed_volume(capped(mesh))
+        volume_mm3 = signed_volume(cap(mesh))
         if volume_mm3 <= 0:
             raise MeshError(
                 "the faces of the surface look inwards",

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.errors import InputError
-from gyriflow.parameters.synthetic import PHANTOM_WEEKS, PhantomSettings
-from gyriflow.units import ML_PER_MM3
+from ..errors import InputError
+from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings
+from ..units import ML_PER_MM3
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]

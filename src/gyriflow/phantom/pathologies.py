@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.phantom.brain import (
+from .brain import (
     BRAINSTEM,
     CALLOSUM,
     CENTRE_MM,
@@ -61,7 +61,7 @@ def without_callosum(labels: Labels, affine: Floats) -> Labels:
 
 
 def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0) -> Labels:
-    """Returns hemispheres that nothing joins, with a gap of CSF between them."""
+    """Returns unconnected hemispheres, with a gap of CSF between them."""
     x, _, _ = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
     return np.where(np.isin(labels, CEREBRUM) & (np.abs(x) < 0.5 * gap_mm), CSF, made).astype(np.int32)
@@ -88,7 +88,7 @@ def one_hemisphere(labels: Labels, affine: Floats, side: Side = "left", gap_mm: 
     return np.where(SIGN[side] * x > 0.5 * gap_mm, made, 0).astype(np.int32)
 
 
-def warped(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) -> Labels:
+def warp(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) -> Labels:
     """Returns labels moved: `came_from` gives the (3, …) place, in mm from the centre, that each place's label has."""
     place = came_from(positions(labels, affine))
     index = np.linalg.inv(affine[:3, :3]) @ (place.reshape(3, -1).T + CENTRE_MM - affine[:3, 3]).T
@@ -104,7 +104,7 @@ def bent_midline(labels: Labels, affine: Floats, mm: float = 3.0) -> Labels:
     def came_from(place: Floats) -> Floats:
         return np.stack([place[0] - mm * np.sin(place[1] / 12.0), place[1], place[2]])
 
-    return warped(labels, affine, came_from)
+    return warp(labels, affine, came_from)
 
 
 def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
@@ -119,7 +119,7 @@ def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
         stretched = np.where(right, (x - mm) * half / (half - mm), (x - mm) * half / (half + mm))
         return np.stack([np.where(inside, stretched, x), place[1], place[2]])
 
-    return warped(labels, affine, came_from)
+    return warp(labels, affine, came_from)
 
 
 def wide_hemisphere(labels: Labels, affine: Floats, factor: float = 1.3, *, ventricle: bool = False) -> Labels:
@@ -128,7 +128,7 @@ def wide_hemisphere(labels: Labels, affine: Floats, factor: float = 1.3, *, vent
     def came_from(place: Floats) -> Floats:
         return np.stack([np.where(place[0] > 0, place[0] / factor, place[0]), place[1], place[2]])
 
-    made = warped(labels, affine, came_from)
+    made = warp(labels, affine, came_from)
     if ventricle:
         x, y, z = positions(made, affine)
         extent = [np.abs(axis[np.isin(made, CEREBRUM)]).max() for axis in (x, y, z)]
@@ -150,10 +150,10 @@ def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: 
         )
 
     x, _, _ = positions(labels, affine)
-    return np.where(SIGN[side] * x > 0, warped(whole, affine, came_from), whole).astype(np.int32)
+    return np.where(SIGN[side] * x > 0, warp(whole, affine, came_from), whole).astype(np.int32)
 
 
-def cropped(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels, Floats]:
+def crop(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels, Floats]:
     """Returns the volume without a share of the brain on top, as where the field of view ends, and its affine."""
     brain = np.isin(labels, CEREBRUM)
     up = affine[2, :3]
@@ -170,7 +170,7 @@ def cropped(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels
     return labels.take(range(int(first[axis]), labels.shape[axis]), axis), moved
 
 
-def sided(labels: Labels, affine: Floats) -> Labels:
+def add_sides(labels: Labels, affine: Floats) -> Labels:
     """Returns the labels of a phantom with sides, as in BOUNTI (`dhcp-19`); the callosum is white matter there."""
     x, _, _ = positions(labels, affine)
     pairs = {CSF: 1, CORTEX: 3, WHITE: 5, CALLOSUM: 5, VENTRICLES: 7, CEREBELLUM: 11, DEEP_GREY: 16}

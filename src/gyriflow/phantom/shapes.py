@@ -8,10 +8,10 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.meshlab import pymeshlab
-from gyriflow.geometry.triangles import TriangleMesh, edges, submesh, unit
-from gyriflow.parameters.synthetic import ShapeKind, ShapeSettings
+from ..errors import InputError
+from ..geometry.meshlab import pymeshlab
+from ..geometry.triangles import TriangleMesh, edges, submesh, unit
+from ..parameters.synthetic import ShapeKind, ShapeSettings
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import affine_transform, gaussian_filter
 
 from ..errors import InputError
-from ..geometry.deformations import moved
+from ..geometry.deformations import transform_points
 from ..geometry.triangles import Floats
 
 SMOOTHING_MM = 0.8
@@ -83,10 +83,10 @@ def channels(
     _require_whole(inside)
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
     voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
-    centres = moved(np.argwhere(inside), affine)
+    centres = transform_points(np.argwhere(inside), affine)
     low, high = centres.min(axis=0) - MARGIN_MM, centres.max(axis=0) + MARGIN_MM
     # on a voxel's centre, so that a grid that needs no resampling gets none
-    low = moved(np.rint(moved(low, np.linalg.inv(affine))), affine)
+    low = transform_points(np.rint(transform_points(low, np.linalg.inv(affine))), affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
     grid[:3, 3] = low
@@ -96,8 +96,8 @@ def channels(
     smoothed = {}
     for bit, mask in masks.items():
         solid = mask.astype(np.float32)
-        tissue[_resampled(solid, affine, grid, shape) > 0.5] |= bit
-        smoothed[bit] = _resampled(gaussian_filter(solid, smoothing_mm / sizes), affine, grid, shape)
+        tissue[_resample(solid, affine, grid, shape) > 0.5] |= bit
+        smoothed[bit] = _resample(gaussian_filter(solid, smoothing_mm / sizes), affine, grid, shape)
     intensity = _intensity(image, grid, shape, tissue & CEREBRUM > 0) if image else None
     return Channels(grid, tissue, smoothed[CEREBRUM], smoothed.get(CORTEX), intensity)
 
@@ -130,7 +130,7 @@ def _intensity(
 ) -> NDArray[np.float32]:
     values, affine = image
     finite = np.nan_to_num(np.asarray(values, dtype=np.float32), nan=0.0, posinf=0.0, neginf=0.0)
-    intensity = _resampled(finite, affine, grid, shape)
+    intensity = _resample(finite, affine, grid, shape)
     bright = float(np.quantile(intensity[inside], BRIGHT))
     covered = float((intensity[inside] != 0).mean())
     if bright <= 0 or covered < 0.9:
@@ -143,9 +143,7 @@ def _intensity(
     return intensity / np.float32(bright)
 
 
-def _resampled(
-    values: NDArray[np.float32], affine: Floats, grid: Floats, shape: tuple[int, ...]
-) -> NDArray[np.float32]:
+def _resample(values: NDArray[np.float32], affine: Floats, grid: Floats, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Returns values of a volume at the points of another grid, linear in between, 0 outside."""
     index = np.linalg.inv(affine) @ grid
     return np.asarray(

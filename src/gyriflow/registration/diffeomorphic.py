@@ -13,7 +13,7 @@ from scipy.ndimage import binary_dilation, map_coordinates
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.deformations import Deformation, moved
+from ..geometry.deformations import Deformation, transform_points
 from ..geometry.triangles import Floats
 from .channels import CEREBRUM, Channels
 
@@ -69,11 +69,11 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
     cross-correlation for the deformation. It begins where centroids and volumes of the cerebra match, turned by that
     of the cube's rotations which fits clearly better than none. The same input gives the same result. InputError where
-    greedy fails; whether the result is good is for `quality.judged` to say.
+    greedy fails; `quality.judge` says whether the result is good.
     """
     began, busy = time.perf_counter(), time.process_time()
     names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
-    turn, start = _started(earlier, later, names)
+    turn, start = _find_start(earlier, later, names)
     images = {f"fixed_{name}": _image(getattr(earlier, name), earlier.affine) for name in names}
     # greedy begins at the identity, so the later brain is handed over where the start puts it
     placed = np.linalg.inv(start) @ later.affine
@@ -117,24 +117,24 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
 
 
 def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
-    """Returns 1 in the cerebrum and near it: what surrounds the brain is not to pull on it."""
+    """Returns 1 in the cerebrum and near it: the surroundings of the brain must not pull on it."""
     rounds = int(np.ceil(NEAR_MM / brain.voxel_mm))
     return binary_dilation(brain.tissue & CEREBRUM > 0, iterations=rounds).astype(np.float32)
 
 
-def _started(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
+def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
     """Returns the (3, 3) turn and the (4, 4) similarity, from earlier to later, that registration begins with."""
     (first, size), (second, other_size) = _place(earlier), _place(later)
     scale = (other_size / size) ** (1 / 3)
     index = np.argwhere(earlier.cerebrum > 0.01)
     index = index[:: max(1, len(index) // POINTS)]
-    points = moved(index, earlier.affine)
+    points = transform_points(index, earlier.affine)
     tried, differences = [], []
     for turn in TURNS:
         matrix = np.eye(4)
         matrix[:3, :3] = scale * turn
         matrix[:3, 3] = second - matrix[:3, :3] @ first
-        at = moved(moved(points, matrix), np.linalg.inv(later.affine)).T
+        at = transform_points(transform_points(points, matrix), np.linalg.inv(later.affine)).T
         squares = [
             WEIGHTS[name]
             * np.square(getattr(earlier, name)[tuple(index.T)] - map_coordinates(getattr(later, name), at, order=1))
@@ -150,4 +150,4 @@ def _started(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tupl
 def _place(brain: Channels) -> tuple[Floats, float]:
     """Returns the (3,) centroid in mm and the volume in mm³ of a cerebrum."""
     index = np.argwhere(brain.tissue & CEREBRUM > 0)
-    return moved(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3
+    return transform_points(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3

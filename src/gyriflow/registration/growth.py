@@ -1,4 +1,4 @@
-"""What a mesh that was carried over weeks tells: local growth, and the displacement of every vertex."""
+"""Local growth and the displacement of every vertex, from a mesh that was carried over weeks."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.diffusion import diffused, vertex_sizes
+from ..geometry.diffusion import diffuse, vertex_sizes
 from ..geometry.motion import without_rigid_motion
 from ..geometry.triangles import Floats
 
@@ -42,7 +42,7 @@ def local_growth(positions: Floats, cells: NDArray[np.integer], weeks: Sequence[
     rates = []
     for first, second, duration in zip(range(len(weeks) - 1), range(1, len(weeks)), np.diff(weeks), strict=True):
         scale = (sizes[first].sum() / sizes[0].sum()) ** (1 / dimension)
-        smooth = diffused(positions[0], cells, relative[[first, second]].T, sigma_mm / scale)
+        smooth = diffuse(positions[0], cells, relative[[first, second]].T, sigma_mm / scale)
         bad = np.asarray(smooth.min(axis=1) <= 0)
         if bad.any():
             raise InputError(

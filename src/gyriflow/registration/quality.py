@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ..errors import InputError
-from ..geometry.deformations import Deformation, carried, determinants, moved
+from ..geometry.deformations import Deformation, carry, determinants, transform_points
 from ..geometry.triangles import Floats
 from .channels import CEREBRUM, CORTEX, Channels
 
@@ -33,7 +33,7 @@ LIMITS = Limits()
 
 @dataclass(frozen=True)
 class Quality:
-    """Numbers that tell how good a registration is.
+    """Measures of how good a registration is.
 
     Attributes
     ----------
@@ -61,17 +61,17 @@ class Quality:
     inside_mm: float
 
 
-def judged(earlier: Channels, later: Channels, deformation: Deformation) -> Quality:
+def judge(earlier: Channels, later: Channels, deformation: Deformation) -> Quality:
     """Returns the quality of a deformation between two brains, by their masks as they are.
 
     Folding is judged in the earlier cerebrum, on the deformation's own grid.
     """
-    grid = moved(np.indices(earlier.tissue.shape).reshape(3, -1).T, earlier.affine)
-    places = moved(carried(deformation, grid), np.linalg.inv(later.affine)).T
+    grid = transform_points(np.indices(earlier.tissue.shape).reshape(3, -1).T, earlier.affine)
+    places = transform_points(carry(deformation, grid), np.linalg.inv(later.affine)).T
     inside = earlier.tissue & CEREBRUM > 0
     with_cortex = earlier.cortex is not None and later.cortex is not None
     growth = determinants(deformation)
-    at = moved(moved(np.argwhere(inside), earlier.affine), np.linalg.inv(deformation.affine))
+    at = transform_points(transform_points(np.argwhere(inside), earlier.affine), np.linalg.inv(deformation.affine))
     growth = map_coordinates(growth, at.T, order=1, mode="nearest")
     lengths = np.linalg.norm(deformation.displacement, axis=-1)
     rim = np.ones(lengths.shape, dtype=bool)

@@ -7,11 +7,11 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.hemisphere_pose import (
+from ..errors import InputError
+from ..geometry.alignment import angle_deg
+from ..geometry.triangles import TriangleMesh, transformed
+from ..parameters.schemes import LabelScheme
+from .hemisphere_pose import (
     CONVENTION_DEG,
     CONVENTIONS,
     LEAST_CONFIDENCE,
@@ -19,9 +19,9 @@ from gyriflow.surface.hemisphere_pose import (
     SYLVIAN_AHEAD,
     hemisphere_by_shape,
 )
-from gyriflow.surface.orientation import mid_plane
-from gyriflow.surface.outlines import reference
-from gyriflow.surface.registration import Target, registered
+from .orientation import mid_plane
+from .outline_fit import Target, register
+from .outlines import reference
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ QUARTERS_DEG = 15.0
 
 @dataclass(frozen=True, eq=False)
 class BrainPose:
-    """The rotation (3, 3) that makes a brain's axes RAS+, what told it, and what is to be said of it."""
+    """The rotation (3, 3) that makes a brain's axes RAS+, where it comes from, and its warnings."""
 
     rotation: Floats
     by: str
@@ -58,7 +58,7 @@ def narrowness(mesh: TriangleMesh) -> float:
 
 
 def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> BrainPose | None:
-    """Returns the pose that cerebellum, brainstem and labelled sides tell; None where there are too few of them.
+    """Returns the pose from cerebellum, brainstem and labelled sides; None where too few of them are labelled.
 
     It is that of the file where the two differ by less than 60°. InputError where the labels of left and right are
     mirrored: no rotation brings them to their sides.
@@ -95,15 +95,15 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     if rotation is None:
         return None
     by = " and ".join([*found, *(["the labelled sides"] if sides is not None else [])])
-    return _kept_or_turned(rotation, by)
+    return _keep_or_turn(rotation, by)
 
 
 def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
-    """Returns the rotation (3, 3) to RAS+ that a whole brain's shape tells, and how sure that is.
+    """Returns the rotation (3, 3) to RAS+ from a whole brain's shape, and how sure it is.
 
     The brain is cut in its plane of mirror symmetry and one side is posed as a hemisphere. The second value is how many
-    times worse the next best pose of it is, which tells up from down; the third how far the Sylvian fissures are in
-    front of the middle, in sizes, which tells front from back; the fourth how many times worse than the best pose
+    times worse the next best pose of it is, which decides up and down; the third how far the Sylvian fissures are in
+    front of the middle, in sizes, which decides front and back; the fourth how many times worse than the best pose
     that of RAS+ coordinates is, infinite where it leads away from RAS+.
     """
     plane = mid_plane(mesh, search_deg=90.0)
@@ -114,7 +114,7 @@ def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
     mirrored = transformed(side, MIRROR)
     is_right = float(side.vertices[:, 0].mean() - mesh.vertices[:, 0].mean()) > 0
     as_given = one if is_right else hemisphere_by_shape(mirrored)
-    fit = registered(as_given.outline, Target(reference()), np.eye(3))
+    fit = register(as_given.outline, Target(reference()), np.eye(3))
     near = angle_deg(fit.rotation) < CONVENTION_DEG
     ras = fit.residual / as_given.residual if near else float("inf")
     rotation, sylvian = one.rotation, one.sylvian
@@ -130,11 +130,11 @@ def pose_of_surface(mesh: TriangleMesh) -> tuple[Floats, float, float, float]:
     return turn.as_matrix() @ rotation, one.confidence, sylvian, ras
 
 
-def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
-    """Returns the pose of a whole brain's surface, in coordinates that its user names or leaves to "auto".
+def pose_surface_by_shape(mesh: TriangleMesh, coordinates: str) -> BrainPose:
+    """Returns the pose of a whole brain's surface, in coordinates that the user names or leaves to "auto".
 
-    What the user names is kept, and doubted in a warning where the shape clearly says otherwise. InputError where the
-    shape is to tell the pose and cannot.
+    Named coordinates are kept, with a warning where the shape clearly contradicts them. InputError where the pose
+    must come from the shape and is ambiguous.
     """
     rotation, confidence, sylvian, ras = pose_of_surface(mesh)
     upright, ahead = confidence >= LEAST_CONFIDENCE, sylvian >= SYLVIAN_AHEAD
@@ -153,14 +153,14 @@ def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
         return BrainPose(
             np.eye(3),
             "default",
-            ("the shape does not tell front from back: the coordinates were taken as RAS+; set coordinates",),
+            ("the shape leaves front and back open: the coordinates were taken as RAS+; set coordinates",),
         )
     if not (upright and ahead) and ras < LEAST_CONFIDENCE:
         doubt = "the shape fits other poses as well as RAS+, in which the coordinates were taken: check the pose"
         return BrainPose(np.eye(3), "default", (doubt,))
     if not (upright and ahead):
         raise InputError(
-            "the pose of the brain cannot be told from its shape",
+            "the pose of the brain cannot be determined from its shape",
             found=f"axes {angles[nearest]:.0f}° off {nearest.upper()}, the next best pose {confidence:.2f} times "
             f"worse, the Sylvian fissures {sylvian:+.2f} of the size in front of the middle",
             expected=f"RAS+ or LPS, or at least {LEAST_CONFIDENCE} times and {SYLVIAN_AHEAD:+.2f}",
@@ -170,7 +170,7 @@ def posed_surface(mesh: TriangleMesh, coordinates: str) -> BrainPose:
 
 
 def _from_hindbrain(found: dict[str, Floats], expected: dict[str, Floats]) -> Floats | None:
-    """Returns the rotation that cerebellum and brainstem tell; None where they are in one direction."""
+    """Returns the rotation from cerebellum and brainstem; None where they lie in one direction."""
     one, other = _unit(found["cerebellum"]), _unit(found["brainstem"])
     # the brainstem is in front of the cerebellum, so that this points to the right
     right = np.cross(one, other)
@@ -183,15 +183,15 @@ def _from_hindbrain(found: dict[str, Floats], expected: dict[str, Floats]) -> Fl
     return np.asarray(Rotation.align_vectors(ours, theirs)[0].as_matrix())
 
 
-def _quartered(rotation: Floats) -> Floats:
+def _turn_by_quarters(rotation: Floats) -> Floats:
     """Returns the rotation by quarter turns that is within 15° of a (3, 3) rotation, else the rotation."""
     quarters = Rotation.create_group("O").as_matrix()
     nearest = min(quarters, key=lambda turn: angle_deg(rotation @ turn.T))
     return np.asarray(nearest.round() if angle_deg(rotation @ nearest.T) < QUARTERS_DEG else rotation)
 
 
-def _kept_or_turned(rotation: Floats, by: str) -> BrainPose:
-    rotation = _quartered(rotation)
+def _keep_or_turn(rotation: Floats, by: str) -> BrainPose:
+    rotation = _turn_by_quarters(rotation)
     angle = angle_deg(rotation)
     if angle < LEAST_TURN_DEG:
         return BrainPose(np.eye(3), "file")

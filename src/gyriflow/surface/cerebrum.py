@@ -1,4 +1,4 @@
-"""Where a label volume's cerebrum is: what its labels enclose, and what is told of labels that are lost."""
+"""Where a label volume's cerebrum is: what its labels enclose, and reports of labels that are lost."""
 
 import logging
 from typing import Any
@@ -7,19 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.labels import cerebrum_mask, missing_tissues, require_cortex_outside
-from gyriflow.surface.pial import TOLD_LOSS, warn
-from gyriflow.surface.stalks import without_stalks
-from gyriflow.surface.ventricles import outside_ventricles
-from gyriflow.units import ML_PER_MM3
+from ..parameters.schemes import LabelScheme
+from ..units import ML_PER_MM3
+from .labels import cerebrum_mask, missing_tissues, require_cortex_outside
+from .pial import TOLD_LOSS, warn
+from .stalks import without_stalks
+from .ventricles import outside_ventricles
 
 log = logging.getLogger(__name__)
 
 Floats = NDArray[np.float64]
 Labels = NDArray[np.integer]
 
-# cortex at less than this part of the cerebrum's surface is told of
+# cortex at less than this fraction of the cerebrum's surface is reported
 LITTLE_CORTEX = 0.7
 
 
@@ -58,7 +58,7 @@ def cerebrum_labels(
     return tissue
 
 
-def tell_of_border(mask: NDArray[np.bool_], report: dict[str, Any]) -> None:
+def report_border(mask: NDArray[np.bool_], report: dict[str, Any]) -> None:
     """Warns where a mask touches the border of its volume: what is beyond it is missing."""
     surface = mask & ~ndimage.binary_erosion(mask, border_value=1)
     ends = [np.moveaxis(mask, axis, 0)[end] for axis in range(3) for end in (0, -1)]
@@ -70,7 +70,7 @@ def tell_of_border(mask: NDArray[np.bool_], report: dict[str, Any]) -> None:
              "lies beyond is missing, and the surface is flat there")  # fmt: skip
 
 
-def tell_of_dropped(topology: dict[str, Any], affine: Floats, volume_mm3: float, report: dict[str, Any]) -> None:
+def report_dropped(topology: dict[str, Any], affine: Floats, volume_mm3: float, report: dict[str, Any]) -> None:
     """Warns where the repair of a mask's topology has dropped parts of a volume."""
     dropped = topology["voxels_dropped"] * float(abs(np.linalg.det(affine[:3, :3])))
     if dropped > TOLD_LOSS * volume_mm3:

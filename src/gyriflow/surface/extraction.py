@@ -8,9 +8,9 @@ from scipy import ndimage
 from scipy.special import ndtr
 from skimage.measure import marching_cubes
 
-from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
-from gyriflow.surface.topology import euler_gain, unambiguous, without_handles
+from ..errors import MeshError
+from ..geometry.triangles import TriangleMesh, signed_volume, transformed
+from .topology import euler_gain, unambiguous, without_handles
 
 PAD_VOXELS = 6
 LEVEL = 0.5
@@ -22,7 +22,7 @@ LEAST_SLIT_VOXELS = 20
 COMPARABLE = 0.2
 
 
-def cropped(mask: NDArray[np.bool_]) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
+def crop(mask: NDArray[np.bool_]) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
     """Returns the slices that cut an (i, j, k) volume to the mask's contents, and the (3,) first index of the cut
     volume once it has been padded with `PAD_VOXELS`.
     """
@@ -37,12 +37,12 @@ def shifted_affine(affine: NDArray[np.float64], first: NDArray[np.int64]) -> NDA
     return moved
 
 
-def smoothed_mask(mask: NDArray[np.bool_], smoothing_voxels: float) -> NDArray[np.float32]:
+def smooth_mask(mask: NDArray[np.bool_], smoothing_voxels: float) -> NDArray[np.float32]:
     """Returns the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
-def unbridged(
+def remove_bridges(
     mask: NDArray[np.bool_], field: NDArray[np.float32], smoothing_voxels: float, left_shut: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], int]:
     """Returns a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
@@ -69,7 +69,7 @@ def unbridged(
     return np.where(slits, np.float32(1.0 - beside), field), int(slits.sum())
 
 
-def refined(field: NDArray, affine: NDArray[np.float64], factor: int) -> tuple[NDArray, NDArray[np.float64]]:
+def refine(field: NDArray, affine: NDArray[np.float64], factor: int) -> tuple[NDArray, NDArray[np.float64]]:
     """Returns an (i, j, k) field on voxels `factor` times smaller, linear in between, and their affine."""
     if factor == 1:
         return field, affine
@@ -94,7 +94,7 @@ def main_parts(mask: NDArray[np.bool_], comparable: float = COMPARABLE) -> tuple
     return ndimage.binary_fill_holes(kept[number]), int(dropped.sum()), int(sizes[dropped].sum())
 
 
-def made_simple(
+def make_simple(
     field: NDArray[np.float32], comparable: float = COMPARABLE
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
     """Returns the field with a level set of main parts only, without cavities and handles, and a report.

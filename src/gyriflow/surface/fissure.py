@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.extraction import EDGE_SLOPE
-from gyriflow.surface.orientation import MidPlane, fissure_points
+from ..geometry.triangles import TriangleMesh
+from ..parameters.schemes import LabelScheme
+from .extraction import EDGE_SLOPE
+from .orientation import MidPlane, fissure_points
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -19,9 +19,9 @@ MARGIN_MM = 5.0
 # the mid-surface follows the walls over this distance, and returns to the plane where there are none
 BEND_MM = 4.0
 FURTHEST_MM = 5.0
-# the mid-surface is looked for around the last one so many times, so that it follows a midline that is shifted far
+# how often the mid-surface is searched for around the last one, so that it follows a midline that is shifted far
 FOLLOWED = 4
-# a mid-surface that is this far from its plane is told of
+# a mid-surface that is this far from its plane is reported
 SHIFTED_MM = 5.0
 # a fissure is shown where it is so wide a gap in its own plane: twice this many half millimetres
 SHOWN_CELLS = 8
@@ -112,7 +112,7 @@ def between(walls: TriangleMesh, start: Fissure) -> Fissure:
     return fissure
 
 
-def opened(
+def open_fissure(
     field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask | None = None
 ) -> NDArray[np.float32]:
     """Returns the smoothed (i, j, k) mask with the fissure at least `gap_mm` wide down to what joins the hemispheres.
@@ -167,7 +167,7 @@ def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Float
     return np.asarray(left - right)
 
 
-def sampled(field: Floats, affine: Floats, points: Floats) -> Floats:
+def sample(field: Floats, affine: Floats, points: Floats) -> Floats:
     """Returns the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
     inverse = np.linalg.inv(affine)
     return ndimage.map_coordinates(field, (points @ inverse[:3, :3].T + inverse[:3, 3]).T, order=1, mode="nearest")
@@ -206,7 +206,7 @@ def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fi
     plane = fissure.plane
     steps = np.arange(-FURTHEST_MM, FURTHEST_MM + SPACING_MM, SPACING_MM)
     line = fissure.places[None] + steps[:, None, None, None] * plane.normal
-    values = sampled(side, affine, line.reshape(-1, 3)).reshape(line.shape[:3])
+    values = sample(side, affine, line.reshape(-1, 3)).reshape(line.shape[:3])
     crossing = (values[:-1] < 0) & (values[1:] >= 0)
     share = -values[:-1] / np.where(crossing, values[1:] - values[:-1], 1.0)
     moves = np.where(crossing, steps[:-1, None, None] + share * SPACING_MM, np.inf)

@@ -6,48 +6,48 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, area, corners
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.surface.brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, pose_of_labels
-from gyriflow.surface.cerebrum import cerebrum_labels, tell_of_border, tell_of_dropped
-from gyriflow.surface.extraction import (
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, area, corners
+from ..parameters.schemes import LabelScheme
+from ..units import ML_PER_MM3
+from .brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, pose_of_labels
+from .cerebrum import cerebrum_labels, report_border, report_dropped
+from .extraction import (
     COMPARABLE,
     LEVEL,
     PAD_VOXELS,
-    cropped,
+    crop,
     isosurface,
-    made_simple,
     main_parts,
-    refined,
+    make_simple,
+    refine,
+    remove_bridges,
     shifted_affine,
-    smoothed_mask,
-    unbridged,
+    smooth_mask,
 )
-from gyriflow.surface.fissure import (
+from .fissure import (
     SHIFTED_MM,
     Fissure,
     between,
     fissure_between,
     fissure_between_labels,
-    opened,
+    open_fissure,
     plane_between_labels,
-    sampled,
+    sample,
     to_the_right,
 )
-from gyriflow.surface.hemispheres import left_faces
-from gyriflow.surface.labels import (
+from .hemispheres import left_faces
+from .labels import (
     LEAST_CORTEX_OUTSIDE,
     require_sides,
 )
-from gyriflow.surface.orientation import mid_plane
-from gyriflow.surface.outcome import PialSurface
-from gyriflow.surface.pial import TOLD_LOSS, even, motion, posed, warn
-from gyriflow.surface.shrinkage import KEPT, after_repairs, with_volume
-from gyriflow.surface.single_hemisphere import require_one, single_hemisphere
-from gyriflow.surface.size import require_plausible_size
-from gyriflow.surface.thickness import Thickness, cortical_thickness
-from gyriflow.units import ML_PER_MM3
+from .orientation import mid_plane
+from .outcome import PialSurface
+from .pial import TOLD_LOSS, make_sound, motion, pose_surface, warn
+from .shrinkage import KEPT, after_repairs, with_volume
+from .single_hemisphere import require_one, single_hemisphere
+from .size import require_plausible_size
+from .thickness import Thickness, cortical_thickness
 
 log = logging.getLogger(__name__)
 
@@ -80,10 +80,10 @@ def from_labels(
     A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say. The cerebrum's mask is smoothed
     (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an isosurface, which is smoothed, remeshed to
     `edge_length_mm` and turned so that the mid-sagittal plane is x = const, and set outwards by what smoothing took of
-    the volume. Where the scheme tells cortex from the tissue inside and cortex labels of both sides touch, the fissure
-    is opened there to `fissure_mm` (0: left shut). It is half-way between the labels of the two sides where the scheme
-    has them. InputError for labels that don't fit the scheme or the week and for one hemisphere alone, MeshError where
-    the surface stays tangled.
+    the volume. Where the scheme separates cortex from the tissue inside and cortex labels of both sides touch, the
+    fissure is opened there to `fissure_mm` (0: left shut). It is half-way between the labels of the two sides where the
+    scheme has them. InputError for labels that don't fit the scheme or the week and for one hemisphere alone, MeshError
+    where the surface stays tangled.
     """
     report: dict[str, Any] = {"source": "labels", "scheme": scheme.name}
     tissue = cerebrum_labels(labels, affine, scheme, report, LEAST_CORTEX_OUTSIDE)
@@ -91,18 +91,18 @@ def from_labels(
     affine = motion(rotation) @ affine
     mask = np.isin(tissue, scheme.cerebrum)
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
-    box, first = cropped(mask)
+    box, first = crop(mask)
     extents = np.linalg.norm(affine[:3, :3], axis=0) * [side.stop - side.start for side in box]
     require_plausible_size(volume, extents, week)
     report["mask_volume_mL"] = volume * ML_PER_MM3
-    tell_of_border(mask, report)
+    report_border(mask, report)
     mask, tissue = np.pad(mask[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS)
     affine = shifted_affine(affine, first)
-    field = smoothed_mask(mask, smoothing_voxels)
+    field = smooth_mask(mask, smoothing_voxels)
     core = mask & ~np.isin(tissue, scheme.cortex)
     _require_both(tissue, scheme, field, affine, report)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
-    walls = isosurface(smoothed_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
+    walls = isosurface(smooth_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
     plane = mid_plane(walls)
     to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
     if to_right is not None and abs(plane.normal @ _between_sides(tissue, scheme, affine)) < SAME_AXIS:
@@ -116,27 +116,27 @@ def from_labels(
         warn(report, f"the fissure bends away from its plane by up to {shift:.0f} mm: check it")
     grid, opens = affine, bool(scheme.cortex) and fissure_mm > 0
     # what smoothing would shut, and reopened slits leave shut, is not shown
-    slit, _ = unbridged(mask, field, smoothing_voxels, np.zeros_like(mask))
+    slit, _ = remove_bridges(mask, field, smoothing_voxels, np.zeros_like(mask))
     hidden = fissure.hidden(slit > LEVEL, affine, fissure_mm)
     # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
     left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if opens else np.zeros_like(mask)
-    field, report["slit_voxels_reopened"] = unbridged(mask, field, smoothing_voxels, left_shut)
+    field, report["slit_voxels_reopened"] = remove_bridges(mask, field, smoothing_voxels, left_shut)
     if opens:
         field, affine, report["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
     # where labels say which side is which, a hemisphere may be far smaller than the other one
-    field, report["topology"] = made_simple(field, COMPARABLE if to_right is None else SMALLEST_HEMISPHERE)
-    tell_of_dropped(report["topology"], affine, volume, report)
+    field, report["topology"] = make_simple(field, COMPARABLE if to_right is None else SMALLEST_HEMISPHERE)
+    report_dropped(report["topology"], affine, volume, report)
     rough = isosurface(field, affine)
-    mesh = even(rough, smoothing_iterations, edge_length_mm, report)
+    mesh = make_sound(rough, smoothing_iterations, edge_length_mm, report)
     expected = after_repairs(volume, report["topology"], affine) - report.get("fissure_opened_mL", 0.0) / ML_PER_MM3
     mesh, report["smoothing"] = with_volume(mesh, expected, area(rough))
     if abs(change := report["smoothing"]["volume_change"]) > KEPT:
         warn(report, f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it")
     centres = corners(mesh).mean(axis=1)
     # between the walls of the surface itself: cortex may be thicker on one side than on the other
-    heights = between(mesh, fissure).height_above(centres) if to_right is None else sampled(to_right, grid, centres)
+    heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
     left = left_faces(mesh, heights)
-    return posed(mesh, left, plane, report, week, rotation)
+    return pose_surface(mesh, left, plane, report, week, rotation)
 
 
 def hemisphere_from_labels(
@@ -168,16 +168,16 @@ def hemisphere_from_labels(
         )
     mask = np.isin(tissue, scheme.cerebrum)
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
-    box, first = cropped(mask)
+    box, first = crop(mask)
     require_plausible_size(2.0 * volume, np.linalg.norm(affine[:3, :3], axis=0) * [s.stop - s.start for s in box], week)
     report["mask_volume_mL"] = volume * ML_PER_MM3
-    tell_of_border(mask, report)
+    report_border(mask, report)
     affine = shifted_affine(affine, first)
-    field, report["topology"] = made_simple(smoothed_mask(np.pad(mask[box], PAD_VOXELS), smoothing_voxels))
-    tell_of_dropped(report["topology"], affine, volume, report)
+    field, report["topology"] = make_simple(smooth_mask(np.pad(mask[box], PAD_VOXELS), smoothing_voxels))
+    report_dropped(report["topology"], affine, volume, report)
     rough = isosurface(field, affine)
     require_one(rough)
-    mesh = even(rough, smoothing_iterations, edge_length_mm, report)
+    mesh = make_sound(rough, smoothing_iterations, edge_length_mm, report)
     mesh, report["smoothing"] = with_volume(mesh, after_repairs(volume, report["topology"], affine), area(rough))
     return single_hemisphere(mesh, side, "auto", report, week)
 
@@ -196,7 +196,7 @@ def thickness_from_labels(
     Parameters
     ----------
     labels, affine, scheme, smoothing_voxels
-        As for `from_labels`; the scheme has to tell cortex from the tissue inside.
+        As for `from_labels`; the scheme has to separate cortex from the tissue inside.
     surface
         The whole pial surface, posed.
     pose : (4, 4) float
@@ -204,7 +204,7 @@ def thickness_from_labels(
     """
     affine = pose @ affine
     tissue = cerebrum_labels(labels, affine, scheme, {})
-    box, first = cropped(np.isin(tissue, scheme.cerebrum))
+    box, first = crop(np.isin(tissue, scheme.cerebrum))
     tissue = np.pad(tissue[box], PAD_VOXELS)
     cerebrum, cortex = np.isin(tissue, scheme.cerebrum), np.isin(tissue, scheme.cortex)
     thickness = cortical_thickness(surface, cerebrum, cortex, shifted_affine(affine, first), smoothing_voxels)
@@ -254,8 +254,8 @@ def _require_both(
         )
     # a part that is left out below, for its size, makes no second hemisphere
     parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
-    shape = narrowness(isosurface(smoothed_mask(parts, 1.0), affine))
-    # a brain that the field of view cuts off may be as flat, which is told already
+    shape = narrowness(isosurface(smooth_mask(parts, 1.0), affine))
+    # a brain that the field of view cuts off may be as flat, which has been reported already
     if shape < NARROWEST_BRAIN and report["border_share"] <= TOLD_LOSS:
         raise InputError(
             "the volume seems to hold one hemisphere only",
@@ -280,12 +280,12 @@ def _with_fissure(
     Where more than a thousandth of the brain is taken, the fissure was shut; voxels that are too coarse for its new
     walls are then made finer first.
     """
-    wide = opened(field, affine, core, fissure, gap_mm, hidden)
+    wide = open_fissure(field, affine, core, fissure, gap_mm, hidden)
     # an opening of less than two voxels would be lost between them
     factor = int(np.ceil(1.8 * np.linalg.norm(affine[:3, :3], axis=0).max() / gap_mm))
     if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
-        solid, _ = refined(core.astype(np.float32), affine, factor)
-        field, affine = refined(field, affine, factor)
-        wide = opened(field, affine, solid > 0.5, fissure, gap_mm, hidden)
+        solid, _ = refine(core.astype(np.float32), affine, factor)
+        field, affine = refine(field, affine, factor)
+        wide = open_fissure(field, affine, solid > 0.5, fissure, gap_mm, hidden)
     voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
     return wide, affine, float((field - wide).sum(dtype=float) * voxel_ml)

@@ -6,21 +6,21 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
-from gyriflow.surface.brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, posed_surface
-from gyriflow.surface.fissure import SHIFTED_MM, fissure_between
-from gyriflow.surface.hemisphere_pose import CONVENTIONS, pair_by_shape
-from gyriflow.surface.hemispheres import least_gap, left_faces, require_common_pose, require_pair, set_apart
-from gyriflow.surface.limits import USUAL, Limits
-from gyriflow.surface.orientation import mid_plane
-from gyriflow.surface.outcome import PialSurface
-from gyriflow.surface.pial import TOLD_LOSS, even, motion, posed, warn
-from gyriflow.surface.repair import cleaned, pieces
-from gyriflow.surface.single_hemisphere import require_one, single_hemisphere
-from gyriflow.surface.size import require_plausible_size
-from gyriflow.surface.stalks import surface_without_stalks
-from gyriflow.surface.study_poses import as_poses, placed, poses
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
+from .brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, pose_surface_by_shape
+from .fissure import SHIFTED_MM, fissure_between
+from .hemisphere_pose import CONVENTIONS, pair_by_shape
+from .hemispheres import least_gap, left_faces, require_common_pose, require_pair, set_apart
+from .limits import USUAL, Limits
+from .orientation import mid_plane
+from .outcome import PialSurface
+from .pial import TOLD_LOSS, make_sound, motion, pose_surface, warn
+from .repair import clean, pieces
+from .single_hemisphere import require_one, single_hemisphere
+from .size import require_plausible_size
+from .stalks import surface_without_stalks
+from .study_poses import as_poses, poses, report_placement
 
 log = logging.getLogger(__name__)
 
@@ -46,10 +46,10 @@ def from_hemispheres(
 
     The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
-    other. With coordinates "auto" each may be in any rigid pose; `posing` is then the report of the pose if it is
-    known already, as from all brains of a study. InputError where the pose cannot be told, where they are swapped, of
-    different size or not of the week's size; MeshError where one can't be made a closed surface without handles and
-    intersections.
+    other. With coordinates "auto" each may be in any rigid pose; `posing` is then the report of the pose if it is known
+    already, as from all brains of a study. InputError where the pose cannot be determined, or the hemispheres are
+    swapped, of different size or not of the week's size; MeshError where one can't be made a closed surface without
+    handles and intersections.
     """
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
     left, report["repair_left"] = hemisphere(in_ras(left, coordinates), max_hole_mm, report)
@@ -65,8 +65,8 @@ def from_hemispheres(
     both = merged(left, right)
     for warning in require_pair(left, right, limits):
         warn(report, warning)
-    left = even(left, smoothing_iterations, edge_length_mm, report, "mesh_left")
-    right = even(right, smoothing_iterations, edge_length_mm, report, "mesh_right")
+    left = make_sound(left, smoothing_iterations, edge_length_mm, report, "mesh_left")
+    right = make_sound(right, smoothing_iterations, edge_length_mm, report, "mesh_right")
     plane = mid_plane(merged(left, right))
     require_common_pose(plane.asymmetry_mm, float(np.ptp(both.vertices, axis=0).max()), limits)
     report["gap_before_mm"] = least_gap(left, right)
@@ -77,22 +77,22 @@ def from_hemispheres(
         warn(report, f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm")
         plane = mid_plane(merged(left, right))
     mesh = merged(left, right)
-    surface = posed(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, report, week)
+    surface = pose_surface(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, report, week)
     turn = np.array(report["pose"])
     before = motion(CONVENTIONS["lps"]) if coordinates == "lps" else np.eye(4)
     both_before = (before, before) if placing is None else (placing.left, placing.right)
     report["motions"] = {
-        side: (turn @ shifted(sign * moved * to_right) @ one).tolist()
+        side: (turn @ translation(sign * moved * to_right) @ one).tolist()
         for side, sign, one in zip(("left", "right"), (-1.0, 1.0), both_before, strict=True)
     }
     if placing:
-        report["posing"] = placed(placing, turn, moved * to_right)
+        report["posing"] = report_placement(placing, turn, moved * to_right)
         if placing.report["together"]:
             report["pose"] = (turn @ placing.left).tolist()
     return surface
 
 
-def shifted(by: NDArray[np.float64]) -> NDArray[np.float64]:
+def translation(by: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the (4, 4) motion by (3,) mm."""
     matrix = np.eye(4)
     matrix[:3, 3] = by
@@ -115,13 +115,13 @@ def from_pial(
     closed and free of handles and intersections.
     """
     report: dict[str, Any] = {"source": "pial", "coordinates": coordinates}
-    mesh, report["repair"] = cleaned(mesh, max_hole_mm)
-    _tell_of_dropped(report["repair"], area(mesh), report)
+    mesh, report["repair"] = clean(mesh, max_hole_mm)
+    _report_dropped(report["repair"], area(mesh), report)
     mesh = without_stalks(mesh, report)
     require_plausible_size(signed_volume(mesh), np.ptp(mesh.vertices, axis=0), week)
-    mesh = even(mesh, smoothing_iterations, edge_length_mm, report)
+    mesh = make_sound(mesh, smoothing_iterations, edge_length_mm, report)
     _require_both(mesh, report)
-    pose = posed_surface(mesh, coordinates)
+    pose = pose_surface_by_shape(mesh, coordinates)
     report["pose_by"] = pose.by
     for warning in pose.warnings:
         warn(report, warning)
@@ -131,7 +131,7 @@ def from_pial(
     if (shift := float(np.abs(fissure.heights).max())) > SHIFTED_MM:
         warn(report, f"the fissure bends away from its plane by up to {shift:.0f} mm: check it")
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
-    return posed(mesh, left, plane, report, week, pose.rotation)
+    return pose_surface(mesh, left, plane, report, week, pose.rotation)
 
 
 def from_hemisphere(
@@ -154,23 +154,23 @@ def from_hemisphere(
     mesh, report["repair"] = hemisphere(mesh, max_hole_mm, report)
     require_plausible_size(2.0 * signed_volume(mesh), np.ptp(mesh.vertices, axis=0), week)
     require_one(mesh)
-    mesh = even(mesh, smoothing_iterations, edge_length_mm, report)
+    mesh = make_sound(mesh, smoothing_iterations, edge_length_mm, report)
     return single_hemisphere(mesh, side, coordinates, report, week)
 
 
 def hemisphere(
     mesh: TriangleMesh, max_hole_mm: float, report: dict[str, Any] | None = None
 ) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Returns the largest piece of a surface, clean and without what hangs on it by stalks, and the repairs.
+    """Returns the largest piece of a surface, repaired and without parts that hang on stalks, and the repairs.
 
-    What was lost of it is told in the warnings of `report`.
+    The warnings of `report` say what was removed.
     """
     said = {} if report is None else report
-    mesh, repairs = cleaned(mesh, max_hole_mm)
+    mesh, repairs = clean(mesh, max_hole_mm)
     largest, *others = pieces(mesh)
     repairs["pieces"], repairs["pieces_dropped"] = 1, repairs["pieces_dropped"] + len(others)
     repairs["area_dropped_mm2"] += sum(area(piece) for piece in others)
-    _tell_of_dropped(repairs, area(largest), said)
+    _report_dropped(repairs, area(largest), said)
     return without_stalks(largest, said), repairs
 
 
@@ -192,7 +192,7 @@ def in_ras(mesh: TriangleMesh, coordinates: Coordinates) -> TriangleMesh:
     return transformed(mesh, motion(CONVENTIONS["lps"])) if coordinates == "lps" else mesh
 
 
-def _tell_of_dropped(repairs: dict[str, Any], kept_mm2: float, report: dict[str, Any]) -> None:
+def _report_dropped(repairs: dict[str, Any], kept_mm2: float, report: dict[str, Any]) -> None:
     dropped = repairs["area_dropped_mm2"]
     if dropped > TOLD_LOSS * kept_mm2:
         warn(report, f"{repairs['pieces_dropped']} pieces apart from the brain or inside it were dropped: "

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import Fit, angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
-from gyriflow.surface.limits import USUAL, Limits
-from gyriflow.surface.medial_wall import medial_wall
-from gyriflow.surface.outlines import Outline, outline, reference
-from gyriflow.surface.registration import Target, found, matched, registered
+from ..errors import InputError
+from ..geometry.alignment import Fit, angle_deg
+from ..geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
+from .limits import USUAL, Limits
+from .medial_wall import medial_wall
+from .outline_fit import Target, register, register_deformed, register_from_all_sides
+from .outlines import Outline, outline, reference
 
 Floats = NDArray[np.float64]
 
@@ -26,17 +26,17 @@ MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 LEAST_CONFIDENCE, WORST_RESIDUAL = 1.1, 0.085
 # two sides of one brain are mirror images as well as this times the asymmetry allowed
 PAIR_RESIDUAL_PER_ASYMMETRY = 3.5
-# a fit of one side on the other is off by about so many degrees per residual, about each axis
+# a fit of one side on the other is off by about this many degrees per residual, about each axis
 ERROR_DEG_PER_RESIDUAL = 50.0
 # beside the shape, poses near these axes of files are likely
 CONVENTIONS = {"ras": np.eye(3), "lps": np.diag([-1.0, -1.0, 1.0])}
 CONVENTION_DEG = 35.0
-# two hemispheres side by side have their centres so far apart, in sizes
+# two hemispheres side by side have their centres this far apart, in sizes
 APART = 0.4
-# so many brains of the study are asked for the pose of a doubtful one
+# how many other brains of the study are consulted for the pose of a doubtful one
 OTHERS = 2
 SIDES = ("left", "right")
-# the Sylvian dent is in front of the middle by so much of the hemisphere's size where it is to be told from the back
+# how far, in sizes of the hemisphere, the Sylvian dent must be in front of the middle for front and back to be clear
 SYLVIAN_AHEAD = 0.05
 
 
@@ -100,7 +100,7 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUA
             or [_require_clear(hemisphere, side) for hemisphere, side in zip(hemispheres, SIDES, strict=True)]
         )
     one, other = hemispheres
-    fit = matched(Target(one.outline), Target(other.outline), other.rotation.T @ one.rotation)
+    fit = register_deformed(Target(one.outline), Target(other.outline), other.rotation.T @ one.rotation)
     worst = PAIR_RESIDUAL_PER_ASYMMETRY * limits.max_asymmetry
     if fit.residual > worst:
         raise InputError(
@@ -127,16 +127,16 @@ def pair_by_shape(left: TriangleMesh, right: TriangleMesh, limits: Limits = USUA
         )
     one, other = (
         replace(hemisphere, rotation=turn.as_matrix() @ hemisphere.rotation)
-        for hemisphere, turn in zip(hemispheres, _reconciled(one, other, fit), strict=True)
+        for hemisphere, turn in zip(hemispheres, _reconcile(one, other, fit), strict=True)
     )
     return Pair(one, other, fit)
 
 
-def _reconciled(one: Hemisphere, other: Hemisphere, fit: Fit) -> tuple[Rotation, Rotation]:
-    """Returns by which rotations both hemispheres are to be turned to lie as the fit and their walls say.
+def _reconcile(one: Hemisphere, other: Hemisphere, fit: Fit) -> tuple[Rotation, Rotation]:
+    """Returns the rotations of both hemispheres that agree best with the fit and their medial walls.
 
-    Least squares of three measures: each wall's tilts and the fit, by their errors. Of the pitch the walls say nothing:
-    each hemisphere gets one half-way between what the two say.
+    Least squares of three measures: each wall's tilts and the fit, by their errors. The walls say nothing about the
+    pitch: each hemisphere gets the one half-way between the two.
     """
     apart = Rotation.from_matrix(other.rotation @ fit.rotation @ one.rotation.T).as_rotvec()
     walls = np.array([one.wall_error_deg, other.wall_error_deg]) ** 2
@@ -165,7 +165,7 @@ def _require_clear(hemisphere: Hemisphere, side: str) -> Hemisphere:
     if _is_clear(hemisphere):
         return hemisphere
     raise InputError(
-        f"the pose of the {side} hemisphere cannot be told from its shape",
+        f"the pose of the {side} hemisphere cannot be determined from its shape",
         found=f"a residual of {hemisphere.residual:.3f}, the next best pose {hemisphere.confidence:.2f} times worse",
         expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times; or a pose near RAS or LPS",
         remedy="Is it a cerebral hemisphere's closed pial surface? If so, pose it and set coordinates: ras or lps.",
@@ -181,10 +181,10 @@ def _near_a_convention(meshes: list[TriangleMesh], hemispheres: list[Hemisphere]
     for axes in CONVENTIONS.values():
         posed = []
         for mesh, best in zip(meshes, hemispheres, strict=True):
-            fit = registered(best.outline, Target(reference()), axes)
+            fit = register(best.outline, Target(reference()), axes)
             nearly = fit.residual < LEAST_CONFIDENCE * best.residual and fit.residual <= WORST_RESIDUAL
             if nearly and angle_deg(fit.rotation @ axes.T) < CONVENTION_DEG:
-                posed.append(_described(mesh, best.outline, fit, best.confidence))
+                posed.append(_describe(mesh, best.outline, fit, best.confidence))
         # the left one is mirrored, so that both are to be right of the middle
         across = [(axes @ hemisphere.outline.centre)[0] for hemisphere in posed]
         if len(posed) == 2 and sum(across) > APART * posed[0].outline.size_mm:
@@ -202,10 +202,10 @@ def _like_others(meshes: list[TriangleMesh], hemispheres: list[Hemisphere], othe
         known = [getattr(pair, side) for pair in others]
         known.sort(key=lambda hemisphere: abs(np.log(hemisphere.outline.size_mm / best.outline.size_mm)))
         for other in known[:OTHERS]:
-            fit, confidence = found(best.outline, Target(other.outline))
+            fit, confidence = register_from_all_sides(best.outline, Target(other.outline))
             if confidence >= LEAST_CONFIDENCE and fit.residual <= WORST_RESIDUAL:
                 turned = Fit(other.rotation @ fit.rotation, fit.shift, fit.residual)
-                posed.append(_described(mesh, best.outline, turned, confidence))
+                posed.append(_describe(mesh, best.outline, turned, confidence))
                 break
     return posed if len(posed) == 2 else []
 
@@ -213,10 +213,10 @@ def _like_others(meshes: list[TriangleMesh], hemispheres: list[Hemisphere], othe
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
     """Returns the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
     shape = outline(mesh)
-    return _described(mesh, shape, *found(shape, Target(reference())))
+    return _describe(mesh, shape, *register_from_all_sides(shape, Target(reference())))
 
 
-def _described(mesh: TriangleMesh, shape: Outline, fit: Fit, confidence: float) -> Hemisphere:
+def _describe(mesh: TriangleMesh, shape: Outline, fit: Fit, confidence: float) -> Hemisphere:
     """Returns a hemisphere whose fit on the reference is known, its medial wall upright."""
     points = np.asarray((mesh.vertices - shape.centre) / shape.size_mm, dtype=np.float64)
     start = np.asarray(-fit.rotation[0], dtype=np.float64)

@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas, face_components, signed_volume, submesh
-from gyriflow.surface.limits import Limits
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, corners, face_areas, face_components, signed_volume, submesh
+from .limits import Limits
 
 Floats = NDArray[np.float64]
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
@@ -79,10 +79,10 @@ def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, Triang
 
     The fissure is the plane x = `fissure_x_mm` in RAS+. The parts are open where a connected brain is cut.
     """
-    return parted(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
+    return cut_sides(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
 
 
-def parted(mesh: TriangleMesh, left: NDArray[np.bool_]) -> tuple[TriangleMesh, TriangleMesh]:
+def cut_sides(mesh: TriangleMesh, left: NDArray[np.bool_]) -> tuple[TriangleMesh, TriangleMesh]:
     """Returns the surfaces of the faces where the (m,) mask holds, and of the others.
 
     InputError where one of the two has no face.

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.errors import InputError
-from gyriflow.parameters.schemes import SCHEMES, LabelScheme
+from ..errors import InputError
+from ..parameters.schemes import SCHEMES, LabelScheme
 
 # brains of the example atlas have cortex at 86 % of their surface and more, read by wrong schemes at 48 % and less
 LEAST_CORTEX_OUTSIDE = 0.5

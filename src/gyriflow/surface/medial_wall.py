@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.geometry.triangles import unit
+from ..geometry.triangles import unit
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gyriflow.geometry.triangles import TriangleMesh, vertex_areas, vertex_normals
+from ..geometry.triangles import TriangleMesh, vertex_areas, vertex_normals
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -65,11 +65,11 @@ def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG) -> MidPlane:
     weights = vertex_areas(mesh)
     chosen = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
     sample, tree = mesh.vertices[chosen], cKDTree(mesh.vertices)
-    candidates = [_fitted_to_fissure(mesh, *plane) for plane in _symmetry_planes(sample, tree, search_deg)]
+    candidates = [_fit_to_fissure(mesh, *plane) for plane in _symmetry_planes(sample, tree, search_deg)]
     return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))
 
 
-def _fitted_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry: float) -> MidPlane:
+def _fit_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry: float) -> MidPlane:
     """Returns the plane fitted to the fissure near a plane of symmetry, or that plane where it fits nearly as well."""
     middle = fissure_points(mesh, normal, offset)
     fitted = _plane_through(middle, normal, offset)

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, area, euler_number, is_closed, mean_edge_length, signed_volume
-from gyriflow.surface.remeshing import self_intersecting_faces
-from gyriflow.surface.repair import pieces
-from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
+from ..errors import MeshError
+from ..geometry.remeshing import self_intersecting_faces
+from ..geometry.triangles import TriangleMesh, area, euler_number, is_closed, mean_edge_length, signed_volume
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .repair import pieces
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class PialSurface:
     report: dict[str, Any]
 
 
-def described(
+def describe(
     whole: TriangleMesh,
     left: TriangleMesh | None,
     right: TriangleMesh | None,

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from gyriflow.geometry.triangles import TriangleMesh, corners, vertex_areas, vertex_normals
-from gyriflow.surface.extraction import isosurface
+from ..geometry.triangles import TriangleMesh, corners, vertex_areas, vertex_normals
+from .extraction import isosurface
 
 Floats = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""What the surfaces of all kinds of brains go through: evened, posed, parted, measured."""
+"""What the surfaces of all kinds of brains go through: even triangles, a pose, two sides, measures."""
 
 import logging
 from typing import Any
@@ -6,18 +6,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.surface.hemispheres import parted, split
-from gyriflow.surface.orientation import MidPlane, upright
-from gyriflow.surface.outcome import PialSurface, described, faults, require_sound
-from gyriflow.surface.remaking import remade
-from gyriflow.surface.remeshing import evened
+from ..geometry.triangles import TriangleMesh, transformed
+from .even_triangles import make_even
+from .hemispheres import cut_sides, split
+from .orientation import MidPlane, upright
+from .outcome import PialSurface, describe, faults, require_sound
+from .rebuilding import rebuild
 
 log = logging.getLogger(__name__)
 
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
-# what is lost beyond this part of a brain is told of
+# a loss beyond this fraction of a brain is reported
 TOLD_LOSS = 0.005
 
 
@@ -29,26 +29,26 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
     """
     require_sound(mesh)
     pose = {"pose": np.eye(4).tolist(), "rotation_deg": 0.0}
-    return described(mesh, *split(mesh, 0.0), 0.0, {"source": "shape", **pose}, week)
+    return describe(mesh, *split(mesh, 0.0), 0.0, {"source": "shape", **pose}, week)
 
 
-def even(
+def make_sound(
     mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float, report: dict[str, Any], name: str = "mesh"
 ) -> TriangleMesh:
     """Returns the surface smoothed and remeshed, each piece a sphere that does not cut itself.
 
-    Where the triangles can't be repaired, the surface is made anew through voxels of half an edge length.
+    Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length.
     """
-    smooth, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
+    smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
     if faults(smooth):
-        warn(report, f"the surface was made anew through voxels, since it had {faults(smooth)}")
-        mesh, report[name.replace("mesh", "remade")] = remade(mesh, 0.5 * edge_length_mm)
-        smooth, report[name] = evened(mesh, smoothing_iterations, edge_length_mm)
+        warn(report, f"the surface was rebuilt through voxels, since it had {faults(smooth)}")
+        mesh, report[name.replace("mesh", "remade")] = rebuild(mesh, 0.5 * edge_length_mm)
+        smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
     require_sound(smooth)
     return smooth
 
 
-def posed(
+def pose_surface(
     mesh: TriangleMesh,
     is_left: NDArray[np.bool_],
     plane: MidPlane,
@@ -63,7 +63,7 @@ def posed(
     """
     matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
     whole = transformed(mesh, matrix)
-    left, right = parted(whole, is_left)
+    left, right = cut_sides(whole, is_left)
     # where the plane, which may have kept a tilt below half a degree, passes the brain's centre
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
@@ -80,7 +80,7 @@ def posed(
         "fissure_scatter_mm": plane.scatter_mm,
         "asymmetry_mm": plane.asymmetry_mm,
     }
-    return described(whole, left, right, fissure_x, report, week)
+    return describe(whole, left, right, fissure_x, report, week)
 
 
 def motion(rotation: NDArray[np.float64] | None) -> NDArray[np.float64]:

@@ -5,9 +5,10 @@ from typing import Any
 import igl
 import numpy as np
 
-from gyriflow.errors import MeshError
-from gyriflow.geometry.meshlab import pymeshlab
-from gyriflow.geometry.triangles import (
+from ..errors import MeshError
+from ..geometry.meshlab import pymeshlab
+from ..geometry.remeshing import self_intersecting_faces
+from ..geometry.triangles import (
     TriangleMesh,
     area_vectors,
     edges,
@@ -19,7 +20,6 @@ from gyriflow.geometry.triangles import (
     signed_volume,
     submesh,
 )
-from gyriflow.surface.remeshing import self_intersecting_faces
 
 # vertices closer than this are one vertex
 SAME_MM = 1e-5
@@ -27,7 +27,7 @@ SAME_MM = 1e-5
 COMPARABLE = 0.3
 
 
-def cleaned(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
     Equal vertices are joined, degenerate and double faces removed, non-manifold edges opened, holes up to
@@ -35,13 +35,13 @@ def cleaned(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[
     MeshError for larger holes and for surfaces that stay open.
     """
     report: dict[str, Any] = {}
-    mesh = _without_doubles(mesh, report)
+    mesh = _drop_doubles(mesh, report)
     # not before: faces that meet in several copies of a vertex would count
     report["faces_that_cut_others"] = int(self_intersecting_faces(mesh).sum())
-    mesh = _manifold(mesh, report)
+    mesh = _make_manifold(mesh, report)
     mesh = _main_pieces(mesh, report)
-    mesh = _filled(mesh, max_hole_mm, report)
-    mesh = _outward(mesh, report)
+    mesh = _fill_holes(mesh, max_hole_mm, report)
+    mesh = _turn_outward(mesh, report)
     if not is_closed(mesh):
         _, counts = edges(mesh)
         raise MeshError(
@@ -59,7 +59,7 @@ def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
     return [submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
 
 
-def _without_doubles(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
+def _drop_doubles(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
     vertices, _, _, faces = igl.remove_duplicate_vertices(mesh.vertices, mesh.faces, SAME_MM)
     used = len(np.unique(mesh.faces))
     faces = np.asarray(faces, dtype=np.int64)
@@ -74,7 +74,7 @@ def _without_doubles(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh
     return result
 
 
-def _manifold(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
+def _make_manifold(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
     _, counts = edges(mesh)
     bad = int((counts > 2).sum())
     report["non_manifold_edges_opened"] = bad
@@ -108,7 +108,7 @@ def _main_pieces(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
     return merged(*kept)
 
 
-def _filled(mesh: TriangleMesh, max_hole_mm: float, report: dict[str, Any]) -> TriangleMesh:
+def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, report: dict[str, Any]) -> TriangleMesh:
     """Returns the surface with a fan over each hole up to `max_hole_mm` across."""
     loops = [np.asarray(loop) for loop in igl.boundary_loop_all(mesh.faces)]
     sizes = [float(np.ptp(mesh.vertices[loop], axis=0).max()) for loop in loops]
@@ -134,7 +134,7 @@ def _filled(mesh: TriangleMesh, max_hole_mm: float, report: dict[str, Any]) -> T
     return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
 
 
-def _outward(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
+def _turn_outward(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
     found = pieces(mesh)
     inward = [signed_volume(piece) < 0 for piece in found]
     report["pieces_turned_outward"] = int(sum(inward))

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.geometry.triangles import TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
-from gyriflow.surface.outcome import faults
-from gyriflow.surface.remeshing import self_intersecting_faces
-from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
+from ..geometry.remeshing import self_intersecting_faces
+from ..geometry.triangles import TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .outcome import faults
 
 log = logging.getLogger(__name__)
 
@@ -18,7 +18,7 @@ KEPT = 0.01
 # beyond this it has taken structures, not rounded them, and moving the whole surface would not bring them back
 MOST_GIVEN_BACK = 0.05
 ROUNDS = 2
-# walls that would cut each other are held back, with their neighbours, so many times
+# how many times walls that would cut each other are held back, with their neighbours
 HELD_BACK = 4
 
 

@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.surface.brain_pose import (
+from ..errors import InputError
+from ..geometry.alignment import angle_deg
+from ..geometry.triangles import TriangleMesh, transformed
+from .brain_pose import (
     DOUBTFUL_BRAIN,
     LEAST_TURN_DEG,
     narrowness,
 )
-from gyriflow.surface.hemisphere_pose import (
+from .hemisphere_pose import (
     CONVENTION_DEG,
     CONVENTIONS,
     LEAST_CONFIDENCE,
@@ -21,8 +21,8 @@ from gyriflow.surface.hemisphere_pose import (
     SYLVIAN_AHEAD,
     hemisphere_by_shape,
 )
-from gyriflow.surface.outcome import PialSurface, described
-from gyriflow.surface.pial import motion, warn
+from .outcome import PialSurface, describe
+from .pial import motion, warn
 
 # the medial wall's distance from the mid-sagittal plane
 BESIDE_MM = 0.5
@@ -45,8 +45,8 @@ def single_hemisphere(
     """Returns a clean hemisphere posed, in coordinates "ras", "lps" or "auto", with the whole report.
 
     With "auto", the axes of the file are kept where its shape says that they are RAS or LPS within 35°, and its medial
-    wall is then turned upright; else the shape's pose is taken. InputError where the shape cannot tell it, or tells
-    that it is the other side.
+    wall is then turned upright; else the shape's pose is taken. InputError where it is ambiguous, or the shape is
+    that of the other side.
     """
     mirrored = side == "left"
     shape = hemisphere_by_shape(transformed(mesh, MIRROR) if mirrored else mesh)
@@ -62,7 +62,7 @@ def single_hemisphere(
             remedy="Set the other side; or, if it is right, pose the file yourself and set coordinates: ras.",
         )
     if shape.sylvian < SYLVIAN_AHEAD:
-        warn(report, f"the side, {side}, is what the configuration says: the shape does not tell it")
+        warn(report, f"the side, {side}, is taken from the configuration: it cannot be determined from the shape")
     if coordinates != "auto":
         chosen, report["pose_by"] = CONVENTIONS[coordinates], "configuration"
         if clear and angles[coordinates] > LEAST_TURN_DEG:
@@ -80,7 +80,7 @@ def single_hemisphere(
         warn(report, f"the hemisphere was turned by {angles['ras']:.0f}°, as its shape says")
     else:
         raise InputError(
-            "the pose of the hemisphere cannot be told from its shape",
+            "the pose of the hemisphere cannot be determined from its shape",
             found=f"the next best pose {shape.confidence:.2f} times worse",
             expected=f"at least {LEAST_CONFIDENCE} times, or RAS or LPS",
             remedy="Pose it and set coordinates: ras or lps.",
@@ -95,4 +95,4 @@ def single_hemisphere(
         "sylvian_ahead": shape.sylvian,
     }
     left, right = (whole, None) if mirrored else (None, whole)
-    return described(whole, left, right, fissure_x, report, week)
+    return describe(whole, left, right, fissure_x, report, week)

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.units import ML_PER_MM3
+from ..errors import InputError
+from ..units import ML_PER_MM3
 
 # cerebral volume (mL) at 25.4 and 36.6 GW: the atlas of Fidon et al. 2021 (doi 10.5281/zenodo.5524312) and the growth
 # by 230 % between these weeks found by Clouchoux et al. 2012 (doi 10.1016/j.ajog.2011.10.002)
@@ -23,7 +23,7 @@ def expected_volume_ml(week: float) -> float:
 def require_plausible_size(volume_mm3: float, extents_mm: NDArray[np.float64], week: float) -> None:
     """Raises InputError where a cerebrum's volume is out of all proportion for its week, with a guess of the unit.
 
-    `extents_mm` (3,) is only told. The bounds are wide: a fifth to six times the published volume.
+    `extents_mm` (3,) only appears in the message. The bounds are wide: a fifth to six times the published volume.
     """
     expected = expected_volume_ml(week)
     volume = volume_mm3 * ML_PER_MM3

@@ -7,8 +7,8 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.geometry.triangles import TriangleMesh, corners, submesh
-from gyriflow.surface.repair import cleaned
+from ..geometry.triangles import TriangleMesh, corners, submesh
+from .repair import clean
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -75,7 +75,7 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
 def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
     """Returns a closed surface without what hangs on it by stalks, closed where these were cut, and the parts."""
     if not SMALLEST_MM < np.ptp(mesh.vertices, axis=0).max() < LARGEST_MM:
-        # in another unit, which is told elsewhere
+        # in another unit, which is reported elsewhere
         return mesh, []
     size = np.full(3, SURFACE_VOXEL_MM)
     first = mesh.vertices.min(axis=0) - 2.0 * size
@@ -94,7 +94,7 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
     at = np.clip(np.rint((corners(mesh).mean(axis=1) - first) / size).astype(int), 0, shape - 1)
     kept = left[tuple(nearest[(slice(None), *at.T)])]
     open_, _ = submesh(mesh, kept)
-    return cleaned(open_, WIDEST_CUT_MM)[0], report
+    return clean(open_, WIDEST_CUT_MM)[0], report
 
 
 def _contact_mm2(one: Mask, other: Mask, size_mm: Floats) -> float:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.surface.hemisphere_pose import CONVENTIONS, MIRROR, SYLVIAN_AHEAD, Pair, about_x, pair_by_shape, pitch_deg
-from gyriflow.surface.limits import USUAL, Limits
-from gyriflow.surface.registration import Target, registered
+from ..errors import InputError
+from ..geometry.alignment import angle_deg
+from ..geometry.triangles import TriangleMesh
+from .hemisphere_pose import CONVENTIONS, MIRROR, SYLVIAN_AHEAD, Pair, about_x, pair_by_shape, pitch_deg
+from .limits import USUAL, Limits
+from .outline_fit import Target, register
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ COMMON_DEG_PER_RESIDUAL, COMMON_OFFSET, COMMON_DISTANCE = 180.0, 0.08, 0.15
 DECLARED_TURN_DEG = 30.0
 # the medial walls' distance from the mid-sagittal plane where the files do not say it
 BESIDE_MM = 0.5
-# each brain is registered with so many that are smaller and larger
+# how many smaller and larger brains each brain is registered with
 NEIGHBOURS = 4
 # the pitch is known to a degree or two
 PITCH_STEP_DEG = 0.5
@@ -68,15 +68,15 @@ def pairs_by_shape(
 def poses(pairs: Sequence[Pair], declared: Sequence[bool]) -> list[Poses]:
     """Returns the poses of the brains of one study, given what `pair_by_shape` says of each.
 
-    Shape tells each hemisphere's pose but for the pitch, in which brains of different age differ: there they are
-    registered with each other. Where hemispheres share coordinates of which one axis is exactly left-right, and shape
-    says that these are RAS or LPS, they keep the file's pose, and the other brains follow them; else the reference
-    shape's pitch is zero. The mid-sagittal plane is x = 0. For brains where `declared` holds, whose files name their
-    coordinate system, the axis need not be exact.
+    Shape gives each hemisphere's pose except for the pitch, in which brains of different age differ: for the pitch they
+    are registered with each other. Where hemispheres share coordinates of which one axis is exactly left-right, and
+    shape says that these are RAS or LPS, they keep the file's pose, and the other brains follow them; else the
+    reference shape's pitch is zero. The mid-sagittal plane is x = 0. For brains where `declared` holds, whose files
+    name their coordinate system, the axis need not be exact.
     """
     frames = [_frame(pair, named) for pair, named in zip(pairs, declared, strict=True)]
     pitches, places = _pitches(pairs, frames), _places(pairs, frames)
-    return [_posed(*brain) for brain in zip(pairs, frames, declared, pitches, places, strict=True)]
+    return [_make_poses(*brain) for brain in zip(pairs, frames, declared, pitches, places, strict=True)]
 
 
 def as_poses(report: dict[str, Any]) -> Poses:
@@ -87,7 +87,7 @@ def as_poses(report: dict[str, Any]) -> Poses:
     return Poses(np.array(matrices["left"]), np.array(matrices["right"]), report)
 
 
-def placed(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any]:
+def report_placement(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any]:
     """Returns the report with the whole motions: the pose, then left by −`moved` and right by +`moved`, then `turn`."""
     matrices = {}
     for side, motion, sign in (("left", poses.left, -1.0), ("right", poses.right, 1.0)):
@@ -97,7 +97,7 @@ def placed(poses: Poses, turn: Floats, moved: Floats) -> dict[str, Any]:
     return poses.report | {"matrices": matrices}
 
 
-def _posed(pair: Pair, frame: str | None, declared: bool, pitch: float, place: Floats) -> Poses:
+def _make_poses(pair: Pair, frame: str | None, declared: bool, pitch: float, place: Floats) -> Poses:
     both = {"left": pair.left, "right": pair.right}
     report: dict[str, Any] = {
         "method": "file" if frame else "shape",
@@ -111,7 +111,7 @@ def _posed(pair: Pair, frame: str | None, declared: bool, pitch: float, place: F
     }
     if np.mean(list(report["sylvian_ahead"].values())) < SYLVIAN_AHEAD:
         report["warnings"].append(
-            "left and right are what the configuration says: the shapes do not tell whether the files are swapped"
+            "left and right are taken from the configuration: the shapes do not show whether the files are swapped"
         )
     if frame:
         motion = np.eye(4)
@@ -196,7 +196,7 @@ def _pitches(pairs: Sequence[Pair], frames: list[str | None]) -> list[float]:
     unit_rows = np.eye(len(pairs))
     for i, j in combinations(range(len(pairs)), 2):
         if abs(rank[i] - rank[j]) <= NEIGHBOURS:
-            turn, weight = _registered(pairs[i], pairs[j])
+            turn, weight = _register_pair(pairs[i], pairs[j])
             rows.append(weight * (unit_rows[i] - unit_rows[j]))
             values.append(weight * turn)
     for row, pair in zip(unit_rows, pairs, strict=True):
@@ -220,11 +220,11 @@ def _pitch_in_file(pair: Pair, frame: str) -> float:
     )
 
 
-def _registered(one: Pair, other: Pair) -> tuple[float, float]:
-    """Returns by how much more than the other brain the one is to be pitched to lie alike, and the result's weight."""
+def _register_pair(one: Pair, other: Pair) -> tuple[float, float]:
+    """Returns the pitch of one brain beyond the other's with which they lie alike, and the result's weight."""
     turns, residuals = [], []
     for a, b in ((one.left, other.left), (one.right, other.right)):
-        fit = registered(a.outline, Target(b.outline), b.rotation.T @ a.rotation)
+        fit = register(a.outline, Target(b.outline), b.rotation.T @ a.rotation)
         turns.append(pitch_deg(b.rotation @ fit.rotation @ a.rotation.T))
         residuals.append(fit.residual)
     return float(np.mean(turns)), float(np.mean(residuals)) ** -2

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.layers import layer_thickness
-from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
-from gyriflow.surface.extraction import LEVEL, isosurface, main_parts, smoothed_mask
-from gyriflow.surface.fissure import sampled
+from ..errors import InputError
+from ..geometry.layers import layer_thickness
+from ..geometry.triangles import TriangleMesh, vertex_areas
+from .extraction import LEVEL, isosurface, main_parts, smooth_mask
+from .fissure import sample
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -72,7 +72,7 @@ def cortical_thickness(
     smoothing_voxels
         σ of the Gaussian with which the pial surface was made.
     """
-    core = smoothed_mask(cerebrum & ~cortex, smoothing_voxels)
+    core = smooth_mask(cerebrum & ~cortex, smoothing_voxels)
     kept, _, _ = main_parts(core > LEVEL)
     core = np.where(kept, np.maximum(core, LEVEL + 1e-3), np.minimum(core, LEVEL - 1e-3)).astype(np.float32)
     inner = isosurface(core, affine)
@@ -98,8 +98,8 @@ def _cortex_under(points: Floats, cerebrum: Mask, cortex: Mask, affine: Floats, 
     """Returns which of (n, 3) points lie at the surface of the cerebrum's labels, with cortex under them."""
     size = np.linalg.norm(affine[:3, :3], axis=0)
     to_cortex, to_outside = (ndimage.distance_transform_edt(mask, sampling=size) for mask in (~cortex, cerebrum))
-    near = sampled(to_cortex, affine, points) < NEAR_VOXELS * voxel_mm
-    return near & (sampled(to_outside, affine, points) < FARTHEST_VOXELS * voxel_mm)
+    near = sample(to_cortex, affine, points) < NEAR_VOXELS * voxel_mm
+    return near & (sample(to_outside, affine, points) < FARTHEST_VOXELS * voxel_mm)
 
 
 def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:

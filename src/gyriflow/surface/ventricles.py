@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gyriflow.parameters.schemes import LabelScheme
+from ..parameters.schemes import LabelScheme
 
 Mask = NDArray[np.bool_]
 
@@ -12,7 +12,7 @@ Mask = NDArray[np.bool_]
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1
 # fluid belongs to the cerebrum where it sees the cerebrum's tissue in more than this part of the directions
 ENCLOSED = 0.5
-# the border between what is enclosed and what is not is smoothed over so many voxels
+# the border between what is enclosed and what is not is smoothed over this many voxels
 SMOOTHING = 2.0
 # parts of the fluid below this share of the largest are crumbs
 CRUMB = 0.02

@@ -7,10 +7,10 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.errors import InputError
-from gyriflow.geometry.layers import layer_thickness, nearest_on
-from gyriflow.geometry.triangles import TriangleMesh, merged, transformed, vertex_areas
-from gyriflow.surface.thickness import Thickness, summary
+from ..errors import InputError
+from ..geometry.layers import layer_thickness, nearest_on
+from ..geometry.triangles import TriangleMesh, merged, transformed, vertex_areas
+from .thickness import Thickness, summary
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.matching import matched, values_at
+from ..geometry.matching import match_points, values_at
 from ..geometry.triangles import Floats, Ints, vertex_normals
 from .shapes import Shape
 
@@ -63,7 +63,7 @@ def placement(
     normals, areas = vertex_normals(real.mesh), real.areas
     values, row = {}, {}
     for name, shape in others.items():
-        match = matched(real.mesh.vertices, normals, shape.mesh)
+        match = match_points(real.mesh.vertices, normals, shape.mesh)
         values[name] = {measure: values_at(match, getattr(shape, measure)) for measure in MEASURES}
         if name == "run":
             row["matched_share"] = float(np.average(match.agrees, weights=areas))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..geometry.motion import fitted_onto
-from ..geometry.remeshing import remeshed
+from ..geometry.motion import fit_onto
+from ..geometry.remeshing import remesh
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume, transformed, vertex_areas
 
 EDGE_MM = 1.0
@@ -61,7 +61,7 @@ def ready(mesh: TriangleMesh, real: TriangleMesh) -> TriangleMesh:
             expected="closed surfaces with their faces outwards",
         )
     if mesh is real:
-        return remeshed(real, EDGE_MM)
+        return remesh(real, EDGE_MM)
     factor = (volumes[1] / volumes[0]) ** (1 / 3)
-    even = remeshed(transformed(mesh, np.diag([factor] * 3 + [1.0])), EDGE_MM)
-    return transformed(even, fitted_onto(even, real))
+    even = remesh(transformed(mesh, np.diag([factor] * 3 + [1.0])), EDGE_MM)
+    return transformed(even, fit_onto(even, real))

@@ -4,9 +4,9 @@ import pytest
 import trimesh
 from shapes import box_mesh, ellipsoid_mesh
 
-from gyriflow.geometry.deformations import Deformation, carried, carried_back, determinants, moved
-from gyriflow.geometry.diffusion import diffused, vertex_sizes
-from gyriflow.geometry.matching import labels_at, matched, values_at
+from gyriflow.geometry.deformations import Deformation, carry, carry_back, determinants, transform_points
+from gyriflow.geometry.diffusion import diffuse, vertex_sizes
+from gyriflow.geometry.matching import labels_at, match_points, values_at
 from gyriflow.geometry.triangles import TriangleMesh, merged, vertex_normals
 
 GRID = np.diag([2.0, 2.0, 2.0, 1.0])
@@ -16,7 +16,7 @@ GRID[:3, 3] = -30.0
 def bent(amplitude: float) -> Deformation:
     """Returns a map with u = (a sin(y/8), 0, 0) before a scaling by 1.1 and a shift."""
     index = np.moveaxis(np.indices((31, 31, 31)), 0, -1).reshape(-1, 3)
-    points = moved(index, GRID)
+    points = transform_points(index, GRID)
     displacement = np.zeros((31, 31, 31, 3))
     displacement[..., 0] = (amplitude * np.sin(points[:, 1] / 8)).reshape(31, 31, 31)
     matrix = np.diag([1.1, 1.1, 1.1, 1.0])
@@ -29,11 +29,11 @@ POINTS = np.random.default_rng(3).uniform(-20, 20, (200, 3))
 
 def test_points_go_through_displacement_and_then_the_matrix():
     expected = 1.1 * (POINTS + np.stack([3 * np.sin(POINTS[:, 1] / 8), *np.zeros((2, 200))], axis=1)) + [3, -2, 1]
-    assert carried(bent(3.0), POINTS) == pytest.approx(expected, abs=0.03)
+    assert carry(bent(3.0), POINTS) == pytest.approx(expected, abs=0.03)
 
 
 def test_points_come_back():
-    assert carried_back(bent(3.0), carried(bent(3.0), POINTS)) == pytest.approx(POINTS, abs=2e-3)
+    assert carry_back(bent(3.0), carry(bent(3.0), POINTS)) == pytest.approx(POINTS, abs=2e-3)
 
 
 def test_determinant_is_the_growth_of_volume():
@@ -59,19 +59,19 @@ def test_the_other_wall_is_not_matched():
     mesh = walls()
     # beyond the middle of the gap, nearer to the other wall
     point, normal = np.array([[0.3, 0.4, 0.7]]), np.array([[1.0, 0.0, 0.0]])
-    match = matched(point, normal, mesh)
+    match = match_points(point, normal, mesh)
     assert match.agrees.all()
     assert values_at(match, mesh.vertices)[0, 0] == pytest.approx(-0.5)
-    assert matched(point, -normal, mesh).distance_mm == pytest.approx([0.2])
+    assert match_points(point, -normal, mesh).distance_mm == pytest.approx([0.2])
 
 
 def test_values_are_linear_in_faces_and_labels_those_of_the_nearest_corner():
     ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
     mesh = TriangleMesh(ball.vertices, ball.faces)
     directions = mesh.vertices[mesh.faces[:100]].mean(axis=1)
-    match = matched(directions, directions / np.linalg.norm(directions, axis=1)[:, None], mesh)
+    match = match_points(directions, directions / np.linalg.norm(directions, axis=1)[:, None], mesh)
     assert values_at(match, mesh.vertices @ [1.0, 2.0, 3.0]) == pytest.approx(directions @ [1.0, 2.0, 3.0], abs=1e-6)
-    exact = matched(mesh.vertices, vertex_normals(mesh), mesh)
+    exact = match_points(mesh.vertices, vertex_normals(mesh), mesh)
     assert labels_at(exact, np.arange(len(mesh.vertices))).tolist() == list(range(len(mesh.vertices)))
 
 
@@ -79,7 +79,7 @@ def test_diffusion_on_a_sphere_damps_a_harmonic_as_the_heat_equation_does():
     ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
     z = ball.vertices[:, 2] / 10
     second = 1.5 * z**2 - 0.5
-    smooth = diffused(np.asarray(ball.vertices), np.asarray(ball.faces), np.stack([second, np.ones(len(z))], 1), 4.0)
+    smooth = diffuse(np.asarray(ball.vertices), np.asarray(ball.faces), np.stack([second, np.ones(len(z))], 1), 4.0)
     # eigenvalue l(l + 1)/R² = 0.06, time σ²/2 = 8; eight implicit steps instead of the exponential
     assert smooth[:, 0] @ second / (second @ second) == pytest.approx((1 + 0.06) ** -8, rel=0.01)
     assert smooth[:, 1] == pytest.approx(np.ones(len(z)))
@@ -89,7 +89,7 @@ def test_diffusion_in_a_bar_spreads_with_the_variance_of_the_gaussian_and_keeps_
     bar = box_mesh((80, 2, 2), (80.0, 2.0, 2.0))
     peak = (np.abs(bar.vertices[:, 0]) < 0.1).astype(float)
     mass = vertex_sizes(bar.vertices, bar.tets)
-    smooth = diffused(bar.vertices, bar.tets, peak, 5.0)
+    smooth = diffuse(bar.vertices, bar.tets, peak, 5.0)
     assert smooth @ mass == pytest.approx(peak @ mass)
     assert (smooth * mass) @ bar.vertices[:, 0] ** 2 / (smooth @ mass) == pytest.approx(25.0, rel=0.02)
 

@@ -9,7 +9,7 @@ from shapes import box_mesh, ellipsoid_mesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
-from gyriflow.mesh.maps import placed, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
+from gyriflow.mesh.maps import move_nearest, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
 
 RADIUS = 20.0
 SLOPE = np.array([0.3, -0.7, 0.2])
@@ -138,7 +138,7 @@ def test_a_turned_brain_takes_its_map_in_either_coordinates(given_posed):
     values = linear(surface.vertices)
     turned = moved(brain.vertices, matrix)
     given = transformed(surface, matrix) if given_posed else surface
-    there = placed(turned[np.unique(facets)], given, [matrix, np.eye(4)])
+    there = move_nearest(turned[np.unique(facets)], given, [matrix, np.eye(4)])
     assert vertex_map_on_mesh(turned, facets, there, values)[np.unique(facets)] == pytest.approx(
         values[np.unique(facets)]
     )

@@ -15,7 +15,7 @@ from gyriflow.geometry.triangles import TriangleMesh, merged, signed_volume, tra
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.mesh.curving import curved
+from gyriflow.mesh.curving import curve_edges
 from gyriflow.mesh.gates import refuse_bad_mesh
 from gyriflow.mesh.quality import jacobian_ratios, quality_summary, radius_ratios
 from gyriflow.mesh.tetrahedralisation import even_surface, tetrahedralise
@@ -228,7 +228,7 @@ def test_a_node_that_would_fold_its_element_over_stays_back():
     vertices = cube.vertices.copy()
     vertices[outer] = 8.0 * vertices[outer] / length[outer]
     vertices[np.setdiff1d(np.arange(len(vertices)), outer)] *= 4.0
-    mesh = curved(TetrahedralMesh(vertices, cube.tets), ball(8.0, 4))
+    mesh = curve_edges(TetrahedralMesh(vertices, cube.tets), ball(8.0, 4))
     ratios = jacobian_ratios(mesh)
     assert 0 < ratios.min() < 0.5
     assert ratios.max() <= 1.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gyriflow.metrics.age_curve import LEAST_ERROR_GW, LeftOut, age_curve, estimated_age, leave_one_week_out, weights
+from gyriflow.metrics.age_curve import LEAST_ERROR_GW, LeftOut, age_curve, estimate_age, leave_one_week_out, weights
 
 WEEKS = np.arange(21.0, 30.0)
 
@@ -16,23 +16,23 @@ WEEKS = np.arange(21.0, 30.0)
 def test_age_is_read_back_from_a_smooth_metric(metric) -> None:
     curve = age_curve(WEEKS, metric(WEEKS))
     for week in (21.0, 23.4, 28.9):
-        found = estimated_age(curve, metric(week), 0.0)
+        found = estimate_age(curve, metric(week), 0.0)
         assert (found.week, found.outside) == (pytest.approx(week, abs=0.02), "")
 
 
 def test_noise_gives_the_range() -> None:
-    found = estimated_age(age_curve(WEEKS, 500 - 10 * WEEKS), 500 - 10 * 25.0, noise=5.0)
+    found = estimate_age(age_curve(WEEKS, 500 - 10 * WEEKS), 500 - 10 * 25.0, noise=5.0)
     assert (found.low, found.week, found.high) == pytest.approx((24.5, 25.0, 25.5), abs=0.02)
 
 
 @pytest.mark.parametrize(("sign", "first"), [(1.0, "younger"), (-1.0, "older")])
 def test_values_beyond_the_ends(sign: float, first: str) -> None:
     curve = age_curve(WEEKS, sign * 10 * WEEKS)
-    below, above = estimated_age(curve, 200.0 * sign, 5.0), estimated_age(curve, 300.0 * sign, 5.0)
+    below, above = estimate_age(curve, 200.0 * sign, 5.0), estimate_age(curve, 300.0 * sign, 5.0)
     assert (below.week, below.outside) == (21.0, "younger")
     assert (above.week, above.outside) == (29.0, "older")
     # by less than the noise
-    assert estimated_age(curve, sign * 294.0, 5.0).outside == ""
+    assert estimate_age(curve, sign * 294.0, 5.0).outside == ""
 
 
 def test_curve_never_turns_back() -> None:
@@ -44,7 +44,7 @@ def test_curve_never_turns_back() -> None:
 
 
 def test_constant_metric_says_nothing() -> None:
-    found = estimated_age(age_curve(WEEKS, np.full(9, 3.0)), 3.0, 0.0)
+    found = estimate_age(age_curve(WEEKS, np.full(9, 3.0)), 3.0, 0.0)
     assert (found.low, found.week, found.high) == pytest.approx((21.0, 25.0, 29.0))
     # neither is rounding a signal
     level = leave_one_week_out(WEEKS, np.full(9, 3.0)), leave_one_week_out(WEEKS, 3.0 + 1e-15 * WEEKS)
@@ -52,7 +52,7 @@ def test_constant_metric_says_nothing() -> None:
 
 
 def test_no_value_no_age() -> None:
-    assert np.isnan(estimated_age(age_curve(WEEKS, WEEKS), np.nan, 1.0).week)
+    assert np.isnan(estimate_age(age_curve(WEEKS, WEEKS), np.nan, 1.0).week)
 
 
 def test_weight_of_a_perfect_metric_and_of_noise() -> None:
@@ -91,8 +91,8 @@ def test_weights_of_metrics_of_unequal_skill_stay_unequal() -> None:
 
 def test_range_beyond_an_end_is_clipped() -> None:
     curve = age_curve(WEEKS, 10 * WEEKS)
-    assert not estimated_age(curve, 250.0, 30.0).clipped
-    found = estimated_age(curve, 280.0, 30.0)
+    assert not estimate_age(curve, 250.0, 30.0).clipped
+    found = estimate_age(curve, 280.0, 30.0)
     assert (found.outside, found.clipped, found.high) == ("", True, 29.0)
     assert found.low == pytest.approx(25.0, abs=0.02)
 

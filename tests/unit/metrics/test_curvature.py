@@ -11,7 +11,7 @@ import trimesh
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, signed_volume, submesh
-from gyriflow.metrics.curvature import continued, curvature
+from gyriflow.metrics.curvature import continue_smoothly, curvature
 from gyriflow.metrics.laplace_beltrami import laplacian
 
 
@@ -184,9 +184,9 @@ def test_continuation_of_a_constant_and_of_a_gradient() -> None:
     stiffness, _ = laplacian(mesh)
     known = ((mesh.vertices[:, :2] >= 3) & (mesh.vertices[:, :2] <= 16)).all(axis=1)
     wrong = np.where(known, 3.0, 50.0)
-    np.testing.assert_allclose(continued(wrong, known, stiffness), 3.0, rtol=1e-10)
+    np.testing.assert_allclose(continue_smoothly(wrong, known, stiffness), 3.0, rtol=1e-10)
     slope = np.where(known, mesh.vertices[:, 0], 1e3)
-    filled = continued(slope, known, stiffness)
+    filled = continue_smoothly(slope, known, stiffness)
     np.testing.assert_array_equal(filled[known], mesh.vertices[known, 0])
     assert filled.min() > 2.99  # nothing beyond the known values at 3 and 16
     assert filled.max() < 16.01

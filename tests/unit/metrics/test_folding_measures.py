@@ -9,7 +9,7 @@ from gyriflow.metrics.folding_measures import (
     folding_index,
     gaussian_curvature_norm,
     intrinsic_curvature_index,
-    joined,
+    join,
     mean_curvature_norm,
     mean_curvature_quantiles,
 )
@@ -98,5 +98,5 @@ def test_quantiles_go_by_area() -> None:
 
 def test_two_surfaces_add_up() -> None:
     bend, areas = torus()
-    both = joined([bend, bend])
+    both = join([bend, bend])
     assert folding_index(both, np.tile(areas, 2)) == pytest.approx(2 * folding_index(bend, areas))

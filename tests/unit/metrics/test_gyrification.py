@@ -18,7 +18,7 @@ from gyriflow.geometry.triangles import (
 )
 from gyriflow.metrics.depth import convex_hull, sulcal_depth
 from gyriflow.metrics.gyrification import (
-    capped,
+    cap,
     envelope,
     gyrification_index,
     local_gyrification_index,
@@ -103,7 +103,7 @@ def test_sulcal_depth_is_zero_outside_the_envelope() -> None:
 
 def test_cap_of_half_a_sphere() -> None:
     half = half_sphere()
-    closed = capped(half)
+    closed = cap(half)
     assert not is_closed(half)
     assert is_closed(closed)
     assert signed_volume(closed) == pytest.approx(0.5 * signed_volume(sphere()), rel=1e-3)
@@ -114,7 +114,7 @@ def test_cap_of_half_a_sphere() -> None:
 def test_two_cuts_are_closed_one_by_one() -> None:
     mesh = sphere()
     slab, _ = submesh(mesh, np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 2]) < 12.0)
-    closed = capped(slab)
+    closed = cap(slab)
     assert is_closed(closed)
     assert len(closed.vertices) == len(slab.vertices) + 2
     assert signed_volume(closed) == pytest.approx(np.pi * (25.0**2 * 24 - 2 * 12.0**3 / 3), rel=0.03)
@@ -122,7 +122,7 @@ def test_two_cuts_are_closed_one_by_one() -> None:
 
 def test_closed_surface_needs_no_cap() -> None:
     mesh = sphere()
-    assert capped(mesh) is mesh
+    assert cap(mesh) is mesh
 
 
 def test_cut_is_left_out_of_the_index() -> None:

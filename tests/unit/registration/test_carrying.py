@@ -4,11 +4,11 @@ import trimesh
 from shapes import ellipsoid_mesh
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.deformations import Deformation, moved
+from gyriflow.geometry.deformations import Deformation, transform_points
 from gyriflow.geometry.motion import without_rigid_motion
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.registration.carrying import back_over_weeks, carried_map, carried_regions, over_weeks
+from gyriflow.registration.carrying import carry_back_over_weeks, carry_map, carry_over_weeks, carry_regions
 from gyriflow.registration.growth import local_growth, weekly_displacements, with_amplitude
 
 GRID = np.diag([4.0, 4.0, 4.0, 1.0])
@@ -35,28 +35,28 @@ def sphere() -> TriangleMesh:
 
 def test_points_are_carried_in_turn_and_back():
     chain = [affine_map(scaled(1.1, (1, 0, 0))), affine_map(scaled(1.2))]
-    positions = over_weeks(BALL.vertices, chain)
+    positions = carry_over_weeks(BALL.vertices, chain)
     assert positions.shape == (3, len(BALL.vertices), 3)
     assert positions[2] == pytest.approx(1.2 * (1.1 * BALL.vertices + [1, 0, 0]))
-    assert back_over_weeks(positions[2], chain) == pytest.approx(positions, abs=2e-3)
+    assert carry_back_over_weeks(positions[2], chain) == pytest.approx(positions, abs=2e-3)
 
 
 def test_points_beyond_the_grid_are_refused():
     with pytest.raises(InputError, match=r"beyond the grid.*8\.00 mm|beyond the grid"):
-        over_weeks(BALL.vertices + [60.0, 0, 0], [affine_map(np.eye(4))])
+        carry_over_weeks(BALL.vertices + [60.0, 0, 0], [affine_map(np.eye(4))])
 
 
 def test_maps_and_regions_come_to_the_same_places_of_another_brain():
     source = sphere()
     matrix = scaled(1.3, (5.0, 0, 0))
     target = TriangleMesh(
-        moved(trimesh.creation.icosphere(subdivisions=3, radius=10.0).vertices, matrix),
+        transform_points(trimesh.creation.icosphere(subdivisions=3, radius=10.0).vertices, matrix),
         trimesh.creation.icosphere(subdivisions=3).faces,
     )
     deformation = affine_map(matrix)
-    values = carried_map(source.vertices[:, 2], source, target, deformation)
+    values = carry_map(source.vertices[:, 2], source, target, deformation)
     assert values == pytest.approx(target.vertices[:, 2] / 1.3, abs=0.1)
-    regions = carried_regions((source.vertices[:, 0] > 0).astype(int), source, target, deformation)
+    regions = carry_regions((source.vertices[:, 0] > 0).astype(int), source, target, deformation)
     clear = np.abs(target.vertices[:, 0] - 5.0) > 1.5
     assert (regions == (target.vertices[:, 0] > 5.0))[clear].all()
 

@@ -8,7 +8,7 @@ from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.registrations import CarriedMesh, read_carried_mesh, write_carried_mesh
 from gyriflow.registration.growth import local_growth
-from gyriflow.registration.matched import filled, followed, positions_by_week
+from gyriflow.registration.matched_surfaces import follow_inside, follow_surfaces, positions_by_week
 
 ATLAS = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
 FACES = np.asarray(ATLAS.faces)
@@ -29,16 +29,16 @@ def test_matched_surfaces_are_ordered_by_week():
 def test_another_mesh_of_the_brain_goes_along():
     own = trimesh.creation.icosphere(subdivisions=3, radius=10.1)
     turned = own.vertices @ np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1.0]])
-    found = followed(TriangleMesh(turned, own.faces), WEEKS, FACES)
+    found = follow_surfaces(TriangleMesh(turned, own.faces), WEEKS, FACES)
     assert found[0] == pytest.approx(turned)
     assert found[1] == pytest.approx(turned * STRETCH, abs=0.05)
     with pytest.raises(InputError, match="is not that of the matched surfaces' first week"):
-        followed(TriangleMesh(turned * 1.5, own.faces), WEEKS, FACES)
+        follow_surfaces(TriangleMesh(turned * 1.5, own.faces), WEEKS, FACES)
 
 
 def test_the_inside_goes_along_smoothly():
     solid = ellipsoid_mesh(8, (10.0, 10.0, 10.0))
-    found = filled(solid, WEEKS, FACES)
+    found = follow_inside(solid, WEEKS, FACES)
     # a linear displacement is harmonic
     assert found[1] == pytest.approx(solid.vertices * STRETCH, abs=0.05)
     rates = local_growth(found, solid.tets, [21, 23], 3.0)

@@ -5,11 +5,11 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.deformations import Deformation, carried, moved
+from gyriflow.geometry.deformations import Deformation, carry, transform_points
 from gyriflow.io.registrations import read_deformation, write_deformation
 from gyriflow.registration.channels import Channels, channels
 from gyriflow.registration.diffeomorphic import register
-from gyriflow.registration.quality import judged, require_good
+from gyriflow.registration.quality import judge, require_good
 
 VOXEL = 1.0
 CORTEX, WHITE, OTHER = 2, 1, 7
@@ -46,7 +46,7 @@ def phantom(points: np.ndarray) -> np.ndarray:
 
 
 def volume(affine: np.ndarray, *, later: bool, shape=(66, 78, 66)) -> np.ndarray:
-    points = moved(np.indices(shape).reshape(3, -1).T, affine)
+    points = transform_points(np.indices(shape).reshape(3, -1).T, affine)
     return phantom(not_grown(points) if later else points).reshape(shape)
 
 
@@ -86,21 +86,21 @@ def rim_errors(carried_points: np.ndarray) -> np.ndarray:
 
 
 def rim_points(brain: Channels) -> np.ndarray:
-    grid = moved(np.indices(brain.tissue.shape).reshape(3, -1).T, brain.affine)
+    grid = transform_points(np.indices(brain.tissue.shape).reshape(3, -1).T, brain.affine)
     return grid[np.abs(beyond_rim(grid)) < 0.02]
 
 
 def test_the_rim_comes_to_where_it_grew(pair, found):
     points = rim_points(pair[0])
-    errors = rim_errors(carried(found.deformation, points))
-    by_affine = rim_errors(moved(points, found.deformation.matrix))
+    errors = rim_errors(carry(found.deformation, points))
+    by_affine = rim_errors(transform_points(points, found.deformation.matrix))
     assert errors.mean() < 0.4 * VOXEL
     assert errors.mean() < 0.6 * by_affine.mean()
     assert found.turned_deg == 0
 
 
 def test_quality_of_a_good_registration(pair, found):
-    quality = judged(*pair, found.deformation)
+    quality = judge(*pair, found.deformation)
     assert quality.dice_cerebrum > 0.97
     assert quality.dice_cortex > 0.85
     assert quality.folded_share == 0
@@ -121,13 +121,13 @@ def test_a_brain_in_another_pose_is_turned_first(pair):
     later = channels(labels, turned @ affine, cerebrum=(WHITE, CORTEX), cortex=(CORTEX,))
     found = register(pair[0], later)
     assert found.turned_deg == pytest.approx(180)
-    turned_back = carried(found.deformation, rim_points(pair[0])) @ half_turn
+    turned_back = carry(found.deformation, rim_points(pair[0])) @ half_turn
     assert rim_errors(turned_back).mean() < 0.4 * VOXEL
 
 
 def test_a_failed_registration_is_refused_with_numbers(pair):
     none = Deformation(np.eye(4), np.zeros((*pair[0].tissue.shape, 3)), pair[0].affine)
-    quality = judged(*pair, none)
+    quality = judge(*pair, none)
     with pytest.raises(InputError, match=r"registration week 21 to 22 has failed: Dice of the cerebrum 0\.\d+ below"):
         require_good(quality, pair="week 21 to 22")
 
@@ -136,7 +136,7 @@ def test_a_map_that_folds_is_refused(pair, found):
     displacement = found.deformation.displacement.copy()
     displacement[22:25] += [8.0, 0.0, 0.0]
     folded = Deformation(found.deformation.matrix, displacement, found.deformation.affine)
-    quality = judged(*pair, folded)
+    quality = judge(*pair, folded)
     assert quality.least_determinant < 0
     assert quality.folded_share > 0.005
     with pytest.raises(InputError, match="the map folds in"):
@@ -174,7 +174,9 @@ def test_a_grid_that_needs_no_resampling_gets_none():
     affine = centred()
     labels = volume(affine, later=False)
     brain = channels(labels, affine, cerebrum=(WHITE, CORTEX), cortex=(CORTEX,))
-    at = np.rint(moved(moved(np.argwhere(brain.tissue > 0), brain.affine), np.linalg.inv(affine))).astype(int)
+    at = np.rint(
+        transform_points(transform_points(np.argwhere(brain.tissue > 0), brain.affine), np.linalg.inv(affine))
+    ).astype(int)
     assert (labels[tuple(at.T)] > 0).all()
     assert np.count_nonzero(brain.tissue) == np.count_nonzero(labels)
 

@@ -10,8 +10,8 @@ from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import phantom_labels
-from gyriflow.surface.brain_pose import narrowness, pose_of_labels, posed_surface
-from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.brain_pose import narrowness, pose_of_labels, pose_surface_by_shape
+from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 
 TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]
 
@@ -29,7 +29,7 @@ def turned(degrees):
 
 def surface_of(labels, affine):
     mask = np.isin(labels, pathologies.CEREBRUM)
-    return isosurface(made_simple(smoothed_mask(np.pad(mask, 4), 1.0))[0], affine)
+    return isosurface(make_simple(smooth_mask(np.pad(mask, 4), 1.0))[0], affine)
 
 
 @pytest.mark.parametrize("degrees", TURNS)
@@ -51,7 +51,7 @@ def test_small_tilts_are_the_files_own(brain, degrees):
 
 @pytest.mark.parametrize("turn", TURNS)
 def test_a_turned_brain_is_turned_and_a_mirrored_one_is_called_so(brain, turn):
-    labels, affine = pathologies.sided(*brain), brain[1]
+    labels, affine = pathologies.add_sides(*brain), brain[1]
     pose = pose_of_labels(labels, turned(turn) @ affine, SCHEMES["dhcp-19"])
     np.testing.assert_allclose(pose.rotation @ turned(turn)[:3, :3], np.eye(3), atol=1e-9)
     with pytest.raises(InputError, match=r"left hemisphere lie on the right.*affine mirrors"):
@@ -67,8 +67,8 @@ def test_labels_without_hindbrain_and_sides_tell_no_pose(brain):
 def test_the_shape_tells_lps_from_ras(brain, pathology):
     labels, affine = brain
     mesh = surface_of(getattr(pathologies, pathology)(labels, affine) if pathology else labels, affine)
-    assert posed_surface(mesh, "auto").warnings == ()
-    lps = posed_surface(transformed(mesh, turned((0, 0, 180))), "auto")
+    assert pose_surface_by_shape(mesh, "auto").warnings == ()
+    lps = pose_surface_by_shape(transformed(mesh, turned((0, 0, 180))), "auto")
     np.testing.assert_allclose(lps.rotation, np.diag([-1.0, -1.0, 1.0]))
     assert "are LPS" in lps.warnings[0]
 
@@ -76,17 +76,17 @@ def test_the_shape_tells_lps_from_ras(brain, pathology):
 def test_the_shape_tells_any_pose(brain):
     mesh = surface_of(*brain)
     turn = turned((100, 40, -70))
-    pose = posed_surface(transformed(mesh, turn), "auto")
+    pose = pose_surface_by_shape(transformed(mesh, turn), "auto")
     assert angle_deg(pose.rotation @ turn[:3, :3]) < 5.0
     assert "as its shape says" in pose.warnings[0]
 
 
 def test_coordinates_that_are_named_are_kept_and_doubted(brain):
     mesh = surface_of(*brain)
-    pose = posed_surface(transformed(mesh, turned((180, 0, 0))), "ras")
+    pose = pose_surface_by_shape(transformed(mesh, turned((180, 0, 0))), "ras")
     assert np.array_equal(pose.rotation, np.eye(3))
     assert "turned by 1" in pose.warnings[0]
-    assert posed_surface(mesh, "ras").warnings == ()
+    assert pose_surface_by_shape(mesh, "ras").warnings == ()
 
 
 def test_a_shape_without_a_pose_is_refused():
@@ -95,8 +95,8 @@ def test_a_shape_without_a_pose_is_refused():
     # neither front nor back, up nor down, and its axes are no file's
     ball = trimesh.creation.icosphere(subdivisions=4)
     mesh = transformed(TriangleMesh(ball.vertices * [24, 33, 22], ball.faces), turned((50, 40, 30)))
-    with pytest.raises(InputError, match="cannot be told from its shape"):
-        posed_surface(mesh, "auto")
+    with pytest.raises(InputError, match="cannot be determined from its shape"):
+        pose_surface_by_shape(mesh, "auto")
 
 
 def test_hemispheres_are_narrow_and_brains_are_not(brain):

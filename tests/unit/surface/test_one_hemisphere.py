@@ -9,7 +9,7 @@ from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normal
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, made_simple, shifted_affine, smoothed_mask
+from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 from gyriflow.surface.from_labels import from_labels, hemisphere_from_labels
 from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres
 from gyriflow.surface.white import thickness_from_white
@@ -24,7 +24,7 @@ def brain():
 
 def surface_of(labels, affine):
     mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
-    return isosurface(made_simple(smoothed_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
 
 
 def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
-    labels, affine = pathologies.sided(*brain), brain[1]
+    labels, affine = pathologies.add_sides(*brain), brain[1]
     left = pathologies.one_hemisphere(labels, affine, "left")
     surface = hemisphere_from_labels(left, affine, SCHEMES["dhcp-19"], "left", **QUICK)
     assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5

@@ -6,15 +6,15 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, smoothed_mask
-from gyriflow.surface.fissure import fissure_between, opened
+from gyriflow.surface.extraction import isosurface, smooth_mask
+from gyriflow.surface.fissure import fissure_between, open_fissure
 from gyriflow.surface.orientation import mid_plane, upright
 
 
 @pytest.fixture(scope="module")
 def brain():
     labels, affine = phantom_labels(24.0, voxel_mm=1.2)
-    mesh = isosurface(smoothed_mask(np.isin(labels, (1, 2, 5, 6, 8)), 1.0), affine)
+    mesh = isosurface(smooth_mask(np.isin(labels, (1, 2, 5, 6, 8)), 1.0), affine)
     # the phantom's own centre to the origin: its fissure is x = 0 there
     return TriangleMesh(mesh.vertices - CENTRE_MM, mesh.faces)
 
@@ -100,10 +100,10 @@ def test_shut_fissure_is_opened_down_to_the_joint():
     core[6:18, 6:34, 6:24], core[22:34, 6:34, 6:24] = True, True
     core[18:22, 12:28, 6:12] = True
     affine = np.diag([0.8, 0.8, 0.8, 1.0])
-    walls = isosurface(smoothed_mask(core, 1.0), affine)
+    walls = isosurface(smooth_mask(core, 1.0), affine)
     plane = mid_plane(walls)
-    shut = smoothed_mask(brain, 1.0)
-    field = opened(shut, affine, core, fissure_between(walls, plane), 1.6)
+    shut = smooth_mask(brain, 1.0)
+    field = open_fissure(shut, affine, core, fissure_between(walls, plane), 1.6)
     assert plane.offset == pytest.approx(19.5 * 0.8, abs=0.2)
     # open at the top above the joint and beside it, closed in the joint
     assert not (field[19:21, 20, 16:26] > 0.5).any()

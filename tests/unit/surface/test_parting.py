@@ -9,10 +9,10 @@ from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas,
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, made_simple, shifted_affine, smoothed_mask
-from gyriflow.surface.fissure import fissure_between, opened
+from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
+from gyriflow.surface.fissure import fissure_between, open_fissure
 from gyriflow.surface.from_labels import from_labels
-from gyriflow.surface.hemispheres import left_faces, parted
+from gyriflow.surface.hemispheres import cut_sides, left_faces
 from gyriflow.surface.orientation import MidPlane, mid_plane
 from gyriflow.surface.repair import pieces
 
@@ -26,7 +26,7 @@ def brain():
 
 def surface_of(labels, affine):
     mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
-    return isosurface(made_simple(smoothed_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
 
 
 def ball_at(*centre):
@@ -44,7 +44,7 @@ def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
     labels, affine = brain
     mesh = surface_of(pathologies.bent_midline(pathologies.apart(labels, affine), affine, mm), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
-    sides = parted(mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1))))
+    sides = cut_sides(mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1))))
     assert [len(pieces(side)) for side in sides] == [1, 1]
     assert area(sides[0]) == pytest.approx(area(sides[1]), rel=0.05)
 
@@ -55,7 +55,7 @@ def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
     mesh = surface_of(getattr(pathologies, pathology)(labels, affine), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
-    sides = parted(mesh, left)
+    sides = cut_sides(mesh, left)
     assert [len(pieces(side)) for side in sides] == [1, 1]
     place = corners(mesh).mean(axis=1) - CENTRE_MM
     middle = {"bent_midline": 3.0 * np.sin(place[:, 1] / 12.0), "shifted_midline": 8.0}.get(pathology, 0.0)
@@ -104,11 +104,11 @@ def block(gap_voxels):
 @pytest.mark.parametrize(("gap_voxels", "open_voxels"), [(0, 1), (1, 0)])
 def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     brain, core, affine = block(gap_voxels)
-    walls = isosurface(smoothed_mask(core, 1.0), affine)
+    walls = isosurface(smooth_mask(core, 1.0), affine)
     fissure = fissure_between(walls, mid_plane(walls))
-    field = smoothed_mask(brain, 0.5)
+    field = smooth_mask(brain, 0.5)
     hidden = fissure.hidden(brain, affine, 1.5)
-    wide = opened(field, affine, core, fissure, 1.5, hidden)
+    wide = open_fissure(field, affine, core, fissure, 1.5, hidden)
     # cortex beside a fissure that CSF shows stays; a hidden one is opened
     taken = (field > 0.5) & (wide <= 0.5)
     assert bool(taken[18:23, 15:25, 17:24].any()) == bool(open_voxels)

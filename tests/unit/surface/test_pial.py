@@ -10,6 +10,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
@@ -24,11 +25,10 @@ from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.surface.from_labels import from_labels
 from gyriflow.surface.from_surfaces import from_hemispheres, from_pial
 from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
-from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.repair import pieces
 from gyriflow.surface.size import require_plausible_size
 
@@ -68,7 +68,7 @@ def halves(volume):
 
 
 def from_binary(mask, affine):
-    return isosurface(made_simple(smoothed_mask(mask, 1.0))[0], affine)
+    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], affine)
 
 
 def require_sound(surface, surfaces=1):

@@ -15,7 +15,7 @@ from gyriflow.io.surfaces import declared, read_surface, write_surface
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface import hemisphere_pose
-from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
+from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.surface.from_surfaces import from_hemispheres
 from gyriflow.surface.hemisphere_pose import about_x, pair_by_shape, pitch_deg
 from gyriflow.surface.hemispheres import least_gap
@@ -35,7 +35,7 @@ def halves():
     cerebrum = np.isin(labels, SCHEMES["spina-bifida-atlas"].cerebrum)
     centred = affine.copy()
     centred[:3, 3] -= CENTRE_MM
-    return [isosurface(made_simple(smoothed_mask(cerebrum & side, 1.0))[0], centred) for side in (x < -0.6, x > 0.6)]
+    return [isosurface(make_simple(smooth_mask(cerebrum & side, 1.0))[0], centred) for side in (x < -0.6, x > 0.6)]
 
 
 def rigid(seed):
@@ -170,7 +170,7 @@ def test_swapped_hemispheres_are_refused(halves):
 def test_shapes_without_a_pose_are_refused(half_lengths):
     ball = trimesh.creation.icosphere(subdivisions=4)
     shape = TriangleMesh(ball.vertices * half_lengths, ball.faces)
-    with pytest.raises(InputError, match="cannot be told from its shape"):
+    with pytest.raises(InputError, match="cannot be determined from its shape"):
         pair_by_shape(shape, shape)
 
 
@@ -251,7 +251,7 @@ def test_a_doubtful_shape_near_the_axes_of_files_is_posed_as_these_say(halves, f
 def test_a_doubtful_shape_in_any_pose_is_posed_like_the_studys_others_or_refused(halves):
     motions = rigid(31), rigid(32)
     moved = tuple(transformed(half, motion) for half, motion in zip(halves, motions, strict=True))
-    with pytest.raises(InputError, match="cannot be told from its shape"):
+    with pytest.raises(InputError, match="cannot be determined from its shape"):
         pair_by_shape(*moved)
     pairs = pairs_by_shape([moved, tuple(halves)])
     posed, _ = poses(pairs, [False, False])

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import unit
+from gyriflow.surface.outline_fit import Target, register, register_deformed
 from gyriflow.surface.outlines import reference
-from gyriflow.surface.registration import Target, matched, registered
 
 
 def bent(outline, seed):
@@ -30,9 +30,9 @@ def bent(outline, seed):
 def test_a_deformation_turns_a_match_less_than_it_turns_nearest_places(seed):
     one, other = Target(reference()), Target(bent(reference(), seed))
     start = Rotation.from_rotvec([3, -4, 5], degrees=True).as_matrix()
-    nearest = registered(one.outline, other, start)
+    nearest = register(one.outline, other, start)
     assert angle_deg(nearest.rotation) > 0.9
-    assert angle_deg(matched(one, other, start).rotation) < 0.85 * angle_deg(nearest.rotation)
+    assert angle_deg(register_deformed(one, other, start).rotation) < 0.85 * angle_deg(nearest.rotation)
 
 
 def test_a_match_of_moved_outlines_is_the_motion():
@@ -42,6 +42,6 @@ def test_a_match_of_moved_outlines_is_the_motion():
         outline, points=motion.apply(outline.points) + [0.1, 0.0, -0.2], normals=motion.apply(outline.normals)
     )
     start = Rotation.from_rotvec([24, -28, 36], degrees=True).as_matrix()
-    fit = matched(Target(outline), Target(moved), start)
+    fit = register_deformed(Target(outline), Target(moved), start)
     np.testing.assert_allclose(fit.rotation, motion.as_matrix(), atol=1e-3)
     np.testing.assert_allclose(fit.shift, [0.1, 0.0, -0.2], atol=1e-3)

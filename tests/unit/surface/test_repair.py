@@ -5,10 +5,11 @@ import pytest
 import trimesh
 
 from gyriflow.errors import MeshError
+from gyriflow.geometry.remeshing import remesh, self_intersecting_faces, untangle
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume, submesh
-from gyriflow.surface.remaking import remade
-from gyriflow.surface.remeshing import evened, remeshed, self_intersecting_faces, smoothed, untangled
-from gyriflow.surface.repair import cleaned, pieces
+from gyriflow.surface.even_triangles import make_even, smooth_taubin
+from gyriflow.surface.rebuilding import rebuild
+from gyriflow.surface.repair import clean, pieces
 
 RADIUS = 10.0
 VOLUME = 4 / 3 * np.pi * RADIUS**3
@@ -20,7 +21,7 @@ def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
 
 
 def test_sound_surface_stays_as_it_is():
-    mesh, report = cleaned(ball(), 3.0)
+    mesh, report = clean(ball(), 3.0)
     assert signed_volume(mesh) == pytest.approx(signed_volume(ball()))
     assert {key: value for key, value in report.items() if value} == {"pieces": 1}
 
@@ -28,7 +29,7 @@ def test_sound_surface_stays_as_it_is():
 def test_small_hole_is_closed_and_reported():
     whole = ball()
     near = np.linalg.norm(whole.vertices[whole.faces].mean(axis=1) - [0, 0, RADIUS], axis=1) < 1.2
-    mesh, report = cleaned(submesh(whole, ~near)[0], 3.0)
+    mesh, report = clean(submesh(whole, ~near)[0], 3.0)
     assert is_closed(mesh)
     assert report["holes_closed"] == 1
     assert 1.5 < report["largest_hole_mm"] < 3.0
@@ -39,11 +40,11 @@ def test_large_hole_is_refused_with_its_size():
     whole = ball()
     mesh, _ = submesh(whole, whole.vertices[whole.faces][:, :, 2].max(axis=1) < 8.0)
     with pytest.raises(MeshError, match=r"1 of 1 holes, up to 1[12]\.\d mm.*at most 3 mm"):
-        cleaned(mesh, 3.0)
+        clean(mesh, 3.0)
 
 
 def test_faces_inside_out_are_turned():
-    mesh, report = cleaned(flipped(ball()), 3.0)
+    mesh, report = clean(flipped(ball()), 3.0)
     assert signed_volume(mesh) > 0
     assert report["pieces_turned_outward"] == 1
 
@@ -51,7 +52,7 @@ def test_faces_inside_out_are_turned():
 def test_faces_partly_inside_out_are_turned():
     faces = ball().faces.copy()
     faces[100:300] = faces[100:300, ::-1]
-    mesh, report = cleaned(TriangleMesh(ball().vertices, faces), 3.0)
+    mesh, report = clean(TriangleMesh(ball().vertices, faces), 3.0)
     assert is_closed(mesh)
     assert signed_volume(mesh) == pytest.approx(signed_volume(ball()))
     assert report["faces_turned_to_agree"] == 200
@@ -60,7 +61,7 @@ def test_faces_partly_inside_out_are_turned():
 def test_soup_of_separate_triangles_is_joined():
     whole = ball()
     soup = TriangleMesh(whole.vertices[whole.faces].reshape(-1, 3), np.arange(3 * len(whole.faces)).reshape(-1, 3))
-    mesh, report = cleaned(soup, 3.0)
+    mesh, report = clean(soup, 3.0)
     assert len(mesh.vertices) == len(whole.vertices)
     assert report["duplicate_vertices_joined"] == 3 * len(whole.faces) - len(whole.vertices)
     assert report["faces_that_cut_others"] == 0
@@ -69,7 +70,7 @@ def test_soup_of_separate_triangles_is_joined():
 def test_degenerate_and_double_faces_are_removed():
     whole = ball()
     faces = np.vstack([whole.faces, whole.faces[:5], [[7, 7, 8]]])
-    mesh, report = cleaned(TriangleMesh(whole.vertices, faces), 3.0)
+    mesh, report = clean(TriangleMesh(whole.vertices, faces), 3.0)
     assert len(mesh.faces) == len(whole.faces)
     assert (report["double_faces_removed"], report["degenerate_faces_removed"]) == (5, 1)
 
@@ -78,14 +79,14 @@ def test_non_manifold_fin_is_removed():
     whole = ball()
     vertices = np.vstack([whole.vertices, whole.vertices[whole.faces[0, 0]] * 1.02])
     fin = [[whole.faces[0, 0], whole.faces[0, 1], len(whole.vertices)]]
-    mesh, report = cleaned(TriangleMesh(vertices, np.vstack([whole.faces, fin])), 3.0)
+    mesh, report = clean(TriangleMesh(vertices, np.vstack([whole.faces, fin])), 3.0)
     assert is_closed(mesh)
     assert report["non_manifold_edges_opened"] == 1
     assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.01)
 
 
 def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
-    mesh, report = cleaned(
+    mesh, report = clean(
         merged(ball((-11, 0, 0)), ball((11, 0, 0), 9.5), ball((0, 30, 0), 1.0), flipped(ball((-11, 0, 0), 7.0))), 3.0
     )
     assert (report["pieces"], report["pieces_dropped"]) == (2, 2)
@@ -94,7 +95,7 @@ def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
 
 
 def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
-    even, report = evened(ball(), 10, 1.0)
+    even, report = make_even(ball(), 10, 1.0)
     assert is_closed(even)
     lengths = np.linalg.norm(np.diff(even.vertices[even.faces[:, :2]], axis=1), axis=-1)
     assert lengths.mean() == pytest.approx(1.0, rel=0.1)
@@ -105,7 +106,7 @@ def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
 def test_smoothing_removes_noise_but_not_volume():
     noise = np.random.default_rng(0).normal(scale=0.1, size=ball().vertices.shape)
     rough = TriangleMesh(ball().vertices + noise, ball().faces)
-    smooth = smoothed(rough, 10)
+    smooth = smooth_taubin(rough, 10)
     assert signed_volume(smooth) == pytest.approx(VOLUME, rel=0.01)
     assert np.linalg.norm(smooth.vertices, axis=1).std() < 0.5 * np.linalg.norm(rough.vertices, axis=1).std()
 
@@ -117,7 +118,7 @@ def test_tangle_is_counted_and_relaxed():
     vertices[np.argsort(-vertices[:, 2])[1]] += [0.0, 2.5, -1.5]
     tangled = TriangleMesh(vertices, ball().faces)
     assert self_intersecting_faces(tangled).sum() > 0
-    free = untangled(tangled)
+    free = untangle(tangled)
     assert self_intersecting_faces(free).sum() == 0
     assert euler_number(free) == 2
     assert signed_volume(free) == pytest.approx(VOLUME, rel=0.01)
@@ -126,7 +127,7 @@ def test_tangle_is_counted_and_relaxed():
 def test_overlapping_balls_are_made_one_surface():
     both = merged(ball((-6, 0, 0)), ball((6, 0, 0)))
     assert self_intersecting_faces(both).any()
-    one, report = remade(both, 0.7)
+    one, report = rebuild(both, 0.7)
     assert is_closed(one)
     assert euler_number(one) == 2
     # two balls less the lens that they share: two caps of height 4
@@ -137,8 +138,8 @@ def test_overlapping_balls_are_made_one_surface():
 
 def test_handle_of_a_torus_is_closed_when_remade():
     ring = trimesh.creation.torus(major_radius=10.0, minor_radius=7.5, major_sections=60, minor_sections=40)
-    mesh, report = cleaned(TriangleMesh(ring.vertices, ring.faces), 3.0)
+    mesh, report = clean(TriangleMesh(ring.vertices, ring.faces), 3.0)
     assert euler_number(mesh) == 0
-    simple, report = remade(remeshed(mesh, 1.0), 0.8)
+    simple, report = rebuild(remesh(mesh, 1.0), 0.8)
     assert euler_number(simple) == 2
     assert report["tunnels_filled"] + report["bridges_cut"] == 1

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged, signed_volume
 from gyriflow.parameters.schemes import SCHEMES, LabelScheme
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.from_labels import from_labels
-from gyriflow.surface.remeshing import self_intersecting_faces
 from gyriflow.surface.shrinkage import after_repairs, with_volume
 
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))

@@ -7,7 +7,7 @@ from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
 from gyriflow.parameters.schemes import SCHEMES, LabelScheme
 from gyriflow.phantom.brain import phantom_labels
 from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
-from gyriflow.surface.extraction import isosurface, smoothed_mask
+from gyriflow.surface.extraction import isosurface, smooth_mask
 from gyriflow.surface.stalks import surface_without_stalks, without_stalks
 from gyriflow.surface.ventricles import outside_ventricles
 
@@ -49,15 +49,15 @@ def test_parts_that_are_joined_broadly_stay(case):
 
 def test_a_polyp_of_a_surface_is_cut_and_the_cut_closed():
     mask, large = body(1.4)
-    mesh, stalks = surface_without_stalks(isosurface(smoothed_mask(mask, 0.7), AFFINE))
+    mesh, stalks = surface_without_stalks(isosurface(smooth_mask(mask, 0.7), AFFINE))
     assert len(stalks) == 1
     assert is_closed(mesh)
     assert euler_number(mesh) == 2
-    assert signed_volume(mesh) == pytest.approx(signed_volume(isosurface(smoothed_mask(large, 0.7), AFFINE)), rel=0.01)
+    assert signed_volume(mesh) == pytest.approx(signed_volume(isosurface(smooth_mask(large, 0.7), AFFINE)), rel=0.01)
 
 
 def test_surfaces_without_stalks_are_the_same_objects():
-    mesh = isosurface(smoothed_mask(body(0.0, 0.0)[0], 0.7), AFFINE)
+    mesh = isosurface(smooth_mask(body(0.0, 0.0)[0], 0.7), AFFINE)
     assert surface_without_stalks(mesh) == (mesh, [])
 
 

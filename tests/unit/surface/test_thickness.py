@@ -8,8 +8,8 @@ from skimage.measure import marching_cubes
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import transformed
-from gyriflow.surface.extraction import isosurface, made_simple, smoothed_mask
-from gyriflow.surface.remeshing import evened
+from gyriflow.surface.even_triangles import make_even
+from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.surface.thickness import cortical_thickness
 
 FOLDS_MM = 2.0
@@ -37,7 +37,7 @@ def layered(folds_mm, voxel_mm):
     depth, inside = depth_below(points, folds_mm)
     affine = np.diag([voxel_mm] * 3 + [1.0])
     affine[:3, 3] = axis[0]
-    pial, _ = evened(isosurface(made_simple(smoothed_mask(inside, 1.0))[0], affine), 10, 1.0)
+    pial, _ = make_even(isosurface(make_simple(smooth_mask(inside, 1.0))[0], affine), 10, 1.0)
     return pial, depth, inside, affine
 
 

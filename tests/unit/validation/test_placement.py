@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.motion import fitted_onto
+from gyriflow.geometry.motion import fit_onto
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, signed_volume, transformed
 from gyriflow.validation.nulls import spin_test, spins, spun
 from gyriflow.validation.placement import correlation, gain_interval, patches, placement, skill
@@ -110,7 +110,7 @@ def test_interval_is_as_wide_as_gains_scatter_from_surface_to_surface():
 
 def test_closest_points_find_the_motion_back():
     matrix = motion(10, (4, 3, -2))
-    back = fitted_onto(transformed(REAL, matrix), REAL)
+    back = fit_onto(transformed(REAL, matrix), REAL)
     assert back @ matrix == pytest.approx(np.eye(4), abs=0.02)
 
 

@@ -5,15 +5,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gyriflow.geometry.alignment import (
+from ..geometry.alignment import (
     CUBE_ROTATIONS,
     Fit,
     fits_from_all_sides,
     margin,
     step_towards_planes,
 )
-from gyriflow.geometry.triangles import unit
-from gyriflow.surface.outlines import Outline
+from ..geometry.triangles import unit
+from .outlines import Outline
 
 Floats = NDArray[np.float64]
 
@@ -38,13 +38,13 @@ class Target:
         self.oriented = cKDTree(np.hstack([outline.points, NORMALS * outline.normals]))
 
 
-def registered(source: Outline, target: Target, start: Floats, shift: Floats | None = None) -> Fit:
+def register(source: Outline, target: Target, start: Floats, shift: Floats | None = None) -> Fit:
     """Returns the fit of `source` on `target` from a (3, 3) rotation near it."""
-    rotation, moved = _descended(source, target, start, FINE, 40, 1, shift)
+    rotation, moved = _descend(source, target, start, FINE, 40, 1, shift)
     return Fit(rotation, moved, _residual(source, target, rotation, moved))
 
 
-def found(source: Outline, target: Target) -> tuple[Fit, float]:
+def register_from_all_sides(source: Outline, target: Target) -> tuple[Fit, float]:
     """Returns the best fit of `source` on `target` from all sides, and how many times worse the next best one is.
 
     The starts are the 24 rotations of the cube, after one at random. The next best is more than 40° away.
@@ -52,31 +52,31 @@ def found(source: Outline, target: Target) -> tuple[Fit, float]:
     random = Rotation.random(random_state=1).as_matrix()
 
     def roughly(start: Floats) -> Fit:
-        rotation, shift = _descended(source, target, start, COARSE, 12, 4)
+        rotation, shift = _descend(source, target, start, COARSE, 12, 4)
         return Fit(rotation, shift, _residual(source, target, rotation, shift))
 
     def better(fit: Fit) -> Fit:
-        return registered(source, target, fit.rotation, fit.shift)
+        return register(source, target, fit.rotation, fit.shift)
 
     fits = fits_from_all_sides(CUBE_ROTATIONS @ random, roughly, better, REFINED, DISTINCT_DEG)
     best = min(fits, key=lambda fit: fit.residual)
     return best, margin(fits, best, DISTINCT_DEG)
 
 
-def matched(one: Target, other: Target, start: Floats) -> Fit:
+def register_deformed(one: Target, other: Target, start: Floats) -> Fit:
     """Returns the fit of `one` on `other`, two shapes that are alike but for a smooth deformation.
 
     It is the rigid part of a quadratic deformation, which leaves the bends out of it where nearest places alone would
     turn a shape to make up for them. Both directions count alike. The residual is that of the rigid fit.
     """
-    there = registered(one.outline, other, start)
+    there = register(one.outline, other, start)
     back = Fit(there.rotation.T, -there.rotation.T @ there.shift, there.residual)
-    ahead, behind = _unbent(one.outline, other, there), _unbent(other.outline, one, back)
+    ahead, behind = _rigid_part_of_bending(one.outline, other, there), _rigid_part_of_bending(other.outline, one, back)
     mean = Rotation.from_matrix([ahead.rotation, behind.rotation.T]).mean().as_matrix()
     return Fit(mean, 0.5 * (ahead.shift - behind.rotation.T @ behind.shift), there.residual)
 
 
-def _unbent(source: Outline, target: Target, fit: Fit) -> Fit:
+def _rigid_part_of_bending(source: Outline, target: Target, fit: Fit) -> Fit:
     """Returns the rigid part of the quadratic deformation that takes on from a fit."""
     points = source.points[source.sample]
     start, facing = points @ fit.rotation.T + fit.shift, source.normals[source.sample] @ fit.rotation.T
@@ -87,7 +87,7 @@ def _unbent(source: Outline, target: Target, fit: Fit) -> Fit:
     bends = np.zeros((basis.shape[1], 3))
     for _ in range(BENDS):
         at = start + basis @ bends
-        ahead, plane, weights = _met(at, facing, target, FINE)
+        ahead, plane, weights = _nearest_planes(at, facing, target, FINE)
         rows = (basis[:, :, None] * plane[:, None, :]).reshape(len(basis), -1)
         stiff = STIFFNESS * len(start)
         step = np.linalg.solve(
@@ -103,7 +103,7 @@ def _unbent(source: Outline, target: Target, fit: Fit) -> Fit:
     return Fit(rotation, at.mean(axis=0) - rotation @ points.mean(axis=0), fit.residual)
 
 
-def _met(at: Floats, facing: Floats, target: Target, scale: float) -> tuple[Floats, Floats, Floats]:
+def _nearest_planes(at: Floats, facing: Floats, target: Target, scale: float) -> tuple[Floats, Floats, Floats]:
     """Returns how far nearest places are, along which directions, and their Geman-McClure weights.
 
     The directions are those of the symmetric point-to-plane distance, Rusinkiewicz 2019 (doi 10.1145/3306346.3323037).
@@ -115,7 +115,7 @@ def _met(at: Floats, facing: Floats, target: Target, scale: float) -> tuple[Floa
     return ahead, plane, (np.einsum("ij,ij->i", theirs, facing) > 0.5) / (1.0 + (ahead / scale) ** 2) ** 2
 
 
-def _descended(
+def _descend(
     source: Outline,
     target: Target,
     rotation: Floats,
@@ -129,7 +129,7 @@ def _descended(
     shift = np.zeros(3) if shift is None else shift
     for _ in range(rounds):
         at, facing = points @ rotation.T + shift, normals @ rotation.T
-        ahead, plane, weights = _met(at, facing, target, scale)
+        ahead, plane, weights = _nearest_planes(at, facing, target, scale)
         turn, move = step_towards_planes(at, plane, ahead, weights)
         rotation, shift = turn @ rotation, turn @ shift + move
         if np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-4:

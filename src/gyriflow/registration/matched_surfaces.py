@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.diffusion import harmonic
-from ..geometry.matching import matched, values_at
+from ..geometry.diffusion import continue_harmonically
+from ..geometry.matching import match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from ..geometry.triangles import Floats, TriangleMesh, vertex_normals
 
@@ -34,7 +34,7 @@ def positions_by_week(surfaces: Mapping[float, TriangleMesh]) -> tuple[list[floa
     return weeks, np.stack([surfaces[week].vertices for week in weeks])
 
 
-def followed(mesh: TriangleMesh, surfaces: Floats, faces: NDArray[np.integer]) -> Floats:
+def follow_surfaces(mesh: TriangleMesh, surfaces: Floats, faces: NDArray[np.integer]) -> Floats:
     """Returns the (w, n, 3) positions of a surface's vertices that go along with matched surfaces near it.
 
     Each vertex keeps its distance from the point of the first week's surface that is nearest with an agreeing normal,
@@ -49,7 +49,7 @@ def followed(mesh: TriangleMesh, surfaces: Floats, faces: NDArray[np.integer]) -
 
     InputError where the surface lies elsewhere.
     """
-    match = matched(mesh.vertices, vertex_normals(mesh), TriangleMesh(surfaces[0], faces.astype(np.int64)))
+    match = match_points(mesh.vertices, vertex_normals(mesh), TriangleMesh(surfaces[0], faces.astype(np.int64)))
     if match.distance_mm.mean() > AWAY_MM:
         raise InputError(
             "the surface is not that of the matched surfaces' first week",
@@ -61,13 +61,13 @@ def followed(mesh: TriangleMesh, surfaces: Floats, faces: NDArray[np.integer]) -
     return np.stack([mesh.vertices + values_at(match, week) - start for week in surfaces])
 
 
-def filled(mesh: TetrahedralMesh, surfaces: Floats, faces: NDArray[np.integer]) -> Floats:
+def follow_inside(mesh: TetrahedralMesh, surfaces: Floats, faces: NDArray[np.integer]) -> Floats:
     """Returns the (w, n, 3) positions of a tetrahedral mesh's vertices that go along with matched surfaces.
 
     Its boundary follows them; the displacement inside is harmonic, as smooth as the boundary allows.
     """
     boundary, used = boundary_surface(mesh)
-    along = followed(boundary, surfaces, faces)
+    along = follow_surfaces(boundary, surfaces, faces)
     moves = (along - along[0]).transpose(1, 0, 2).reshape(len(used), -1)
-    inside = harmonic(mesh.vertices, mesh.tets, used, moves)
+    inside = continue_harmonically(mesh.vertices, mesh.tets, used, moves)
     return mesh.vertices + inside.reshape(len(mesh.vertices), len(surfaces), 3).transpose(1, 0, 2)

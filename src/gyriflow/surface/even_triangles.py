@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from gyriflow.geometry.remeshing import from_meshlab, in_meshlab, remeshed, self_intersecting_faces, untangled
-from gyriflow.geometry.triangles import TriangleMesh
+from ..geometry.remeshing import from_meshlab, in_meshlab, remesh, self_intersecting_faces, untangle
+from ..geometry.triangles import TriangleMesh
 
 
-def smoothed(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
+def smooth_taubin(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
     """Returns the surface after Taubin smoothing, which keeps volume (Taubin 1995, λ = 0.5, μ = −0.53)."""
     if iterations == 0:
         return mesh
@@ -15,12 +15,14 @@ def smoothed(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
     return from_meshlab(document)
 
 
-def evened(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def make_even(
+    mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float
+) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the surface smoothed, remeshed and untangled, and the number of cutting faces before and after."""
-    even = remeshed(smoothed(mesh, smoothing_iterations), edge_length_mm)
+    even = remesh(smooth_taubin(mesh, smoothing_iterations), edge_length_mm)
     before = int(self_intersecting_faces(even).sum())
     if before:
-        even = untangled(even)
+        even = untangle(even)
     after = int(self_intersecting_faces(even).sum()) if before else 0
     return even, {
         "smoothing_iterations": smoothing_iterations,

@@ -1,4 +1,4 @@
-"""A surface made anew through a voxel grid: what is left where repair of the triangles is not enough."""
+"""A surface rebuilt through a voxel grid, for where repair of the triangles is not enough."""
 
 from typing import Any
 
@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.surface.extraction import EDGE_SLOPE, isosurface, made_simple
+from ..geometry.triangles import TriangleMesh
+from .extraction import EDGE_SLOPE, isosurface, make_simple
 
 MARGIN_VOXELS = 6
 
 
-def remade(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the surface of the region that `mesh` winds around, without handles or intersections, and a report.
 
-    The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) tells inside from outside even
-    where the surface cuts itself. Details below the voxel size are lost.
+    The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) separates inside from outside
+    even where the surface cuts itself. Details below the voxel size are lost.
     """
     first = mesh.vertices.min(axis=0) - MARGIN_VOXELS * voxel_mm
     shape = np.ceil(np.ptp(mesh.vertices, axis=0) / voxel_mm).astype(int) + 2 * MARGIN_VOXELS
@@ -26,7 +26,7 @@ def remade(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str,
     affine[:3, 3] = first
     points = np.indices(shape).reshape(3, -1).T * voxel_mm + first
     # every face lies within a voxel of one of these points
-    near, _ = cKDTree(_spread(mesh, voxel_mm)).query(points, distance_upper_bound=3.0 * voxel_mm, workers=-1)
+    near, _ = cKDTree(_spread_points(mesh, voxel_mm)).query(points, distance_upper_bound=3.0 * voxel_mm, workers=-1)
     band = np.isfinite(near)
     distance = np.full(len(points), np.inf)
     distance[band] = np.sqrt(igl.point_mesh_squared_distance(points[band], mesh.vertices, mesh.faces)[0])
@@ -35,12 +35,12 @@ def remade(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str,
     inside = _inside_beyond_band(wound.reshape(shape), band.reshape(shape), mesh, affine)
     signed = np.where(inside, distance.reshape(shape), -distance.reshape(shape))
     field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)
-    field, report = made_simple(field)
+    field, report = make_simple(field)
     return isosurface(field, affine), {"remade_with_voxels_mm": voxel_mm} | report
 
 
-def _spread(mesh: TriangleMesh, voxel_mm: float) -> NDArray[np.float64]:
-    """Returns points on the surface, none of its places further than about a voxel from one of them."""
+def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> NDArray[np.float64]:
+    """Returns points on the surface, so dense that no place on it is further than about a voxel from one."""
     a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
     longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=-1).max()
     steps = max(int(np.ceil(longest / voxel_mm)), 1)
