@@ -36,7 +36,7 @@ TWO_ELEMENTS = 2.0
 METRIC_TITLES = {
     "volume": "volume",
     "area": "pial area",
-    "gyrification_index": "gyrification index, hemispheres' hulls",
+    "gyrification_index": "gyrification index, hulls",
     "gyrification_index_envelope": "gyrification index, envelopes",
     "mean_curvedness": "mean curvedness",
     "mean_shape_index": "mean shape index",
