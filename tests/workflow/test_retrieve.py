@@ -81,7 +81,7 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
     server.asked.clear()
     jobs = workflow.jobs("growth", "--configfile", name, "--forceall")
     assert "atlas_file" not in jobs
-    assert jobs["pial_from_hemispheres"] == 2
+    assert jobs["pial_from_labels"] == 2
     last = workflow.run("retrieve", "--cores", "1", "--configfile", name, "--forceall")
     assert last.returncode == 0, last.stderr
     assert "licence" not in last.stderr
