@@ -47,7 +47,7 @@ def test_a_cortex_that_outgrows_its_elements_is_told_once():
     assert "fewer than 2" in resolution_warning(rows(1.5), 1)
     assert resolution_warning(rows(1.5), 2) == ""
     assert "fewer than 0.9" in resolution_warning(rows(1.2, 0.8), 2)
-    assert resolution_warning(rows(np.nan), 1) == ""
+    assert "fewer than 2" in resolution_warning(rows(np.nan), 1)  # no element lies in the cortex at all
 
 
 def test_nearly_incompressible_tissue_is_told():
