@@ -159,6 +159,32 @@ def growth_problems(
                 yield Problem(f"can't be estimated: {found}", _place(name, (key,), runs))
 
 
+def mesh_size_problems(
+    growth: GrowthSettings, start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]
+) -> Iterator[Problem]:
+    """Yields what is wrong where meshes are made for the end of the runs, by what measured brains are stretched."""
+    if not all(brain.has("id", "week", "source") for brain in brains):
+        return
+    known = ids_of(brains)
+    series = growth_series(
+        {brain.id: KINDS[brain.source] for brain in brains},
+        {brain.id: brain.week for brain in brains},
+        growth.brains,
+        {brain.id: brain.population if brain.has("population") else None for brain in brains},
+    )
+    wanted = growth.estimated_from if growth.has("estimated_from") else None
+    started = {
+        brain for run in runs.values() for brain in start_ids(run.start if run.start is not None else start, known)
+    }
+    without = sorted(brain for brain in started if estimated_from(series, wanted, brain) is None)
+    if without:
+        text = (
+            f"`end` needs brains of other weeks that belong with {', '.join(without)}, which tell how far the surface "
+            "is stretched; list them, or give a smaller surface_edge_mm"
+        )
+        yield Problem(text, ("mesh", "sized_for"))
+
+
 def _too_few_weeks(brains: Sequence[str], weeks: Mapping[str, float]) -> str | None:
     """Returns what is wrong with the weeks of brains that are to give growth rates, None where nothing is."""
     found = len({weeks[brain] for brain in brains})

@@ -100,6 +100,11 @@ class Config(Settings):
             yield from checks.growth_problems(self.growth, start, self.brains, self.runs)
 
     @check
+    def _mesh(self) -> Iterator[Problem]:
+        if self.has("atlas", "mesh", "start") and self.mesh.sized_for == "end":
+            yield from checks.mesh_size_problems(self.growth, self.start, self.brains, self.runs)
+
+    @check
     def _age_reference(self) -> Iterator[Problem]:
         if self.has("atlas"):
             yield from checks.age_reference_problems(self.brains, self.metrics.age_reference)
@@ -167,6 +172,10 @@ class Config(Settings):
         """Returns the output weeks of a run from a start brain, whose own week is the first."""
         settings = self.runs[run]
         return output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
+
+    def last_week(self, brain: str) -> float:
+        """Returns the last week that a run folds a start brain to."""
+        return max(self.runs[run].end_week for run, start in self.folded if start == brain)
 
     @property
     def growth_series(self) -> dict[str, list[str]]:

@@ -59,5 +59,6 @@ def resolution_warning(rows: Sequence[dict], order: int) -> str:
         return ""
     return (
         f"from GW {rows[-1]['week']:.2f} on fewer than {NEEDED[order]:g} elements lie through the cortex, "
-        "since it grows: folds may be mesh noise; a smaller mesh.surface_edge_mm resolves it to a later week"
+        "since it grows: folds may be mesh noise; "
+        "a smaller mesh.surface_edge_mm, or mesh.sized_for: end, resolves it to a later week"
     )
