@@ -52,9 +52,21 @@ STUDY = "results/study"
 SURFACES = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
 
 
-def surfaces_in(folder):
-    """Returns the surface files of a brain in a folder, by part."""
-    return {part: f"{folder}/{name}.surf.gii" for part, name in SURFACES.items()}
+def surfaces_in(folder, sides=SIDES):
+    """Returns the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
+    return {
+        part: f"{folder}/{SURFACES[part]}.surf.gii" for part in ("whole", *sides)
+    }
+
+
+def sides_of(brain):
+    """Returns the hemispheres that a brain has."""
+    return CONFIG.brain(brain).sides
+
+
+def with_sides(*sides):
+    """Returns the ids of the brains that have these hemispheres and no other."""
+    return [brain for brain in BRAINS if sides_of(brain) == sides]
 
 
 def one_of(names):
@@ -97,9 +109,16 @@ def of_weeks(pattern):
 
 
 def comparable(brain):
-    """Returns the brains that a start brain may be compared with: those of its population where it has one, else all."""
+    """Returns the brains that a start brain may be compared with.
+
+    They have the same hemispheres, and are of its population where it has one.
+    """
     population = CONFIG.brain(brain).population
-    return [other for other in CONFIG.brains if population in (None, other.population)]
+    return [
+        other
+        for other in CONFIG.brains
+        if population in (None, other.population) and other.sides == sides_of(brain)
+    ]
 
 
 def measured_after_start(run, brain):

@@ -18,9 +18,7 @@ def folding_rate():
 
 rule growth_rates:
     input:
-        whole=expand(PIAL["whole"], brain=GROWTH_BRAINS),
-        left=expand(PIAL["left"], brain=GROWTH_BRAINS),
-        right=expand(PIAL["right"], brain=GROWTH_BRAINS),
+        expand(PIAL["whole"], brain=GROWTH_BRAINS),
     output:
         areas=f"{STUDY}/growth/areas.csv",
         rates=f"{STUDY}/growth/rates.csv",

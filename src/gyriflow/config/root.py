@@ -13,7 +13,7 @@ from ..parameters.varying import Varying, files_of
 from . import checks
 from .atlas import AtlasSettings, UsedAtlas
 from .atlas_description import Atlas
-from .brains import KINDS, Brain
+from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
 from .metrics import MetricsSettings, age_reference
@@ -171,7 +171,7 @@ class Config(Settings):
     @property
     def growth_series(self) -> dict[str, list[str]]:
         """The ids of the brains of each series of growth rates, by its name; none where they are all of one week."""
-        kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
+        kinds = {brain.id: brain.kind for brain in self.brains}
         populations = {brain.id: brain.population for brain in self.brains}
         weeks = {brain.id: brain.week for brain in self.brains}
         return growth_series(kinds, weeks, self.growth.brains, populations)
@@ -183,7 +183,9 @@ class Config(Settings):
     @property
     def age_reference(self) -> list[str]:
         """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
-        return age_reference(self.brains, self.metrics.age_reference, self.brain(self.start_brains[0]).population)
+        start = self.brain(self.start_brains[0])
+        alike = [brain for brain in self.brains if brain.sides == start.sides]
+        return age_reference(alike, self.metrics.age_reference, start.population)
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.
