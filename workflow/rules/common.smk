@@ -2,7 +2,7 @@
 import re
 
 from gyriflow.errors import GyriflowError
-from gyriflow.launch import hold_lock
+from gyriflow.launch import hold_lock, refused_brains
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
@@ -35,7 +35,14 @@ def validated_config():
         sys.exit(error.exit_code)
 
 
-CONFIG = validated_config()
+WHOLE_CONFIG = validated_config()
+# brains that an earlier pass of this call has refused, and why; without them it finishes the study
+REFUSED = {
+    brain: cause
+    for brain, cause in refused_brains().items()
+    if brain in [known.id for known in WHOLE_CONFIG.brains]
+}
+CONFIG = WHOLE_CONFIG.without(REFUSED)
 BRAINS = [brain.id for brain in CONFIG.brains]
 # every run with each of the brains that it folds
 FOLDED = CONFIG.folded
@@ -54,9 +61,7 @@ SURFACES = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
 
 def surfaces_in(folder, sides=SIDES):
     """Returns the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
-    return {
-        part: f"{folder}/{SURFACES[part]}.surf.gii" for part in ("whole", *sides)
-    }
+    return {part: f"{folder}/{SURFACES[part]}.surf.gii" for part in ("whole", *sides)}
 
 
 def sides_of(brain):

@@ -104,9 +104,7 @@ rule regions:
         params=rules.parameters.output[0],
         maps=maps_of_run,
         # the hemispheres of the folded brain are those of the measured one
-        sides=lambda wildcards: [
-            PIAL[side] for side in sides_of(wildcards.brain)
-        ],
+        sides=lambda wildcards: [PIAL[side] for side in sides_of(wildcards.brain)],
     output:
         mesh=f"{RUN}/folding/regions.xdmf",
         data=f"{RUN}/folding/regions.h5",

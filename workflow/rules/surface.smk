@@ -2,7 +2,6 @@
 from gyriflow.parameters.schemes import LabelScheme
 
 
-
 def pial_of(*sides):
     """Returns the files that are made for every brain with some hemispheres, whatever its source."""
     return {

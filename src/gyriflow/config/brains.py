@@ -212,7 +212,7 @@ class Brain(Settings):
 
     @check
     def _a_hemisphere_is_labels_or_surface(self) -> Iterator[Problem]:
-        if not self.gives("hemisphere") or not self.hemisphere.has("file"):
+        if self.hemisphere is None or not self.hemisphere.has("file"):
             return
         volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
         if volume and not self.gives("scheme"):

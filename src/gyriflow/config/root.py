@@ -1,6 +1,6 @@
 """The whole configuration."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 from pydantic import field_validator
@@ -111,6 +111,11 @@ class Config(Settings):
                 return brain
         raise KeyError(name)
 
+    def without(self, names: Collection[str]) -> "Config":
+        """Returns the configuration without some brains, which is left to be finished where these are refused."""
+        kept = tuple(brain for brain in self.brains if brain.id not in names)
+        return self.model_copy(update={"brains": kept}) if names else self
+
     def measured_name(self, brains: Iterable[str]) -> str:
         """Returns the name of measured brains in figures and tables: their populations if known.
 
@@ -183,6 +188,8 @@ class Config(Settings):
     @property
     def age_reference(self) -> list[str]:
         """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
+        if not self.start_brains:
+            return []
         start = self.brain(self.start_brains[0])
         alike = [brain for brain in self.brains if brain.sides == start.sides]
         return age_reference(alike, self.metrics.age_reference, start.population)

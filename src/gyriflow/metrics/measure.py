@@ -44,9 +44,9 @@ class BrainMetrics:
     table : DataFrame
         hemisphere (whole, left or right), metric, value, unit: one row per number.
     maps : dict
-        Per hemisphere ("left", "right", or the only one) arrays per vertex by name: shape_index, curvedness (1/mm), mean_curvature
-        (1/mm), gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm (where it is known;
-        NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
+        Per hemisphere ("left", "right", or the only one) arrays per vertex by name: shape_index, curvedness (1/mm),
+        mean_curvature (1/mm), gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm
+        (where it is known; NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
     spectra : DataFrame
         Per hemisphere and band: hemisphere, band, wavelength_min_mm, wavelength_max_mm, modes, power, relative_power,
         complete, denominator_complete, resolved, weyl_formula.
