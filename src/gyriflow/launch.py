@@ -28,6 +28,8 @@ LOOKS_ONLY = frozenset(
     + ("--filegraph", "--list-rules", "--list", "-l", "--lint", "-h", "--help", "-v", "--version")
 )
 """Options under which Snakemake takes no lock."""
+GOES_ON = "GYRIFLOW_KEEP_GOING"
+"""Environment variable that is set where a call has an option of `KEEP_GOING`."""
 KEEP_GOING = frozenset(("--keep-going", "-k"))
 REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 """Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
@@ -146,6 +148,11 @@ def refused_brains() -> dict[str, str]:
     return read_json(path) if path else {}
 
 
+def keeps_going() -> bool:
+    """Returns whether the call that this process belongs to goes on where a step or a row of a table fails."""
+    return GOES_ON in os.environ
+
+
 def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
     """Returns the cause by the id of each brain of which a step has failed since a time (s, of the epoch)."""
     from .io.logs import gather_messages  # takes a second, which a good run need not wait for
@@ -188,6 +195,8 @@ def main(arguments: Sequence[str]) -> int:
     # beside the results, where jobs on other machines of a cluster find it too
     exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
     os.environ[EXIT_FILE] = str(exit_file)
+    if KEEP_GOING.intersection(arguments):
+        os.environ[GOES_ON] = "1"
     interrupts: list[int] = []
     began = time.time()
 

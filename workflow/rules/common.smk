@@ -2,7 +2,7 @@
 import re
 
 from gyriflow.errors import GyriflowError
-from gyriflow.launch import hold_lock, refused_brains
+from gyriflow.launch import hold_lock, keeps_going, refused_brains
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
@@ -28,7 +28,7 @@ def validated_config():
             content = read_yaml(file)
             if isinstance(content, dict) and {"brains", "atlas"} & set(content):
                 base = file.resolve().parent
-        return load(config, base)
+        return load(config, base, keep_going=keeps_going())
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
@@ -43,6 +43,9 @@ REFUSED = {
     if brain in [known.id for known in WHOLE_CONFIG.brains]
 }
 CONFIG = WHOLE_CONFIG.without(REFUSED)
+if workflow.is_main_process:
+    for row in WHOLE_CONFIG.left_out.values():
+        print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 BRAINS = [brain.id for brain in CONFIG.brains]
 # every run with each of the brains that it folds
 FOLDED = CONFIG.folded

@@ -106,8 +106,9 @@ rule quality_table:
         refused=[
             quality_labels(brain) | {"cause": cause, "page": None}
             for brain, cause in REFUSED.items()
-        ],
-        order=[brain.id for brain in WHOLE_CONFIG.brains],
+        ]
+        + [{"subject": row, **said} for row, said in WHOLE_CONFIG.left_out.items()],
+        order=[*(brain.id for brain in WHOLE_CONFIG.brains), *WHOLE_CONFIG.left_out],
     script:
         "../scripts/quality_table.py"
 

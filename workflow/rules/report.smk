@@ -56,7 +56,7 @@ rule html_report:
         snakefile=f"{workflow.basedir}/Snakefile",
         # the brains of the atlas are among the brains by now
         config=WHOLE_CONFIG.model_dump(
-            mode="json", exclude_defaults=True, exclude={"atlas"}
+            mode="json", exclude_defaults=True, exclude={"atlas", "participants"}
         ),
     script:
         "../scripts/html_report.py"

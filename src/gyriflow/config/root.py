@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
-from pydantic import field_validator
+from pydantic import PrivateAttr, field_validator
 
 from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING, FoldingSettings, bounds_of, output_weeks
@@ -17,6 +17,7 @@ from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
 from .metrics import MetricsSettings, age_reference
+from .participants import ParticipantsSettings
 from .report import ReportSettings
 from .runs import Run, Start, start_ids
 from .surface import SurfaceSettings
@@ -32,13 +33,16 @@ class Config(Settings):
 
     brains: tuple[Brain, ...] = setting(
         (), "", "The brains: those to fold, and others to compare with and to estimate growth from. Required without "
-        "`atlas`.",
+        "`atlas` and `participants`.",
     )  # fmt: skip
     atlas: tuple[AtlasSettings, ...] = setting(
         (), "",
         "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of "
         "these.",
     )  # fmt: skip
+    participants: ParticipantsSettings | None = setting(
+        None, "", "A table of brains, such as the `participants.tsv` of BIDS."
+    )
     schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
     start: Start | None = setting(
         None, "", "Id of the brain to fold, a list of ids, or `all`; required if a run has no `start` of its own."
@@ -53,6 +57,7 @@ class Config(Settings):
     )  # fmt: skip
     metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")
     report: ReportSettings = setting(ReportSettings(), "", "Figures and report.")
+    _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
 
     @field_validator("brains", mode="before")
     @classmethod
@@ -110,6 +115,16 @@ class Config(Settings):
             if brain.id == name:
                 return brain
         raise KeyError(name)
+
+    @property
+    def left_out(self) -> dict[str, dict[str, Any]]:
+        """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
+        return self._left_out
+
+    def leave_out(self, rows: dict[str, dict[str, Any]]) -> "Config":
+        """Returns the configuration with rows of `participants` that can't be used."""
+        self._left_out = rows
+        return self
 
     def without(self, names: Collection[str]) -> "Config":
         """Returns the configuration without some brains, which is left to be finished where these are refused."""

@@ -35,9 +35,10 @@ THICKNESS_LIMITS_MM = (0.0, 4.0)
 SHAPE_VIEWS = ("left", "right", "top", "bottom")
 THICKNESS_VIEWS = ("left", "right", "left medial", "right medial")
 OTHER_VIEWS = ("front", "back", "left medial", "right medial")
-MOST_LINES, LINE_LETTERS = 9, 138
+MOST_LINES, LINE_LETTERS = 8, 138
+SCALE_BAR_MM = 20.0
 # in inches, from the top of the page
-HEAD_IN, PLANES_IN, VIEWS_IN, FOOT_IN = 0.62, 2.05, 1.42, 1.75
+HEAD_IN, PLANES_IN, VIEWS_IN, FOOT_IN = 0.62, 2.4, 1.42, 1.45
 PIXELS_PER_INCH = 200
 
 
@@ -147,7 +148,7 @@ def _draw_warnings(figure: Figure, verdict: Verdict, warnings: Sequence[str]) ->
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], "• … more in quality.csv"]
     heading = {"fine": "No warnings.", "look": "Look at:", "refused": "Refused:"}[verdict]
-    place, colour = (FOOT_IN - 0.3) / height, VERDICT_COLOURS[verdict]
+    place, colour = (FOOT_IN - 0.12) / height, VERDICT_COLOURS[verdict]
     figure.text(0.015, place, heading, fontsize=7.5, fontweight="bold", color=colour, ha="left", va="top")
     below = place - 0.16 / height
     figure.text(0.015, below, "\n".join(lines), fontsize=6.5, linespacing=1.35, ha="left", va="top")
@@ -160,7 +161,7 @@ def _draw_planes(figure: Figure, brain: Brain, *, top: float) -> None:
     grids = {plane: plane_grid(plane, at[plane], low, high) for plane in PLANES}
     widths = np.array([extent[1] - extent[0] for _, extent in grids.values()])
     tallest = max(extent[3] - extent[2] for _, extent in grids.values())
-    inches = min((PLANES_IN - 0.25) / tallest, (FULL_WIDTH_IN - 0.6) / widths.sum())
+    inches = min((PLANES_IN - 0.4) / tallest, (FULL_WIDTH_IN - 0.6) / widths.sum())
     left = 0.5 * (FULL_WIDTH_IN - inches * widths.sum() - 0.3)
     keys: list[Patch] = []
     for plane, (points, extent) in grids.items():
@@ -179,6 +180,10 @@ def _draw_planes(figure: Figure, brain: Brain, *, top: float) -> None:
         colour = "white" if brain.volumes and brain.volumes[0].image is not None else "black"
         for x, end in zip((0.03, 0.97), ends, strict=True):
             axes.text(x, 0.5, end, transform=axes.transAxes, ha="center", va="center", fontsize=6.5, color=colour)
+        if plane == "coronal":
+            start = extent[0] + 1.0, extent[2] + 2.0
+            axes.plot([start[0], start[0] + SCALE_BAR_MM], [start[1]] * 2, color=colour, linewidth=1.2)
+            axes.text(start[0], start[1] + 1.0, f"{SCALE_BAR_MM:g} mm", fontsize=6, color=colour)
         left += wide + 0.15
     inner = brain.white is not None or any(volume.tissues is not None for volume in brain.volumes)
     names = [Patch(color=PIAL_COLOUR, label="pial surface")]
@@ -186,7 +191,7 @@ def _draw_planes(figure: Figure, brain: Brain, *, top: float) -> None:
     handles = [*names, *keys]
     figure.legend(
         handles=handles, loc="upper center", ncols=len(handles), fontsize=6, frameon=False, handlelength=1.0,
-        bbox_to_anchor=(0.5, (top - PLANES_IN + 0.1) / height), borderaxespad=0, columnspacing=1.2,
+        bbox_to_anchor=(0.5, (top - PLANES_IN + 0.15) / height), borderaxespad=0, columnspacing=1.2,
     )  # fmt: skip
 
 

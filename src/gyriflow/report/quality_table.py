@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..geometry.alignment import angle_deg
 from .quality import verdict_of
 
 COLUMNS = (
@@ -52,7 +53,7 @@ def quality_row(
         "mean_thickness_mm": thickness.get("mean_mm"),
         "thickness_measured_share": thickness.get("measured_area_share"),
         "pose_by": report.get("pose_by") or report.get("posing", {}).get("method") or "configuration",
-        "rotation_deg": report.get("rotation_deg"),
+        "rotation_deg": angle_deg(np.array(report["pose"])[:3, :3]),
         "asymmetry_mm": report.get("asymmetry_mm"),
     }
 
@@ -90,7 +91,7 @@ def facts(row: Mapping[str, Any]) -> dict[str, str]:
         "hemispheres": str(row["sides"]),
         "area": f"{row['area_cm2']:.1f} cm² ({both})",
         "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of that expected)",
-        "pose": f"by {row['pose_by']}, turned by {row['rotation_deg'] or 0:.1f}°",
+        "pose": f"by {row['pose_by']}, turned by {row['rotation_deg']:.1f}°",
     }
     if _known(row["asymmetry_mm"]):
         found["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
