@@ -180,6 +180,9 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
     try:
         again = [sys.executable, "-m", "gyriflow.launch", *arguments]
         subprocess.run(again, env=os.environ | {REFUSED_FILE: str(path)}, check=False)
+    except KeyboardInterrupt:
+        # the same command goes on from here
+        pass
     finally:
         path.unlink(missing_ok=True)
 
