@@ -29,7 +29,8 @@ with step(snakemake.log[0]):
     if files.thickness:
         (thickness,) = read_vertex_maps(files.thickness).values()
     white = posed_whites(report, {side: read_surface(path) for side, path in params.white.items()})
-    warnings = [said for log in params.logs for level, said in read_messages(log) if level == "warning"]
+    said = [message for log in params.logs for message in read_messages(log)]
+    warnings = list(dict.fromkeys(message for level, message in said if level == "warning"))
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.labels, report, read_json(files.measured) if files.measured else {}, warnings, expected)
     brain = Brain(surface, report["fissure_x_mm"], thickness, white, volumes)

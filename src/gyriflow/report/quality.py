@@ -198,7 +198,8 @@ def _draw_planes(figure: Figure, brain: Brain, *, top: float) -> None:
 def _places(brain: Brain, low: Floats, high: Floats) -> dict[str, float]:
     """Returns where the planes are: through the middle, the sagittal one through the middle of a hemisphere."""
     middle = (low + high) / 2
-    right = high[0] - brain.fissure_x_mm > 0.25 * (high[0] - low[0])
+    # the larger one, of equal ones the right one
+    right = high[0] - brain.fissure_x_mm > 0.8 * (brain.fissure_x_mm - low[0])
     inner = float(np.clip(brain.fissure_x_mm, low[0], high[0]))
     return {"coronal": middle[1], "axial": middle[2], "sagittal": (inner + (high[0] if right else low[0])) / 2}
 
