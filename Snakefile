@@ -33,6 +33,7 @@ include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/run_figures.smk"
 include: "workflow/rules/study_figures.smk"
+include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -47,6 +48,7 @@ localrules:
     validate,
     metrics,
     figures,
+    quality,
     report,
     paper,
     parameters,
@@ -62,6 +64,8 @@ rule all:
         rules.folding.input,
         rules.metrics.input,
         rules.figures.input,
+        rules.quality.input,
+        rules.study_warnings.output,
         rules.report.input,
 
 

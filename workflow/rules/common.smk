@@ -2,7 +2,7 @@
 import re
 
 from gyriflow.errors import GyriflowError
-from gyriflow.launch import hold_lock
+from gyriflow.launch import hold_lock, keeps_going, refused_brains
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
@@ -28,14 +28,24 @@ def validated_config():
             content = read_yaml(file)
             if isinstance(content, dict) and {"brains", "atlas"} & set(content):
                 base = file.resolve().parent
-        return load(config, base)
+        return load(config, base, keep_going=keeps_going())
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
 
 
-CONFIG = validated_config()
+WHOLE_CONFIG = validated_config()
+# brains that an earlier pass of this call has refused, and why; without them it finishes the study
+REFUSED = {
+    brain: cause
+    for brain, cause in refused_brains().items()
+    if brain in [known.id for known in WHOLE_CONFIG.brains]
+}
+CONFIG = WHOLE_CONFIG.without(REFUSED)
+if workflow.is_main_process:
+    for row in WHOLE_CONFIG.left_out.values():
+        print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 BRAINS = [brain.id for brain in CONFIG.brains]
 # every run with each of the brains that it folds
 FOLDED = CONFIG.folded
@@ -52,9 +62,19 @@ STUDY = "results/study"
 SURFACES = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
 
 
-def surfaces_in(folder):
-    """Returns the surface files of a brain in a folder, by part."""
-    return {part: f"{folder}/{name}.surf.gii" for part, name in SURFACES.items()}
+def surfaces_in(folder, sides=SIDES):
+    """Returns the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
+    return {part: f"{folder}/{SURFACES[part]}.surf.gii" for part in ("whole", *sides)}
+
+
+def sides_of(brain):
+    """Returns the hemispheres that a brain has."""
+    return CONFIG.brain(brain).sides
+
+
+def with_sides(*sides):
+    """Returns the ids of the brains that have these hemispheres and no other."""
+    return [brain for brain in BRAINS if sides_of(brain) == sides]
 
 
 def one_of(names):
@@ -97,9 +117,16 @@ def of_weeks(pattern):
 
 
 def comparable(brain):
-    """Returns the brains that a start brain may be compared with: those of its population where it has one, else all."""
+    """Returns the brains that a start brain may be compared with.
+
+    They have the same hemispheres, and are of its population where it has one.
+    """
     population = CONFIG.brain(brain).population
-    return [other for other in CONFIG.brains if population in (None, other.population)]
+    return [
+        other
+        for other in CONFIG.brains
+        if population in (None, other.population) and other.sides == sides_of(brain)
+    ]
 
 
 def measured_after_start(run, brain):

@@ -104,8 +104,7 @@ rule regions:
         params=rules.parameters.output[0],
         maps=maps_of_run,
         # the hemispheres of the folded brain are those of the measured one
-        left=PIAL["left"],
-        right=PIAL["right"],
+        sides=lambda wildcards: [PIAL[side] for side in sides_of(wildcards.brain)],
     output:
         mesh=f"{RUN}/folding/regions.xdmf",
         data=f"{RUN}/folding/regions.h5",
@@ -161,25 +160,58 @@ rule simulate:
         " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
 
 
+def folded_of(*sides):
+    """Returns the surfaces of a simulated brain at a week with some hemispheres, and its thickness."""
+    folder = f"{RUN}/surfaces/week-{{week}}"
+    return {
+        **surfaces_in(folder, sides),
+        "thickness": f"{folder}/thickness.shape.gii",
+    }
+
+
 rule folded_surface:
     input:
         frames=rules.simulate.output.frames,
         regions=rules.regions.output.mesh,
         data=rules.regions.output.data,
     output:
-        **surfaces_in(f"{RUN}/surfaces/week-{{week}}"),
-        thickness=f"{RUN}/surfaces/week-{{week}}/thickness.shape.gii",
+        **folded_of(*SIDES),
     log:
         f"{RUN}/logs/folded_surface.week-{{week}}.log",
     benchmark:
         f"{RUN}/benchmarks/folded_surface.week-{{week}}.tsv"
+    wildcard_constraints:
+        brain=one_of(with_sides(*SIDES)),
     conda:
         ENVIRONMENT
     script:
         "../scripts/folded_surface.py"
 
 
+# from hemispheres that are alone
+use rule folded_surface as folded_left with:
+    output:
+        **folded_of("left"),
+    wildcard_constraints:
+        brain=one_of(with_sides("left")),
+
+
+use rule folded_surface as folded_right with:
+    output:
+        **folded_of("right"),
+    wildcard_constraints:
+        brain=one_of(with_sides("right")),
+
+
 rule folding:
     input:
         of_runs(rules.simulate.output),
-        of_weeks(rules.folded_surface.output),
+        [
+            expand(
+                list(folded_of(*sides_of(brain)).values()),
+                run=run,
+                brain=brain,
+                week=week_tags(run, brain),
+            )
+            for run, brain in FOLDED
+        ],

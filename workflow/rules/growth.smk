@@ -18,9 +18,7 @@ def folding_rate():
 
 rule growth_rates:
     input:
-        whole=expand(PIAL["whole"], brain=GROWTH_BRAINS),
-        left=expand(PIAL["left"], brain=GROWTH_BRAINS),
-        right=expand(PIAL["right"], brain=GROWTH_BRAINS),
+        expand(PIAL["whole"], brain=GROWTH_BRAINS),
     output:
         areas=f"{STUDY}/growth/areas.csv",
         rates=f"{STUDY}/growth/rates.csv",
@@ -83,7 +81,8 @@ rule growth_figure:
         ENVIRONMENT
     params:
         folding_rate_per_s=folding_rate(),
-        estimated_from=CONFIG.estimated_from(CONFIG.start_brains[0]),
+        estimated_from=CONFIG.start_brains
+        and CONFIG.estimated_from(CONFIG.start_brains[0]),
         series_names=list(CONFIG.growth_series),
         measured=CONFIG.measured_name(GROWTH_BRAINS),
         dpi=CONFIG.report.dpi,

@@ -8,6 +8,24 @@ def surface_folder(where):
     )
 
 
+def brain_of(where):
+    """Returns the id of the brain that metrics in a folder are of: the measured one, or the start of the run."""
+    kind, *names = where.split("/")
+    return names[0] if kind == "brains" else names[1]
+
+
+def of_sides(*sides):
+    """Returns a pattern of the folders with metrics of brains that have these hemispheres."""
+    return one_of(
+        [where for where in MEASURED + SIMULATED if sides_of(brain_of(where)) == sides]
+    )
+
+
+def maps_of(*sides):
+    """Returns the files with maps on some hemispheres, beside the metrics of a brain."""
+    return {side: f"results/{{where}}/{side}.shape.gii" for side in sides}
+
+
 def brain_labels(where):
     """Returns the first columns of a brain's tables: its id, the run ("real" for measured brains), its week."""
     match where.split("/"):
@@ -32,6 +50,11 @@ def thickness_of(wildcards):
     return []
 
 
+# made for every brain, whatever hemispheres it has
+MEASURES = {
+    name: f"results/{{where}}/{name}.csv"
+    for name in ("metrics", "spectra", "coefficients")
+}
 # where the metrics of a brain lie under results
 MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
 SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
@@ -40,13 +63,10 @@ SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
 # Only a common number of modes makes brains depend on each other: measured ones then wait for all simulations.
 rule weyl_numbers:
     input:
-        left=[
-            f"results/{surface_folder(where)}/left.pial.surf.gii"
+        [
+            surfaces_in(f"results/{surface_folder(where)}")[side]
             for where in MEASURED + SIMULATED
-        ],
-        right=[
-            f"results/{surface_folder(where)}/right.pial.surf.gii"
-            for where in MEASURED + SIMULATED
+            for side in sides_of(brain_of(where))
         ],
     output:
         f"{STUDY}/weyl_numbers.csv",
@@ -60,6 +80,7 @@ rule weyl_numbers:
         runtime=20,
     params:
         labels=[brain_labels(where) for where in MEASURED + SIMULATED],
+        sides=[sides_of(brain_of(where)) for where in MEASURED + SIMULATED],
         formula=CONFIG.metrics.spangy_wavelength,
     script:
         "../scripts/weyl_numbers.py"
@@ -68,7 +89,10 @@ rule weyl_numbers:
 rule measure:
     input:
         unpack(
-            lambda wildcards: surfaces_in(f"results/{surface_folder(wildcards.where)}")
+            lambda wildcards: surfaces_in(
+                f"results/{surface_folder(wildcards.where)}",
+                sides_of(brain_of(wildcards.where)),
+            )
         ),
         thickness=thickness_of,
         mode_numbers=(
@@ -77,17 +101,14 @@ rule measure:
             else []
         ),
     output:
-        metrics="results/{where}/metrics.csv",
-        spectra="results/{where}/spectra.csv",
-        coefficients="results/{where}/coefficients.csv",
-        left="results/{where}/left.shape.gii",
-        right="results/{where}/right.shape.gii",
+        **MEASURES,
+        **maps_of(*SIDES),
     log:
         "results/{where}/logs/measure.log",
     benchmark:
         "results/{where}/benchmarks/measure.tsv"
     wildcard_constraints:
-        where=one_of(MEASURED + SIMULATED),
+        where=of_sides(*SIDES),
     conda:
         ENVIRONMENT
     resources:
@@ -98,6 +119,23 @@ rule measure:
         settings=CONFIG.metrics.model_dump(exclude={"age_reference"}),
     script:
         "../scripts/measure.py"
+
+
+# of hemispheres that are alone
+use rule measure as measure_left with:
+    output:
+        **MEASURES,
+        **maps_of("left"),
+    wildcard_constraints:
+        where=of_sides("left"),
+
+
+use rule measure as measure_right with:
+    output:
+        **MEASURES,
+        **maps_of("right"),
+    wildcard_constraints:
+        where=of_sides("right"),
 
 
 rule displacement:
@@ -119,8 +157,16 @@ rule displacement:
 
 rule similarity:
     input:
-        simulated=list(surfaces_in(f"{RUN}/surfaces/week-{{week}}").values()),
-        real=list(surfaces_in("results/brains/{measured}/surface").values()),
+        simulated=lambda wildcards: list(
+            surfaces_in(
+                f"{RUN}/surfaces/week-{{week}}", sides_of(wildcards.brain)
+            ).values()
+        ),
+        real=lambda wildcards: list(
+            surfaces_in(
+                "results/brains/{measured}/surface", sides_of(wildcards.brain)
+            ).values()
+        ),
     output:
         f"{RUN}/metrics/week-{{week}}/similarity.{{measured}}.csv",
     log:
@@ -140,6 +186,6 @@ rule similarity:
             "week": float(wildcards.week),
             "real": wildcards.measured,
         },
-        parts=list(SURFACES),
+        parts=lambda wildcards: ["whole", *sides_of(wildcards.brain)],
     script:
         "../scripts/similarity.py"

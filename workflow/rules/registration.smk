@@ -16,9 +16,9 @@ def later_brains(brain):
     last = within[0] if within else end
     chosen = {start.week: brain}
     for other in map(CONFIG.brain, series):
-        if start.week < other.week <= last and other.source in WITH_LABELS:
+        if start.week < other.week <= last and other.has_labels:
             chosen.setdefault(other.week, other.id)
-    if start.source not in WITH_LABELS:
+    if not start.has_labels:
         return [brain]
     return [chosen[week] for week in sorted(chosen)]
 

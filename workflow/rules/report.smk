@@ -39,6 +39,8 @@ rule html_report:
         rules.figures.input,
         rules.metrics.input,
         rules.study_resources.output,
+        rules.quality.input,
+        rules.study_warnings.output,
     output:
         html="results/report/report.html",
         config="results/report/config.yaml",
@@ -53,7 +55,9 @@ rule html_report:
     params:
         snakefile=f"{workflow.basedir}/Snakefile",
         # the brains of the atlas are among the brains by now
-        config=CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}),
+        config=WHOLE_CONFIG.model_dump(
+            mode="json", exclude_defaults=True, exclude={"atlas", "participants"}
+        ),
     script:
         "../scripts/html_report.py"
 

@@ -1,7 +1,9 @@
 # Figures of the whole study.
 FIGURES = f"{STUDY}/figures"
 # the last week of which every run has a surface, where there is one
-COMMON_WEEKS = set.intersection(*(set(week_tags(*pair)) for pair in FOLDED))
+COMMON_WEEKS = (
+    set.intersection(*(set(week_tags(*pair)) for pair in FOLDED)) if FOLDED else set()
+)
 LAST_WEEK = max(COMMON_WEEKS, default=None)
 LAST_BRAINS = [brain.id for brain in CONFIG.brains if week_tag(brain.week) == LAST_WEEK]
 

@@ -9,14 +9,12 @@ from gyriflow.io.surfaces import read_surface
 from gyriflow.step import step
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
-files, params, output = snakemake.input, snakemake.params, snakemake.output
+params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):
     areas = pd.DataFrame({"series": params.series, "subject": params.brains, "week": params.weeks})
-    areas["area_cm2"] = [
-        (area(read_surface(left)) + area(read_surface(right))) * CM2_PER_MM2
-        for left, right in zip(files.left, files.right, strict=True)
-    ]
-    areas["volume_ml"] = [signed_volume(read_surface(whole)) * ML_PER_MM3 for whole in files.whole]
+    surfaces = [read_surface(file) for file in snakemake.input]
+    areas["area_cm2"] = [area(surface) * CM2_PER_MM2 for surface in surfaces]
+    areas["volume_ml"] = [signed_volume(surface) * ML_PER_MM3 for surface in surfaces]
     write_table(output.areas, areas)
     write_table(output.rates, rates_of_series(areas))
     write_table(output.agreement, agreement(areas))

@@ -13,7 +13,7 @@ with step(snakemake.log[0]):
     write_yaml(output.config, params.config)
     with replaced(output.html) as temporary:
         options = ["--configfile", output.config, "--snakefile", params.snakefile, "--nolock", "--report", temporary]
-        command = [sys.executable, "-m", "snakemake", "figures", "metrics", "study_resources", *options]
+        command = [sys.executable, "-m", "snakemake", "figures", "metrics", "study_resources", "quality", *options]
         outcome = subprocess.run(command, capture_output=True, text=True, check=False)
         if outcome.returncode:
             last = "\n".join(outcome.stderr.splitlines()[-8:])

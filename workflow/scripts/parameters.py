@@ -21,9 +21,7 @@ with step(snakemake.log[0]):
         sizes = followed_sizes(settings["follow"], curves, snakemake.params.estimated_from, weeks, shrink)
         settings["follow"] = settings["follow"] | sizes
         settings["regional_growth"] = {week: regional_map(week) for week in snakemake.params.regional_weeks[:-1]}
-    known = {
-        "start_week": weeks[0],
-        "output_weeks": list(weeks),
-        "fissure_x_mm": read_json(files.surface)["fissure_x_mm"],
-    }
+    surface = read_json(files.surface)
+    known = {"start_week": weeks[0], "output_weeks": list(weeks), "fissure_x_mm": surface["fissure_x_mm"]}
+    known["side"] = surface.get("side")
     write_yaml(snakemake.output[0], known | settings)

@@ -1,5 +1,7 @@
 """Zones, tags and fields of a run on the start mesh, for inspection before the solve."""
 
+import numpy as np
+
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.regions import cell_tags, facet_tags
 from gyriflow.folding.zone_checks import refuse_impossible
@@ -23,6 +25,10 @@ with step(snakemake.log[0]):
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
     fields = layer_fields(mesh.vertices, zones, parameters, maps, parameters.start_week, REGION_FIELDS)
-    on_left = nearer_left(TriangleMesh(mesh.vertices, zones.facets), *map(read_surface, (files.left, files.right)))
+    boundary = TriangleMesh(mesh.vertices, zones.facets)
+    if parameters.side is None:
+        on_left = nearer_left(boundary, *map(read_surface, files.sides))
+    else:
+        on_left = np.full(len(zones.facets), parameters.side == "left")
     tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
     write_regions(snakemake.output.mesh, Regions(mesh, zones.facets, fields, *tags))

@@ -8,7 +8,7 @@ from ..parameters.messages import nearest
 from ..parameters.schemes import SCHEMES
 from ..parameters.settings import Problem
 from ..parameters.varying import Varying
-from .brains import KINDS, Brain
+from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .metrics import LEAST_AGE_WEEKS
 from .runs import ALL, Run, Start, start_ids
@@ -137,7 +137,7 @@ def growth_problems(
         mixed = sorted({populations[brain] or "of no known population" for brain in chosen})
         if len(mixed) > 1:
             yield Problem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", paths[name])
-    series = growth_series({brain.id: KINDS[brain.source] for brain in brains}, weeks, given, populations)
+    series = growth_series({brain.id: brain.kind for brain in brains}, weeks, given, populations)
     wanted = growth.estimated_from if growth.has("estimated_from") else None
     if wanted is not None and series and wanted not in series:
         yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))

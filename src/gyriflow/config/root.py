@@ -1,9 +1,9 @@
 """The whole configuration."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
-from pydantic import field_validator
+from pydantic import PrivateAttr, field_validator
 
 from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING, FoldingSettings, bounds_of, output_weeks
@@ -13,10 +13,11 @@ from ..parameters.varying import Varying, files_of
 from . import checks
 from .atlas import AtlasSettings, UsedAtlas
 from .atlas_description import Atlas
-from .brains import KINDS, Brain
+from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
 from .metrics import MetricsSettings, age_reference
+from .participants import ParticipantsSettings
 from .report import ReportSettings
 from .runs import Run, Start, start_ids
 from .surface import SurfaceSettings
@@ -32,13 +33,16 @@ class Config(Settings):
 
     brains: tuple[Brain, ...] = setting(
         (), "", "The brains: those to fold, and others to compare with and to estimate growth from. Required without "
-        "`atlas`.",
+        "`atlas` and `participants`.",
     )  # fmt: skip
     atlas: tuple[AtlasSettings, ...] = setting(
         (), "",
         "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of "
         "these.",
     )  # fmt: skip
+    participants: ParticipantsSettings | None = setting(
+        None, "", "A table of brains, such as the `participants.tsv` of BIDS."
+    )
     schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
     start: Start | None = setting(
         None, "", "Id of the brain to fold, a list of ids, or `all`; required if a run has no `start` of its own."
@@ -53,6 +57,7 @@ class Config(Settings):
     )  # fmt: skip
     metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")
     report: ReportSettings = setting(ReportSettings(), "", "Figures and report.")
+    _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
 
     @field_validator("brains", mode="before")
     @classmethod
@@ -115,6 +120,21 @@ class Config(Settings):
             if brain.id == name:
                 return brain
         raise KeyError(name)
+
+    @property
+    def left_out(self) -> dict[str, dict[str, Any]]:
+        """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
+        return self._left_out
+
+    def leave_out(self, rows: dict[str, dict[str, Any]]) -> "Config":
+        """Returns the configuration with rows of `participants` that can't be used."""
+        self._left_out = rows
+        return self
+
+    def without(self, names: Collection[str]) -> "Config":
+        """Returns the configuration without some brains, which is left to be finished where these are refused."""
+        kept = tuple(brain for brain in self.brains if brain.id not in names)
+        return self.model_copy(update={"brains": kept}) if names else self
 
     def measured_name(self, brains: Iterable[str]) -> str:
         """Returns the name of measured brains in figures and tables: their populations if known.
@@ -180,7 +200,7 @@ class Config(Settings):
     @property
     def growth_series(self) -> dict[str, list[str]]:
         """The ids of the brains of each series of growth rates, by its name; none where they are all of one week."""
-        kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
+        kinds = {brain.id: brain.kind for brain in self.brains}
         populations = {brain.id: brain.population for brain in self.brains}
         weeks = {brain.id: brain.week for brain in self.brains}
         return growth_series(kinds, weeks, self.growth.brains, populations)
@@ -192,7 +212,11 @@ class Config(Settings):
     @property
     def age_reference(self) -> list[str]:
         """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
-        return age_reference(self.brains, self.metrics.age_reference, self.brain(self.start_brains[0]).population)
+        if not self.start_brains:
+            return []
+        start = self.brain(self.start_brains[0])
+        alike = [brain for brain in self.brains if brain.sides == start.sides]
+        return age_reference(alike, self.metrics.age_reference, start.population)
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.

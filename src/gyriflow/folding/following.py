@@ -95,7 +95,7 @@ def missed_curves(row: Mapping[str, Any]) -> str:
 def size_of(positions_mm: Floats, zones: Zones) -> Size:
     """Returns the size of a brain from the (n, 3) positions of its mesh in mm."""
     return Size(
-        area(TriangleMesh(positions_mm, zones.cortex_facets)), signed_volume(TriangleMesh(positions_mm, zones.facets))
+        area(TriangleMesh(positions_mm, zones.measured_facets)), signed_volume(TriangleMesh(positions_mm, zones.facets))
     )
 
 

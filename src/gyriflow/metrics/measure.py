@@ -44,9 +44,9 @@ class BrainMetrics:
     table : DataFrame
         hemisphere (whole, left or right), metric, value, unit: one row per number.
     maps : dict
-        Per hemisphere ("left", "right") arrays per vertex by name: shape_index, curvedness (1/mm), mean_curvature
-        (1/mm), gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm (where it is known;
-        NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
+        Per hemisphere ("left", "right", or the only one) arrays per vertex by name: shape_index, curvedness (1/mm),
+        mean_curvature (1/mm), gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm
+        (where it is known; NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
     spectra : DataFrame
         Per hemisphere and band: hemisphere, band, wavelength_min_mm, wavelength_max_mm, modes, power, relative_power,
         complete, denominator_complete, resolved, weyl_formula.
@@ -63,8 +63,8 @@ class BrainMetrics:
 
 def measure_brain(
     whole: TriangleMesh,
-    left: TriangleMesh,
-    right: TriangleMesh,
+    left: TriangleMesh | None,
+    right: TriangleMesh | None,
     *,
     thickness_mm: Floats | None = None,
     curvature_radius_mm: float = CURVATURE_RADIUS_MM,
@@ -80,7 +80,8 @@ def measure_brain(
     whole
         The closed pial surface, outward, in mm.
     left, right
-        The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure. A cut
+        The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure; None for a
+        hemisphere that the brain does not have. A cut
         counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
         curvature within `curvature_radius_mm` of it out of the means. What is said of the whole but its volume and area
         is of both hemispheres: Σ area over Σ area of the hulls, and means over both.
@@ -99,9 +100,9 @@ def measure_brain(
 
     MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
-    _check_outward((whole, left, right))
+    meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
+    _check_outward((whole, *meshes.values()))
     settings = Settings(curvature_radius_mm, spangy_proxy, spangy_modes, spangy_wavelength)
-    meshes = {"left": left, "right": right}
     thicknesses = {
         name: None if thickness_mm is None else at_part(thickness_mm, whole, mesh) for name, mesh in meshes.items()
     }

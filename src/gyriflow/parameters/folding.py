@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag, ValidationInfo, field_validator
 
 from .settings import Problem, Settings, check, setting, up_to_invalid
-from .terms import FieldName, MaterialName
+from .terms import FieldName, MaterialName, MedialWall, Side
 from .varying import (
     Floats,
     Maps,
@@ -184,6 +184,11 @@ class FoldingSettings(Settings):
         "How the brain is held: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the flat "
         "base; `box` does too and lets the upright sides slide; `free`: unconstrained (rigid motions are removed).",
     )  # fmt: skip
+    medial_wall: MedialWall = setting(
+        "sliding", "",
+        "Of a brain of one hemisphere, how its medial wall is supported: `sliding` keeps it in its plane, as the other "
+        "hemisphere would, `held` clamps it. It has no cortex. No meaning for brains of two hemispheres.",
+    )  # fmt: skip
     contact: Contact = setting(Contact(), "", "Contact.")
     no_growth: NoGrowth = setting(NoGrowth(), "", "Tissue that does not grow.")
     output_every_gw: float = setting(
@@ -238,6 +243,7 @@ class FoldingParameters(FoldingSettings):
     start_week: Week = setting(..., "GW", "Gestational age at the start.")
     output_weeks: tuple[Week, ...] = setting(..., "GW", "Output weeks, from `start_week` to `end_week`.")
     fissure_x_mm: float = setting(..., "mm", "Position of the interhemispheric fissure.")
+    side: Side | None = setting(None, "", "The only hemisphere that the brain has; `null`: it has both.")
     regional_growth: dict[Week, str] = setting(
         {}, "GW", "With `follow.regional`: by the week from which each holds, the names of maps of relative growth."
     )

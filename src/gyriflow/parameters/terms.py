@@ -33,15 +33,22 @@ Coordinates = Literal["auto", "ras", "lps"]
 AffineSource = Literal["auto", "sform", "qform"]
 """Which affine of a NIfTI file is used; `auto` refuses two that disagree."""
 
+MedialWall = Literal["held", "sliding"]
+"""What holds the medial wall of a hemisphere that is alone."""
 MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
 """Names of the constitutive laws; each is a class of `mechanics.materials`."""
 
-FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y = range(8)
+FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y, MEDIAL_WALL = range(9)
 """Zones of the boundary's facets."""
-ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y")
+ZONE_NAMES = (
+    *("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y"),
+    "medial wall",
+)
 """Their names, by code."""
-FLAT_CUTS = (BASE, SIDE_X, SIDE_Y)
-"""Zones of simple shapes only: flat cuts through tissue, without cortex."""
+SHAPE_CUTS = (BASE, SIDE_X, SIDE_Y)
+"""Zones of simple shapes only: flat cuts through tissue."""
+FLAT_CUTS = (*SHAPE_CUTS, MEDIAL_WALL)
+"""Zones without cortex: the cuts, and the medial wall of a hemisphere that is alone."""
 
 LEFT, RIGHT, BRIDGE = 1, 2, 3
 """Tags of the hemispheres, and of the tissue between the contact planes."""
