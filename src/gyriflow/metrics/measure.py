@@ -97,7 +97,10 @@ def measure_brain(
     threads
         With two or more, the hemispheres are measured at the same time, each in a process of its own.
 
-    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
+    Raises
+    ------
+    MeshError
+        Where a surface looks inwards, or a hemisphere is not in one piece.
     """
     _check_outward((whole, left, right))
     settings = Settings(curvature_radius_mm, spangy_proxy, spangy_modes, spangy_wavelength)
