@@ -1,4 +1,4 @@
-"""What the site adds to the pages in docs: pages that lie elsewhere in the checkout, and links to files that are no pages."""
+"""What the site adds to docs: pages that lie elsewhere in the checkout, and links to files that are no pages."""
 
 import posixpath
 import re

@@ -1,4 +1,4 @@
-"""What the documentation says can be done: its configurations load, its commands run, its site is built without a warning."""
+"""What the documentation says can be done: configurations load, commands have work to do, the site has no warning."""
 
 import re
 import shlex
