@@ -128,7 +128,10 @@ def fitted(
     weeks, values
         Gestational weeks, at least two different ones, and positive sizes; several brains may share a week.
 
-    InputError for other values, and where the sizes shrink and that is not allowed.
+    Raises
+    ------
+    InputError
+        For other values, and where the sizes shrink and that is not allowed.
     """
     weeks_, values_ = _checked(weeks, values, name)
     count = len(np.unique(weeks_))

@@ -55,7 +55,10 @@ def followed_sizes(
     shrink
         Whether a given table may shrink.
 
-    InputError where the start brain is in no series.
+    Raises
+    ------
+    InputError
+        Where the start brain is in no series.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
@@ -131,7 +134,10 @@ def relative_growth(rates: Floats, weights: Floats, amplitude: float) -> Floats:
     amplitude
         0 for uniform growth, 1 for differences as measured.
 
-    InputError where the whole does not grow in an interval, so that there is nothing to be a multiple of.
+    Raises
+    ------
+    InputError
+        Where the whole does not grow in an interval, so that there is nothing to be a multiple of.
     """
     whole = np.average(rates, axis=1, weights=weights)[:, None]
     if (whole <= 0).any():

@@ -40,7 +40,10 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
         from_week, to_week, area_ratio (θ), rate_per_s, compound_rate_per_s, volume_ratio, core_rate_per_s,
         core_compound_rate_per_s, by ascending week.
 
-    InputError where a week is there twice, or a number is missing or not positive.
+    Raises
+    ------
+    InputError
+        Where a week is there twice, or a number is missing or not positive.
     """
     columns = {"weeks": weeks, "areas_mm2": areas_mm2, "volumes_mm3": volumes_mm3}
     values = {name: np.asarray(column, dtype=float) for name, column in columns.items()}
@@ -155,7 +158,10 @@ def rate_curve(
     allow_negative
         Whether a rate may be below 0.
 
-    InputError where a rate is negative and must not be, all such intervals named.
+    Raises
+    ------
+    InputError
+        Where a rate is negative and must not be, all such intervals named.
     """
     below = rates[rates[column] < 0]
     if len(below) and not allow_negative:

@@ -98,7 +98,10 @@ def measure_brain(
     threads
         With two or more, the hemispheres are measured at the same time, each in a process of its own.
 
-    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
+    Raises
+    ------
+    MeshError
+        Where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     _check_outward((whole, *meshes.values()))
