@@ -21,6 +21,7 @@ rule growth_rates:
         whole=expand(PIAL["whole"], brain=GROWTH_BRAINS),
         left=expand(PIAL["left"], brain=GROWTH_BRAINS),
         right=expand(PIAL["right"], brain=GROWTH_BRAINS),
+        reports=expand(PIAL["report"], brain=GROWTH_BRAINS),
     output:
         areas=f"{STUDY}/growth/areas.csv",
         rates=f"{STUDY}/growth/rates.csv",

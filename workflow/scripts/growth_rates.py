@@ -3,8 +3,8 @@
 import pandas as pd
 
 from gyriflow.geometry.triangles import area, signed_volume
-from gyriflow.growth.rates import agreement, rates_of_series
-from gyriflow.io.files import write_table
+from gyriflow.growth.rates import TISSUES, agreement, rates_of_series
+from gyriflow.io.files import read_json, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.step import step
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
@@ -17,6 +17,9 @@ with step(snakemake.log[0]):
         for left, right in zip(files.left, files.right, strict=True)
     ]
     areas["volume_ml"] = [signed_volume(read_surface(whole)) * ML_PER_MM3 for whole in files.whole]
+    known = [read_json(report).get("label_volumes_mL", {}) for report in files.reports]
+    for tissue in TISSUES:
+        areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in known]
     write_table(output.areas, areas)
     write_table(output.rates, rates_of_series(areas))
     write_table(output.agreement, agreement(areas))

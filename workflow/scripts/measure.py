@@ -1,6 +1,6 @@
 """The metrics of one brain, measured or simulated, at one week."""
 
-from gyriflow.io.files import read_table, write_table
+from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.metrics.mode_numbers import common_modes
@@ -13,6 +13,8 @@ with step(snakemake.log[0]):
         settings["spangy_modes"] = common_modes(read_table(files.mode_numbers))
     if files.get("thickness"):
         (settings["thickness_mm"],) = read_vertex_maps(files.thickness).values()
+    if files.report:
+        settings["label_volumes_ml"] = read_json(files.report).get("label_volumes_mL", {})
     brain = measure_brain(*map(read_surface, (files.whole, files.left, files.right)), **settings)
     for name, table in (("metrics", brain.table), ("spectra", brain.spectra), ("coefficients", brain.coefficients)):
         write_table(output[name], table.assign(**params.labels)[[*params.labels, *table.columns]])

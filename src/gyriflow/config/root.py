@@ -16,7 +16,8 @@ from .atlas_description import Atlas
 from .brains import KINDS, Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
-from .metrics import MetricsSettings, age_reference
+from .metrics import MetricsSettings, age_reference, reference_brains
+from .regions import nearest_given
 from .report import ReportSettings
 from .runs import Run, Start, start_ids
 from .surface import SurfaceSettings
@@ -104,6 +105,11 @@ class Config(Settings):
         if self.has("atlas"):
             yield from checks.age_reference_problems(self.brains, self.metrics.age_reference)
 
+    @check
+    def _brains_of_metrics(self) -> Iterator[Problem]:
+        if self.has("atlas"):
+            yield from checks.metrics_problems(self.brains, self.metrics)
+
     def brain(self, name: str) -> Brain:
         """Returns the brain of an id; KeyError if there is none."""
         for brain in self.brains:
@@ -184,6 +190,34 @@ class Config(Settings):
     def age_reference(self) -> list[str]:
         """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
         return age_reference(self.brains, self.metrics.age_reference, self.brain(self.start_brains[0]).population)
+
+    @property
+    def norm_reference(self) -> list[str]:
+        """The ids of the measured brains that centiles are of."""
+        population = self.brain(self.start_brains[0]).population
+        return reference_brains(self.brains, self.metrics.norm_reference, population)
+
+    def regions_from(self, brain: str) -> str | None:
+        """Returns the brain whose regions a brain gets; None where no regions are given."""
+        return nearest_given(brain, self.metrics.regions, {brain.id: brain.week for brain in self.brains})
+
+    @property
+    def scans(self) -> dict[str, list[str]]:
+        """The ids of the brains of each subject that was scanned at several weeks, by week."""
+        named = {brain.subject for brain in self.brains if brain.subject is not None}
+        found = {
+            name: sorted((b for b in self.brains if b.subject == name), key=lambda b: b.week) for name in sorted(named)
+        }
+        return {name: [brain.id for brain in brains] for name, brains in found.items() if len(brains) > 1}
+
+    def followed(self, run: str) -> list[str]:
+        """Returns the metrics that the growth of a run was made to follow, or was estimated from."""
+        settings = self.runs[run]
+        put_in = {
+            "area": settings.follow is not None or settings.growth_rate_per_s == "estimated",
+            "volume": settings.follow is not None or settings.core_growth_rate_per_s == "estimated",
+        }
+        return [metric for metric, used in put_in.items() if used]
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.

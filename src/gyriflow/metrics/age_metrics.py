@@ -18,8 +18,9 @@ MEASURED = "real"
 OF_THE_ANALYSIS = (
     *("crossing_faces", "curvature_radius", "spangy_modes", "spangy_captured_share", "weyl_number"),
     "thickness_measured_share",
+    *("volume_tissue", "volume_ventricles", "volume_cortex"),
 )
-"""Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
+"""Rows of the table of metrics that describe the surface's faces, the analysis or the labels rather than the folds."""
 
 FAMILIES = {
     "size": ("volume", "area"),
