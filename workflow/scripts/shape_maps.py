@@ -14,9 +14,11 @@ run, measure = snakemake.wildcards.run, snakemake.wildcards.measure
 
 def brains(weeks, left, right, maps):
     """Returns by week the two hemispheres as one surface with its values; the maps of all left ones come first."""
-    values = [read_vertex_maps(file)[measure] for file in maps]
     surfaces = [merged(read_surface(a), read_surface(b)) for a, b in zip(left, right, strict=True)]
-    both = map(np.concatenate, zip(values[: len(weeks)], values[len(weeks) :], strict=True))
+    # thickness is not known of every brain
+    found = [read_vertex_maps(file).get(measure) for file in maps]
+    pairs = zip(surfaces, found[: len(weeks)], found[len(weeks) :], strict=True)
+    both = [np.full(len(m.vertices), np.nan) if a is None else np.concatenate([a, b]) for m, a, b in pairs]
     return dict(zip(weeks, zip(surfaces, both, strict=True), strict=True))
 
 

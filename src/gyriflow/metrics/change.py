@@ -82,6 +82,6 @@ def wide_table(table: pd.DataFrame) -> pd.DataFrame:
     unit = table["unit"].astype(str).replace({"1": "", "nan": ""}).str.replace("/", "_per_")
     parts = [table["hemisphere"], table["region"].fillna(""), table["metric"], unit]
     names = ["_".join(part for part in row if part).replace(" ", "-") for row in zip(*parts, strict=True)]
-    wide = table.assign(column=names).pivot_table("value", BRAIN, "column", aggfunc="first", sort=False, dropna=False)
-    order = [name for name in dict.fromkeys(names) if name in wide]
-    return wide.loc[wide.notna().any(axis=1), order].reset_index().rename_axis(columns=None)
+    wide = table.assign(column=names).set_index([*BRAIN, "column"])["value"].unstack()
+    brains = pd.MultiIndex.from_frame(table[BRAIN].drop_duplicates())
+    return wide.reindex(index=brains, columns=list(dict.fromkeys(names))).reset_index().rename_axis(columns=None)

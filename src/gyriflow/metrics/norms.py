@@ -11,7 +11,7 @@ from scipy import stats
 from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..parameters.schemes import LabelScheme
-from .age_metrics import BRAIN, MEASURED
+from .age_metrics import BRAIN, MEASURED, OF_THE_ANALYSIS
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
@@ -199,7 +199,8 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
 
 
 def _reference(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    return metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+    known = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+    return known[~known["metric"].isin(OF_THE_ANALYSIS)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,7 +94,8 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
     """
     keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
     sides = metrics[metrics["hemisphere"].isin(["left", "right"])]
-    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first", sort=False, dropna=False)
+    wide = sides.set_index([*keys, "hemisphere"])["value"].unstack().reindex(columns=["left", "right"])
+    wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
     total = wide["left"].abs() + wide["right"].abs()
     index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)
     return index.rename("asymmetry_index").reset_index()
