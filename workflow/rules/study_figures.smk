@@ -208,7 +208,7 @@ rule regions_figure:
             for where in SHOWN_WITH_REGIONS.values()
         ],
         regions=f"{STUDY}/regions.csv",
-        asymmetry=rules.asymmetry.output,
+        asymmetry=rules.asymmetry.output[0],
     output:
         **figure(
             f"{FIGURES}/regions", "regions of the cortex", "regions.rst", "Metrics"
