@@ -18,7 +18,8 @@ def folding_rate():
 
 rule growth_rates:
     input:
-        expand(PIAL["whole"], brain=GROWTH_BRAINS),
+        whole=expand(PIAL["whole"], brain=GROWTH_BRAINS),
+        reports=expand(PIAL["report"], brain=GROWTH_BRAINS),
     output:
         areas=f"{STUDY}/growth/areas.csv",
         rates=f"{STUDY}/growth/rates.csv",

@@ -1,4 +1,7 @@
 # Correspondence between brains of successive weeks: where each point of a start brain goes in the real ones.
+from gyriflow.parameters.schemes import SCHEMES
+
+
 def later_brains(brain):
     """Returns a start brain and the brains of its growth series up to where its runs end, one a week.
 
@@ -36,10 +39,41 @@ def registrations(brain):
 CARRIED = [brain for brain in CONFIG.start_brains if len(later_brains(brain)) > 1]
 
 
+def registered_volume(brain):
+    """Returns the volume by which a brain is registered: its labels, or a mask made of its surface."""
+    if CONFIG.brain(brain).source in WITH_LABELS:
+        return label_volume_of(brain)
+    return rules.surface_mask.output[0].format(brain=brain)
+
+
+def registered_scheme(brain):
+    """Returns the scheme of that volume."""
+    if CONFIG.brain(brain).source in WITH_LABELS:
+        return CONFIG.scheme(CONFIG.brain(brain))
+    return SCHEMES["binary"].model_dump()
+
+
+rule surface_mask:
+    input:
+        PIAL["whole"],
+    output:
+        f"{BRAIN}/surface/mask.nii.gz",
+    log:
+        f"{BRAIN}/logs/surface_mask.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/surface_mask.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        voxel_mm=CONFIG.surface.edge_length_mm,
+    script:
+        "../scripts/surface_mask.py"
+
+
 rule register:
     input:
-        earlier=lambda wildcards: label_volume_of(wildcards.earlier),
-        later=lambda wildcards: label_volume_of(wildcards.later),
+        earlier=lambda wildcards: registered_volume(wildcards.earlier),
+        later=lambda wildcards: registered_volume(wildcards.later),
     output:
         f"{STUDY}/registration/{{earlier}}/{{later}}.h5",
     log:
@@ -63,7 +97,7 @@ rule register:
             for brain in (wildcards.earlier, wildcards.later)
         ],
         schemes=lambda wildcards: [
-            CONFIG.scheme(CONFIG.brain(brain))
+            registered_scheme(brain)
             for brain in (wildcards.earlier, wildcards.later)
         ],
     script:

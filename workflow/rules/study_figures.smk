@@ -128,6 +128,7 @@ rule age_profile_figure:
     input:
         profile=rules.age_profile.output.profile,
         check=rules.age_profile.output.check,
+        similarity=rules.age_profile.output.similarity,
     output:
         **figure(
             f"{FIGURES}/age_profile",
@@ -146,6 +147,100 @@ rule age_profile_figure:
         measured=CONFIG.measured_name(CONFIG.age_reference),
     script:
         "../scripts/age_profile_figure.py"
+
+
+rule norms_figure:
+    input:
+        metrics=f"{STUDY}/metrics.csv",
+        norms=rules.centiles.output.norms,
+        curves=rules.centiles.output.curves,
+        centiles=rules.centiles.output.centiles,
+    output:
+        **figure(
+            f"{FIGURES}/norms", "norms over the weeks", "norms.rst", "Metrics"
+        ),
+        table=report(
+            f"{STUDY}/centiles.html",
+            caption="../report/norms.rst",
+            category="Metrics",
+            labels={"figure": "centiles, table"},
+        ),
+    log:
+        f"{STUDY}/logs/norms_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/norms_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(*CONFIG.start_brains),
+        reference=CONFIG.norm_reference,
+        measured=CONFIG.measured_name(CONFIG.norm_reference or BRAINS),
+    script:
+        "../scripts/norms_figure.py"
+
+
+# what is shown with its regions: the brains, and each run at its last week
+SHOWN_WITH_REGIONS = {
+    **{brain: f"brains/{brain}/metrics" for brain in REGIONED},
+    **{
+        f"{run if len(CONFIG.starts(run)) == 1 else f'{run} · {brain}'}, {CONFIG.weeks(run, brain)[-1]:g} GW": (
+            f"runs/{run}/{brain}/metrics/week-{week_tags(run, brain)[-1]}"
+        )
+        for run, brain in REGIONED_RUNS
+    },
+}
+
+
+rule regions_figure:
+    input:
+        left=[
+            f"results/{surface_folder(where)}/left.pial.surf.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        right=[
+            f"results/{surface_folder(where)}/right.pial.surf.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        left_regions=[
+            f"results/{sides_of(where)}/left.regions.label.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        right_regions=[
+            f"results/{sides_of(where)}/right.regions.label.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        regions=f"{STUDY}/regions.csv",
+        asymmetry=rules.asymmetry.output[0],
+    output:
+        **figure(
+            f"{FIGURES}/regions", "regions of the cortex", "regions.rst", "Metrics"
+        ),
+        chart=report(
+            f"{FIGURES}/regions_metrics.png",
+            caption="../report/regions.rst",
+            category="Metrics",
+            labels={"figure": "metrics by region"},
+        ),
+        chart_pdf=f"{FIGURES}/regions_metrics.pdf",
+        table=report(
+            f"{STUDY}/regions.html",
+            caption="../report/regions.rst",
+            category="Metrics",
+            labels={"figure": "metrics by region, table"},
+        ),
+    log:
+        f"{STUDY}/logs/regions_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/regions_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(*CONFIG.start_brains),
+        headings=list(SHOWN_WITH_REGIONS),
+        given=GIVEN,
+        measured=CONFIG.measured_name(REGIONED or BRAINS),
+    script:
+        "../scripts/regions_figure.py"
 
 
 rule runs_figure:
@@ -188,6 +283,8 @@ rule figures:
         rules.spectra_figure.output,
         rules.displacement_figure.output,
         rules.age_profile_figure.output if CONFIG.age_reference else [],
+        rules.norms_figure.output if CONFIG.norm_reference else [],
+        rules.regions_figure.output if WITH_REGIONS else [],
         OF_THE_LAST_WEEK,
         rules.growth.input,
 

@@ -17,7 +17,9 @@ def brains(weeks, surfaces, maps):
     found = {}
     for number, week in enumerate(weeks):
         parts = [read_surface(file) for file in surfaces[number :: len(weeks)]]
-        values = [read_vertex_maps(file)[measure] for file in maps[number :: len(weeks)]]
+        # thickness is not known of every brain
+        values = [read_vertex_maps(file).get(measure) for file in maps[number :: len(weeks)]]
+        values = [np.full(len(p.vertices), np.nan) if v is None else v for p, v in zip(parts, values, strict=True)]
         found[week] = merged(*parts), np.concatenate(values)
     return found
 

@@ -10,7 +10,7 @@ from ..parameters.settings import Problem
 from ..parameters.varying import Varying
 from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
-from .metrics import LEAST_AGE_WEEKS
+from .metrics import LEAST_AGE_WEEKS, MetricsSettings
 from .runs import ALL, Run, Start, start_ids
 
 RESERVED_BRAINS = ("study", "report", ALL)
@@ -167,7 +167,7 @@ def mesh_size_problems(
         return
     known = ids_of(brains)
     series = growth_series(
-        {brain.id: KINDS[brain.source] for brain in brains},
+        {brain.id: brain.kind for brain in brains},
         {brain.id: brain.week for brain in brains},
         growth.brains,
         {brain.id: brain.population if brain.has("population") else None for brain in brains},
@@ -205,3 +205,19 @@ def age_reference_problems(brains: Sequence[Brain], given: Sequence[str] | None)
         if found < LEAST_AGE_WEEKS:
             plural = "" if found == 1 else "s"
             yield Problem(f"found brains of {found} week{plural}; it should have {LEAST_AGE_WEEKS} or more", key)
+
+
+def metrics_problems(brains: Sequence[Brain], metrics: MetricsSettings) -> Iterator[Problem]:
+    """Yields brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
+    known = ids_of(brains)
+    named = {"norm_reference": metrics.norm_reference or (), "regions": tuple(metrics.regions)}
+    for key, ids in named.items():
+        if unknown := [name for name in ids if name not in known]:
+            text = f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}"
+            yield Problem(text, ("metrics", key))
+    scans: dict[tuple[str, float], int] = Counter(
+        (brain.subject, brain.week) for brain in brains if brain.has("subject", "week") and brain.subject is not None
+    )
+    for (subject, week), count in scans.items():
+        if count > 1:
+            yield Problem(f"{count} scans of the subject {subject} are of week {week:g}; expected one", ("brains",))

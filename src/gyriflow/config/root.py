@@ -16,8 +16,9 @@ from .atlas_description import Atlas
 from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
-from .metrics import MetricsSettings, age_reference
+from .metrics import MetricsSettings, age_reference, reference_brains
 from .participants import ParticipantsSettings
+from .regions import nearest_given
 from .report import ReportSettings
 from .runs import Run, Start, start_ids
 from .surface import SurfaceSettings
@@ -113,6 +114,11 @@ class Config(Settings):
     def _age_reference(self) -> Iterator[Problem]:
         if self.has("atlas"):
             yield from checks.age_reference_problems(self.brains, self.metrics.age_reference)
+
+    @check
+    def _brains_of_metrics(self) -> Iterator[Problem]:
+        if self.has("atlas"):
+            yield from checks.metrics_problems(self.brains, self.metrics)
 
     def brain(self, name: str) -> Brain:
         """Returns the brain of an id; KeyError if there is none."""
@@ -217,6 +223,36 @@ class Config(Settings):
         start = self.brain(self.start_brains[0])
         alike = [brain for brain in self.brains if brain.sides == start.sides]
         return age_reference(alike, self.metrics.age_reference, start.population)
+
+    @property
+    def norm_reference(self) -> list[str]:
+        """The ids of the measured brains that centiles are of."""
+        if not self.start_brains:
+            return []
+        population = self.brain(self.start_brains[0]).population
+        return reference_brains(self.brains, self.metrics.norm_reference, population)
+
+    def regions_from(self, brain: str) -> str | None:
+        """Returns the brain whose regions a brain gets; None where no regions are given."""
+        return nearest_given(brain, self.metrics.regions, {brain.id: brain.week for brain in self.brains})
+
+    @property
+    def scans(self) -> dict[str, list[str]]:
+        """The ids of the brains of each subject that was scanned at several weeks, by week."""
+        named = {brain.subject for brain in self.brains if brain.subject is not None}
+        found = {
+            name: sorted((b for b in self.brains if b.subject == name), key=lambda b: b.week) for name in sorted(named)
+        }
+        return {name: [brain.id for brain in brains] for name, brains in found.items() if len(brains) > 1}
+
+    def followed(self, run: str) -> list[str]:
+        """Returns the metrics that the growth of a run was made to follow, or was estimated from."""
+        settings = self.runs[run]
+        put_in = {
+            "area": settings.follow is not None or settings.growth_rate_per_s == "estimated",
+            "volume": settings.follow is not None or settings.core_growth_rate_per_s == "estimated",
+        }
+        return [metric for metric, used in put_in.items() if used]
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.

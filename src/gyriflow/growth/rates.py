@@ -16,6 +16,10 @@ FOLDING_RATES = {
 """Parameters of the folding that can be estimated, and the columns they come from."""
 
 
+TISSUES = ("tissue", "ventricles", "cortex")
+"""What labels know of the volume inside the pial surface; the volume itself contains the ventricles."""
+
+
 def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3: Sequence[float]) -> pd.DataFrame:
     """Returns the growth rates between successive weeks.
 
@@ -92,7 +96,9 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     areas
-        Columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean.
+        Columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean. Where it has
+        tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and
+        tissue_compound_rate_per_s, …, ln(V₂/V₁)/(3Δt), too; NaN where they are not known.
     """
     tables = []
     for name, brains in areas.groupby("series", sort=False):
@@ -101,6 +107,12 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
         areas_mm2, volumes_mm3 = [a / CM2_PER_MM2 for a in area_cm2], [v / ML_PER_MM3 for v in volume_ml]
         rates = growth_rates(weeks, areas_mm2, volumes_mm3)
         rates.insert(0, "series", name)
+        seconds = (rates["to_week"] - rates["from_week"]) * SECONDS_PER_GW
+        for tissue in TISSUES:
+            if f"{tissue}_ml" in brains:
+                known = brains.groupby("week")[f"{tissue}_ml"].mean().to_numpy(dtype=float)
+                rates[f"{tissue}_ratio"] = known[1:] / known[:-1]
+                rates[f"{tissue}_compound_rate_per_s"] = np.log(rates[f"{tissue}_ratio"]) / (3 * seconds)
         tables.append(rates)
     return pd.concat(tables, ignore_index=True)
 

@@ -4,6 +4,8 @@ from typing import Literal, get_args
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = get_args(Side)
+STRUCTURES: dict[Side, Literal["CortexLeft", "CortexRight"]] = {"left": "CortexLeft", "right": "CortexRight"}
+"""What GIFTI files call the cortex of each side."""
 
 VertexField = Literal[
     "displacement",
