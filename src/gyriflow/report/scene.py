@@ -157,8 +157,8 @@ def sees(mesh: TriangleMesh, point: Floats, view: View) -> bool:
     right, up = picture_axes(view)
     # a little aside, since rays through vertices may slip between the triangles around them
     point = point + 0.013 * right + 0.007 * up
-    first, _ = body.ray_trace(origin=point + away * towards, end_point=point - 1e-3 * towards, first_point=True)
-    return len(first) == 0 or float(np.linalg.norm(np.ravel(first) - point)) < SAME_PLACE_MM
+    hits, _ = body.ray_trace(origin=point + away * towards, end_point=point - 1e-3 * towards)
+    return bool(len(hits) == 0 or ((hits - point) @ towards).max() < SAME_PLACE_MM)
 
 
 def render(
