@@ -32,4 +32,7 @@ class ReportSettings(Settings):
     dpi: int = setting(
         300, "dots per inch", "Resolution of the PNG figures; journals ask for 300 to 600.", ge=50, le=1200
     )
+    paths: bool = setting(
+        False, "", "Whether the report shows paths of files, which may hold names. It never shows headers of images."
+    )
     energy: EnergySettings = setting(EnergySettings(), "", "Energy and emissions in the table of resources.")
