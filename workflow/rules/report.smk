@@ -226,14 +226,14 @@ rule html_report:
         MADE,
         surfaces=expand(PIAL["report"], brain=BRAINS),
         runs=rules.study_runs.output.csv,
-        validation=rules.validation_table.output if VALIDATED else [],
+        validation=rules.validation_table.output[0] if VALIDATED else [],
         displacement=(
-            rules.displacement_agreement_table.output
+            rules.displacement_agreement_table.output[0]
             if any(brain in CARRIED for _, brain in VALIDATED)
             else []
         ),
-        provenance=rules.provenance.output,
-        view=rules.view_surfaces.output,
+        provenance=rules.provenance.output[0],
+        view=rules.view_surfaces.output[0],
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
