@@ -32,6 +32,7 @@ rule displacement_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         caption=(
             "Largest and mean norm of the displacement between output weeks, over all nodes, beside "
             "the values that the FetalFoldSim paper reports for its simulation and for real brains. "
@@ -62,6 +63,7 @@ rule metrics_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         caption=(
             "Metrics over the weeks: runs as lines, measured brains as stars. The gyrification index "
             "is the pial area divided by that of the convex hull, or by that of a tighter envelope. "
@@ -90,6 +92,7 @@ rule spectra_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         caption=(
             "Relative power of the shape measure's spectrum in the bands B4, B5 and B6 (primary, "
             "secondary and tertiary folds) over the weeks, per hemisphere (SpAnGy, Germanaud et al. "
@@ -118,6 +121,7 @@ rule bands_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         measured=CONFIG.measured_name(BRAINS),
         week=LAST_WEEK and float(LAST_WEEK),
     script:
@@ -144,6 +148,7 @@ rule age_profile_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         measured=CONFIG.measured_name(CONFIG.age_reference),
     script:
         "../scripts/age_profile_figure.py"
@@ -156,9 +161,7 @@ rule norms_figure:
         curves=rules.centiles.output.curves,
         centiles=rules.centiles.output.centiles,
     output:
-        **figure(
-            f"{FIGURES}/norms", "norms over the weeks", "norms.rst", "Metrics"
-        ),
+        **figure(f"{FIGURES}/norms", "norms over the weeks", "norms.rst", "Metrics"),
         table=report(
             f"{STUDY}/centiles.html",
             caption="../report/norms.rst",
@@ -257,8 +260,8 @@ rule runs_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
-        measured=CONFIG.measured_name(LAST_BRAINS),
         folded=FOLDED,
+        measured=CONFIG.measured_name(LAST_BRAINS),
         week=LAST_WEEK and float(LAST_WEEK),
     script:
         "../scripts/runs_figure.py"

@@ -9,7 +9,7 @@ from gyriflow.report.renders import scalar_maps
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
-run, measure = snakemake.wildcards.run, snakemake.wildcards.measure
+measure = snakemake.wildcards.measure
 
 
 def brains(weeks, surfaces, maps):
@@ -28,6 +28,5 @@ with step(snakemake.log[0]):
     maps = {"simulated": brains(params.simulated_weeks, files.simulated, files.simulated_maps)}
     if files.real:
         maps[params.measured] = brains(params.real_weeks, files.real, files.real_maps)
-    shown = {"title": f"run {run}", "measured": params.measured, "synthetic": params.synthetic}
-    figure = scalar_maps(maps, quantity=measure, **shown)
+    figure = scalar_maps(maps, quantity=measure, measured=params.measured, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

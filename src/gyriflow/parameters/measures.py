@@ -16,12 +16,12 @@ class VertexMeasure:
     colours
         Name of a Matplotlib colour map.
     limits
-        Ends of the colour scale; None: 0 and the 98th percentile of all surfaces.
+        Ends of the colour scale; None: from 0 to where few vertices of all surfaces are above.
     """
 
     label: str
     caption: str
-    colours: str = "viridis"
+    colours: str = "YlGnBu"
     limits: tuple[float, float] | None = None
 
 
@@ -38,7 +38,6 @@ SHAPE_MEASURES = {
     "sulcal_depth_mm": VertexMeasure(
         "sulcal depth (mm)",
         "Sulcal depth, the straight distance to the convex hull of each hemisphere,",
-        colours="YlGnBu",
     ),
     "thickness_mm": VertexMeasure(
         "cortical thickness (mm)",

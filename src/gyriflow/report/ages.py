@@ -16,11 +16,11 @@ from .style import (
     MUTED_COLOUR,
     REAL_BRAIN,
     REAL_COLOUR,
+    add_letters,
+    chosen_colours,
     light_grid,
     new_figure,
-    run_colours,
     run_legend,
-    simulated_runs,
     styled,
     week_axis,
     week_label,
@@ -47,7 +47,7 @@ def age_profile_chart(
     check: pd.DataFrame,
     similarity: pd.DataFrame,
     *,
-    title: str = "",
+    runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -63,6 +63,8 @@ def age_profile_chart(
     profile, check : columns run, week, hemisphere, metric, kind, estimated_week, low, high, weight, flag
         `profile` has brains_per_week, `check` mean_absolute_error, too.
     similarity : columns run, week, hemisphere, reference_week, similarity
+    runs
+        All runs of the study, which settle the colours.
 
     Raises
     ------
@@ -71,15 +73,13 @@ def age_profile_chart(
     """
     brains = profile[profile["hemisphere"] == "whole"]
     left_out = check[check["hemisphere"] == "whole"]
-    runs = simulated_runs(brains["run"])
-    if not runs:
+    of_runs = chosen_colours(brains["run"], runs)
+    if not of_runs:
         raise InputError("no simulated brain in the age profile", found=sorted(set(brains["run"])))
-    colours = run_colours(runs) | {MEASURED: REAL_COLOUR}
-    last = max(set.intersection(*(set(brains.loc[brains["run"] == run, "week"]) for run in runs)))
+    colours = of_runs | {MEASURED: REAL_COLOUR}
+    last = max(set.intersection(*(set(brains.loc[brains["run"] == run, "week"]) for run in of_runs)))
     rows = _of_last_week(brains, last)
-    figure = new_figure(
-        FULL_WIDTH_IN, 5.0 + 0.17 * rows["metric"].nunique(), title=title, synthetic=synthetic, measured=measured
-    )
+    figure = new_figure(FULL_WIDTH_IN, 5.0 + 0.17 * rows["metric"].nunique(), synthetic=synthetic, measured=measured)
     grid = figure.add_gridspec(3, 2, height_ratios=[2.9, 1.3, 0.5 + 0.17 * rows["metric"].nunique()])
     panels = [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])]
     for axes, table in zip(panels, (brains, left_out), strict=True):
@@ -88,10 +88,10 @@ def age_profile_chart(
     panels[0].set_ylabel("looks like (GW)")
     panels[0].set_title("simulated")
     panels[1].set_title(_errors(left_out, measured))
-    _metric_panel(figure.add_subplot(grid[2, :]), rows, colours, last)
-    _similarity_panel(
-        figure.add_subplot(grid[1, :]), similarity[similarity["hemisphere"] == "whole"], colours, last
-    )
+    between, below = figure.add_subplot(grid[1, :]), figure.add_subplot(grid[2, :])
+    _similarity_panel(between, similarity[similarity["hemisphere"] == "whole"], colours, last)
+    _metric_panel(below, rows, colours, last)
+    add_letters([*panels, between, below])
     if (profile["brains_per_week"] < 2).all():
         figure.supxlabel(ONE_A_WEEK, fontsize=6.5, color=MUTED_COLOUR)
     dots: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
@@ -102,7 +102,7 @@ def age_profile_chart(
         Line2D([], [], markersize=4, label="outside the reference", **dots | {"marker": "^"}),
         Line2D([], [], markersize=4, label="range cut at its end", **dots | {"marker": "d"}),
     ]
-    run_legend(figure, runs, measured=f"{measured}, left out", extra=extra)
+    run_legend(figure, of_runs, measured=f"{measured}, left out", extra=extra)
     return figure
 
 
@@ -188,7 +188,7 @@ def _similarity_panel(axes: Axes, similarity: pd.DataFrame, colours: Mapping[str
 def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any], week: float) -> None:
     """Draws the age by each metric with its range, most weight on top."""
     metrics = list(dict.fromkeys(rows["metric"]))
-    runs = simulated_runs(rows["run"])
+    runs = list(dict.fromkeys(rows["run"]))
     for index, run in enumerate(runs):
         own = rows[rows["run"] == run]
         columns = (own[name] for name in ("metric", "kind", "flag", "estimated_week", "low", "high"))
