@@ -31,6 +31,7 @@ include: "workflow/rules/folding.smk"
 include: "workflow/rules/metrics.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
+include: "workflow/rules/studies.smk"
 include: "workflow/rules/run_figures.smk"
 include: "workflow/rules/study_figures.smk"
 include: "workflow/rules/report.smk"
@@ -48,6 +49,7 @@ localrules:
     metrics,
     figures,
     report,
+    studies,
     paper,
     parameters,
     html_report,

@@ -35,6 +35,16 @@ def thickness_of(wildcards):
 # where the metrics of a brain lie under results
 MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
 SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
+# the brains of runs of studies, at the weeks of comparison
+COMPARED_MEMBERS = sorted(
+    {
+        f"runs/{member.run}/{brain}/metrics/week-{week_tag(study.compare_week)}"
+        for name, study in CONFIG.studies.items()
+        for member in CONFIG.members[name]
+        for brain in CONFIG.starts(member.run)
+    }
+    - set(SIMULATED)
+)
 
 
 # Only a common number of modes makes brains depend on each other: measured ones then wait for all simulations.
@@ -87,7 +97,7 @@ rule measure:
     benchmark:
         "results/{where}/benchmarks/measure.tsv"
     wildcard_constraints:
-        where=one_of(MEASURED + SIMULATED),
+        where=one_of(MEASURED + SIMULATED + COMPARED_MEMBERS),
     conda:
         ENVIRONMENT
     resources:

@@ -20,6 +20,8 @@ Value = Annotated[
 """A value of a parameter that a study varies."""
 NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields")
 """Keys of a run that say nothing of its model, or that the study sets."""
+RESERVED_STUDIES = ("benchmarks", "calibration", "figures", "growth", "logs", "registration", "tables")
+"""Folders of the study's results that are no studies."""
 
 
 class Compared(Protocol):
@@ -153,6 +155,8 @@ def study_problems(
         here = ("studies", name)
         if not name.replace("-", "").replace("_", "").isalnum():
             yield Problem("a study's name has letters, digits, - _ only", here)
+        if name in RESERVED_STUDIES:
+            yield Problem("the name is reserved; choose another", here)
         if study.has("base") and study.base not in runs:
             yield Problem(f"found {study.base!r}; expected a run: {', '.join(runs)}", (*here, "base"))
         elif study.has("base", "vary", "fixed", "compare_week"):
