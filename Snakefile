@@ -32,6 +32,7 @@ include: "workflow/rules/metrics.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/studies.smk"
+include: "workflow/rules/calibration.smk"
 include: "workflow/rules/run_figures.smk"
 include: "workflow/rules/study_figures.smk"
 include: "workflow/rules/report.smk"
@@ -50,6 +51,7 @@ localrules:
     figures,
     report,
     studies,
+    calibrate,
     paper,
     parameters,
     html_report,

@@ -119,7 +119,7 @@ def members_of(
         weeks.setdefault(_model(settings), set()).add(settings.end_week)
     solved = {
         _model(run): name
-        for name, run in reversed(runs.items())
+        for name, run in reversed(list(runs.items()))
         if all(passes(name, week) for week in weeks.get(_model(run), ()))
     }
     members: dict[str, list[Member]] = {name: [] for name in studies}
@@ -177,9 +177,9 @@ def _member_problems(name: str, study: Study, base: Run, names: dict[str, str]) 
             if key in NOT_VARIED:
                 yield Problem("cannot differ within a study; choose another base", (*here, section, key))
                 return
-    for key, values in study.vary.items():
-        if not values or len(set(values)) < len(values):
-            yield Problem(f"found {list(values)}; expected one or more values, each once", (*here, "vary", key))
+    for key, listed in study.vary.items():
+        if not listed or len(set(listed)) < len(listed):
+            yield Problem(f"found {list(listed)}; expected one or more values, each once", (*here, "vary", key))
     for values in combinations(study):
         try:
             settings = changed(base, study.fixed | values | {"end_week": study.compare_week})

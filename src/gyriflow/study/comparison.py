@@ -140,15 +140,16 @@ def nearest(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[st
     for keys, group in compared.groupby(["subject", "real", "hemisphere", "measure"], sort=False):
         ranked = group.sort_values("distance", kind="stable")
         best = ranked.iloc[0]
-        of_best = values.loc[(keys[0], best["run"])]
+        subject = str(keys[0])
+        of_best = values.loc[(subject, str(best["run"]))]
         row = dict(zip(("subject", "real", "hemisphere", "measure"), keys, strict=True))
         row |= {name: of_best[name] for name in varied}
         row |= {"run": best["run"], "distance": best["distance"]}
         if len(ranked) > 1:
             second = ranked.iloc[1]
-            row |= {f"next_{name}": values.loc[(keys[0], second["run"])][name] for name in varied}
+            row |= {f"next_{name}": values.loc[(subject, str(second["run"]))][name] for name in varied}
             row["next_distance"] = second["distance"]
-        row["flag"] = _flags(best, of_best, members[members["subject"] == keys[0]], varied)
+        row["flag"] = _flags(best, of_best, members[members["subject"] == subject], varied)
         rows.append(row)
     columns = ["subject", "real", "hemisphere", "measure", *varied, "run", "distance"]
     columns += [*(f"next_{name}" for name in varied), "next_distance", "flag"]
