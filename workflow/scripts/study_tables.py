@@ -6,7 +6,7 @@ from gyriflow.io.files import read_json, read_table
 from gyriflow.io.printed_tables import write_printed
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
-from gyriflow.study.comparison import member_row, nearest
+from gyriflow.study.comparison import member_row, nearest, side_by_side
 from gyriflow.study.published import comparison_caption, with_published_nearest
 
 files, params, study = snakemake.input, snakemake.params, snakemake.wildcards.study
@@ -29,6 +29,7 @@ with step(snakemake.log[0]):
     comparison = members[["subject", "run", *varied, "resolution"]].merge(found, on=["subject", "run"])
     caption = comparison_caption(study, params.week, found)
     write_printed(paths("members"), members, f"Runs of the study {study}: how each ended, and what it took.")
-    write_printed(paths("comparison"), comparison, f"Distance of each run from the real brain. {caption}")
+    wide = side_by_side(comparison, varied)
+    write_printed(paths("comparison"), comparison, f"Distance of each run from the real. {caption}", printed=wide)
     closest = with_published_nearest(nearest(found, members, varied), read_yaml(files.published), varied, params.week)
     write_printed(paths("nearest"), closest, f"Nearest run by each measure. {caption}")

@@ -25,14 +25,21 @@ IN_LATEX = {
 """Characters that not every LaTeX engine sets."""
 
 
-def write_printed(paths: Mapping[str, AnyPath], table: pd.DataFrame, caption: str) -> None:
+def write_printed(
+    paths: Mapping[str, AnyPath], table: pd.DataFrame, caption: str, *, printed: pd.DataFrame | None = None
+) -> None:
     """Writes a table to the paths `csv`, `md` and `tex`.
 
     CSV holds the values; the others hold them as a reader wants them, with the caption, empty cells as a dash. LaTeX
     needs the package booktabs.
+
+    Parameters
+    ----------
+    printed
+        The table in another form for Markdown and LaTeX, where that is easier to read.
     """
     write_table(paths["csv"], table)
-    shown = table.map(as_printed)
+    shown = (table if printed is None else printed).map(as_printed)
     with replaced(paths["md"]) as temporary:
         text = shown.to_markdown(index=False, disable_numparse=True)
         temporary.write_text(f"{caption}\n\n{text}\n", encoding="utf-8")
@@ -55,12 +62,14 @@ def latex(shown: pd.DataFrame, caption: str) -> str:
     """Returns a table of text as LaTeX with booktabs."""
     plain = shown.rename(columns=str).map(_escaped)
     plain.columns = [_escaped(name) for name in plain.columns]
-    styled = plain.style.hide(axis="index")
-    return str(
-        styled.to_latex(
-            hrules=True, caption=_escaped(caption), position="htbp", position_float="centering", column_format="l" * len(plain.columns)
-        )
+    text = plain.style.hide(axis="index").to_latex(
+        hrules=True,
+        caption=_escaped(caption),
+        position="htbp",
+        position_float="centering",
+        column_format="l" * len(plain.columns),
     )
+    return str(text)
 
 
 def _escaped(text: str) -> str:
