@@ -19,6 +19,10 @@ CANDIDATES = 1024
 DRAWS = 1000
 """Functions drawn from the surrogate, whose minima tell how sure the optimum is."""
 INTERVAL = (0.025, 0.975)
+LEAST_HALF_WIDTH = 0.005
+"""No interval of the optimum is narrower than this part of the range to either side: candidates are not denser."""
+APART = 0.02
+"""Least distance of runs of a round from each other and from earlier runs, in the unit box."""
 GRID = 41
 """Points along each parameter in `profiles`."""
 INDEX_SAMPLES = 1024
@@ -81,6 +85,8 @@ def propose(surrogate: Surrogate, count: int) -> pd.DataFrame:
     process, points, scores = surrogate.process, surrogate.points, surrogate.scores
     candidates, chosen = _candidates(surrogate), []
     for _ in range(count):
+        free = np.linalg.norm(candidates[:, None] - points[None], axis=2).min(axis=1) >= APART
+        candidates = candidates[free] if free.any() else candidates
         best = candidates[int(expected_improvement(process, candidates, float(scores.min())).argmax())]
         chosen.append(best)
         points, scores = np.vstack([points, best]), np.append(scores, process.predict(best[None]))
@@ -117,7 +123,9 @@ def optimum(surrogate: Surrogate) -> pd.DataFrame:
     minima = _drawn_minima(surrogate, np.vstack([candidates, best]))
     mean, sd = process.predict(best[None], return_std=True)
     value = in_bounds(best[None], surrogate.bounds).iloc[0]
-    low, high = (in_bounds(np.quantile(minima, q, axis=0)[None], surrogate.bounds).iloc[0] for q in INTERVAL)
+    low, high = np.quantile(minima, INTERVAL, axis=0)
+    low, high = np.minimum(low, best - LEAST_HALF_WIDTH), np.maximum(high, best + LEAST_HALF_WIDTH)
+    low, high = (in_bounds(np.clip(end, 0, 1)[None], surrogate.bounds).iloc[0] for end in (low, high))
     return pd.DataFrame(
         {
             "parameter": list(surrogate.bounds),
@@ -185,5 +193,16 @@ def _candidates(surrogate: Surrogate) -> Floats:
 
 def _drawn_minima(surrogate: Surrogate, points: Floats) -> Floats:
     """Returns the (draws, d) places where functions drawn from the surrogate at the points are least."""
-    drawn = surrogate.process.sample_y(points, n_samples=DRAWS, random_state=surrogate.seed)
-    return points[drawn.argmin(axis=0)]
+    mean, covariance = surrogate.process.predict(points, return_cov=True)
+    # a small addition to the diagonal keeps the factorisation possible where points are nearly equal
+    jitter = 1e-9 * float(np.trace(covariance)) / len(points) + 1e-300
+    for _ in range(8):
+        try:
+            factor = np.linalg.cholesky(covariance + jitter * np.eye(len(points)))
+            break
+        except np.linalg.LinAlgError:
+            jitter *= 10
+    else:
+        raise ValueError("the covariance of the surrogate is not positive definite")
+    draws = np.random.default_rng(surrogate.seed).standard_normal((len(points), DRAWS))
+    return points[(mean[:, None] + factor @ draws).argmin(axis=0)]

@@ -64,12 +64,11 @@ def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
     assert [member.run for member in other.members["stiffness"]][1] == "stiffness-1500"
 
 
-def test_comparison_prefers_the_starts_population():
-    brains = [
-        {"id": "a", "week": 21, "phantom": {}, "population": "one"},
-        {"id": "b", "week": 25, "phantom": {}, "population": "two"},
-        {"id": "c", "week": 25, "phantom": {}, "population": "one"},
-    ]
+def test_comparison_prefers_the_starts_population(tmp_path):
+    brains = []
+    for name, week, population in (("a", 21, "one"), ("b", 25, "two"), ("c", 25, "one")):
+        (tmp_path / f"{name}.stl").touch()
+        brains.append({"id": name, "week": week, "pial": str(tmp_path / f"{name}.stl"), "population": population})
     study = config(brains=brains, studies={"thickness": THICKNESS})
     assert study.compared_with(study.studies["thickness"], "a") == ["c"]
     others = config(brains=brains[:2], studies={"thickness": THICKNESS})
