@@ -41,7 +41,8 @@ def write_printed(
     write_table(paths["csv"], table)
     shown = (table if printed is None else printed).map(as_printed)
     with replaced(paths["md"]) as temporary:
-        text = shown.to_markdown(index=False, disable_numparse=True)
+        plain = shown.rename(columns=lambda name: str(name).replace("|", r"\|")).map(lambda cell: cell.replace("|", r"\|"))
+        text = plain.to_markdown(index=False, disable_numparse=True)
         temporary.write_text(f"{caption}\n\n{text}\n", encoding="utf-8")
     with replaced(paths["tex"]) as temporary:
         temporary.write_text(latex(shown, caption), encoding="utf-8")
@@ -55,7 +56,7 @@ def as_printed(value: object) -> str:
         return str(value).strip() or "–" if value is not None else "–"
     if pd.isna(value):
         return "–"
-    return f"{value:.{DIGITS}g}" if abs(value) < 1e5 else f"{value:,.0f}".replace(",", " ")
+    return f"{value:.{DIGITS}g}" if abs(value) < 10**DIGITS else f"{value:,.0f}".replace(",", " ")
 
 
 def latex(shown: pd.DataFrame, caption: str) -> str:

@@ -71,7 +71,7 @@ def displacement_table(published: Mapping[str, Any], displacement: pd.DataFrame)
     rows = displacement[displacement["nodes"] == "all"]
     weeks = sorted({*published["displacement"]["from_weeks"], *rows["from_week"]})
     table = []
-    for column, name in (("max_mm", "max |u| (mm)"), ("mean_mm", "mean |u| (mm)")):
+    for column, name in (("max_mm", "largest displacement (mm)"), ("mean_mm", "mean displacement (mm)")):
         sources = {}
         for run, of_run in rows.groupby("run", sort=False):
             sources[f"{run} (simulated)"] = dict(zip(of_run["from_week"], of_run[column], strict=True))
