@@ -32,6 +32,8 @@ include: "workflow/rules/metrics.smk"
 include: "workflow/rules/regions.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
+include: "workflow/rules/studies.smk"
+include: "workflow/rules/calibration.smk"
 include: "workflow/rules/run_figures.smk"
 include: "workflow/rules/study_figures.smk"
 include: "workflow/rules/quality.smk"
@@ -51,6 +53,8 @@ localrules:
     figures,
     quality,
     report,
+    studies,
+    calibrate,
     paper,
     parameters,
     html_report,

@@ -17,7 +17,11 @@ def brain_of(where):
 def of_sides(*sides):
     """Returns a pattern of the folders with metrics of brains that have these hemispheres."""
     return one_of(
-        [where for where in MEASURED + SIMULATED if sides_of(brain_of(where)) == sides]
+        [
+            where
+            for where in MEASURED + SIMULATED + COMPARED_MEMBERS
+            if sides_of(brain_of(where)) == sides
+        ]
     )
 
 
@@ -58,6 +62,16 @@ MEASURES = {
 # where the metrics of a brain lie under results
 MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
 SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
+# the brains of runs of studies, at the weeks of comparison
+COMPARED_MEMBERS = sorted(
+    {
+        f"runs/{member.run}/{brain}/metrics/week-{week_tag(study.compare_week)}"
+        for name, study in CONFIG.studies.items()
+        for member in CONFIG.members[name]
+        for brain in CONFIG.starts(member.run)
+    }
+    - set(SIMULATED)
+)
 
 
 # brains whose labels can be counted

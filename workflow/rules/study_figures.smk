@@ -292,11 +292,15 @@ rule figures:
         rules.growth.input,
 
 
-# the figures and tables of the paper that this study's data allow
+# what shows runs without measuring them week by week
+PAPER_FIGURES = [rule for rule in PAPER_FIGURES_OF_RUNS if rule is not rules.shape_maps]
+
+
+# the figures and tables of the paper; brains are measured at the weeks of comparison only
 rule paper:
     input:
-        [of_runs(rule.output, measure=SHAPE_MEASURES) for rule in PAPER_FIGURES_OF_RUNS],
+        [of_runs(rule.output) for rule in PAPER_FIGURES],
         rules.displacement_figure.output,
-        rules.spectra_figure.output,
-        OF_THE_LAST_WEEK,
         rules.growth.input,
+        rules.published_tables.output,
+        rules.studies.input,

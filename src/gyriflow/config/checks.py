@@ -11,9 +11,9 @@ from ..parameters.varying import Varying
 from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
 from .metrics import LEAST_AGE_WEEKS, MetricsSettings
-from .runs import ALL, Run, Start, start_ids
+from .runs import ALL, FIRST, Run, Start, start_ids
 
-RESERVED_BRAINS = ("study", "report", ALL)
+RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Names that stand for something else in results, tables and settings."""
 RESERVED_RUNS = ("real",)
 """What stands for the run in tables of measured brains."""
@@ -76,7 +76,7 @@ def start_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[s
 
 
 def _id_problems(start: Start | None, known: Sequence[str], key: tuple[str, ...]) -> Iterator[Problem]:
-    if start is None or start == ALL or not known:
+    if start is None or start in (ALL, FIRST) or not known:
         return
     names = [start] if isinstance(start, str) else list(start)
     if not names:

@@ -1,6 +1,7 @@
 """The whole configuration."""
 
 from collections.abc import Collection, Iterable, Iterator
+from functools import cached_property
 from typing import Any
 
 from pydantic import PrivateAttr, field_validator
@@ -14,6 +15,7 @@ from . import checks
 from .atlas import AtlasSettings, UsedAtlas
 from .atlas_description import Atlas
 from .brains import Brain
+from .calibration import Calibration, calibration_problems
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
 from .metrics import MetricsSettings, age_reference, reference_brains
@@ -21,6 +23,7 @@ from .participants import ParticipantsSettings
 from .regions import nearest_given
 from .report import ReportSettings
 from .runs import Run, Start, start_ids
+from .studies import Compared, Member, Study, members_of, real_brains, study_problems
 from .surface import SurfaceSettings
 
 REAL_BRAIN = "real brain"
@@ -46,7 +49,8 @@ class Config(Settings):
     )
     schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
     start: Start | None = setting(
-        None, "", "Id of the brain to fold, a list of ids, or `all`; required if a run has no `start` of its own."
+        None, "", "Id of the brain to fold, a list of ids, `first` (of the list of brains, of an atlas the earliest) or `all`; "
+        "required if a run has no `start` of its own.",
     )
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
     mesh: MeshSettings = setting(MeshSettings(), "", "Tetrahedral mesh.")
@@ -56,6 +60,10 @@ class Config(Settings):
         {}, "",
         "Runs by name, each with its `start` and what differs from `folding`; without any, one run named `reference`.",
     )  # fmt: skip
+    studies: dict[str, Study] = setting(
+        {}, "", "Studies by name: runs that differ from one in a few parameters, compared with the real brains of a week."
+    )
+    calibrate: Calibration | None = setting(None, "", "A search for the parameters that meet a real brain best.")
     metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")
     report: ReportSettings = setting(ReportSettings(), "", "Figures and report.")
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
@@ -109,6 +117,16 @@ class Config(Settings):
     def _mesh(self) -> Iterator[Problem]:
         if self.has("atlas", "mesh", "start") and self.mesh.sized_for == "end":
             yield from checks.mesh_size_problems(self.growth, self.start, self.brains, self.runs)
+
+    @check
+    def _studies(self) -> Iterator[Problem]:
+        if self.has("atlas", "brains", "runs"):
+            yield from study_problems(self.studies, self.runs, self.brains)
+
+    @check
+    def _calibrate(self) -> Iterator[Problem]:
+        if self.has("atlas", "brains", "runs"):
+            yield from calibration_problems(self.calibrate, self.runs, self.brains)
 
     @check
     def _age_reference(self) -> Iterator[Problem]:
@@ -174,13 +192,30 @@ class Config(Settings):
         """The atlases with what their descriptions say, as the files lie at this moment."""
         return [UsedAtlas(section, Atlas(**read_yaml(section.description))) for section in self.atlas]
 
-    def run(self, name: str) -> FoldingSettings:
-        """Returns the complete settings of a run."""
-        return self.runs[name]
+    def run(self, name: str) -> Run:
+        """Returns the complete settings of a run, of one of a study too."""
+        return self.runs[name] if name in self.runs else self.study_runs[name]
+
+    @cached_property
+    def members(self) -> dict[str, list[Member]]:
+        """The members of each study, by its name."""
+        return members_of(
+            self.studies, self.runs, lambda run, week: all(week in self.weeks(run, brain) for brain in self.starts(run))
+        )
+
+    @cached_property
+    def study_runs(self) -> dict[str, Run]:
+        """The runs that studies have besides those of `runs`, by name."""
+        every = {member.run: member.settings for members in self.members.values() for member in members}
+        return {name: run for name, run in every.items() if name not in self.runs}
+
+    def compared_with(self, compared: Compared, brain: str) -> list[str]:
+        """Returns the ids of the brains that the runs of a study or a calibration from a brain are compared with."""
+        return real_brains(compared, self.brain(brain), self.brains)
 
     def starts(self, run: str) -> list[str]:
         """Returns the ids of the brains that a run folds, in the order of `brains`."""
-        own = self.runs[run].start
+        own = self.run(run).start
         return start_ids(self.start if own is None else own, [brain.id for brain in self.brains])
 
     @property
@@ -196,8 +231,16 @@ class Config(Settings):
 
     def weeks(self, run: str, brain: str) -> list[float]:
         """Returns the output weeks of a run from a start brain, whose own week is the first."""
-        settings = self.runs[run]
-        return output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
+        settings = self.run(run)
+        weeks = output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
+        if run in self.runs:
+            return weeks
+        compared = {
+            study.compare_week
+            for name, study in self.studies.items()
+            if run in [member.run for member in self.members[name]]
+        }
+        return sorted({*weeks, *compared})
 
     def last_week(self, brain: str) -> float:
         """Returns the last week that a run folds a start brain to."""
@@ -259,7 +302,7 @@ class Config(Settings):
 
         The number of ranks is left out, since no result depends on it.
         """
-        settings = self.runs[run].model_dump(mode="json", exclude={"ranks", "start"})
+        settings = self.run(run).model_dump(mode="json", exclude={"ranks", "start"})
         for name, value in self._tables(run).items():
             curve = {"weeks": value.weeks} if value.weeks else {}
             settings[name] = curve | ({"map": name} if value.map is not None else {})
@@ -279,7 +322,7 @@ class Config(Settings):
 
     def _tables(self, run: str) -> dict[str, Varying]:
         """Returns the parameters of a run that are curves or maps."""
-        values = {name: getattr(self.runs[run], name) for name in VARYING}
+        values = {name: getattr(self.run(run), name) for name in VARYING}
         return {name: value for name, value in values.items() if isinstance(value, Varying)}
 
 

@@ -21,7 +21,7 @@ class Results:
     runs, validation, displacement : as for `runs_table`
     provenance : commit, versions, files (brain, what, sha256, and path where it may be shown) and made, the time
     metrics : {setting: {"value", "unit", "description"}}
-    warnings : columns of, step, message
+    warnings : columns subject, run, step, level, message
     configuration : text, without paths unless they may be shown
     """
 
