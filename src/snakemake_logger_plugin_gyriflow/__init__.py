@@ -5,6 +5,7 @@ import sys
 import threading
 from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
@@ -25,11 +26,15 @@ OF_FAILED_JOBS = (
 
 @dataclass
 class LogHandlerSettings(LogHandlerSettingsBase):
-    """The plugin's option, `--logger-gyriflow-details FILE`."""
+    """The plugin's options, `--logger-gyriflow-details FILE` and `--logger-gyriflow-plan FILE`."""
 
     details: str = field(
         default="",
         metadata={"help": "File for all that Snakemake says, besides its own log", "env_var": False, "required": False},
+    )
+    plan: str = field(
+        default="",
+        metadata={"help": "File for the jobs of a dry run, as JSON", "env_var": False, "required": False},
     )
 
 
@@ -40,11 +45,14 @@ class LogHandler(LogHandlerBase):
         # every job's process imports this module, and few need more of it
         from gyriflow.cost import typical_seconds
         from gyriflow.shipped import SHIPPED
-        from gyriflow.terminal.display import RunDisplay
+        from gyriflow.terminal.display import STATE, RunDisplay
         from gyriflow.terminal.stages import stages
         from snakemake.logging import DefaultFormatter
 
-        details = self.settings.details if isinstance(self.settings, LogHandlerSettings) else ""
+        settings = self.settings if isinstance(self.settings, LogHandlerSettings) else LogHandlerSettings()
+        details = settings.details
+        self.plan_file = settings.plan
+        self.planned: dict[int, dict[str, Any]] = {}
         self.file = logging.FileHandler(details) if details else None
         if self.file:
             self.file.setFormatter(DefaultFormatter(self.common_settings.quiet, show_failed_logs=True))
@@ -54,6 +62,8 @@ class LogHandler(LogHandlerBase):
             typical_s=typical_seconds(),
             details=details or None,
         )
+        # the details are in .snakemake/log of the working directory, which is not the current one yet
+        self.state_file = Path(details).parents[2] / STATE if details else None
         self.cores: int | None = None
         self.of_failed_jobs: list[str] = []
         self.ended = threading.Event()
@@ -64,6 +74,16 @@ class LogHandler(LogHandlerBase):
         while not self.ended.wait(LOOK_EVERY_S):
             with self.lock:  # type: ignore[union-attr]  # made by logging.Handler
                 self.display.tick()
+                self._save_state()
+
+    def _save_state(self) -> None:
+        """Leaves how far the run is for `gyriflow status`; a full disk is the steps' to report."""
+        from gyriflow.errors import StorageError
+        from gyriflow.io.files import write_json
+
+        if self.state_file and self.display.total:
+            with suppress(StorageError):
+                write_json(self.state_file, self.display.state())
 
     def emit(self, record: logging.LogRecord) -> None:
         """Hands a record on, to the file as it is and to the terminal where a reader needs it."""
@@ -79,7 +99,15 @@ class LogHandler(LogHandlerBase):
         match said.get("event"):
             case LogEvent.RESOURCES_INFO if said.get("cores"):
                 self.cores = int(said["cores"])
-            case LogEvent.RUN_INFO:
+            case LogEvent.JOB_INFO if self.plan_file:
+                self.planned[said["jobid"]] = {
+                    "rule": said["rule_name"],
+                    "wildcards": dict(said["wildcards"] or {}),
+                    "threads": said["threads"],
+                    "output": list(said["output"]),
+                    "reason": said["reason"],
+                }
+            case LogEvent.RUN_INFO if not self.plan_file:
                 jobs = dict(said.get("stats") or {})
                 jobs.pop("total", None)
                 self.display.plan(jobs, self.cores)
@@ -100,7 +128,7 @@ class LogHandler(LogHandlerBase):
         """Passes warnings and errors on; what is said of failed jobs besides is kept for the case that none is named."""
         text = record.getMessage().strip()
         if text.startswith(NOTHING_TO_DO):
-            self.display.up_to_date = True
+            self.display.up_to_date = not self.plan_file
         elif record.levelno >= logging.WARNING and text:
             if text.startswith(OF_FAILED_JOBS):
                 self.of_failed_jobs.append(text)
@@ -112,11 +140,16 @@ class LogHandler(LogHandlerBase):
         if not self.ended.is_set():
             self.ended.set()
             # a terminal that is gone has nobody who reads
+            if self.plan_file:
+                from gyriflow.io.files import write_json
+
+                write_json(self.plan_file, list(self.planned.values()))
             with suppress(OSError, ValueError):
                 if not self.display.failed:
                     for text in self.of_failed_jobs:
                         self.display.message(text)
                 self.display.end()
+            self._save_state()
             if self.file:
                 self.file.close()
         super().close()

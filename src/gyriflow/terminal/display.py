@@ -6,8 +6,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from .logs import FoldingStep, GrowingLog, cause, last_step, warnings_in
 from .stages import subject
@@ -16,6 +17,8 @@ from .time_left import LEAST_SHARE, Pace, as_duration, as_seconds
 MINUTE = 60.0
 CLEAR = "\r\x1b[K"
 """Goes to the beginning of the terminal's line and empties it."""
+STATE = Path(".snakemake", "gyriflow-run.json")
+"""Where, in a working directory, the state of its live or last run is."""
 USUAL_REPORT = Path("results", "report", "report.html")
 
 
@@ -36,6 +39,17 @@ class Job:
     def what(self) -> str:
         """The stage and what it works on, as one phrase."""
         return f"{self.stage}, {self.subject}"
+
+    @property
+    def now(self) -> str:
+        """What the job is at."""
+        return self.what + (f": GW {self.step.week:.2f} of {self.step.end_week:g}" if self.step else "")
+
+    @property
+    def brief(self) -> str:
+        """The same in a few words."""
+        about = self.subject.replace("run ", "").replace("brain ", "").replace(", ", "/")
+        return f"{self.stage} {about}" + (f" GW {self.step.week:.1f}" if self.step else "")
 
 
 @dataclass
@@ -73,7 +87,9 @@ class RunDisplay:
         self.pace = Pace(self.typical_s)
         self.cores = 1
         self.done = self.total = 0
-        self.failed: list[str] = []
+        self.failed: list[dict[str, Any]] = []
+        self.began_at = _now()
+        self.ended_at: str | None = None
         self.errors = 0
         self.told: set[tuple[str, ...]] = set()
         self.report: str | None = None
@@ -118,9 +134,9 @@ class RunDisplay:
         """Says what failed and why, the cause first; `otherwise` is told where the job's log is silent."""
         job = self.running.pop(number, None)
         what = job.what if job else rule
-        self.failed.append(what)
         text = "".join(GrowingLog(Path(log)).all_text() for log in logs)
         why = cause(text) or otherwise or "it left no message"
+        self.failed.append({"what": what, "why": why, "logs": [str(Path(log).absolute()) for log in logs]})
         first, *rest = why.splitlines()
         self.line(f"failed  {what}: {first}")
         for more in rest:
@@ -147,6 +163,7 @@ class RunDisplay:
     def end(self) -> None:
         """Says how it ended, and where the report is."""
         self._clear()
+        self.ended_at = _now()
         took = as_duration(self.clock() - self.began)
         if self.failed:
             count = len(self.failed)
@@ -158,6 +175,19 @@ class RunDisplay:
             self.line("gyriflow: everything is up to date" + _place(USUAL_REPORT))
         elif self.total and self.done == self.total and not self.errors:
             self.line(f"gyriflow: done in {took}" + (_place(Path(self.report)) if self.report else ""))
+
+    def state(self) -> dict[str, Any]:
+        """Returns how far the run is, in plain types."""
+        return {
+            "began": self.began_at,
+            "ended": self.ended_at,
+            "done": self.done,
+            "total": self.total,
+            "left_s": self.time_left() if self.total else None,
+            "running": [job.now for job in self.running.values()],
+            "failed": self.failed,
+            "details": self.details,
+        }
 
     # --- how it is written ------------------------------------------------------------------------------------
 
@@ -171,13 +201,9 @@ class RunDisplay:
         """Writes the live line anew, where the stream is a terminal."""
         if not self.live or not self.total:
             return
-        now = [
-            job.subject + (f" GW {job.step.week:.1f} of {job.step.end_week:g}" if job.step else "")
-            for job in self.running.values()
-        ]
-        stages = ", ".join(f"{job.stage} {text}" for job, text in zip(self.running.values(), now, strict=True))
         left = self.time_left()
-        text = f"{self._share()}  {stages}" + (f"  about {as_duration(left)} left" if left is not None else "")
+        text = f"{self._share()}  " + (f"{as_duration(left)} left  " if left is not None else "")
+        text += ", ".join(job.brief for job in self.running.values())
         self._clear()
         self.stream.write(text[: shutil.get_terminal_size().columns - 1])
         self.stream.flush()
@@ -231,3 +257,7 @@ class RunDisplay:
 def _place(report: Path) -> str:
     """Returns where the report is, as the end of a sentence; nothing where there is none."""
     return f"; report: {report.absolute()}" if report.is_file() else ""
+
+
+def _now() -> str:
+    return f"{datetime.now():%Y-%m-%d %H:%M:%S}"
