@@ -1,8 +1,8 @@
 """Fits what studies take to finished ones: `./run python benchmarks/cost.py STUDY ...` (working directories).
 
 Times are of one core: what a job kept busy, which other load on the machine hardly changes. Each rule has a constant and
-a part that grows with its brain: faces of the surface, nodes of the mesh, nodes times steps of a folding. The error is
-that of studies left out: the fit to the others, with sizes predicted from the configuration alone, against what was
+a part that grows with its brain: faces of the surface, nodes of the mesh, nodes times steps of a folding. The error
+is that of studies left out: the fit to the others, with sizes predicted from the configuration alone, against what was
 measured. Writes `src/gyriflow/cost/measured.json`, which the terminal and `gyriflow check` read.
 """
 
@@ -78,9 +78,7 @@ def read_study(folder: Path) -> Study:
     jobs["busy_s"] = busy_seconds(jobs["wall_s"], jobs["cpu_s"])
     jobs["steps"] = 1.0
     for index in jobs.index[jobs["rule"] == "simulate"]:
-        summary = read_json(
-            folder / f"results/runs/{jobs['run'][index]}/{jobs['brain'][index]}/folding/summary.json"
-        )
+        summary = read_json(folder / f"results/runs/{jobs['run'][index]}/{jobs['brain'][index]}/folding/summary.json")
         jobs.loc[index, ["busy_s", "MiB", "steps"]] = (
             summary["cpu_seconds"], summary["peak_memory_MiB"], summary["steps"],
         )  # fmt: skip

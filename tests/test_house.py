@@ -29,8 +29,15 @@ ARROWS = {
     **dict.fromkeys(("validation", "report"), PLAIN),
     # the shell around the rooms: how a workflow starts, how a step ends, which code it depends on
     "provenance": set(),
+    "shipped": set(),
+    "version": {"shipped"},
     "step": {"errors"},
-    "launch": {"errors", "io", "step"},
+    "terminal": set(),
+    "launch": {"errors", "io", "shipped", "step", "terminal"},
+    # what a study takes is told from its configuration
+    "cost": PLAIN | {"config", "io"},
+    # the command line is above everything
+    "cli": PLAIN | {"config", "cost", "folding", "io", "launch", "shipped", "surface", "terminal", "version"},
 }
 """The rooms, and what each may import besides itself. Siblings do not know each other; they meet in plain geometry, in
 the vocabulary and in files."""
@@ -41,7 +48,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
-OPENING_ROOMS = {"io", "folding", "provenance", "step", "launch"}
+OPENING_ROOMS = {"io", "folding", "provenance", "step", "launch", "terminal"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
     *("open", "read_text", "read_bytes", "write_text", "write_bytes", "tofile", "to_filename", "savefig"),

@@ -32,7 +32,19 @@ LOOKS_ONLY = frozenset(
 )
 """Options under which Snakemake takes no lock."""
 SAYS_ITSELF = frozenset(
-    ("--verbose", "--quiet", "-q", "--printshellcmds", "-p", "--logger", "--debug", "--debug-dag", "--unlock", "--touch", "-t")
+    (
+        "--verbose",
+        "--quiet",
+        "-q",
+        "--printshellcmds",
+        "-p",
+        "--logger",
+        "--debug",
+        "--debug-dag",
+        "--unlock",
+        "--touch",
+        "-t",
+    )
     + ("--report", "--archive", "--delete-all-output", "--delete-temp-output", "--cleanup-metadata", "--cm")
     + ("--list-input-changes", "--list-params-changes", "--list-code-changes", "--generate-unit-tests", "--mode")
 )

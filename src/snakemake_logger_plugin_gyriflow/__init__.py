@@ -1,4 +1,4 @@
-"""Snakemake's logger plugin `gyriflow`: a quiet terminal (`--logger gyriflow`), which `./run snakemake` takes by itself."""
+"""Snakemake's logger plugin `gyriflow`: a quiet terminal (`--logger gyriflow`), the default of `./run snakemake`."""
 
 import logging
 import sys
@@ -43,11 +43,12 @@ class LogHandler(LogHandlerBase):
 
     def __post_init__(self) -> None:
         # every job's process imports this module, and few need more of it
+        from snakemake.logging import DefaultFormatter
+
         from gyriflow.cost import typical_seconds
         from gyriflow.shipped import SHIPPED
         from gyriflow.terminal.display import STATE, RunDisplay
         from gyriflow.terminal.stages import stages
-        from snakemake.logging import DefaultFormatter
 
         settings = self.settings if isinstance(self.settings, LogHandlerSettings) else LogHandlerSettings()
         details = settings.details
@@ -113,7 +114,11 @@ class LogHandler(LogHandlerBase):
                 self.display.plan(jobs, self.cores)
             case LogEvent.JOB_INFO:
                 self.display.job_begins(
-                    said["jobid"], said["rule_name"], said["wildcards"] or {}, said["output"], next(iter(said["log"]), None)
+                    said["jobid"],
+                    said["rule_name"],
+                    said["wildcards"] or {},
+                    said["output"],
+                    next(iter(said["log"]), None),
                 )
             case LogEvent.JOB_FINISHED:
                 self.display.job_ends(said["job_id"])
@@ -125,7 +130,7 @@ class LogHandler(LogHandlerBase):
                 self._pass_on(record)
 
     def _pass_on(self, record: logging.LogRecord) -> None:
-        """Passes warnings and errors on; what is said of failed jobs besides is kept for the case that none is named."""
+        """Passes warnings and errors on; those of failed jobs are kept for the case that no job is named."""
         text = record.getMessage().strip()
         if text.startswith(NOTHING_TO_DO):
             self.display.up_to_date = not self.plan_file

@@ -7,7 +7,7 @@ from pathlib import Path
 import yaml
 
 from ..errors import InputError
-from ..io.files import replaced
+from ..io.files import write_text
 from .recognition import UNSET, Found, recognise
 
 HEAD = """\
@@ -38,11 +38,12 @@ def write_configuration(folder: Path, path: Path, force: bool) -> Iterator[str]:
     InputError where nothing was recognised, or a configuration is there and `force` is not set.
     """
     if path.exists() and not force:
-        raise InputError("is there already", path=path, remedy="Choose another file with --output, or replace it: --force")
+        raise InputError(
+            "is there already", path=path, remedy="Choose another file with --output, or replace it: --force"
+        )
     found = recognise(folder)
     text = configuration(found, folder, path)
-    with replaced(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, text)
     kinds = Counter(_kind(brain) for brain in found)
     yield f"{len(found)} brain{'s' if len(found) > 1 else ''}: " + ", ".join(
         f"{count} from {kind}" for kind, count in kinds.items()

@@ -28,7 +28,9 @@ DEMO = SHIPPED / "config" / "config.yaml"
 MIB_PER_GIB = 1024
 
 
-def check_study(config: Path | None, directory: Path, cores: int, read_files: bool = True) -> Iterator[tuple[str, bool]]:
+def check_study(
+    config: Path | None, directory: Path, cores: int, read_files: bool = True
+) -> Iterator[tuple[str, bool]]:
     """Yields lines on a study, each with whether it is a problem.
 
     InputError for a configuration that is not valid, with all its problems.
@@ -79,7 +81,6 @@ def _check_files(brain: Brain, config: Config) -> None:
 
 def _work(path: Path, config: Config, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
     """Yields what will run, by stage, and what it will take of time, memory and disk."""
-    directory.mkdir(parents=True, exist_ok=True)
     jobs = plan(["--configfile", str(path.resolve()), "--directory", str(directory.resolve())])
     if not jobs:
         yield "nothing to run: all results are up to date", False
@@ -92,7 +93,7 @@ def _work(path: Path, config: Config, directory: Path, cores: int) -> Iterator[t
     for stage, planned in by_stage.items():
         yield f"  {stage:<12} {len(planned):4d}  {reasons(planned)}", False
     # the solver's own rule for its memory is heavy to import
-    from ..folding.prediction import predicted_memory_mib
+    from ..folding.__main__ import predicted_memory_mib
 
     predicted = predict([job.job for job in jobs], config, read_json(MEASURED), cores, predicted_memory_mib)
     yield from _needs(predicted, directory, cores)
@@ -103,8 +104,8 @@ def _needs(predicted: Prediction, directory: Path, cores: int) -> Iterator[tuple
         return f"{as_duration(value / error)} to {as_duration(value * error)}"
 
     yield (
-        f"time    about {as_duration(predicted.wall_seconds)} on {cores} core{'s' if cores > 1 else ''} of a machine like "
-        f"that of the measurements ({between(predicted.wall_seconds, predicted.time_error)}; "
+        f"time    about {as_duration(predicted.wall_seconds)} on {cores} core{'s' if cores > 1 else ''} without other "
+        f"load ({between(predicted.wall_seconds, predicted.time_error)}, by the errors of studies left out; "
         f"{predicted.core_seconds / 3600:.2g} core hours)",
         False,
     )
@@ -115,7 +116,7 @@ def _needs(predicted: Prediction, directory: Path, cores: int) -> Iterator[tuple
         f"{_gib(available)} are free" + (": too little; use fewer cores, or larger edges" if too_much else ""),
         too_much,
     )
-    free = shutil.disk_usage(directory).free / 2**20
+    free = shutil.disk_usage(_there(directory)).free / 2**20
     full = predicted.disk_mib > free
     yield (
         f"disk    about {_gib(predicted.disk_mib)}, at most {_gib(predicted.disk_mib * predicted.disk_error)}; "
@@ -126,3 +127,8 @@ def _needs(predicted: Prediction, directory: Path, cores: int) -> Iterator[tuple
 
 def _gib(mib: float) -> str:
     return f"{mib / MIB_PER_GIB:.1f} GB" if mib >= 100 else f"{mib:.0f} MB"
+
+
+def _there(folder: Path) -> Path:
+    """Returns the folder, or the first one around it that exists."""
+    return next(path for path in (folder.absolute(), *folder.absolute().parents) if path.is_dir())

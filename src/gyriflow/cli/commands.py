@@ -25,7 +25,12 @@ directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
 )
 cores_option = click.option(
-    "-c", "--cores", type=click.IntRange(1), default=os.cpu_count() or 1, show_default="all", help="How many cores to use."
+    "-c",
+    "--cores",
+    type=click.IntRange(1),
+    default=os.cpu_count() or 1,
+    show_default="all",
+    help="How many cores to use.",
 )
 config_argument = click.argument("config", type=FILE, required=False)
 
@@ -168,7 +173,13 @@ def view(directory: Path, only_print: bool) -> None:
 @main.command()
 @click.argument("first", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.argument("second", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--tolerance", type=click.FloatRange(0), default=1e-6, show_default=True, help="Relative difference that counts as none.")
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0),
+    default=1e-6,
+    show_default=True,
+    help="Relative difference that counts as none.",
+)
 @told
 def compare(first: Path, second: Path, tolerance: float) -> None:
     """Compare two results folders: settings, versions, inputs, and every number of their tables.
@@ -206,7 +217,7 @@ def completion(shell: str) -> None:
 
 
 def _chosen(config: Path | None, directory: Path) -> Path | None:
-    """Returns the configuration that is meant: the one that is named, gyriflow.yaml here or there, or none, the demo."""
+    """Returns the configuration that is meant: the one named, gyriflow.yaml here or there, or none, the demo."""
     if config is not None:
         return config
     return next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)

@@ -88,7 +88,10 @@ def compare_tables(first: pd.DataFrame, second: pd.DataFrame, tolerance: float) 
     Rows belong together that have the same texts and keys; values of a long table are told by metric.
     """
     found = []
-    for names, where in ((first.columns.difference(second.columns), "first"), (second.columns.difference(first.columns), "second")):
+    for names, where in (
+        (first.columns.difference(second.columns), "first"),
+        (second.columns.difference(first.columns), "second"),
+    ):
         if len(names):
             found.append(f"columns only in the {where}: {', '.join(names)}")
     shared = [name for name in first.columns if name in second.columns and name not in OF_THE_MACHINE]
@@ -142,15 +145,10 @@ def _tables(folder: Path) -> list[Path]:
 def _settings(first: Path, second: Path) -> Iterator[str]:
     """Yields what differs in configuration and provenance."""
     for file, read in ((CONFIGURATION, read_yaml), (PROVENANCE, read_json)):
-        contents = []
-        for folder in (first, second):
-            try:
-                contents.append(dict(_flat(read(folder / file))))
-            except InputError:
-                contents.append(None)
-        if contents[0] is None or contents[1] is None:
-            if contents != [None, None]:
-                yield f"{file} is only in {first if contents[1] is None else second}"
+        contents = [dict(_flat(read(folder / file))) for folder in (first, second) if (folder / file).is_file()]
+        if len(contents) == 1:
+            yield f"{file} is only in {first if (first / file).is_file() else second}"
+        if len(contents) < 2:
             continue
         for key in sorted(contents[0].keys() | contents[1].keys()):
             values = [content.get(key, "default" if file == CONFIGURATION else "none") for content in contents]

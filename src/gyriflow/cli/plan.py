@@ -56,7 +56,9 @@ class PlannedJob:
     def job(self) -> Job:
         """What the cost of the job depends on."""
         place = re.fullmatch(r"runs/([^/]+)/([^/]+)/.*|brains/([^/]+)/.*", self.wildcards.get("where", ""))
-        run, brain, measured = place.groups() if place else (self.wildcards.get("run"), self.wildcards.get("brain"), None)
+        run, brain, measured = (
+            place.groups() if place else (self.wildcards.get("run"), self.wildcards.get("brain"), None)
+        )
         return Job(self.rule, run, brain or measured, self.threads)
 
 
@@ -74,7 +76,9 @@ def plan(arguments: Sequence[str], directory: Path | None = None) -> list[Planne
         )  # fmt: skip
         if outcome.returncode or not file.is_file():
             said = [line for line in outcome.stderr.splitlines() if not line.startswith("Using workflow specific")]
-            raise PlanError("\n".join(said).removeprefix("gyriflow: ") or "Snakemake gave no plan", outcome.returncode or 1)
+            raise PlanError(
+                "\n".join(said).removeprefix("gyriflow: ") or "Snakemake gave no plan", outcome.returncode or 1
+            )
         jobs = read_json(file)
     return [
         PlannedJob(job["rule"], job["wildcards"], int(job["threads"]), tuple(job["output"]), job["reason"])

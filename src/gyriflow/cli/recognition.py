@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
+from ..io.files import read_table
 from ..io.volumes import read_label_volume
 from ..parameters.schemes import SCHEMES, LabelScheme
 from ..surface.labels import cerebrum_mask, require_cortex_outside
@@ -23,7 +24,10 @@ SIDE = {
     "left": re.compile(r"(?:^|[._-])(?:left|lh|hemi-l|l)(?=[._-])", re.IGNORECASE),
     "right": re.compile(r"(?:^|[._-])(?:right|rh|hemi-r|r)(?=[._-])", re.IGNORECASE),
 }
-OF_SURFACES = {"pial": re.compile(r"pial|outer", re.IGNORECASE), "white": re.compile(r"white|[._-]wm[._-]|inner", re.IGNORECASE)}
+OF_SURFACES = {
+    "pial": re.compile(r"pial|outer", re.IGNORECASE),
+    "white": re.compile(r"white|[._-]wm[._-]|inner", re.IGNORECASE),
+}
 OTHER_SURFACES = re.compile(r"sphere|midthickness|inflated|medial|\.(?:shape|func|label)\.gii$", re.IGNORECASE)
 WEEK = re.compile(
     r"(?:(?:week|wk|gestational[_-]?age|ga|gw|sta|t|age)[-_]?(\d{2}(?:\.\d+)?))(?!\d)|(?<!\d)(\d{2}(?:\.\d+)?)[-_]?(?:weeks?|wk|gw|w)(?![a-z])",
@@ -31,7 +35,17 @@ WEEK = re.compile(
 )
 WEEKS = (18.0, 45.0)
 """Numbers in names that may be gestational ages."""
-AGE_COLUMNS = ("gestational_age", "ga", "ga_weeks", "gestational_weeks", "gestational_age_weeks", "scan_age", "week", "weeks", "age_at_scan")
+AGE_COLUMNS = (
+    "gestational_age",
+    "ga",
+    "ga_weeks",
+    "gestational_weeks",
+    "gestational_age_weeks",
+    "scan_age",
+    "week",
+    "weeks",
+    "age_at_scan",
+)
 ID_COLUMNS = ("participant_id", "subject_id", "subject", "id")
 HIDDEN = ("results", "resources", "derivatives-gyriflow")
 UNSET = "CHOOSE"
@@ -77,10 +91,7 @@ def participants(folder: Path) -> dict[str, float]:
     """Returns the gestational ages of a folder's participants.tsv, by id; nothing where there is none."""
     for path in (folder / "participants.tsv", *sorted(folder.glob("*/participants.tsv"))):
         if path.is_file():
-            try:
-                table = pd.read_csv(path, sep="\t", dtype=str)
-            except (OSError, ValueError) as error:
-                raise InputError(f"cannot be read as a table: {error}", path=path) from error
+            table = read_table(path, "\t")
             columns = {name.lower(): name for name in table.columns}
             of_id = next((columns[name] for name in ID_COLUMNS if name in columns), None)
             of_age = next((columns[name] for name in AGE_COLUMNS if name in columns), None)
@@ -91,7 +102,7 @@ def participants(folder: Path) -> dict[str, float]:
 
 
 def week_in(text: str) -> float | None:
-    """Returns the gestational age that a name tells, such as `week21`, `GA21`, `STA30`, `t21.00`, `25w`; None without one."""
+    """Returns the gestational age in a name such as `week21`, `GA21`, `STA30`, `t21.00`, `25w`; None without one."""
     for match in WEEK.finditer(text):
         week = float(match[1] or match[2])
         if WEEKS[0] <= week <= WEEKS[1]:
@@ -173,7 +184,9 @@ def _volumes(folder: Path, files: Sequence[Path], ages: dict[str, float]) -> lis
         scheme, candidates = fitting_scheme(labels)
         brain = Found({"id": _id(file), "week": _week(file, ages), "labels": str(file), "scheme": scheme or UNSET})
         if scheme is None:
-            listed = " or ".join(candidates) if candidates else f"none of {', '.join(SCHEMES)} fits; write one under schemes"
+            listed = (
+                " or ".join(candidates) if candidates else f"none of {', '.join(SCHEMES)} fits; write one under schemes"
+            )
             brain.notes.append(f"scheme: {listed}")
         image = _image_of(file, [other for other in volumes if other not in named])
         if image is not None:
@@ -192,7 +205,11 @@ def _image_of(labels: Path, others: Sequence[Path]) -> Path | None:
 def _stem(file: Path) -> str:
     """Returns a name without what says that it is labels or an image."""
     plain = re.sub(r"\.(nii|gz|mgz|mgh|gii|surf|vtk|stl|ply|obj)\b", "", file.name.lower())
-    return re.sub(r"[._-]?(desc-\w+|labels?|dseg|seg|parcellation|tissue|regional|t2w?|t1w?|srr|svr|recon|dhcp-19|bounti)\b", "", plain)
+    return re.sub(
+        r"[._-]?(desc-\w+|labels?|dseg|seg|parcellation|tissue|regional|t2w?|t1w?|srr|svr|recon|dhcp-19|bounti)\b",
+        "",
+        plain,
+    )
 
 
 def _week(file: Path, ages: dict[str, float]) -> float | str:

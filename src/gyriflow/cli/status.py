@@ -36,7 +36,10 @@ def status(directory: Path) -> Status:
     state = run_state(directory)
     if not results.is_dir() and state is None:
         raise InputError(
-            "holds no study", path=directory, expected="a working directory with results/", remedy="Give it as argument."
+            "holds no study",
+            path=directory,
+            expected="a working directory with results/",
+            remedy="Give it as argument.",
         )
     brains = [
         [folder.name, *(DONE if (folder / file).is_file() else NOT_YET for file in BRAIN_FILES.values())]
@@ -93,7 +96,12 @@ def _row(run: str, folder: Path) -> list[str]:
     surfaces = len(list(folder.glob("surfaces/week-*/pial.surf.gii")))
     measured = len(list(folder.glob("metrics/week-*/metrics.csv")))
     figures = len(list(folder.glob("figures/*.png")))
-    return [run, folder.name, _folding(folder), *(str(count) if count else NOT_YET for count in (surfaces, measured, figures))]
+    return [
+        run,
+        folder.name,
+        _folding(folder),
+        *(str(count) if count else NOT_YET for count in (surfaces, measured, figures)),
+    ]
 
 
 def _folding(folder: Path) -> str:

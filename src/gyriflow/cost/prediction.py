@@ -78,7 +78,7 @@ def predict(
     config: Config,
     measured: Mapping[str, Any],
     cores: int,
-    memory_of_run: Callable[[float, int, str, int], float] | None = None,
+    memory_of_run: Callable[[int, int, str, int], float] | None = None,
 ) -> Prediction:
     """Returns what jobs of a configuration are likely to take.
 
@@ -98,7 +98,10 @@ def predict(
     mesh, rules = measured["mesh"], measured["rules"]
     sizes = {brain.id: size_of(brain, config, mesh["nodes_factor"], mesh["tets_per_node"]) for brain in config.brains}
     usual = sizes[config.start_brains[0]]
-    seconds, spans, memories, disk = [], {}, [], 0.0
+    seconds: list[float] = []
+    spans: dict[str, float] = {}
+    memories: list[tuple[float, int]] = []
+    disk = 0.0
     for job in jobs:
         size = sizes.get(job.brain or "", usual)
         row = rules.get(rule_key(job.rule, config)) or rules.get(job.rule) or measured["other"]
@@ -107,7 +110,7 @@ def predict(
         memory = row["MiB"] + row["MiB_per_work"] * work_of(job, size, 1.0)
         if job.rule == "simulate" and memory_of_run is not None and job.run is not None:
             run = config.run(job.run)
-            memory = memory_of_run(size.tets, run.ranks, run.contact.kind, config.mesh.order)
+            memory = memory_of_run(round(size.tets), run.ranks, run.contact.kind, config.mesh.order)
         seconds.append(time)
         # what each stage takes at least, one after the other
         alone = time / min(job.threads, cores)
@@ -141,7 +144,7 @@ def _steps(config: Config, job: Job) -> float:
 
 
 def _disk_mib(job: Job, size: Size, config: Config, disk: Mapping[str, float]) -> float:
-    """Returns what a job leaves on the disk: a folding its frames, exactly as they are laid out; other jobs as measured."""
+    """Returns what a job leaves on the disk: a folding its frames as they are laid out, other jobs as measured."""
     if job.rule == "simulate" and job.run is not None and job.brain is not None:
         fields = config.run(job.run).fields
         of_elements = len(set(ELEMENT_FIELDS) & set(fields))

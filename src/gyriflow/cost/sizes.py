@@ -44,7 +44,10 @@ def size_of(brain: Brain, config: Config, nodes_factor: float, tets_per_node: fl
     if brain.shape is not None:
         extents = np.array(brain.shape.size_mm, dtype=float)
         extents = extents if len(extents) == 3 else np.full(3, 2 * extents[0])
-        area, volume = float(2 * (extents[0] * extents[1] + extents[1:].prod() + extents[0] * extents[2])), extents.prod()
+        area, volume = (
+            float(2 * (extents[0] * extents[1] + extents[1:].prod() + extents[0] * extents[2])),
+            extents.prod(),
+        )
     else:
         area = 100 * float(np.interp(brain.week, list(AREAS_CM2), list(AREAS_CM2.values())))
         volume = 1000 * float(np.interp(brain.week, list(VOLUMES_ML), list(VOLUMES_ML.values())))

@@ -106,7 +106,9 @@ class RunDisplay:
         steps = f"{self.total} step{'s' if self.total != 1 else ''}"
         self.line(f"gyriflow: {steps} to do" + (f"; all details: {self.details}" if self.details else ""))
 
-    def job_begins(self, number: int, rule: str, wildcards: Mapping[str, str], outputs: Sequence[str], log: str | None):
+    def job_begins(
+        self, number: int, rule: str, wildcards: Mapping[str, str], outputs: Sequence[str], log: str | None
+    ) -> None:
         """Takes note of a job, and names its stage and subject when they are new."""
         if rule not in self.stage_of or not outputs:
             return
@@ -168,8 +170,8 @@ class RunDisplay:
         if self.failed:
             count = len(self.failed)
             self.line(
-                f"gyriflow: {count} step{'s' if count > 1 else ''} failed after {took}, {self.total - self.done} are not "
-                "done; once the cause is mended, the same command goes on from here"
+                f"gyriflow: {count} step{'s' if count > 1 else ''} failed after {took}, {self.total - self.done} are "
+                "not done; once the cause is mended, the same command goes on from here"
             )
         elif self.up_to_date:
             self.line("gyriflow: everything is up to date" + _place(USUAL_REPORT))

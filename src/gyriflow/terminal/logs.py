@@ -32,10 +32,8 @@ def warnings_in(text: str) -> list[str]:
 
 def last_step(text: str) -> FoldingStep | None:
     """Returns the last step of a folding in a piece of its log, or None where there is none."""
-    found = None
-    for found in STEP.finditer(text):
-        pass
-    return None if found is None else FoldingStep(float(found["week"]), float(found["end"]), found["left"])
+    steps = list(STEP.finditer(text))
+    return FoldingStep(float(steps[-1]["week"]), float(steps[-1]["end"]), steps[-1]["left"]) if steps else None
 
 
 def cause(text: str) -> str:

@@ -44,9 +44,7 @@ class Pace:
         cores
             How many jobs run side by side.
         """
-        on_their_way = [
-            max(self.expected(rule) - since, 0.0) if own is None else own for rule, since, own in running
-        ]
+        on_their_way = [max(self.expected(rule) - since, 0.0) if own is None else own for rule, since, own in running]
         total = sum(on_their_way) + sum(count * self.expected(rule) for rule, count in waiting.items())
         return max(total / max(cores, 1), max(on_their_way, default=0.0))
 
