@@ -28,7 +28,7 @@ ARROWS = {
     **dict.fromkeys(("io", "phantom", "surface", "mesh", "registration", "growth", "metrics"), PLAIN),
     **dict.fromkeys(("validation", "report"), PLAIN),
     # the shell around the rooms: how a workflow starts, how a step ends, which code it depends on
-    "provenance": set(),
+    "provenance": {"version"},
     "shipped": set(),
     "version": {"shipped"},
     "step": {"errors"},

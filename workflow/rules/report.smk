@@ -3,6 +3,8 @@
 BENCHMARKS = {
     job.name: job.benchmark.regex().pattern for job in workflow.rules if job.benchmark
 }
+# the brains of the atlas are among the brains by now
+USED_CONFIG = CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"})
 
 
 rule study_resources:
@@ -34,6 +36,31 @@ rule study_resources:
         "../scripts/study_resources.py"
 
 
+rule provenance:
+    input:
+        rules.figures.input,
+        rules.metrics.input,
+    output:
+        study=f"{STUDY}/provenance.json",
+        brains=expand(f"{BRAIN}/provenance.json", brain=BRAINS),
+        runs=of_runs(f"{RUN}/provenance.json"),
+    log:
+        f"{STUDY}/logs/provenance.log",
+    benchmark:
+        f"{STUDY}/benchmarks/provenance.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        config=USED_CONFIG,
+        brains=[
+            brain.model_dump(mode="json", exclude_defaults=True)
+            for brain in CONFIG.brains
+        ],
+        folded=FOLDED,
+    script:
+        "../scripts/provenance.py"
+
+
 rule html_report:
     input:
         rules.figures.input,
@@ -52,8 +79,7 @@ rule html_report:
         runtime=20,
     params:
         snakefile=f"{workflow.basedir}/Snakefile",
-        # the brains of the atlas are among the brains by now
-        config=CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}),
+        config=USED_CONFIG,
     script:
         "../scripts/html_report.py"
 
@@ -61,3 +87,4 @@ rule html_report:
 rule report:
     input:
         rules.html_report.output,
+        rules.provenance.output,

@@ -152,7 +152,7 @@ def _settings(first: Path, second: Path) -> Iterator[str]:
             continue
         for key in sorted(contents[0].keys() | contents[1].keys()):
             values = [content.get(key, "default" if file == CONFIGURATION else "none") for content in contents]
-            if values[0] != values[1] and not key.startswith(("made", "results")):
+            if values[0] != values[1] and not key.startswith(("recorded", "results")):
                 yield f"{key}: {values[0]} and {values[1]}"
 
 
