@@ -9,7 +9,7 @@ measured. Writes `src/gyriflow/cost/measured.json`, which the terminal and `gyri
 import argparse
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -93,13 +93,20 @@ def read_study(folder: Path) -> Study:
     return Study(folder, config, jobs.dropna(subset=["busy_s"]), sizes)
 
 
-def line(work: pd.Series, taken: pd.Series) -> tuple[float, float]:
+def line(work: pd.Series, taken: pd.Series, proportional: bool = False) -> tuple[float, float]:
     """Returns constant and slope, neither below 0, with the least sum of squared relative errors."""
     taken = np.maximum(taken.to_numpy(dtype=float), 0.1)
+    if proportional:
+        return 0.0, float(np.median(taken / work))
     matrix = np.column_stack([np.ones(len(work)), work]) / taken[:, None]
     scale = np.maximum(np.abs(matrix).max(axis=0), 1e-30)
     solution, _ = nnls(matrix / scale, np.ones(len(work)))
     return tuple(float(value) for value in solution / scale)
+
+
+def only_foldings(study: Study) -> Study:
+    """Returns a study without its other jobs."""
+    return replace(study, jobs=study.jobs[study.jobs["rule"] == "simulate"])
 
 
 def bytes_of(folder: Path, *patterns: str) -> int:
@@ -111,7 +118,9 @@ def fit(studies: list[Study]) -> dict:
     jobs = pd.concat([study.jobs for study in studies], ignore_index=True)
     rules = {}
     for key, rows in jobs.groupby("key"):
-        seconds = line(rows["work"], rows["busy_s"])
+        # those that grow most, and of which few were measured, grow in proportion
+        proportional = rows["rule"].iloc[0] in ("simulate", "tetrahedralise")
+        seconds = line(rows["work"], rows["busy_s"], proportional)
         known = rows.dropna(subset=["MiB"])
         memory = line(known["size"], known["MiB"]) if len(known) else (0.0, 0.0)
         typical = float(rows["busy_s"].median())
@@ -119,7 +128,8 @@ def fit(studies: list[Study]) -> dict:
             "rule": rows["rule"].iloc[0], "jobs": len(rows), "typical_s": typical,
             "s": seconds[0], "s_per_work": seconds[1], "MiB": memory[0], "MiB_per_work": memory[1],
         }  # fmt: skip
-    factors, per_node = [], []
+    factors: dict[str, list[float]] = {}
+    per_node = []
     for study in studies:
         for brain, size in study.sizes.items():
             if not size.nodes:
@@ -127,7 +137,8 @@ def fit(studies: list[Study]) -> dict:
             folder, mesh = study.folder / "results/brains" / brain, study.config.mesh
             quality = read_json(folder / "mesh/quality.json")
             edge = quality["pial_edge_mm"] if mesh.pial_faces else mesh.surface_edge_mm
-            factors.append(size.nodes / cubes(quality["pial_area_mm2"], quality["volume_mm3"], mesh, edge))
+            wanted = cubes(quality["pial_area_mm2"], quality["volume_mm3"], mesh, edge)
+            factors.setdefault(mesh.mesher, []).append(size.nodes / wanted)
             per_node.append(size.tets * (8 if mesh.order == 2 else 1) / size.nodes)
     faces = sum(
         len(list((study.folder / f"results/brains/{brain}").glob("surface/pial.surf.gii"))) * size.faces
@@ -145,7 +156,10 @@ def fit(studies: list[Study]) -> dict:
     ) - on_surfaces - in_meshes  # fmt: skip
     nodes = sum(size.nodes for study in studies for size in study.sizes.values())
     return {
-        "mesh": {"nodes_factor": float(np.median(factors)), "tets_per_node": float(np.median(per_node))},
+        "mesh": {
+            "nodes_factor": {mesher: float(np.median(found)) for mesher, found in factors.items()},
+            "tets_per_node": float(np.median(per_node)),
+        },
         "disk": {
             "MiB_per_face": on_surfaces / MIB / (2 * faces),  # a folded or measured surface has two such jobs
             "MiB_per_node": in_meshes / MIB / nodes,
@@ -174,14 +188,19 @@ def compare(study: Study, coefficients: dict) -> dict[str, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("studies", nargs="+", type=Path, help="working directories of finished studies")
+    parser.add_argument(
+        "--loaded", nargs="+", type=Path, default=[],
+        help="studies made beside much other load: only their foldings count, whose CPU time the solver measures itself",
+    )  # fmt: skip
     arguments = parser.parse_args()
     studies = [read_study(folder) for folder in arguments.studies]
+    loaded = [only_foldings(read_study(folder)) for folder in arguments.loaded]
     errors = {
-        str(study.folder): compare(study, fit([other for other in studies if other is not study]))
+        str(study.folder): compare(study, fit([other for other in [*studies, *loaded] if other is not study]))
         for study in studies
     }  # fmt: skip
-    coefficients = fit(studies)
-    coefficients["studies"] = len(studies)
+    coefficients = fit([*studies, *loaded])
+    coefficients["studies"] = len(studies) + len(loaded)
     coefficients["error"] = {
         kind: max(max(error[kind], 1 / error[kind]) for error in errors.values()) for kind in ("time", "memory", "disk")
     }

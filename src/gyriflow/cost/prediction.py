@@ -96,7 +96,9 @@ def predict(
         Memory in MiB of a folding with a number of elements and of ranks, a kind of contact, and elements of an order.
     """
     mesh, rules = measured["mesh"], measured["rules"]
-    sizes = {brain.id: size_of(brain, config, mesh["nodes_factor"], mesh["tets_per_node"]) for brain in config.brains}
+    factors = mesh["nodes_factor"]
+    factor = factors.get(config.mesh.mesher, max(factors.values()))
+    sizes = {brain.id: size_of(brain, config, factor, mesh["tets_per_node"]) for brain in config.brains}
     usual = sizes[config.start_brains[0]]
     seconds: list[float] = []
     spans: dict[str, float] = {}
