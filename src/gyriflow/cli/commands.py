@@ -137,11 +137,12 @@ def run(
 
     named = bool(further) and further[0].endswith(CONFIG_SUFFIXES)
     chosen = _chosen(Path(further[0]) if named else None, directory)
-    arguments = [*stages, "--cores", str(cores), "--directory", str(directory)]
-    arguments += ["--configfile", str(chosen.resolve())] if chosen else []
+    arguments = ["--configfile", str(chosen.resolve())] if chosen else []
     arguments += ["--dry-run"] if dry_run else []
     arguments += ["--verbose"] if verbose else []
-    sys.exit(launch([*arguments, *further[int(named) :]]))
+    # an option of one value stands before the targets
+    arguments += ["--cores", str(cores), "--directory", str(directory), *stages, *further[int(named) :]]
+    sys.exit(launch(arguments))
 
 
 @main.command()

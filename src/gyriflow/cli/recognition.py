@@ -26,7 +26,7 @@ SIDE = {
 }
 OF_SURFACES = {
     "pial": re.compile(r"pial|outer", re.IGNORECASE),
-    "white": re.compile(r"white|[._-]wm[._-]|inner", re.IGNORECASE),
+    "white": re.compile(r"white|(?<=[._-])wm(?=[._-])|inner", re.IGNORECASE),
 }
 OTHER_SURFACES = re.compile(r"sphere|midthickness|inflated|medial|\.(?:shape|func|label)\.gii$", re.IGNORECASE)
 WEEK = re.compile(
