@@ -12,6 +12,8 @@ ENVIRONMENT = "../../envs/gyriflow.yaml"
 # scripts and programs find the package without its being installed, in conda environments of single rules too
 shell.prefix(
     f'set -euo pipefail; export PYTHONPATH="{SOURCE}${{{{PYTHONPATH:+:$PYTHONPATH}}}}"; '
+    if CHECKED_OUT
+    else "set -euo pipefail; "
 )
 
 

@@ -10,6 +10,10 @@ from gyriflow.report.style import run_names
 BENCHMARKS = {
     job.name: job.benchmark.regex().pattern for job in workflow.rules if job.benchmark
 }
+# the brains of the atlas are among the brains by now
+USED_CONFIG = WHOLE_CONFIG.model_dump(
+    mode="json", exclude_defaults=True, exclude={"atlas", "participants"}
+)
 
 
 rule study_resources:
@@ -205,15 +209,15 @@ rule view_surfaces:
         "../scripts/view_surfaces.py"
 
 
-rule provenance:
+rule report_provenance:
     input:
         rules.metrics.input,
     output:
         "results/report/provenance.json",
     log:
-        "results/report/logs/provenance.log",
+        "results/report/logs/report_provenance.log",
     benchmark:
-        "results/report/benchmarks/provenance.tsv"
+        "results/report/benchmarks/report_provenance.tsv"
     conda:
         ENVIRONMENT
     params:
@@ -221,7 +225,7 @@ rule provenance:
         paths=CONFIG.report.paths,
         source=workflow.basedir,
     script:
-        "../scripts/provenance.py"
+        "../scripts/report_provenance.py"
 
 
 rule html_report:
@@ -237,7 +241,7 @@ rule html_report:
             if any(brain in CARRIED for _, brain in VALIDATED)
             else []
         ),
-        provenance=rules.provenance.output[0],
+        provenance=rules.report_provenance.output[0],
         view=rules.view_surfaces.output[0],
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
@@ -265,16 +269,34 @@ rule html_report:
         brains=described_brains(),
         surfaced=BRAINS,
         metrics=described_settings(CONFIG.metrics),
-        # the brains of the atlas are among the brains by now
-        config=(lambda plain: plain if CONFIG.report.paths else hide_paths(plain))(
-            WHOLE_CONFIG.model_dump(
-                mode="json",
-                exclude_defaults=True,
-                exclude={"atlas", "participants"},
-            )
-        ),
+        config=USED_CONFIG if CONFIG.report.paths else hide_paths(USED_CONFIG),
     script:
         "../scripts/html_report.py"
+
+
+rule provenance:
+    input:
+        rules.figures.input,
+        rules.metrics.input,
+    output:
+        study=f"{STUDY}/provenance.json",
+        brains=expand(f"{BRAIN}/provenance.json", brain=BRAINS),
+        runs=of_runs(f"{RUN}/provenance.json"),
+    log:
+        f"{STUDY}/logs/provenance.log",
+    benchmark:
+        f"{STUDY}/benchmarks/provenance.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        config=USED_CONFIG,
+        brains=[
+            brain.model_dump(mode="json", exclude_defaults=True)
+            for brain in CONFIG.brains
+        ],
+        folded=FOLDED,
+    script:
+        "../scripts/provenance.py"
 
 
 # the configuration with its paths, for those who have the files
@@ -288,7 +310,7 @@ rule report_config:
     conda:
         ENVIRONMENT
     params:
-        config=CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}),
+        config=USED_CONFIG,
     script:
         "../scripts/report_config.py"
 
@@ -297,3 +319,4 @@ rule report:
     input:
         rules.html_report.output,
         rules.report_config.output,
+        rules.provenance.output,
