@@ -47,9 +47,7 @@ rule parameters:
             else None
         ),
         regional_weeks=lambda wildcards: (
-            [CONFIG.brain(brain).week for brain in later_brains(wildcards.brain)]
-            if regional(wildcards.run)
-            else []
+            weeks_of_chain(wildcards.brain) if regional(wildcards.run) else []
         ),
     script:
         "../scripts/parameters.py"

@@ -53,6 +53,15 @@ rule growth_curves:
         ENVIRONMENT
     params:
         may_shrink=CONFIG.folding.allow_negative_growth,
+        # predictions know the brains up to some week only
+        known_until_gw=sorted(
+            {
+                CONFIG.run(run).follow.known_until_gw
+                for run in CONFIG.runs
+                if CONFIG.run(run).follow is not None
+                and CONFIG.run(run).follow.known_until_gw is not None
+            }
+        ),
     script:
         "../scripts/growth_curves.py"
 

@@ -23,21 +23,87 @@ def week_before(brain, week):
 VALIDATED = [pair for pair in FOLDED if compared_with(*pair)]
 
 
+# what all runs from a start brain are compared with in a week: surfaces that are ready, with their curvature
+READY = {
+    f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/week-{{week}}/{name}{ending}.gii"
+    for name in ("real", "start", "adjacent")
+    for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
+}
+COMPARED_IN = {
+    (brain, week): real
+    for run, brain in VALIDATED
+    for week, real in compared_with(run, brain).items()
+}
+
+
+def of_compared_weeks(pattern):
+    """Returns an input function: the files of a pattern for every week that a run is compared in."""
+    return lambda wildcards: [
+        pattern.format(run=wildcards.run, brain=wildcards.brain, week=week)
+        for week in compared_with(wildcards.run, wildcards.brain)
+    ]
+
+
+def kinds(run, brain):
+    """Returns by compared week whether growth taken from the brains of that week explains it, or the run predicts it."""
+    follow = CONFIG.run(run).follow
+    measured = follow is not None and (
+        follow.regional > 0 or "measured" in (follow.area_cm2, follow.volume_ml)
+    )
+    explains = measured or "estimated" in CONFIG.parameters(run).values()
+    until = None if follow is None else follow.known_until_gw
+    return {
+        float(week): (
+            "explained"
+            if explains and (until is None or float(week) <= until)
+            else "predicted"
+        )
+        for week in compared_with(run, brain)
+    }
+
+
+def seed_of(run):
+    """Returns the seed of the randomness in a run's growth, 0 where there is none."""
+    follow = CONFIG.run(run).follow
+    return 0 if follow is None else follow.seed
+
+
+rule ready_surfaces:
+    input:
+        real=lambda wildcards: PIAL["whole"].format(
+            brain=COMPARED_IN[wildcards.brain, wildcards.week]
+        ),
+        adjacent=lambda wildcards: PIAL["whole"].format(
+            brain=week_before(wildcards.brain, wildcards.week)
+        ),
+        start=PIAL["whole"],
+    output:
+        **READY,
+    log:
+        f"{STUDY}/validation/logs/{{brain}}.week-{{week}}.log",
+    benchmark:
+        f"{STUDY}/validation/benchmarks/{{brain}}.week-{{week}}.tsv"
+    wildcard_constraints:
+        brain=one_of({brain for brain, _ in COMPARED_IN}),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+    script:
+        "../scripts/ready_surfaces.py"
+
+
 rule validation:
     input:
-        simulated=lambda wildcards: [
-            f"{RUN}/surfaces/week-{week}/pial.surf.gii"
-            for week in compared_with(wildcards.run, wildcards.brain)
-        ],
-        real=lambda wildcards: [
+        **{name: of_compared_weeks(pattern) for name, pattern in READY.items()},
+        simulated=of_compared_weeks(f"{RUN}/surfaces/week-{{week}}/pial.surf.gii"),
+        whole=lambda wildcards: [
             PIAL["whole"].format(brain=brain)
             for brain in compared_with(wildcards.run, wildcards.brain).values()
         ],
-        adjacent=lambda wildcards: [
-            PIAL["whole"].format(brain=week_before(wildcards.brain, week))
-            for week in compared_with(wildcards.run, wildcards.brain)
-        ],
-        start=PIAL["whole"],
         params=rules.parameters.output[0],
         # what the errors of runs that follow no curve are errors against
         curves=lambda wildcards: (
@@ -57,17 +123,10 @@ rule validation:
         mem_mb=4000,
         runtime=60,
     params:
-        weeks=lambda wildcards: [
-            float(week) for week in compared_with(wildcards.run, wildcards.brain)
-        ],
         start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
         series=lambda wildcards: CONFIG.estimated_from(wildcards.brain),
-        # growth taken from the brains that are compared explains them; it predicts nothing
-        kind=lambda wildcards: (
-            "explained"
-            if curves_of_run(wildcards) or rates_of_run(wildcards)
-            else "predicted"
-        ),
+        kinds=lambda wildcards: kinds(wildcards.run, wildcards.brain),
+        seed=lambda wildcards: seed_of(wildcards.run),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/validation.py"
@@ -91,7 +150,7 @@ rule displacement_agreement:
         labels=lambda wildcards: {
             "run": wildcards.run,
             "start_week": CONFIG.brain(wildcards.brain).week,
-            "seed": 0,
+            "seed": seed_of(wildcards.run),
         },
     script:
         "../scripts/displacement_agreement.py"

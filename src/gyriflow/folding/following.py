@@ -131,10 +131,13 @@ def following_step(
         poisson_ratio=p.poisson_ratio,
         bounds=(-FASTEST_PER_S if p.allow_negative_growth else 0.0, FASTEST_PER_S),
     )
-    regional = map_at(p.regional_growth, end_week)
-    values = {"growth_rate_per_s": rates.tangential, "core_growth_rate_per_s": rates.core}
-    if regional is not None:
-        values = {name: Varying(weeks={end_week: rate}, map=regional) for name, rate in values.items()}  # type: ignore[misc]
+    values: dict[str, Any] = {}
+    for name, rate, maps_by_week in (
+        ("growth_rate_per_s", rates.tangential, p.regional_growth_of_cortex or p.regional_growth),
+        ("core_growth_rate_per_s", rates.core, p.regional_growth),
+    ):
+        regional = map_at(maps_by_week, end_week)
+        values[name] = rate if regional is None else Varying(weeks={end_week: rate}, map=regional)
     return Step(p.model_copy(update=values), before, aim, rates, realised)
 
 

@@ -129,6 +129,33 @@ class Follow(Settings):
     smoothing_mm: float = setting(
         6.0, "mm", "Standard deviation of the Gaussian that smooths measured local growth.", ge=1, le=50
     )
+    smoothing_gw: float = setting(
+        0.0, "GW",
+        "Standard deviation of the Gaussian over the weeks that smooths measured local growth: brains of successive "
+        "weeks are other fetuses.",
+        ge=0, le=20,
+    )  # fmt: skip
+    cortex: Literal["volume", "area"] = setting(
+        "volume", "",
+        "What the cortex's regional growth is that of: `volume` of the tissue, like the core's, or `area` of the pial "
+        "surface.",
+    )  # fmt: skip
+    known_until_gw: Week | None = setting(
+        None, "GW",
+        "Only brains up to this week give curves and maps, earlier ones than the start's among them, and what comes "
+        "after is extrapolated: a prediction. `null`: all brains.",
+    )  # fmt: skip
+    rotated: bool = setting(
+        False, "", "Whether the maps are rotated over the brain at random, which keeps their smoothness: a null model."
+    )
+    noise: float = setting(
+        0.0,
+        "",
+        "Standard deviation of random differences of growth, as a part of the mean, vertex by vertex.",
+        ge=0,
+        le=1,
+    )
+    seed: int = setting(0, "", "Of the rotation and of the noise.", ge=0)
 
 
 class FoldingSettings(Settings):
@@ -241,12 +268,15 @@ class FoldingParameters(FoldingSettings):
     regional_growth: dict[Week, str] = setting(
         {}, "GW", "With `follow.regional`: by the week from which each holds, the names of maps of relative growth."
     )
+    regional_growth_of_cortex: dict[Week, str] = setting(
+        {}, "GW", "The same of the cortex, where it differs from that of the core."
+    )
 
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
         own = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
-        return own | set(self.regional_growth.values())
+        return own | set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""

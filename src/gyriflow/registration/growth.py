@@ -11,38 +11,42 @@ from ..geometry.motion import without_rigid_motion
 from ..geometry.triangles import Floats
 
 
-def local_growth(positions: Floats, cells: NDArray[np.integer], weeks: Sequence[float], sigma_mm: float) -> Floats:
+def local_growth(
+    positions: Floats, cells: NDArray[np.integer], weeks: Sequence[float], sigma_mm: float, *, own: int = 0
+) -> Floats:
     """Returns the (w − 1, n) local log growth per week: of area for triangles, of volume for tetrahedra.
 
-    The size that belongs to a vertex, as a multiple of that in the first week, is smoothed in both weeks by diffusion
-    along the mesh, and the logarithm of the ratio divided by the time between. Smoothed so, the whole grows as measured
-    whatever the length, and single inverted elements do no harm. A growth of volume is that of the map's gradient,
-    ln det ∇; one of the pial triangles is tangential.
+    The size that belongs to a vertex, as a multiple of that in the mesh's own week, is smoothed in both weeks by
+    diffusion along the mesh, and the logarithm of the ratio divided by the time between. Smoothed so, the whole grows
+    as measured whatever the length, and single inverted elements do no harm. A growth of volume is that of the map's
+    gradient, ln det ∇; one of the pial triangles is tangential.
 
     Parameters
     ----------
     positions
         (w, n, 3) positions in mm of the same vertices in all weeks: vertex-matched surfaces, or a mesh carried along.
     cells
-        (m, 3) triangles or (m, 4) tetrahedra, sound in the first week.
+        (m, 3) triangles or (m, 4) tetrahedra, sound in their own week.
     weeks
         Gestational weeks, ascending.
     sigma_mm
         Standard deviation of the Gaussian in mm of each interval's first week (2.355 times less than its full width at
-        half maximum): lengths of the first week are scaled with the whole to that week's.
+        half maximum): lengths of the mesh's own week are scaled with the whole to that week's.
+    own
+        Index of the week that the mesh was made in; the others it was carried to.
 
     InputError where weeks do not ascend, or a vertex's share vanishes or is inverted after smoothing.
     """
     _require_ascending(positions, weeks)
-    start = vertex_sizes(positions[0], cells)
+    start = vertex_sizes(positions[own], cells)
     used = start > 0
     dimension = cells.shape[1] - 1
     sizes = np.stack([vertex_sizes(position, cells) for position in positions])
     relative = np.where(used, sizes, 1.0) / np.where(used, start, 1.0)
     rates = []
     for first, second, duration in zip(range(len(weeks) - 1), range(1, len(weeks)), np.diff(weeks), strict=True):
-        scale = (sizes[first].sum() / sizes[0].sum()) ** (1 / dimension)
-        smooth = diffuse(positions[0], cells, relative[[first, second]].T, sigma_mm / scale)
+        scale = (sizes[first].sum() / sizes[own].sum()) ** (1 / dimension)
+        smooth = diffuse(positions[own], cells, relative[[first, second]].T, sigma_mm / scale)
         bad = np.asarray(smooth.min(axis=1) <= 0)
         if bad.any():
             raise InputError(

@@ -6,7 +6,8 @@ import pytest
 
 from gyriflow.errors import InputError
 from gyriflow.growth.curves import curve_table
-from gyriflow.growth.following import fits_of_series, followed_sizes, regional_map, relative_growth
+from gyriflow.growth.following import fits_of_series, followed_sizes
+from gyriflow.growth.regional import regional_map, relative_growth
 
 WEEKS = np.arange(21.0, 26.0)
 AREAS = pd.DataFrame(
@@ -16,11 +17,11 @@ AREAS = pd.DataFrame(
 
 def curves():
     (fits,) = fits_of_series(AREAS).values()
-    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume")
+    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=np.nan)
 
 
 def test_measured_sizes_are_followed_every_quarter_of_a_week():
-    follow = {"area_cm2": "measured", "volume_ml": {21: 40.0, 25: 80.0}}
+    follow = {"area_cm2": "measured", "volume_ml": {21: 40.0, 25: 80.0}, "known_until_gw": None}
     sizes = followed_sizes(follow, curves(), "volume", [21.0, 22.0, 23.0], False)
     assert list(sizes["area_cm2"])[:3] == [21.0, 21.25, 21.5]
     assert max(sizes["area_cm2"]) >= 23.0
@@ -29,14 +30,14 @@ def test_measured_sizes_are_followed_every_quarter_of_a_week():
 
 
 def test_a_brain_without_a_series_has_no_measured_curve():
-    follow = {"area_cm2": "measured", "volume_ml": "measured"}
+    follow = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": None}
     for table, series in ((None, None), (curves(), "surface")):
         with pytest.raises(InputError, match="no measured curve of area_cm2"):
             followed_sizes(follow, table, series, [21.0, 22.0], False)
 
 
 def test_a_given_table_shrinks_only_where_that_is_allowed():
-    follow = {"area_cm2": {21: 90.0, 25: 80.0}, "volume_ml": {21: 40.0, 25: 80.0}}
+    follow = {"area_cm2": {21: 90.0, 25: 80.0}, "volume_ml": {21: 40.0, 25: 80.0}, "known_until_gw": None}
     with pytest.raises(InputError, match="area_cm2 shrinks"):
         followed_sizes(follow, None, None, [21.0, 22.0], False)
     assert followed_sizes(follow, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
