@@ -16,7 +16,11 @@ def rates_of_run(wildcards):
 def curves_of_run(wildcards):
     """Returns the table of the measured curves where the run follows one of them."""
     follow = CONFIG.run(wildcards.run).follow
-    measured = follow is not None and "measured" in (follow.area_cm2, follow.volume_ml)
+    measured = follow is not None and "measured" in (
+        follow.area_cm2,
+        follow.volume_ml,
+        follow.thickness_mm,
+    )
     return rules.growth_curves.output.curves if measured else []
 
 

@@ -132,6 +132,58 @@ rule validation:
         "../scripts/validation.py"
 
 
+def carried_weeks(brain):
+    """Returns the compared weeks, as in file names, of the real brains that a start brain's mesh is carried to."""
+    later = [CONFIG.brain(name) for name in later_brains(brain)[1:]]
+    return (
+        {week_tag(other.week): other.id for other in later} if brain in CARRIED else {}
+    )
+
+
+rule registration_ceiling:
+    input:
+        **{
+            name: lambda wildcards, pattern=pattern: [
+                pattern.format(brain=wildcards.brain, week=week)
+                for week in carried_weeks(wildcards.brain)
+                if (wildcards.brain, week) in COMPARED_IN
+            ]
+            for name, pattern in READY.items()
+        },
+        whole=lambda wildcards: [
+            PIAL["whole"].format(brain=COMPARED_IN[wildcards.brain, week])
+            for week in carried_weeks(wildcards.brain)
+            if (wildcards.brain, week) in COMPARED_IN
+        ],
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        report=PIAL["report"],
+        carried=rules.carried_mesh.output[0],
+    output:
+        f"{STUDY}/validation/{{brain}}/registration.csv",
+    log:
+        f"{STUDY}/validation/logs/{{brain}}.registration.log",
+    benchmark:
+        f"{STUDY}/validation/benchmarks/{{brain}}.registration.tsv"
+    wildcard_constraints:
+        brain=one_of(CARRIED),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+        weeks=lambda wildcards: [
+            float(week)
+            for week in carried_weeks(wildcards.brain)
+            if (wildcards.brain, week) in COMPARED_IN
+        ],
+        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+    script:
+        "../scripts/registration_ceiling.py"
+
+
 rule displacement_agreement:
     input:
         frames=rules.simulate.output.frames,
@@ -193,9 +245,119 @@ rule displacement_agreement_table:
         "../scripts/join_tables.py"
 
 
+rule registration_ceiling_table:
+    input:
+        [
+            f"{STUDY}/validation/{brain}/registration.csv"
+            for brain in CARRIED
+            if any(start == brain for start, _ in COMPARED_IN)
+        ],
+    output:
+        f"{STUDY}/registration_ceiling.csv",
+    log:
+        f"{STUDY}/logs/registration_ceiling_table.log",
+    benchmark:
+        f"{STUDY}/benchmarks/registration_ceiling_table.tsv"
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/join_tables.py"
+
+
+def smoothing_lengths():
+    """Returns the runs that differ in nothing but the smoothing of measured growth, and their lengths in mm.
+
+    They are those like the first run with regional growth; one that is like it but uniform has an infinite length.
+    """
+    like, found = None, {}
+    for run in CONFIG.runs:
+        settings = CONFIG.run(run).model_dump(exclude={"preset"})
+        follow = settings["follow"]
+        if follow is None:
+            continue
+        length = follow.pop("smoothing_mm") if follow["regional"] > 0 else float("inf")
+        amount = follow.pop("regional")
+        if like is None and amount > 0:
+            like = settings | {"regional": amount}
+        if (
+            like is not None
+            and settings | {"regional": amount or like["regional"]} == like
+        ):
+            found[run] = length
+    return found
+
+
+SMOOTHING = {
+    run: length
+    for run, length in smoothing_lengths().items()
+    if any(run == validated for validated, _ in VALIDATED)
+}
+CEILING = (
+    rules.registration_ceiling_table.output
+    if any(start in CARRIED for start, _ in COMPARED_IN)
+    else []
+)
+
+
+rule validation_figure:
+    input:
+        validation=rules.validation_table.output[0],
+        ceiling=CEILING,
+    output:
+        **figure(
+            f"{STUDY}/figures/validation",
+            "gain over no folding, by week",
+            "figure.rst",
+            "Validation",
+        ),
+    log:
+        f"{STUDY}/logs/validation_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/validation_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        smoothing_mm=None,
+        dpi=CONFIG.report.dpi,
+        caption=(
+            "Correlation of curvature with that of the real brain, less that of the start brain merely scaled up: "
+            "above 0 folding is worth more than none. Bars are 95 % intervals of a bootstrap over patches of the "
+            "surface; full marks explain a week whose own brains gave the growth, open ones predict it."
+        ),
+    script:
+        "../scripts/validation_figure.py"
+
+
+use rule validation_figure as smoothing_figure with:
+    output:
+        **figure(
+            f"{STUDY}/figures/smoothing",
+            "skill by the smoothing of measured growth",
+            "figure.rst",
+            "Validation",
+        ),
+    log:
+        f"{STUDY}/logs/smoothing_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/smoothing_figure.tsv"
+    params:
+        smoothing_mm=SMOOTHING,
+        dpi=CONFIG.report.dpi,
+        caption=(
+            "How local growth must be known: skill of runs that differ in the smoothing of measured growth alone. "
+            "1 is as good as the real brain of the week before, 0 as no folding."
+        ),
+
+
 rule validate:
     input:
-        rules.validation_table.output if VALIDATED else [],
+        (
+            [rules.validation_table.output, rules.validation_figure.output]
+            if VALIDATED
+            else []
+        ),
+        rules.smoothing_figure.output if len(set(SMOOTHING.values())) > 2 else [],
+        CEILING,
         (
             rules.displacement_agreement_table.output
             if any(brain in CARRIED for _, brain in VALIDATED)

@@ -1,6 +1,6 @@
 """The validated parameters of a run, which its folding reads and which stay with its results."""
 
-from gyriflow.growth.following import followed_sizes
+from gyriflow.growth.following import THICKNESS, followed_sizes
 from gyriflow.growth.rates import FOLDING_RATES, rate_curve
 from gyriflow.growth.regional import CORTEX, known_weeks, regional_map
 from gyriflow.io.files import read_json, read_table
@@ -21,6 +21,8 @@ with step(snakemake.log[0]):
         shrink = settings["allow_negative_growth"]
         sizes = followed_sizes(settings["follow"], curves, snakemake.params.estimated_from, weeks, shrink)
         settings["follow"] = settings["follow"] | sizes
+        if THICKNESS in sizes:
+            settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}
         if snakemake.params.regional_weeks:
             known = known_weeks(snakemake.params.regional_weeks, settings["follow"]["known_until_gw"])
             settings["regional_growth"] = {week: regional_map(week) for week in known}

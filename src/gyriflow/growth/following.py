@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 
 QUANTITIES = ("area_cm2", "volume_ml")
 """Sizes that growth follows, as columns of the table of areas."""
+THICKNESS = "thickness_mm"
+"""Column of that table with the mean cortical thickness, where it is known."""
 SPACING_GW = 0.25
 """Of the weeks that a run knows a curve at."""
 
@@ -26,26 +28,30 @@ def fits_of_series(
     Parameters
     ----------
     areas
-        Columns series, week, area_cm2, volume_ml; series of two weeks or more.
+        Columns series, week, area_cm2, volume_ml, thickness_mm; series of two weeks or more. Where brains of less than
+        two weeks have a thickness, no curve of it is fitted; thickness may shrink.
     until
         The last week whose brains count; series that then have less than two weeks are left out. None for all.
     """
     if until is not None:
         areas = areas[areas["week"] <= until]
         areas = areas[areas.groupby("series")["week"].transform("nunique") > 1]
-    return {
-        str(name): {
-            quantity: fitted(brains["week"].tolist(), brains[quantity].tolist(), name=quantity, may_shrink=may_shrink)
-            for quantity in QUANTITIES
-        }
-        for name, brains in areas.groupby("series", sort=False)
-    }
+    fits: dict[str, dict[str, Fit]] = {}
+    for name, brains in areas.groupby("series", sort=False):
+        fits[str(name)] = {}
+        for quantity in (*QUANTITIES, THICKNESS):
+            known = brains.dropna(subset=quantity)
+            if quantity in QUANTITIES or len(known["week"].unique()) > 1:
+                shrink = may_shrink or quantity == THICKNESS
+                curve = fitted(known["week"].tolist(), known[quantity].tolist(), name=quantity, may_shrink=shrink)
+                fits[str(name)][quantity] = curve
+    return fits
 
 
 def followed_sizes(
     follow: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float], shrink: bool
 ) -> dict[str, dict[float, float]]:
-    """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week.
+    """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week; thickness if given.
 
     Parameters
     ----------
@@ -65,13 +71,15 @@ def followed_sizes(
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in QUANTITIES:
+    for quantity in (*QUANTITIES, *([THICKNESS] if follow[THICKNESS] is not None else [])):
         given = follow[quantity]
         if given == "measured":
             curve = _measured(curves, series, quantity, follow["known_until_gw"])
         else:
             known = {float(week): number for week, number in given.items()}
-            curve = tabulated(list(known), list(known.values()), name=quantity, may_shrink=shrink)
+            curve = tabulated(
+                list(known), list(known.values()), name=quantity, may_shrink=shrink or quantity == THICKNESS
+            )
         sizes = value(curve, at)
         tables[quantity] = {round(float(week), 6): float(size) for week, size in zip(at, sizes, strict=True)}
     return tables

@@ -120,6 +120,11 @@ class Follow(Settings):
     volume_ml: SizeCurve = setting(
         "measured", "mL", "Volume inside the pial surface by gestational week, or `measured`; likewise."
     )
+    thickness_mm: SizeCurve | None = setting(
+        None, "mm",
+        "Cortical thickness by gestational week, or `measured`, a curve through the mean thickness of these brains; "
+        "`null`: the run's `thickness_mm`.",
+    )  # fmt: skip
     regional: float = setting(
         0.0, "",
         "How much of the measured differences between regions growth has: 0 none, 1 all; they come from registering "
