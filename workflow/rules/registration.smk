@@ -122,6 +122,11 @@ rule carried_mesh:
         runtime=30,
     params:
         weeks=lambda wildcards: weeks_of_chain(wildcards.brain),
+        strain=lambda wildcards: any(
+            regional(run) and CONFIG.run(run).follow.directional > 0
+            for run, brain in FOLDED
+            if brain == wildcards.brain
+        ),
         # the smoothing lengths that runs from this brain ask for
         smoothing_mm=lambda wildcards: sorted(
             {

@@ -8,7 +8,7 @@ from gyriflow.io.files import read_json
 from gyriflow.io.registrations import CarriedMesh, read_deformation, write_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.registration.carrying import carry_both_ways
-from gyriflow.registration.growth import local_growth
+from gyriflow.registration.growth import local_growth, local_strain
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
@@ -27,4 +27,9 @@ with step(snakemake.log[0]):
         }
         for length in params.smoothing_mm
     }
+    if params.strain:
+        # directions are those of the mesh's pose
+        turned = positions @ pose[:3, :3].T
+        for length, kinds in growth.items():
+            kinds["strain"] = local_strain(turned, cells["volume"], params.weeks, length, own=len(maps[0]))
     write_carried_mesh(snakemake.output[0], CarriedMesh(np.array(params.weeks), positions, growth))

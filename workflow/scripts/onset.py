@@ -18,8 +18,8 @@ files, params, tables = snakemake.input, snakemake.params, []
 
 def carried(mesh, index):
     """Returns the vertices of a surface in the pose of the brain of an index, carried to the last brain's."""
-    points = transform_points(mesh.vertices, np.linalg.inv(poses[index]))
-    return transform_points(carry_over_weeks(points, deformations[index:])[-1], poses[-1])
+    places = carry_over_weeks(transform_points(mesh.vertices, np.linalg.inv(poses[index])), deformations[index:])
+    return transform_points(places[-1], poses[-1])
 
 
 with step(snakemake.log[0]):
@@ -28,14 +28,14 @@ with step(snakemake.log[0]):
     for side in SIDES:
         real, run = ([read_surface(path) for path in files[f"{who}_{side}"]] for who in ("real", "run"))
         last = sulcal_regions(real[-1], sulcal_depth(real[-1], convex_hull(real[-1])))
+        names = {number: f"{side} {number}" for number in range(1, last.max() + 1)}
         # the vertices of a run are the same in all weeks
         start = regions_on(run[0], carried(run[0], 0), real[-1], last)
         places = [regions_on(mesh, carried(mesh, index), real[-1], last) for index, mesh in enumerate(real)]
         brains = {"real": (params.real_weeks, real, places), params.run: (params.run_weeks, run, [start] * len(run))}
         for who, (weeks, meshes, regions) in brains.items():
             depths = [sulcal_depth(mesh, convex_hull(mesh)) for mesh in meshes]
-            names = {number: f"{side} {number}" for number in range(1, last.max() + 1)}
             found = map(relief, meshes, depths, regions, [names] * len(meshes))
-            labels = {"run": who, "subject": params.subject, "hemisphere": side}
-            tables.append(onset(dict(zip(weeks, found, strict=True))).assign(**labels))
+            table = onset(dict(zip(weeks, found, strict=True))).assign(run=who, subject=params.subject)
+            tables.append(table.assign(hemisphere=side))
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

@@ -2,7 +2,7 @@
 
 from gyriflow.growth.following import THICKNESS, followed_sizes
 from gyriflow.growth.rates import FOLDING_RATES, rate_curve
-from gyriflow.growth.regional import CORTEX, known_weeks, regional_map
+from gyriflow.growth.regional import CORTEX, STRAIN, known_weeks, regional_map
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.step import step
@@ -26,6 +26,8 @@ with step(snakemake.log[0]):
         if snakemake.params.regional_weeks:
             known = known_weeks(snakemake.params.regional_weeks, settings["follow"]["known_until_gw"])
             settings["regional_growth"] = {week: regional_map(week) for week in known}
+            if settings["follow"]["directional"] > 0:
+                settings["regional_strain"] = {week: regional_map(week, STRAIN) for week in known}
             if settings["follow"]["cortex"] == "area":
                 settings["regional_growth_of_cortex"] = {week: regional_map(week, CORTEX) for week in known}
     start = {

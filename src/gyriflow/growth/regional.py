@@ -11,11 +11,12 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..geometry.spins import spins, spun
 from ..geometry.triangles import Floats
+from ..parameters.folding import STRAIN as PARTS
 
 SLOWEST, FASTEST = -1.0, 3.0
 """Bounds of local growth as a multiple of the whole brain's."""
-CORTEX = "cortex"
-"""In the name of a map that is the cortex's alone."""
+CORTEX, STRAIN = "cortex", "strain"
+"""In the names of a map that is the cortex's alone, and of those of strain."""
 
 
 def regional_map(week: float, part: str = "") -> str:
@@ -54,7 +55,8 @@ def regional_maps(
     weeks
         (w + 1,) of the brains, ascending.
     growth
-        (w, n) local log growth per week between them: of `volume`, and of `area`, known at pial vertices only.
+        (w, n) local log growth per week between them: of `volume`, and of `area`, known at pial vertices only; and
+        the (w, n, 6) `strain` per week where directions are asked for.
     sizes
         (n,) volumes and areas that belong to the vertices, 0 for the area of those inside.
     points, right
@@ -70,6 +72,14 @@ def regional_maps(
         # the area of a place inside the cortex is that of the pial surface over it
         local[CORTEX] = of_pial[:, cKDTree(points[pial]).query(points)[1]]
     found: dict[str, Floats] = {}
+    if follow["directional"] > 0:
+        strain = growth["strain"][: len(first)]
+        smooth = smoothed_over_weeks(
+            strain.reshape(len(strain), -1), list(weeks)[: len(first) + 1], follow["smoothing_gw"]
+        )
+        for week, values in zip(first, smooth.reshape(strain.shape), strict=True):
+            name = regional_map(week, STRAIN)
+            found |= {f"{name}_{part}": follow["directional"] * values[:, i] for i, part in enumerate(PARTS)}
     for part, maps in local.items():
         drawn = as_null_model(maps, points, right, follow)
         found |= {regional_map(week, part): values for week, values in zip(first, drawn, strict=True)}

@@ -45,6 +45,8 @@ Memory = Annotated[
     PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
 ]
 Fraction = Annotated[float, Field(gt=0, le=2)]
+STRAIN = ("xx", "yy", "zz", "xy", "xz", "yz")
+"""Parts of a symmetric tensor, which end the names of their maps."""
 
 
 class Contact(Settings):
@@ -145,6 +147,12 @@ class Follow(Settings):
         "What the cortex's regional growth is that of: `volume` of the tissue, like the core's, or `area` of the pial "
         "surface.",
     )  # fmt: skip
+    directional: float = setting(
+        0.0, "",
+        "How much of the measured differences between directions growth has: 0 none, 1 all. Cortex and core then grow "
+        "by their rates in all directions, and by the measured strain without change of volume.",
+        ge=0, le=2,
+    )  # fmt: skip
     known_until_gw: Week | None = setting(
         None, "GW",
         "Only brains up to this week give curves and maps, earlier ones than the start's among them, and what comes "
@@ -161,6 +169,11 @@ class Follow(Settings):
         le=1,
     )
     seed: int = setting(0, "", "Of the rotation and of the noise.", ge=0)
+
+    @check
+    def _directions_are_not_rotated(self) -> Iterator[Problem]:
+        if self.gives("directional") and self.directional > 0 and self.gives("rotated") and self.rotated:
+            yield Problem("rotates maps of growth, not of its directions: set directional to 0", ("rotated",))
 
 
 class FoldingSettings(Settings):
@@ -277,11 +290,16 @@ class FoldingParameters(FoldingSettings):
         {}, "GW", "The same of the cortex, where it differs from that of the core."
     )
 
+    regional_strain: dict[Week, str] = setting(
+        {}, "GW", "With `follow.directional`: likewise what the names of the six maps of measured strain begin with."
+    )
+
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
         own = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
-        return own | set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
+        strain = {f"{name}_{part}" for name in self.regional_strain.values() for part in STRAIN}
+        return own | strain | set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""

@@ -7,7 +7,7 @@ from gyriflow.errors import InputError
 from gyriflow.growth.regional import known_weeks, regional_maps, smoothed_over_weeks
 
 WEEKS = [21.0, 22.0, 23.0, 25.0]
-FOLLOW = {"regional": 1.0, "smoothing_gw": 0.0, "known_until_gw": None, "cortex": "volume"}
+FOLLOW = {"regional": 1.0, "directional": 0.0, "smoothing_gw": 0.0, "known_until_gw": None, "cortex": "volume"}
 FOLLOW |= {"rotated": False, "noise": 0.0, "seed": 0}
 
 
