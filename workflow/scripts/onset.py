@@ -35,7 +35,6 @@ with step(snakemake.log[0]):
         brains = {"real": (params.real_weeks, real, places), params.run: (params.run_weeks, run, [start] * len(run))}
         for who, (weeks, meshes, regions) in brains.items():
             depths = [sulcal_depth(mesh, convex_hull(mesh)) for mesh in meshes]
-            found = map(relief, meshes, depths, regions, [names] * len(meshes))
-            table = onset(dict(zip(weeks, found, strict=True))).assign(run=who, subject=params.subject)
-            tables.append(table.assign(hemisphere=side))
+            found = dict(zip(weeks, map(relief, meshes, depths, regions, [names] * len(meshes)), strict=True))
+            tables.append(onset(found).assign(run=who, subject=params.subject, hemisphere=side))
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))
