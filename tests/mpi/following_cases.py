@@ -88,3 +88,18 @@ def test_regional_growth_is_faster_where_its_map_says():
     after = grown(local, state, 3)
     stretch = [np.ptp(after.positions[side, 1]) / np.ptp(state.positions[side, 1]) for side in (mesh_x > 0, mesh_x < 0)]
     assert stretch[0] > stretch[1] + 0.01
+
+
+def test_growth_goes_in_measured_directions_and_still_meets_its_curves():
+    folding, state = following((0.10, 0.15))
+    count = len(state.positions)
+    strain = {"xx": 0.06, "yy": -0.03, "zz": -0.03, "xy": 0.0, "xz": 0.0, "yz": 0.0}
+    maps = {f"strain_{part}": np.full(count, value) for part, value in strain.items()}
+    values = folding.parameters.model_dump(mode="json") | {"regional_strain": {21.0: "strain"}}
+    values |= {"shear_modulus_cortex_pa": 300.0}
+    local = Folding(COMM, ellipsoid_mesh(8, AXES), folding.zones, parameters_from(values), maps)
+    after = grown(local, state, 7)
+    stretch = np.log(np.ptp(after.positions, axis=0) / np.ptp(state.positions, axis=0))
+    # a strain that is the same everywhere is compatible, so that the body follows it without stress
+    assert stretch[0] - stretch[1:].mean() == pytest.approx(0.09, abs=0.01)
+    assert after.rows[-1]["volume_ml"] == pytest.approx(after.rows[-1]["volume_aim_ml"], rel=5e-3)

@@ -25,7 +25,11 @@ def rates_of_run(wildcards):
 def curves_of_run(wildcards):
     """Returns the table of the measured curves where the run follows one of them."""
     follow = CONFIG.run(wildcards.run).follow
-    measured = follow is not None and "measured" in (follow.area_cm2, follow.volume_ml)
+    measured = follow is not None and "measured" in (
+        follow.area_cm2,
+        follow.volume_ml,
+        follow.thickness_mm,
+    )
     return rules.growth_curves.output.curves if measured else []
 
 
@@ -58,9 +62,7 @@ rule parameters:
             else None
         ),
         regional_weeks=lambda wildcards: (
-            [CONFIG.brain(brain).week for brain in later_brains(wildcards.brain)]
-            if regional(wildcards.run)
-            else []
+            weeks_of_chain(wildcards.brain) if regional(wildcards.run) else []
         ),
     script:
         "../scripts/parameters.py"

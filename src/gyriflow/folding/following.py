@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ..geometry.triangles import TriangleMesh, area, signed_volume
 from ..mechanics.steering import FIRST_SHARE, Aim, GrowthRates, realised_share, steered_rates
-from ..parameters.folding import FoldingParameters
+from ..parameters.folding import STRAIN, FoldingParameters
 from ..parameters.varying import Maps, Varying
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
+from .memory import unpacked
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -129,12 +130,16 @@ def following_step(
         min(before.area_mm2 * thickness / before.volume_mm3, MOST_CORTEX),
         realised,
         poisson_ratio=p.poisson_ratio,
+        isotropic=bool(p.regional_strain),
         bounds=(-FASTEST_PER_S if p.allow_negative_growth else 0.0, FASTEST_PER_S),
     )
-    regional = map_at(p.regional_growth, end_week)
-    values = {"growth_rate_per_s": rates.tangential, "core_growth_rate_per_s": rates.core}
-    if regional is not None:
-        values = {name: Varying(weeks={end_week: rate}, map=regional) for name, rate in values.items()}  # type: ignore[misc]
+    values: dict[str, Any] = {}
+    for name, rate, maps_by_week in (
+        ("growth_rate_per_s", rates.tangential, p.regional_growth_of_cortex or p.regional_growth),
+        ("core_growth_rate_per_s", rates.core, p.regional_growth),
+    ):
+        regional = map_at(maps_by_week, end_week)
+        values[name] = rate if regional is None else Varying(weeks={end_week: rate}, map=regional)
     return Step(p.model_copy(update=values), before, aim, rates, realised)
 
 
@@ -155,6 +160,18 @@ def value_on(curve: Any, week: float) -> float:
         return float(np.exp(np.interp(week, weeks, logs)))
     i, j = (0, 1) if week < weeks[0] else (-1, -2)
     return float(np.exp(logs[i] + (logs[i] - logs[j]) / (weeks[i] - weeks[j]) * (week - weeks[i])))
+
+
+def strain_at(p: FoldingParameters, maps: Maps, week: float) -> Floats | None:
+    """Returns the (6, n) measured strain per week that holds at a week, None where growth has no directions."""
+    name = map_at(p.regional_strain, week)
+    return None if name is None else np.stack([maps[f"{name}_{part}"] for part in STRAIN])
+
+
+def undone(strain: Floats) -> Floats:
+    """Returns the (..., 3, 3) inverse of growth by small (..., 6) strains, which leaves volumes as they are."""
+    inverse = np.linalg.inv(np.eye(3) + unpacked(strain))
+    return np.asarray(inverse / np.cbrt(np.linalg.det(inverse))[..., None, None])
 
 
 def map_at(maps: Mapping[float, str], week: float) -> str | None:
