@@ -1,5 +1,6 @@
 """Zones, tags and fields of a run on the start mesh, for inspection before the solve."""
 
+from gyriflow.folding.following import growing_at_start
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.regions import cell_tags, facet_tags
 from gyriflow.folding.zone_checks import refuse_impossible
@@ -22,7 +23,8 @@ with step(snakemake.log[0]):
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    fields = layer_fields(mesh.vertices, zones, parameters, maps, parameters.start_week, REGION_FIELDS)
+    growing = growing_at_start(parameters, mesh.vertices, zones, maps)
+    fields = layer_fields(mesh.vertices, zones, growing, maps, parameters.start_week, REGION_FIELDS)
     on_left = nearer_left(TriangleMesh(mesh.vertices, zones.facets), *map(read_surface, (files.left, files.right)))
     tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
     write_regions(snakemake.output.mesh, Regions(mesh, zones.facets, fields, *tags))

@@ -138,6 +138,12 @@ def following_step(
     return Step(p.model_copy(update=values), before, aim, rates, realised)
 
 
+def growing_at_start(p: FoldingParameters, positions_mm: Floats, zones: Zones, maps: Maps) -> FoldingParameters:
+    """Returns the parameters of a run with the growth of its first step, for (n, 3) positions of its start mesh."""
+    start = size_of(positions_mm, zones)
+    return following_step(p, start, start, 0.0, p.step_s, {}, maps).parameters
+
+
 def joined(curve: Any, at_start: float, start_week: float, week: float) -> float:
     """Returns a curve's value at a week, for a brain that had another value at the start.
 
