@@ -36,7 +36,7 @@ FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""
 
 LINEAR = 0.03
-"""Part by which elastic forces may be off those that a tangent foretells, for it to serve another iteration."""
+"""Part by which elastic forces may change otherwise than a tangent foretells, for it to serve another iteration."""
 
 
 class Contribution(Protocol):
@@ -155,7 +155,7 @@ class Problem:
         self._elastic: tuple[PETSc.Mat, PETSc.Mat] | None = None  # its elastic part, as a whole and for products
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
-        # elastic forces last asked for; displacement and forces where the elastic part was assembled; for products
+        # elastic forces last asked for; displacement and forces when the tangent was; for products
         self._forces, self._known_u, self._known_forces, self._change, self._product = (
             self.new_vector() for _ in range(5)
         )
@@ -268,17 +268,17 @@ class Problem:
         """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
 
         Terms of the contributions are those of the present displacement. With `may_keep` the elastic part may be that
-        of an earlier displacement in the same step, where forces have been all but linear since; the residual must have
-        been asked for at the present displacement then.
+        of an earlier displacement in the same step, where it has foretold how forces changed since it was last asked
+        for; the residual must have been asked for at the present displacement then, and at that one.
         """
         # petsc4py keeps what several ranks share until all of them agree to let go of it
         PETSc.garbage_cleanup(self.domain.comm)
         if self._present is not None:
             self._present.set_parts(())  # else its further blocks would stay on the diagonal
-        if self._elastic is None or not (may_keep and self._still_linear()):
+        if self._elastic is None or not (may_keep and self._foretold()):
             self._elastic = self._elastic_tangent()
-            self.vector.copy(self._known_u)
-            self._forces.copy(self._known_forces)
+        self.vector.copy(self._known_u)
+        self._forces.copy(self._known_forces)
         matrix, products = self._elastic
         if not (self.contributions or self.summed):
             self._present = Tangent(matrix, products, ())
@@ -291,8 +291,8 @@ class Problem:
         self._present = Tangent(matrix, self._sum_matrix, parts, NODES_PER_TERM[self.domain.order])
         return self._present
 
-    def _still_linear(self) -> bool:
-        """Returns whether the elastic forces last asked for are those that the kept elastic tangent foretells."""
+    def _foretold(self) -> bool:
+        """Returns whether the kept elastic tangent foretells how elastic forces changed since it was last asked for."""
         assert self._elastic is not None
         self._change.waxpy(-1.0, self._known_u, self.vector)
         self._elastic[1].mult(self._change, self._product)
