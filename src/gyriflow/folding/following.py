@@ -55,7 +55,9 @@ class Step:
     before, aim
         The size at the step's start and that to be reached at its end, None where growth is prescribed.
     rates
-        The rates that were set.
+        The rates that were set, as they are over the whole step.
+    at_start
+        What they are at its start; None where the step takes them as constant.
     realised
         Part of tangential growth that turns into area, as taken for this step.
     """
@@ -64,6 +66,7 @@ class Step:
     before: Size
     aim: Size | None = None
     rates: GrowthRates | None = None
+    at_start: GrowthRates | None = None
     realised: float = FIRST_SHARE
 
     def row(self, after: Size, step_s: float) -> dict[str, Any]:
@@ -72,6 +75,11 @@ class Step:
         if self.aim is None or self.rates is None:
             return sizes
         share = realised_share(self.realised, self.rates.tangential, self.before.area_mm2, after.area_mm2, step_s)
+        if self.at_start is not None:
+            sizes |= {
+                "growth_rate_at_start_per_s": self.at_start.tangential,
+                "core_growth_rate_at_start_per_s": self.at_start.core,
+            }
         return sizes | {
             "area_aim_cm2": self.aim.area_mm2 * CM2_PER_MM2,
             "volume_aim_ml": self.aim.volume_mm3 * ML_PER_MM3,
@@ -133,14 +141,42 @@ def following_step(
         isotropic=bool(p.regional_strain),
         bounds=(-FASTEST_PER_S if p.allow_negative_growth else 0.0, FASTEST_PER_S),
     )
+    at_start = rates_at_start(rates, step_s, last) if p.time_scheme == "adams-bashforth" else None
+    given = at_start or rates
     values: dict[str, Any] = {}
     for name, rate, maps_by_week in (
-        ("growth_rate_per_s", rates.tangential, p.regional_growth_of_cortex or p.regional_growth),
-        ("core_growth_rate_per_s", rates.core, p.regional_growth),
+        ("growth_rate_per_s", given.tangential, p.regional_growth_of_cortex or p.regional_growth),
+        ("core_growth_rate_per_s", given.core, p.regional_growth),
     ):
         regional = map_at(maps_by_week, end_week)
         values[name] = rate if regional is None else Varying(weeks={end_week: rate}, map=regional)
-    return Step(p.model_copy(update=values), before, aim, rates, realised)
+    return Step(p.model_copy(update=values), before, aim, rates, at_start, realised)
+
+
+def rates_at_start(rates: GrowthRates, step_s: float, last: Mapping[str, Any]) -> GrowthRates:
+    """Returns the rates at a step's start with which two-step Adams-Bashforth takes the given ones over the step.
+
+    The scheme goes by (1 + r/2) a − r/2 a_before, r the step's length over that of the one before, and velocities are
+    linear in the rates. So a = (wanted + r/2 a_before)/(1 + r/2): between the two, in the bounds of both, and without
+    a swing, since a third of an error at most goes on to the next step where steps are equal.
+
+    Parameters
+    ----------
+    last
+        Row of the step table of the step before, empty where there was none.
+    """
+    if not last:
+        return rates
+    part = step_s / last["dt_s"] / 2
+    tangential = (rates.tangential + part * last["growth_rate_at_start_per_s"]) / (1 + part)
+    core = (rates.core + part * last["core_growth_rate_at_start_per_s"]) / (1 + part)
+    return GrowthRates(tangential, core, rates.limited)
+
+
+def growing_at_start(p: FoldingParameters, positions_mm: Floats, zones: Zones, maps: Maps) -> FoldingParameters:
+    """Returns the parameters of a run with the growth of its first step, for (n, 3) positions of its start mesh."""
+    start = size_of(positions_mm, zones)
+    return following_step(p, start, start, 0.0, p.step_s, {}, maps).parameters
 
 
 def joined(curve: Any, at_start: float, start_week: float, week: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import SolverError
-from .krylov import Wear, new_krylov, smooth_with
+from .krylov import Wear, estimate_bounds, keep_bounds, new_krylov, smooth_with
 from .problem import Problem
 from .tangent import Tangent
 
@@ -203,10 +203,15 @@ class _System:
             matrix.setNearNullSpace(self.problem.near_null_space())
             self.problem.hierarchy.renew(multigrid, matrix)
         try:
-            if fast:
+            if krylov.getType() == "cg":
                 krylov.setUp()
-                smooth_with(krylov, tangent.products, tangent.smoothing)
+                if fast:
+                    smooth_with(krylov, tangent.products, tangent.smoothing)
+                if not (fast and reuse):
+                    estimate_bounds(krylov)
             krylov.solve(self.residual, self.direction)
+            if fast:
+                keep_bounds(krylov)
         except PETSc.Error:  # a factorisation that broke down
             return 0, 0
         self.direction.scale(-1.0)

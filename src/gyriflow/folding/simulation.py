@@ -22,7 +22,7 @@ from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
 from .element_layers import Layered, linear_layers, quadratic_layers
-from .following import following_step, size_of, strain_at, undone
+from .following import following_step, growing_at_start, size_of, strain_at, undone
 from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
@@ -104,8 +104,7 @@ class Folding:
         self._through = math.nan  # elements through the cortex in the last step
         self._start_size = size_of(mesh.vertices, zones)
         # those of the last step, with its rates of growth
-        growth = following_step(parameters, self._start_size, self._start_size, 0.0, parameters.step_s, {}, self.maps)
-        self.present = growth.parameters
+        self.present = growing_at_start(parameters, mesh.vertices, zones, self.maps)
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         self._through, self._part = math.nan, self.domain.part  # of its layers

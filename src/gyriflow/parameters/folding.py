@@ -398,6 +398,3 @@ def _scheme_problems(p: FoldingSettings, start_week: float, maps: Maps, start: s
         yield Problem(f"found {p.time_scheme}; with stress_memory_gw above 0 it should be implicit", ("time_scheme",))
     if p.contact.kind == "planes":
         yield Problem(f"found {p.time_scheme}; with contact.kind planes it should be implicit", ("time_scheme",))
-    if p.follow is not None and p.time_scheme == "adams-bashforth":
-        # the rate of the step before, which this scheme counts too, would swing against the one that is set
-        yield Problem(f"found {p.time_scheme}; with follow it should be implicit or midpoint", ("time_scheme",))
