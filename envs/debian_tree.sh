@@ -22,6 +22,8 @@ create_tree() {
         awk '$2 == "Debian" && $3 == "Debian" {print $1; exit}')
     while IFS= read -r option; do options+=("--aptopt=$option"); done < <(apt-config dump |
         grep -E '^Acquire::(https?::(Proxy|Proxy-Auto-Detect|CaInfo|Verify-Peer|Verify-Host)|Check-Valid-Until|Check-Date)\b.* ".+";')
+    # mirrors that keep a day of a suite that changes daily say rightly that it is an old one
+    [ "$suite" = trixie ] || options+=(--aptopt='Acquire::Check-Valid-Until "false"')
     include=$(listed "$here/envs/debian.txt" | tr ' ' ,)
     # in namespaces of its own: killed, it leaves neither processes nor mounts behind
     part unshare --mount --pid --fork --kill-child --mount-proc \
