@@ -101,7 +101,7 @@ def panel_grid(
     panel_in = min(1.75, (FULL_WIDTH_IN - label_in) / most)
     width = max(SINGLE_COLUMN_IN, label_in + most * panel_in)
     left_in = label_in + (width - label_in - most * panel_in) / 2
-    foot_in = max(0.66 if colour_bars or legend else 0.46, 0.14 * -(-len(legend) // _legend_columns(width)) + 0.06)
+    foot_in = max(0.66 if colour_bars or legend else 0.46, 0.15 * -(-len(legend) // _legend_columns(width)) + 0.16)
     layout = _Layout(width, left_in, panel_in, foot_in, half_width)
 
     heading = [line for line in (title, synthetic_note(measured) if synthetic else "") if line]

@@ -122,7 +122,7 @@ def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame
     order = []
     for metric, name in dict(zip(regions["metric"], names, strict=True)).items():
         heading = f"{metric.replace('_', ' ')}, asymmetry"
-        wide[heading] = indices[metric]
+        wide[heading] = indices.get(metric, np.nan)
         order += [f"{name}, left", f"{name}, right", heading]
     brains = pd.MultiIndex.from_frame(regions[index].drop_duplicates())
     return wide.reindex(index=brains, columns=order).rename_axis(["brain", "run", "week (GW)", "region"])
