@@ -135,9 +135,7 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
 def test_labels_of_surfaces_are_given_as_well(workflow):
     """Labels of both hemispheres' own surfaces, with the names of their tables."""
     name = workflow.write("study.yaml", STUDY | {"metrics": {}})
-    made = workflow.run(
-        "results/brains/p22/surface/pial.surf.gii", "--cores", "2", "--configfile", name
-    )
+    made = workflow.run("results/brains/p22/surface/pial.surf.gii", "--cores", "2", "--configfile", name)
     assert made.returncode == 0, made.stderr[-2000:]
     folder, given = workflow.directory / "results/brains/p22/surface", {}
     back = np.linalg.inv(read_json(folder / "surface.json")["pose"])

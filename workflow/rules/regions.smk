@@ -30,9 +30,7 @@ def region_settings(wildcards):
 
 def source_of_regions(pattern):
     """Returns an input function: a file of the brain whose regions a brain gets."""
-    return lambda wildcards: pattern.format(
-        brain=CONFIG.regions_from(wildcards.brain)
-    )
+    return lambda wildcards: pattern.format(brain=CONFIG.regions_from(wildcards.brain))
 
 
 def sides_of(where):
@@ -121,9 +119,7 @@ rule simulated_regions:
 
 rule region_metrics:
     input:
-        unpack(
-            lambda wildcards: region_files(f"results/{sides_of(wildcards.where)}")
-        ),
+        unpack(lambda wildcards: region_files(f"results/{sides_of(wildcards.where)}")),
         unpack(
             lambda wildcards: surfaces_in(f"results/{surface_folder(wildcards.where)}")
         ),

@@ -97,8 +97,7 @@ rule register:
             for brain in (wildcards.earlier, wildcards.later)
         ],
         schemes=lambda wildcards: [
-            registered_scheme(brain)
-            for brain in (wildcards.earlier, wildcards.later)
+            registered_scheme(brain) for brain in (wildcards.earlier, wildcards.later)
         ],
     script:
         "../scripts/register.py"

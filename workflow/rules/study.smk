@@ -133,7 +133,9 @@ def exported(where):
     """Returns what the export needs to know of what is measured in a folder: names, and files by side."""
     labels, folder = brain_labels(where), f"results/{surface_folder(where)}"
     brain = CONFIG.brain(labels["subject"])
-    regions = region_files(f"results/{sides_of(where)}") if where in WITH_REGIONS else {}
+    regions = (
+        region_files(f"results/{sides_of(where)}") if where in WITH_REGIONS else {}
+    )
     return {
         "brain": brain.id,
         "run": labels["run"],

@@ -154,9 +154,7 @@ rule norms_figure:
         curves=rules.centiles.output.curves,
         centiles=rules.centiles.output.centiles,
     output:
-        **figure(
-            f"{FIGURES}/norms", "norms over the weeks", "norms.rst", "Metrics"
-        ),
+        **figure(f"{FIGURES}/norms", "norms over the weeks", "norms.rst", "Metrics"),
         table=report(
             f"{STUDY}/centiles.html",
             caption="../report/norms.rst",

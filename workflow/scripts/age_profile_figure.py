@@ -8,6 +8,10 @@ from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    tables = runs_by_name(read_table(files.profile)), read_table(files.check), runs_by_name(read_table(files.similarity))
+    tables = (
+        runs_by_name(read_table(files.profile)),
+        read_table(files.check),
+        runs_by_name(read_table(files.similarity)),
+    )
     figure = age_profile_chart(*tables, measured=params.measured, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -94,7 +94,7 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
     """
     keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
     sides = metrics[metrics["hemisphere"].isin(["left", "right"])]
-    wide = sides.set_index([*keys, "hemisphere"])["value"].unstack().reindex(columns=["left", "right"])
+    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(columns=["left", "right"])
     wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
     total = wide["left"].abs() + wide["right"].abs()
     index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)

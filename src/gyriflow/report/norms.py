@@ -119,8 +119,8 @@ def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    DataFrame indexed by brain, run and week (GW): "centile (z)" of the metrics of the chart, brains compared with, those
-    of the same week, and the note that goes with them
+    DataFrame indexed by brain, run and week (GW): "centile (z)" of the metrics of the chart, brains compared with,
+    those of the same week, and the note that goes with them
     """
     rows = centiles[(centiles["hemisphere"] == "whole") & centiles["metric"].isin(TITLES)]
     text = [
@@ -128,7 +128,7 @@ def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
         for centile, z in zip(rows["centile"], rows["z"], strict=True)
     ]
     index = ["subject", "run", "week"]
-    wide = rows.assign(text=text).set_index([*index, "metric"])["text"].unstack()
+    wide = rows.assign(text=text).pivot_table("text", index, "metric", aggfunc="first")
     brains = pd.MultiIndex.from_frame(rows[index].drop_duplicates())
     wide = wide.reindex(index=brains, columns=[name for name in TITLES if name in wide]).rename(columns=TITLES)
     first = rows.drop_duplicates(index).set_index(index)

@@ -24,8 +24,7 @@ REGIONS = pd.DataFrame(
     columns=COLUMNS,
 )
 ASYMMETRY = pd.DataFrame(
-    [("a", "real", 21.0, "area", region, 0.1) for region in ("front", "back")]
-    + [("a", "real", 21.0, "area", "", 0.5)],
+    [("a", "real", 21.0, "area", region, 0.1) for region in ("front", "back")] + [("a", "real", 21.0, "area", "", 0.5)],
     columns=["subject", "run", "week", "metric", "region", "asymmetry_index"],
 )
 
