@@ -68,7 +68,7 @@ class GivenRegions(Settings):
 
 
 def nearest_given(brain: str, given: Mapping[str, GivenRegions], weeks: Mapping[str, float]) -> str | None:
-    """Returns the brain whose regions a brain gets: itself, else that of the nearest week; None where none are given."""
+    """Returns the brain whose regions a brain gets: itself, else that of the nearest week; None without any."""
     if brain in given or not given:
         return brain if brain in given else None
     return min(given, key=lambda other: abs(weeks[other] - weeks[brain]))
