@@ -60,9 +60,14 @@ def cohort(checkout_copy, tmp_path_factory):
     name = workflow.write("study.yaml", config)
     refusal = workflow.run("-n", "--configfile", name)
     wanted = [f"results/runs/reference/sub-01/figures/{figure}.png" for figure in ("zones", "shape_index")]
-    outcome = workflow.run("metrics", "quality", *wanted, "--cores", "2", "--keep-going", "--configfile", name)
+    # in parts: one call has five minutes
+    options = ("--cores", "2", "--keep-going", "--configfile", name)
+    outcome = workflow.run("quality", *options)
+    later = [workflow.run("folding", *wanted, *options), workflow.run("metrics", *options)]
     results = workflow.directory / "results"
-    return SimpleNamespace(refusal=refusal, outcome=outcome, results=results, config=name, workflow=workflow)
+    return SimpleNamespace(
+        refusal=refusal, outcome=outcome, later=later, results=results, config=name, workflow=workflow
+    )
 
 
 def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(cohort):
@@ -75,6 +80,7 @@ def test_a_failed_subject_holds_up_no_other_and_the_call_ends_in_its_code(cohort
     assert "Traceback" not in cohort.outcome.stderr
     assert "left out: " in cohort.outcome.stderr
     assert "refused: sub-03, sub-05; finishing the study without" in cohort.outcome.stderr
+    assert [call.returncode for call in cohort.later] == [2, 2]
     metrics = pd.read_csv(cohort.results / "study" / "metrics.csv")
     assert set(metrics["subject"]) == {"sub-01", "sub-02"}
 
