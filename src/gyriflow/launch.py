@@ -1,7 +1,9 @@
 """`python -m gyriflow.launch ARG...`: Snakemake with this checkout's workflow, which is what `./run snakemake` calls.
 
 It clears a lock that an interrupted run has left (never that of a live run) and ends with the exit code of the first
-failed step. Everything else is Snakemake's own command line.
+failed step. Where a run is asked for, the terminal shows stages, weeks, warnings and failures, and a log all else;
+`--verbose`, `--quiet`, `--printshellcmds` or `--logger` give Snakemake's own messages. Everything else is Snakemake's
+own command line.
 """
 
 import fcntl
@@ -12,6 +14,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
+from datetime import datetime
 from pathlib import Path
 from types import FrameType
 from typing import IO
@@ -19,9 +23,20 @@ from typing import IO
 from .errors import GyriflowError, InputError, StorageError
 from .io.files import read_json, write_json
 from .io.yaml_files import read_yaml
+from .shipped import SHIPPED
 from .step import EXIT_FILE, INTERRUPTED, recorded_exit_code
+from .terminal.redirection import prints_go_to
 
-CHECKOUT = Path(__file__).resolve().parents[2]
+SETTINGS = {
+    **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "OMPI_MCA_btl": "self,sm",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "PRTE_MCA_hwloc_default_binding_policy": "none",
+}
+"""Variables of MPI and BLAS where the user sets no others, as `./run` and the conda environment have them."""
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 LOOKS_ONLY = frozenset(
     ("-n", "--dry-run", "--dryrun", "--nolock", "--summary", "-D", "--detailed-summary", "--rulegraph", "--dag")
@@ -37,6 +52,24 @@ REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 
 HELD: list[IO[str]] = []
 """Files whose locks this process holds."""
+SAYS_ITSELF = frozenset(
+    (
+        "--verbose",
+        "--quiet",
+        "-q",
+        "--printshellcmds",
+        "-p",
+        "--logger",
+        "--debug",
+        "--debug-dag",
+        "--unlock",
+        "--touch",
+        "-t",
+    )
+    + ("--report", "--archive", "--delete-all-output", "--delete-temp-output", "--cleanup-metadata", "--cm")
+    + ("--list-input-changes", "--list-params-changes", "--list-code-changes", "--generate-unit-tests", "--mode")
+)
+"""Options under which Snakemake's own messages are wanted, or no steps are run."""
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
@@ -103,6 +136,12 @@ def looks_only(arguments: Sequence[str]) -> bool:
     return bundled or bool(LOOKS_ONLY.intersection(arguments))
 
 
+def runs_quietly(arguments: Sequence[str]) -> bool:
+    """Returns whether steps are run and only the essential is to be on the terminal."""
+    names = {argument.partition("=")[0] for argument in arguments if argument.startswith("-")}
+    return not looks_only(arguments) and not names & SAYS_ITSELF
+
+
 def value_of(arguments: Sequence[str], *names: str) -> str | None:
     """Returns the last value of an option given as `--name value`, `--name=value` or (short) `-nvalue`."""
     found = None
@@ -139,7 +178,7 @@ def add_snakefile(arguments: Sequence[str]) -> list[str]:
     """Returns Snakemake's arguments, with this checkout's Snakefile if the user names none and none is here."""
     if value_of(arguments, "--snakefile", "-s") is not None or any(Path(name).is_file() for name in SNAKEFILES):
         return list(arguments)
-    return ["--snakefile", str(CHECKOUT / "Snakefile"), *arguments]
+    return ["--snakefile", str(SHIPPED / "Snakefile"), *arguments]
 
 
 def refused_brains() -> dict[str, str]:
@@ -189,6 +228,10 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
 
 def main(arguments: Sequence[str]) -> int:
     """Runs Snakemake and returns the exit code: its own, or that of the first failed step."""
+    for name, value in SETTINGS.items():
+        os.environ.setdefault(name, value)
+    # steps call `python`, which is to be this one
+    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     refuse_bad_configfiles(arguments)
     directory = Path(value_of(arguments, "--directory", "-d") or ".")
     if not looks_only(arguments):
@@ -208,12 +251,20 @@ def main(arguments: Sequence[str]) -> int:
         signal.default_int_handler(number, frame)
 
     signal.signal(signal.SIGINT, interrupt)
-    try:
-        cli.main(add_snakefile(arguments))
-    except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else int(end.code is not None)
-    except KeyboardInterrupt:
-        code = INTERRUPTED
+    # the name under which usage and mistakes in it are told
+    sys.argv[0] = "snakemake"
+    complete = add_snakefile(arguments)
+    details = directory.absolute() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
+    quiet = runs_quietly(arguments)
+    if quiet:
+        complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]
+    with prints_go_to(details) if quiet else nullcontext():
+        try:
+            cli.main(complete)
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        except KeyboardInterrupt:
+            code = INTERRUPTED
     recorded = recorded_exit_code(exit_file)
     exit_file.unlink(missing_ok=True)
     if code and interrupts:

@@ -12,6 +12,8 @@ ENVIRONMENT = "../../envs/gyriflow.yaml"
 # scripts and programs find the package without its being installed, in conda environments of single rules too
 shell.prefix(
     f'set -euo pipefail; export PYTHONPATH="{SOURCE}${{{{PYTHONPATH:+:$PYTHONPATH}}}}"; '
+    if CHECKED_OUT
+    else "set -euo pipefail; "
 )
 
 
@@ -49,6 +51,9 @@ if workflow.is_main_process:
 BRAINS = [brain.id for brain in CONFIG.brains]
 # every run with each of the brains that it folds
 FOLDED = CONFIG.folded
+# runs of studies and of the calibration, which may diverge: each with each of the brains that it folds
+STUDIED = [(run, brain) for run in CONFIG.study_runs for brain in CONFIG.starts(run)]
+CALIBRATED = CONFIG.calibrate.runs if CONFIG.calibrate else {}
 
 # held as long as this process lives: how `gyriflow.launch` tells a live run from one that was interrupted
 if workflow.is_main_process and not workflow.dryrun:
@@ -173,6 +178,6 @@ def drawing(*brains):
 
 wildcard_constraints:
     brain=one_of(BRAINS),
-    run=one_of(CONFIG.runs),
+    run=one_of([*CONFIG.runs, *CONFIG.study_runs, *CALIBRATED]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

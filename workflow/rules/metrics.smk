@@ -17,7 +17,11 @@ def brain_of(where):
 def of_sides(*sides):
     """Returns a pattern of the folders with metrics of brains that have these hemispheres."""
     return one_of(
-        [where for where in MEASURED + SIMULATED if sides_of(brain_of(where)) == sides]
+        [
+            where
+            for where in MEASURED + SIMULATED + COMPARED_MEMBERS
+            if sides_of(brain_of(where)) == sides
+        ]
     )
 
 
@@ -58,6 +62,28 @@ MEASURES = {
 # where the metrics of a brain lie under results
 MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
 SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
+# the brains of runs of studies, at the weeks of comparison
+COMPARED_MEMBERS = sorted(
+    {
+        f"runs/{member.run}/{brain}/metrics/week-{week_tag(study.compare_week)}"
+        for name, study in CONFIG.studies.items()
+        for member in CONFIG.members[name]
+        for brain in CONFIG.starts(member.run)
+    }
+    - set(SIMULATED)
+)
+
+
+# brains whose labels can be counted
+WITH_VOLUMES = [brain.id for brain in CONFIG.brains if brain.source in WITH_LABELS]
+
+
+def report_of(wildcards):
+    """Returns the report of a measured brain's surface, which has the volumes of its tissues."""
+    match wildcards.where.split("/"):
+        case ["brains", brain, "metrics"]:
+            return PIAL["report"].format(brain=brain)
+    return []
 
 
 # Only a common number of modes makes brains depend on each other: measured ones then wait for all simulations.
@@ -95,6 +121,7 @@ rule measure:
             )
         ),
         thickness=thickness_of,
+        report=report_of,
         mode_numbers=(
             rules.weyl_numbers.output[0]
             if CONFIG.metrics.spangy_modes == "common"
@@ -116,7 +143,14 @@ rule measure:
         runtime=60,
     params:
         labels=lambda wildcards: brain_labels(wildcards.where),
-        settings=CONFIG.metrics.model_dump(exclude={"age_reference"}),
+        settings=CONFIG.metrics.model_dump(
+            include={
+                "curvature_radius_mm",
+                "spangy_proxy",
+                "spangy_modes",
+                "spangy_wavelength",
+            }
+        ),
     script:
         "../scripts/measure.py"
 
@@ -189,3 +223,26 @@ rule similarity:
         parts=lambda wildcards: ["whole", *sides_of(wildcards.brain)],
     script:
         "../scripts/similarity.py"
+
+
+rule label_volumes:
+    input:
+        labels=label_volume,
+        norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
+    output:
+        volumes=f"{BRAIN}/metrics/volumes.csv",
+        scores=f"{BRAIN}/metrics/published_centiles.csv",
+    log:
+        f"{BRAIN}/logs/label_volumes.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/label_volumes.tsv"
+    wildcard_constraints:
+        brain=one_of(WITH_VOLUMES),
+    conda:
+        ENVIRONMENT
+    params:
+        labels=lambda wildcards: brain_labels(f"brains/{wildcards.brain}/metrics"),
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
+    script:
+        "../scripts/label_volumes.py"

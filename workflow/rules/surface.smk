@@ -315,7 +315,6 @@ rule overlay_figure:
         ),
         dpi=CONFIG.report.dpi,
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
-        title=lambda wildcards: f"{wildcards.brain}, {CONFIG.brain(wildcards.brain).week:g} GW",
     script:
         "../scripts/overlay_figure.py"
 

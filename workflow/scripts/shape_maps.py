@@ -9,7 +9,7 @@ from gyriflow.report.renders import scalar_maps
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
-run, measure = snakemake.wildcards.run, snakemake.wildcards.measure
+measure = snakemake.wildcards.measure
 
 
 def brains(weeks, surfaces, maps):
@@ -17,7 +17,9 @@ def brains(weeks, surfaces, maps):
     found = {}
     for number, week in enumerate(weeks):
         parts = [read_surface(file) for file in surfaces[number :: len(weeks)]]
-        values = [read_vertex_maps(file)[measure] for file in maps[number :: len(weeks)]]
+        # thickness is not known of every brain
+        values = [read_vertex_maps(file).get(measure) for file in maps[number :: len(weeks)]]
+        values = [np.full(len(p.vertices), np.nan) if v is None else v for p, v in zip(parts, values, strict=True)]
         found[week] = merged(*parts), np.concatenate(values)
     return found
 
@@ -26,6 +28,5 @@ with step(snakemake.log[0]):
     maps = {"simulated": brains(params.simulated_weeks, files.simulated, files.simulated_maps)}
     if files.real:
         maps[params.measured] = brains(params.real_weeks, files.real, files.real_maps)
-    shown = {"title": f"run {run}", "measured": params.measured, "synthetic": params.synthetic}
-    figure = scalar_maps(maps, quantity=measure, **shown)
+    figure = scalar_maps(maps, quantity=measure, measured=params.measured, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -107,6 +107,12 @@ class Brain(Settings):
         "Name of the population in figures and tables, such as `spina bifida aperta, unoperated`; `null`: real brain.",
         min_length=1,
     )  # fmt: skip
+    subject: str | None = setting(
+        None, "",
+        "Subject that was scanned, where several brains are scans of one: change between them is then tabled, and "
+        "simulations from one are compared with the others first.",
+        min_length=1,
+    )  # fmt: skip
     labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI).")
     image: InputFile | None = setting(
         None, "", "T2-weighted volume (NIfTI): the input of `segmentation`; with `labels`, for a figure only."

@@ -7,14 +7,11 @@ from ..errors import InputError, MeshError
 from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
-from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, MEDIAL_WALL, ZONE_NAMES
+from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ELEMENTS_NEEDED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
-NEEDED = {1: 2.0, 2: 0.9}
-"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md): two linear
-ones, or about one quadratic."""
 NAMES_OF_NEEDED = {1: "two elements", 2: "one quadratic element"}
-"""What the elements that `NEEDED` asks for are called, by their order."""
+"""What the elements that `ELEMENTS_NEEDED` asks for are called, by their order."""
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
 
@@ -49,7 +46,7 @@ def zone_warnings(report: dict) -> list[str]:
     """Returns what a user should know of the zones, from their report, before trusting a run."""
     warnings = []
     through, order = report["elements_through_cortex"], report["order"]
-    if through < NEEDED[order]:
+    if through < ELEMENTS_NEEDED[order]:
         warnings.append(
             f"fewer than {NAMES_OF_NEEDED[order]} through the cortex ({through:.2f}): folds may be mesh noise"
         )

@@ -78,6 +78,20 @@ def read_json(path: AnyPath) -> Any:
         raise InputError(f"cannot be read as JSON: {error}", path=path) from error
 
 
+def read_text(path: AnyPath) -> str:
+    """Returns a text file; InputError where it is missing."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read as text: {error}", path=path) from error
+
+
+def write_text(path: AnyPath, text: str) -> None:
+    """Writes a text file."""
+    with replaced(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def write_table(path: AnyPath, table: pd.DataFrame) -> None:
     """Writes a table as CSV without its index, ten significant digits."""
     with replaced(path) as temporary:
@@ -96,9 +110,9 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     return rows
 
 
-def read_table(path: AnyPath) -> pd.DataFrame:
-    """Returns a CSV table; InputError where it is missing or torn."""
+def read_table(path: AnyPath, separator: str = ",") -> pd.DataFrame:
+    """Returns a CSV table, or one with another separator; InputError where it is missing or torn."""
     try:
-        return pd.read_csv(path)
+        return pd.read_csv(path, sep=separator)
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read as a CSV table: {error}", path=path) from error

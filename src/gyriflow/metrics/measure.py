@@ -1,6 +1,7 @@
 """All metrics of one brain."""
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -35,6 +36,10 @@ from .mode_numbers import SpangyModes
 from .thickness import at_part
 
 
+LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
+"""The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
+
+
 @dataclass(frozen=True, eq=False)
 class BrainMetrics:
     """The metrics of one brain.
@@ -67,6 +72,7 @@ def measure_brain(
     right: TriangleMesh | None,
     *,
     thickness_mm: Floats | None = None,
+    label_volumes_ml: Mapping[str, float] | None = None,
     curvature_radius_mm: float = CURVATURE_RADIUS_MM,
     spangy_proxy: SpangyProxy = SPANGY_PROXY,
     spangy_modes: SpangyModes = SPANGY_MODES,
@@ -87,6 +93,8 @@ def measure_brain(
         is of both hemispheres: Σ area over Σ area of the hulls, and means over both.
     thickness_mm : (n,) float
         Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
+    label_volumes_ml
+        Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
     curvature_radius_mm
         Radius of the balls that curvature is fitted in, see `curvature.curvature`.
     spangy_proxy
@@ -98,7 +106,10 @@ def measure_brain(
     threads
         With two or more, the hemispheres are measured at the same time, each in a process of its own.
 
-    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
+    Raises
+    ------
+    MeshError
+        Where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     _check_outward((whole, *meshes.values()))
@@ -109,6 +120,8 @@ def measure_brain(
     jobs = [(name, mesh, thicknesses[name], settings) for name, mesh in meshes.items()]
     sides = _measure_sides(jobs, threads)
     rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + folding_rows(sides)]
+    known = label_volumes_ml or {}
+    rows += [("whole", metric, known[name], "mL") for metric, name in LABEL_VOLUMES.items() if name in known]
     for side in sides:
         own = size_rows(side.mesh, side.crossing) + folding_rows([side]) + spectrum_rows(side, spangy_proxy)
         rows += [(side.name, *row) for row in own]

@@ -95,9 +95,9 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
     """
     keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
     sides = metrics[metrics["hemisphere"].isin(SIDES)]
-    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first", sort=False, dropna=False)
     # of a hemisphere that is alone nothing can be said
-    wide = wide.reindex(columns=list(SIDES))
+    wide = sides.set_index([*keys, "hemisphere"])["value"].unstack().reindex(columns=list(SIDES))
+    wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
     total = wide["left"].abs() + wide["right"].abs()
     index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)
     return index.rename("asymmetry_index").reset_index()

@@ -4,6 +4,8 @@ from typing import Literal, get_args
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = get_args(Side)
+STRUCTURES: dict[Side, Literal["CortexLeft", "CortexRight"]] = {"left": "CortexLeft", "right": "CortexRight"}
+"""What GIFTI files call the cortex of each side."""
 
 VertexField = Literal[
     "displacement",
@@ -54,3 +56,7 @@ LEFT, RIGHT, BRIDGE = 1, 2, 3
 """Tags of the hemispheres, and of the tissue between the contact planes."""
 CORTEX, CORE = 1, 2
 """Tags of the layers."""
+
+ELEMENTS_NEEDED = {1: 2.0, 2: 0.9}
+"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md): two linear
+ones, or about one quadratic."""

@@ -10,7 +10,7 @@ from scipy.ndimage import map_coordinates
 
 from ..geometry.triangles import Floats, TriangleMesh
 from .sections import AXIS_NAMES, PLANES
-from .style import FULL_WIDTH_IN, RUN_COLOURS, new_figure, styled
+from .style import FULL_WIDTH_IN, RUN_COLOURS, add_letters, new_figure, styled
 
 MARGIN_MM = 8.0
 PIXEL_MM = 0.25
@@ -19,7 +19,7 @@ BRIGHTEST = 0.995
 
 
 @styled
-def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh, *, title: str = "") -> Figure:
+def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh) -> Figure:
     """Returns a volume in grey with the outline of a surface, in a coronal, an axial and a sagittal plane.
 
     The coronal and the axial plane pass the middle of the surface; the sagittal one passes the right hemisphere, at a
@@ -40,7 +40,7 @@ def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh, *,
     spans = [(high - low)[list(PLANES[plane][1:])] + 2 * MARGIN_MM for plane in PLANES]
     # beside and above the panels is room for words
     height = (FULL_WIDTH_IN - 1.7) * max(span[1] for span in spans) / sum(span[0] for span in spans) + 0.9
-    figure = new_figure(FULL_WIDTH_IN, height, title=title, synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, height, synthetic=False)
     panels = figure.subplots(1, len(PLANES), width_ratios=[span[0] for span in spans])
     lit = values[np.isfinite(values) & (values > 0)]
     brightest = float(np.quantile(lit, BRIGHTEST)) if lit.size else 1.0
@@ -55,6 +55,7 @@ def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh, *,
         axes.set(xlabel=AXIS_NAMES[right], ylabel=AXIS_NAMES[up], xlim=extent[:2], ylim=extent[2:])
         axes.set_title(f"{plane}, {'xyz'[across]} = {at[plane]:.1f} mm")
         axes.set_aspect("equal")
+    add_letters(panels)
     return figure
 
 

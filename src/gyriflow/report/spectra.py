@@ -19,12 +19,12 @@ from .style import (
     MUTED_COLOUR,
     REAL_BRAIN,
     REAL_COLOUR,
+    add_letters,
+    chosen_colours,
     from_zero,
     light_grid,
     new_figure,
-    run_colours,
     run_legend,
-    simulated_runs,
     styled,
     week_axis,
     week_label,
@@ -78,7 +78,7 @@ def spectra_chart(
     *,
     week: float,
     bands: Sequence[int] = FOLD_BANDS,
-    title: str = "",
+    runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -92,6 +92,8 @@ def spectra_chart(
     spectra : columns run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
     week
         Week in GW.
+    runs
+        All runs of the study, which settle the colours.
 
     Raises
     ------
@@ -102,18 +104,17 @@ def spectra_chart(
     rows = rows[(rows["week"] - week).abs() < 1e-6]
     if rows.empty:
         raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
-    runs = simulated_runs(rows["run"])
-    colours = run_colours(runs)
-    figure = new_figure(FULL_WIDTH_IN, 3.0, title=title or week_label(week), synthetic=synthetic, measured=measured)
+    colours = chosen_colours(rows["run"], runs)
+    figure = new_figure(FULL_WIDTH_IN, 3.0, synthetic=synthetic, measured=measured)
     sides = _sides_of(rows)
     panels = figure.subplots(1, len(sides), sharey=True, squeeze=False)[0]
-    width = 0.8 / max(len(runs), 1)
+    width = 0.8 / max(len(colours), 1)
     for axes, hemisphere in zip(panels, sides, strict=True):
         side = rows[rows["hemisphere"] == hemisphere]
-        for index, run in enumerate(runs):
+        for index, (run, colour) in enumerate(colours.items()):
             of_run = side[side["run"] == run]
             position = [bands.index(band) - 0.4 + (index + 0.5) * width for band in of_run["band"]]
-            bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colours[run])
+            bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colour)
             _untrusted_bars(axes, list(bars), list(of_run["trusted"]))
         for _, real in side[side["run"] == MEASURED].iterrows():
             centre = bands.index(real["band"])
@@ -133,7 +134,9 @@ def spectra_chart(
     untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
     marks = set((untrusted["run"] == MEASURED).to_list())
     extra = _untrusted_legend(bars=False in marks, stars=True in marks)
-    run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
+    add_letters(panels)
+    name = measured if MEASURED in set(rows["run"]) else ""
+    run_legend(figure, colours, measured=name, bars=True, extra=extra)
     return figure
 
 
@@ -142,7 +145,7 @@ def spectra_weeks_chart(
     spectra: pd.DataFrame,
     *,
     bands: Sequence[int] = FOLD_BANDS,
-    title: str = "",
+    runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -156,16 +159,15 @@ def spectra_weeks_chart(
     spectra : columns run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
     """
     rows = _with_band_numbers(spectra, bands)
-    runs = simulated_runs(rows["run"])
-    colours = run_colours(runs)
+    colours = chosen_colours(rows["run"], runs)
     sides = _sides_of(rows)
     height = 4.2 if len(sides) == 2 else 2.6
-    figure = new_figure(FULL_WIDTH_IN, height, title=title, synthetic=synthetic, measured=measured)
+    figure = new_figure(FULL_WIDTH_IN, height, synthetic=synthetic, measured=measured)
     panels = figure.subplots(len(sides), len(bands), sharex=True, sharey="col", squeeze=False)
     for line, hemisphere in zip(panels, sides, strict=True):
         for axes, band in zip(line, bands, strict=True):
             here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
-            for run in [*runs, MEASURED]:
+            for run in [*colours, MEASURED]:
                 series = here[here["run"] == run].sort_values("week")
                 colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
                 if run != MEASURED:
@@ -195,5 +197,6 @@ def spectra_weeks_chart(
     untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
     marks = set((untrusted["run"] == MEASURED).to_list())
     extra = _untrusted_legend(points=False in marks, stars=True in marks)
-    run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
+    add_letters(panels.flat)
+    run_legend(figure, colours, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
     return figure
