@@ -135,9 +135,17 @@ def comparable(brain):
 
 
 def measured_after_start(run, brain):
-    """Returns, by output week after the start, the ids of the measured brains that a run is compared with."""
+    """Returns, by output week after the start, the ids of the measured brains that a run is compared with.
+
+    Later scans of the start's own subject come first.
+    """
+    subject = CONFIG.brain(brain).subject
+    ordered = sorted(
+        comparable(brain),
+        key=lambda other: subject is None or other.subject != subject,
+    )
     found = {
-        week: [other.id for other in comparable(brain) if week_tag(other.week) == week]
+        week: [other.id for other in ordered if week_tag(other.week) == week]
         for week in week_tags(run, brain)[1:]
     }
     return {week: brains for week, brains in found.items() if brains}

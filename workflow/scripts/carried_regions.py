@@ -22,5 +22,7 @@ with step(snakemake.log[0]):
     for side in SIDES:
         regions, names = read_vertex_labels(files[f"{side}_regions"])
         pairs = zip((files[f"given_{side}"], files[side]), back, strict=True)
-        found = carry_regions(regions, *(transformed(read_surface(path), matrix) for path, matrix in pairs), deformation)
+        found = carry_regions(
+            regions, *(transformed(read_surface(path), matrix) for path, matrix in pairs), deformation
+        )
         write_vertex_labels(snakemake.output[f"{side}_regions"], found, names, STRUCTURES[side])

@@ -34,8 +34,8 @@ class GivenRegions(Settings):
     right: SurfaceRegions | None = setting(None, "", "Labels of the right hemisphere.")
     names: dict[Label, str] = setting(
         {}, "",
-        "Name of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name, as of left and right, "
-        "are one region, and others are none. Needed with a volume; without, those in the label files.",
+        "Name of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name, as of left and "
+        "right, are one region, and others are none. Needed with a volume; without, those in the label files.",
     )  # fmt: skip
 
     @check
@@ -68,7 +68,7 @@ class GivenRegions(Settings):
 
 
 def nearest_given(brain: str, given: Mapping[str, GivenRegions], weeks: Mapping[str, float]) -> str | None:
-    """Returns the brain whose regions a brain gets: its own, else those of the nearest week; None where none are given."""
+    """Returns the brain whose regions a brain gets: itself, else that of the nearest week; None without any."""
     if brain in given or not given:
         return brain if brain in given else None
     return min(given, key=lambda other: abs(weeks[other] - weeks[brain]))

@@ -80,7 +80,8 @@ def export_bids(
             "GeneratedBy": [{"Name": "gyriflow", "Version": version}],
         },
     )
-    people, taken = [], {}
+    people: list[tuple[str, str, str, float]] = []
+    taken: dict[tuple[str, str, str], ExportedBrain] = {}
     for brain in brains:
         name, session = f"sub-{_alphanumeric(brain.subject)}", f"ses-{_alphanumeric(f'{brain.week:.2f}')}w"
         before = taken.setdefault((name, session, _alphanumeric(brain.run)), brain)

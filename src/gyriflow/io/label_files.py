@@ -49,7 +49,7 @@ def write_vertex_labels(
         colour = "#FFFFFF" if number == NO_REGION else COLOURS[(number - 1) % len(COLOURS)]
         red, green, blue = (int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5))
         entry = GiftiLabel(key=int(number), red=red, green=green, blue=blue, alpha=float(number != NO_REGION))
-        entry.label = name
+        entry.label = name  # type: ignore[attr-defined]
         table.labels.append(entry)
     array = GiftiDataArray(
         np.asarray(labels, dtype=np.int32), intent="NIFTI_INTENT_LABEL", meta=GiftiMetaData({"Name": "regions"})

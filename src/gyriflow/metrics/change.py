@@ -1,6 +1,7 @@
 """Change between scans of one subject, measured and simulated, and tables of a group with one row a brain."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -33,7 +34,7 @@ def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str
     what = ["hemisphere", "region", "metric", "unit"]
     parts = []
     for subject, brains in scans.items():
-        for first, second in zip(brains[:-1], brains[1:], strict=True):
+        for first, second in pairwise(brains):
             scan = table[(table["subject"] == second) & (table["run"] == MEASURED)]
             later = scan.set_index(what)["value"]
             to_week = float(scan["week"].iloc[0])
@@ -55,9 +56,8 @@ def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str
                 part["relative_change"] = part["change"] / part["from_value"].abs().replace(0.0, np.nan)
                 part["measured_change"] = (later - measured).reindex(part.index)
                 part["difference"] = part["to_value"] - later.reindex(part.index)
-                labels = {"subject": subject, "run": run, "from_brain": first, "to_brain": second}
-                labels |= {"from_week": from_week, "to_week": to_week}
-                parts.append(part.reset_index().assign(**labels))
+                part = part.reset_index().assign(subject=subject, run=run, from_brain=first, to_brain=second)
+                parts.append(part.assign(from_week=from_week, to_week=to_week))
     values = ["from_value", "to_value", "change", "change_per_week", "relative_change", "measured_change", "difference"]
     columns = ["subject", "run", "from_brain", "to_brain", "from_week", "to_week", *what, *values]
     return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
@@ -68,7 +68,7 @@ def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
     Columns subject, run, week, hemisphere, region ("" for whole hemispheres), metric, value, unit.
     """
-    both = pd.concat([table.assign(region=table["region"] if "region" in table else "") for table in tables])
+    both = pd.concat([table.assign(region=table.get("region", "")) for table in tables])
     columns = [*BRAIN, "hemisphere", "region", "metric", "value", "unit"]
     return both[columns].reset_index(drop=True)
 
@@ -82,6 +82,6 @@ def wide_table(table: pd.DataFrame) -> pd.DataFrame:
     unit = table["unit"].astype(str).replace({"1": "", "nan": ""}).str.replace("/", "_per_")
     parts = [table["hemisphere"], table["region"].fillna(""), table["metric"], unit]
     names = ["_".join(part for part in row if part).replace(" ", "-") for row in zip(*parts, strict=True)]
-    wide = table.assign(column=names).set_index([*BRAIN, "column"])["value"].unstack()
+    wide = table.assign(column=names).pivot_table("value", BRAIN, "column", aggfunc="first")
     brains = pd.MultiIndex.from_frame(table[BRAIN].drop_duplicates())
     return wide.reindex(index=brains, columns=list(dict.fromkeys(names))).reset_index().rename_axis(columns=None)

@@ -35,7 +35,6 @@ from .hemisphere import (
 from .mode_numbers import SpangyModes
 from .thickness import at_part
 
-
 LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
 """The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
 

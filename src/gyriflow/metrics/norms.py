@@ -116,8 +116,9 @@ def published_scores(
     -------
     DataFrame
         structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution, 0 to
-        100), brains (that the norm was made of; NaN where its source does not say), flag ("ok"; "other labels": the norm
-        was measured with labels of another scheme; "outside the norm's weeks", then without expected, z and centile).
+        100), brains (that the norm was made of; NaN where its source does not say), flag ("ok"; "other labels": the
+        norm was measured with labels of another scheme; "outside the norm's weeks", then without expected, z and
+        centile).
     """
     rows = []
     for name, value in volumes.items():

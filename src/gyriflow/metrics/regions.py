@@ -96,7 +96,7 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
     keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
     sides = metrics[metrics["hemisphere"].isin(SIDES)]
     # of a hemisphere that is alone nothing can be said
-    wide = sides.set_index([*keys, "hemisphere"])["value"].unstack().reindex(columns=list(SIDES))
+    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(columns=list(SIDES))
     wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
     total = wide["left"].abs() + wide["right"].abs()
     index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)

@@ -41,8 +41,8 @@ SHAPE_MEASURES = {
     ),
     "thickness_mm": VertexMeasure(
         "cortical thickness (mm)",
-        "Cortical thickness, of simulated brains to the border that the cortex had at the start, carried with the tissue, "
-        "of measured brains where labels or white surfaces give it (else grey),",
+        "Cortical thickness, of simulated brains to the border that the cortex had at the start, carried with the "
+        "tissue, of measured brains where labels or white surfaces give it (else grey),",
         colours="magma",
     ),
 }

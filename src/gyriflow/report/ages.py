@@ -53,10 +53,12 @@ def age_profile_chart(
 ) -> Figure:
     """Returns the ages that whole brains look like over their own, and each metric's age at the last simulated week.
 
-    Between them stands how similar the runs' brains of that week are to each week of the reference. The upper left panel has the simulated brains, the upper right one the reference brains, each left out of its own
-    reference. Large marks are all metrics together, filled, and without those of size, open; bars are ± the error of
-    reference brains left out (left) and the spread of the metrics (right); dots are single metrics; triangles are ages
-    outside the reference. Where the reference has one brain a week, the figure says that it can date no single fetus.
+    The upper left panel has the simulated brains (and measured ones that are no reference), the upper right one the
+    reference brains, each left out of its own reference. Large marks are all metrics together, filled, and without
+    those of size, open; bars are ± the error of reference brains left out (left) and the spread of the metrics (right);
+    dots are single metrics; triangles are ages outside the reference, diamonds ages or ranges cut at its ends. The
+    middle panel has the similarity of the runs' brains of that week to each week of the reference. Where the reference
+    has one brain a week, the figure says that it can date no single fetus.
 
     Parameters
     ----------
@@ -86,14 +88,14 @@ def age_profile_chart(
         _age_panel(axes, table, colours)
         _frame(axes, [brains, left_out])
     panels[0].set_ylabel("looks like (GW)")
-    panels[0].set_title("simulated")
+    panels[0].set_title("simulated" + (" (stars: other measured brains)" if (brains["run"] == MEASURED).any() else ""))
     panels[1].set_title(_errors(left_out, measured))
     between, below = figure.add_subplot(grid[1, :]), figure.add_subplot(grid[2, :])
     _similarity_panel(between, similarity[similarity["hemisphere"] == "whole"], colours, last)
     _metric_panel(below, rows, colours, last)
     add_letters([*panels, between, below])
     if (profile["brains_per_week"] < 2).all():
-        figure.supxlabel(ONE_A_WEEK, fontsize=6.5, color=MUTED_COLOUR)
+        figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), wrap(ONE_A_WEEK, 90)))))
     dots: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
     extra = [
         Line2D([], [], markersize=5, label="all metrics", **dots),

@@ -19,7 +19,6 @@ def calibration_chart(
     profiles: pd.DataFrame,
     *,
     score: str,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns a panel for each parameter with the runs' scores and the surrogate, and one with the sensitivities.
@@ -33,7 +32,7 @@ def calibration_chart(
         What the score is called.
     """
     names = list(optimum["parameter"])
-    figure = new_figure(FULL_WIDTH_IN, 2.5, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 2.5, synthetic=synthetic)
     panels = figure.subplots(1, len(names) + 1, width_ratios=[1.0] * len(names) + [0.7])
     rows = optimum.set_index("parameter")
     for number, (axes, name) in enumerate(zip(panels, names, strict=False)):

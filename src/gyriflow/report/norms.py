@@ -44,7 +44,6 @@ def norms_chart(
     reference: Sequence[str],
     *,
     measured: str = REAL_BRAIN,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns a panel per metric of whole brains: reference brains, the curve through them, and the others.
@@ -69,7 +68,7 @@ def norms_chart(
     runs = simulated_runs(whole["run"])
     colours = run_colours(runs)
     rows_of_panels = -(-len(shown) // 3)
-    figure = new_figure(FULL_WIDTH_IN, 0.6 + 2.0 * rows_of_panels, title=title, synthetic=synthetic, measured=measured)
+    figure = new_figure(FULL_WIDTH_IN, 0.6 + 2.0 * rows_of_panels, synthetic=synthetic, measured=measured)
     panels = figure.subplots(rows_of_panels, 3, squeeze=False).ravel()
     others = False
     for axes, name in zip(panels, shown, strict=False):
@@ -119,8 +118,8 @@ def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    DataFrame indexed by brain, run and week (GW): "centile (z)" of the metrics of the chart, brains compared with, those
-    of the same week, and the note that goes with them
+    DataFrame indexed by brain, run and week (GW): "centile (z)" of the metrics of the chart, brains compared with,
+    those of the same week, and the note that goes with them
     """
     rows = centiles[(centiles["hemisphere"] == "whole") & centiles["metric"].isin(TITLES)]
     text = [
@@ -128,7 +127,7 @@ def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
         for centile, z in zip(rows["centile"], rows["z"], strict=True)
     ]
     index = ["subject", "run", "week"]
-    wide = rows.assign(text=text).set_index([*index, "metric"])["text"].unstack()
+    wide = rows.assign(text=text).pivot_table("text", index, "metric", aggfunc="first")
     brains = pd.MultiIndex.from_frame(rows[index].drop_duplicates())
     wide = wide.reindex(index=brains, columns=[name for name in TITLES if name in wide]).rename(columns=TITLES)
     first = rows.drop_duplicates(index).set_index(index)

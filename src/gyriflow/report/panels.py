@@ -118,7 +118,7 @@ def panel_grid(
     panel_in = _dots(min(1.75, (FULL_WIDTH_IN - label_in) / most))
     width = _dots(max(SINGLE_COLUMN_IN, label_in + most * panel_in))
     left_in = _dots(label_in + (width - label_in - most * panel_in) / 2)
-    foot_in = max(0.66 if colour_bars or legend else 0.46, 0.14 * -(-len(legend) // _legend_columns(width)) + 0.06)
+    foot_in = max(0.66 if colour_bars or legend else 0.46, 0.15 * -(-len(legend) // _legend_columns(width)) + 0.16)
     layout = _Layout(width, left_in, panel_in, _dots(foot_in), half_width)
 
     # a letter of a column's heading is about 0.055 in wide

@@ -1,6 +1,7 @@
 """Regions of the cortex: a picture of where they are, and a chart of their metrics over the weeks."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -41,7 +42,7 @@ TITLES = {
 }
 """The metrics of the chart and their titles."""
 MOST_RUNS = 3
-STYLES = ("-", "--", ":")
+STYLES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
 
 RegionMap = tuple[TriangleMesh, Ints]
 """A surface and the number of the region of each vertex, 0 for none."""
@@ -54,7 +55,6 @@ def regions_picture(
     *,
     views: Sequence[str] = VIEWS,
     measured: str = PHANTOM,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns brains coloured by region, a column per brain and a row per view, with the regions' names.
@@ -72,8 +72,7 @@ def regions_picture(
     colours = run_colours(names.values())
     palette = {number: to_rgb(colours[name]) for number, name in names.items()} | {0: to_rgb(NO_REGION_COLOUR)}
     painted = {
-        head: (mesh, np.array([palette[int(number)] for number in regions]))
-        for head, (mesh, regions) in brains.items()
+        head: (mesh, np.array([palette[int(number)] for number in regions])) for head, (mesh, regions) in brains.items()
     }
     rows = [
         Row(f"{view.name} view", [Panel(mesh, shades, view) for mesh, shades in painted.values()])
@@ -81,7 +80,7 @@ def regions_picture(
     ]
     legend = [Patch(color=colours[name], label=name) for name in names.values()]
     legend.append(Patch(color=NO_REGION_COLOUR, label="no region"))
-    return panel_grid(list(painted), rows, title=title, synthetic=synthetic, measured=measured, legend=legend)
+    return panel_grid(list(painted), rows, synthetic=synthetic, measured=measured, legend=legend)
 
 
 @styled
@@ -90,7 +89,6 @@ def regions_chart(
     asymmetry: pd.DataFrame,
     *,
     measured: str = REAL_BRAIN,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
@@ -106,7 +104,7 @@ def regions_chart(
     shown = [name for name in TITLES if (regions["metric"] == name).any()]
     runs = simulated_runs(regions["run"])[:MOST_RUNS]
     rows_of_panels = -(-(len(shown) + 1) // 3)
-    figure = new_figure(FULL_WIDTH_IN, 0.6 + 1.9 * rows_of_panels, title=title, synthetic=synthetic, measured=measured)
+    figure = new_figure(FULL_WIDTH_IN, 0.6 + 1.9 * rows_of_panels, synthetic=synthetic, measured=measured)
     panels = figure.subplots(rows_of_panels, 3, squeeze=False).ravel()
     for axes, name in zip(panels, shown, strict=False):
         rows = regions[regions["metric"] == name]
@@ -124,8 +122,12 @@ def regions_chart(
     axes.set_title("asymmetry of area, 2 (L − R)/(L + R)")
     for axes in panels[len(shown) + 1 :]:
         axes.set_axis_off()
-    handles = [Line2D([], [], color=colour, marker="s", linestyle="none", label=name) for name, colour in colours.items()]
-    handles += [Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run) for run, line in zip(runs, STYLES, strict=False)]
+    handles = [
+        Line2D([], [], color=colour, marker="s", linestyle="none", label=name) for name, colour in colours.items()
+    ]
+    handles += [
+        Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run) for run, line in zip(runs, STYLES, strict=False)
+    ]
     handles.append(Line2D([], [], color=MUTED_COLOUR, marker="*", linestyle="none", markersize=7, label=measured))
     columns = 4
     figure.set_figheight(figure.get_figheight() + 0.15 * (-(-len(handles) // columns)))
@@ -133,14 +135,14 @@ def regions_chart(
     return figure
 
 
-def _panel(axes: Axes, values: pd.DataFrame, colours: Mapping[str, str], runs: Sequence[str]) -> None:
+def _panel(axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], runs: Sequence[str]) -> None:
     """Draws the value of each region over the weeks."""
     for (region, run), rows in values.groupby(["region", "run"], sort=False):
         ordered = rows.sort_values("week")
         if run == MEASURED:
             axes.plot(ordered["week"], ordered["value"], "*", color=colours[region], markersize=6)
         elif run in runs:
-            line = STYLES[list(runs).index(run)]
+            line = STYLES[list(runs).index(str(run))]
             axes.plot(ordered["week"], ordered["value"], line, color=colours[region], linewidth=1.1)
     week_axis(axes, values["week"])
     light_grid(axes)

@@ -116,13 +116,13 @@ def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame
     units = regions["unit"].map(shown_unit)
     names = regions["metric"].str.replace("_", " ") + [f" ({unit})" if unit else "" for unit in units]
     left_right = regions.assign(column=names + ", " + regions["hemisphere"])
-    wide = left_right.set_index([*index, "column"])["value"].unstack()
+    wide = left_right.pivot_table("value", index, "column", aggfunc="first")
     of_regions = asymmetry[asymmetry["region"].isin(set(regions["region"]))]
-    indices = of_regions.set_index([*index, "metric"])["asymmetry_index"].unstack()
+    indices = of_regions.pivot_table("asymmetry_index", index, "metric", aggfunc="first")
     order = []
     for metric, name in dict(zip(regions["metric"], names, strict=True)).items():
         heading = f"{metric.replace('_', ' ')}, asymmetry"
-        wide[heading] = indices[metric]
+        wide[heading] = indices.get(metric, np.nan)
         order += [f"{name}, left", f"{name}, right", heading]
     brains = pd.MultiIndex.from_frame(regions[index].drop_duplicates())
     return wide.reindex(index=brains, columns=order).rename_axis(["brain", "run", "week (GW)", "region"])

@@ -27,7 +27,7 @@ CEILING = "registration alone"
 
 @styled
 def validation_chart(
-    validation: pd.DataFrame, ceiling: pd.DataFrame | None = None, *, title: str = "", synthetic: bool = False
+    validation: pd.DataFrame, ceiling: pd.DataFrame | None = None, *, synthetic: bool = False
 ) -> Figure:
     """Returns by week how much better a run's curvature correlates with the real brain's than the scaled start's does.
 
@@ -42,7 +42,7 @@ def validation_chart(
     ceiling
         The same of the start carried by registration.
     """
-    figure = new_figure(FULL_WIDTH_IN, 3.2, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 3.2, synthetic=synthetic)
     runs = list(dict.fromkeys(validation["run"]))
     colours = run_colours(runs)
     for axes, (measure, name) in zip(figure.subplots(1, 2), MEASURES.items(), strict=True):
@@ -68,7 +68,7 @@ def validation_chart(
     ]
     if ceiling is not None and len(ceiling):
         extra.append(Line2D([], [], color=MUTED_COLOUR, linestyle=":", label=CEILING))
-    run_legend(figure, runs, extra=extra)
+    run_legend(figure, colours, extra=extra)
     return figure
 
 
@@ -78,7 +78,6 @@ def smoothing_chart(
     smoothing_mm: Mapping[str, float],
     ceiling: pd.DataFrame | None = None,
     *,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns skill against the length that local growth is smoothed by, a line for each compared week with a skill.
@@ -99,7 +98,7 @@ def smoothing_chart(
     rows["length"] = rows["length"].clip(upper=beyond)
     weeks = sorted(rows.loc[rows["skill_shape_index"].notna(), "week"].unique())
     colours = run_colours([f"{week:g} GW" for week in weeks])
-    figure = new_figure(FULL_WIDTH_IN, 3.2, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 3.2, synthetic=synthetic)
     for axes, (measure, name) in zip(figure.subplots(1, 2), MEASURES.items(), strict=True):
         for week, colour in zip(weeks, colours.values(), strict=True):
             line = rows[rows["week"] == week].groupby("length")[f"skill_{measure}"].mean()
@@ -117,7 +116,7 @@ def smoothing_chart(
         axes.set_title(f"{name}: skill")
         light_grid(axes)
     extra = [Line2D([], [], color=MUTED_COLOUR, linestyle=":", label=CEILING)] if ceiling is not None else []
-    run_legend(figure, list(colours), extra=extra)
+    run_legend(figure, colours, extra=extra)
     return figure
 
 
