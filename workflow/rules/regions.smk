@@ -33,7 +33,7 @@ def source_of_regions(pattern):
     return lambda wildcards: pattern.format(brain=CONFIG.regions_from(wildcards.brain))
 
 
-def sides_of(where):
+def regions_folder(where):
     """Returns the folder with the regions of what is measured in a folder: those of a run hold at all its weeks."""
     return where if where.startswith("brains/") else where.rsplit("/", 1)[0]
 
@@ -89,7 +89,7 @@ rule carried_regions:
     params:
         # masks of surfaces are in the surfaces' own pose
         posed=lambda wildcards: [
-            CONFIG.brain(brain).source not in WITH_LABELS
+            not CONFIG.brain(brain).has_labels
             for brain in (CONFIG.regions_from(wildcards.brain), wildcards.brain)
         ],
     script:
@@ -119,7 +119,11 @@ rule simulated_regions:
 
 rule region_metrics:
     input:
-        unpack(lambda wildcards: region_files(f"results/{sides_of(wildcards.where)}")),
+        unpack(
+            lambda wildcards: region_files(
+                f"results/{regions_folder(wildcards.where)}"
+            )
+        ),
         unpack(
             lambda wildcards: surfaces_in(f"results/{surface_folder(wildcards.where)}")
         ),

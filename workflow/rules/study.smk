@@ -134,15 +134,17 @@ def exported(where):
     labels, folder = brain_labels(where), f"results/{surface_folder(where)}"
     brain = CONFIG.brain(labels["subject"])
     regions = (
-        region_files(f"results/{sides_of(where)}") if where in WITH_REGIONS else {}
+        region_files(f"results/{regions_folder(where)}")
+        if where in WITH_REGIONS
+        else {}
     )
     return {
         "brain": brain.id,
         "run": labels["run"],
         "week": labels["week"],
         "subject": brain.subject or brain.id,
-        "surfaces": {side: surfaces_in(folder)[side] for side in SIDES},
-        "maps": {side: f"results/{where}/{side}.shape.gii" for side in SIDES},
+        "surfaces": {side: surfaces_in(folder)[side] for side in brain.sides},
+        "maps": {side: f"results/{where}/{side}.shape.gii" for side in brain.sides},
         "regions": dict(zip(SIDES, regions.values())),
     }
 

@@ -214,12 +214,15 @@ rule onset:
             f"run_{side}": lambda wildcards, side=side: [
                 f"results/runs/{wildcards.run}/{wildcards.brain}/surfaces/week-{week}/{side}.pial.surf.gii"
                 for week in week_tags(wildcards.run, wildcards.brain)
+                if side in sides_of(wildcards.brain)
             ]
             for side in SIDES
         },
         **{
-            f"real_{side}": lambda wildcards, side=side: expand(
-                PIAL[side], brain=later_brains(wildcards.brain)
+            f"real_{side}": lambda wildcards, side=side: (
+                expand(PIAL[side], brain=later_brains(wildcards.brain))
+                if side in sides_of(wildcards.brain)
+                else []
             )
             for side in SIDES
         },
@@ -240,6 +243,7 @@ rule onset:
     params:
         run=lambda wildcards: wildcards.run,
         subject=lambda wildcards: wildcards.brain,
+        sides=lambda wildcards: sides_of(wildcards.brain),
         run_weeks=lambda wildcards: CONFIG.weeks(wildcards.run, wildcards.brain),
         real_weeks=lambda wildcards: [
             CONFIG.brain(name).week for name in later_brains(wildcards.brain)

@@ -8,7 +8,6 @@ from gyriflow.io.files import read_json, write_table
 from gyriflow.io.registrations import read_deformation
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.depth import convex_hull, sulcal_depth
-from gyriflow.parameters.terms import SIDES
 from gyriflow.registration.carrying import carry_over_weeks
 from gyriflow.step import step
 from gyriflow.validation.onset import onset, regions_on, relief, sulcal_regions
@@ -25,7 +24,7 @@ def carried(mesh, index):
 with step(snakemake.log[0]):
     deformations = [read_deformation(path)[0] for path in files.registrations]
     poses = [np.array(read_json(path)["pose"]) for path in files.reports]
-    for side in SIDES:
+    for side in params.sides:
         real, run = ([read_surface(path) for path in files[f"{who}_{side}"]] for who in ("real", "run"))
         last = sulcal_regions(real[-1], sulcal_depth(real[-1], convex_hull(real[-1])))
         names = {number: f"{side} {number}" for number in range(1, last.max() + 1)}
