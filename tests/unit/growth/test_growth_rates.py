@@ -12,6 +12,7 @@ import trimesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.rates import FOLDING_RATES, agreement, growth_rates, rate_curve, rates_of_series
+from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
 
 WEEK_S = 604_800.0
@@ -152,8 +153,11 @@ def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(
         ball = trimesh.creation.icosphere(subdivisions=2, radius=radius_mm)
         files.append(tmp_path / f"{number}.gii")
         write_surface(files[-1], TriangleMesh(ball.vertices, ball.faces))
+    reports = [tmp_path / f"{name}.json" for name in "abcd"]
+    for report, tissue_ml in zip(reports, (30.0, 40.0, None, None), strict=True):
+        write_json(report, {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {})
     job = SimpleNamespace(
-        input=SimpleNamespace(whole=files, left=files, right=files),
+        input=SimpleNamespace(whole=files, left=files, right=files, reports=reports),
         output=SimpleNamespace(**{name: tmp_path / f"{name}.csv" for name in ("areas", "rates", "agreement")}),
         params=SimpleNamespace(series=["mine", "mine", "atlas", "atlas"], brains=[*"abcd"], weeks=[21, 22, 21, 22]),
         log=[str(tmp_path / "log")],
@@ -165,3 +169,10 @@ def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(
     assert row.difference_per_s == pytest.approx((1.05 - 1.1) / WEEK_S, rel=1e-5)
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]
+    # of the labels where these are known
+    np.testing.assert_array_equal(areas["tissue_ml"], [30.0, 40.0, np.nan, np.nan])
+    rates = pd.read_csv(tmp_path / "rates.csv").set_index("series")
+    assert rates.loc["mine", "tissue_ratio"] == pytest.approx(4 / 3)
+    assert rates.loc["mine", "tissue_compound_rate_per_s"] == pytest.approx(np.log(4 / 3) / (3 * WEEK_S))
+    assert np.isnan(rates.loc["atlas", "tissue_ratio"])
+    assert rates["cortex_ratio"].isna().all()
