@@ -40,7 +40,7 @@ rule quality_figure:
             f"{BRAIN}/figures/mesh_quality",
             "mesh quality",
             "figure.rst",
-            "Brains and growth",
+            "Inputs",
             brain="{brain}",
         ),
     log:

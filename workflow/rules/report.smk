@@ -47,6 +47,7 @@ MADE = [
     *rules.figures.input,
     *rules.metrics.input,
     *rules.study_resources.output,
+    f"{STUDY}/figures/cost.png",
 ]
 PICTURE_BYTES = 9_000_000
 
@@ -219,6 +220,27 @@ rule provenance:
         source=workflow.basedir,
     script:
         "../scripts/provenance.py"
+
+
+rule cost_figure:
+    input:
+        rules.study_resources.output.csv,
+    output:
+        **figure(f"{STUDY}/figures/cost", "time and energy", "figure.rst", "Resources"),
+    log:
+        f"{STUDY}/logs/cost_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/cost_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        dpi=CONFIG.report.dpi,
+        caption=(
+            "Time (a) and energy (b) of the stages, the longest first. Times are summed over the jobs of a stage, which "
+            "may have run side by side; energy is an estimate, whose assumptions stand under the table."
+        ),
+    script:
+        "../scripts/cost_figure.py"
 
 
 rule html_report:

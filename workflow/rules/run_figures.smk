@@ -41,6 +41,10 @@ BESIDE = {
 }
 
 
+# runs in which something may touch
+TOUCHING = [run for run in CONFIG.runs if CONFIG.run(run).contact.kind != "none"]
+
+
 def run_figure(name, title, caption, category="Folding"):
     """Returns the outputs of a rule that draws a figure of a run."""
     return figure(
@@ -185,6 +189,81 @@ REGIONS = {
 }
 
 
+rule mesh_figure:
+    input:
+        mesh=rules.regions.output.mesh,
+        data=rules.regions.output.data,
+    output:
+        **run_figure("mesh", "the mesh, cut open", "figure.rst"),
+    log:
+        f"{RUN}/logs/mesh_figure.log",
+    benchmark:
+        f"{RUN}/benchmarks/mesh_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+        caption=(
+            "Tetrahedral mesh at the start of run *{run}*: from the left (a), and cut open across the "
+            "middle, seen from the front (b), and along it, seen from above (c). Elements are left out whole."
+        ),
+    script:
+        "../scripts/mesh_figure.py"
+
+
+rule contact_scheme:
+    input:
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        params=rules.parameters.output[0],
+    output:
+        **run_figure("contact_scheme", "scheme of contact", "figure.rst"),
+    log:
+        f"{RUN}/logs/contact_scheme.log",
+    benchmark:
+        f"{RUN}/benchmarks/contact_scheme.tsv"
+    wildcard_constraints:
+        run=one_of(TOUCHING),
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+        caption=(
+            "Contact in run *{run}* at the start: an axial section with the walls that may touch (a), "
+            "the fissure enlarged, with the pressure that acts (b), and the law of contact (c)."
+        ),
+    script:
+        "../scripts/contact_scheme.py"
+
+
+rule outlines_figure:
+    input:
+        simulated=lambda wildcards: [
+            f"{RUN}/surfaces/week-{week}/pial.surf.gii"
+            for week in measured_beside(wildcards.run, wildcards.brain)
+        ],
+        real=measured_surfaces("whole"),
+    output:
+        **run_figure("outlines", "outlines over each other", "figure.rst"),
+    log:
+        f"{RUN}/logs/outlines_figure.log",
+    benchmark:
+        f"{RUN}/benchmarks/outlines_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+        measured=BESIDE["measured"],
+        weeks=BESIDE["real_weeks"],
+        caption=(
+            "Outlines of the simulated brain of run *{run}* over those of the measured brain of the same "
+            "week, laid onto each other by rigid alignment, in coronal and axial planes through the middle "
+            "and a sagittal plane through the right hemisphere."
+        ),
+    script:
+        "../scripts/outlines_figure.py"
+
+
 rule growth_zone_figure:
     input:
         **REGIONS,
@@ -223,7 +302,7 @@ rule layers_figure:
         caption=(
             "Regions of the start brain of run *{run}* in sections through its middle: elements by "
             "hemisphere (between the contact planes they belong to neither), whether they grow, "
-            "tangential growth in one time step, and shear modulus. Dashed: the ellipsoid of no "
+            "the cortical weight, tangential growth in one time step, and shear modulus. Dashed: the ellipsoid of no "
             "growth, where there is one."
         ),
     script:
@@ -233,8 +312,10 @@ rule layers_figure:
 rule normals_figure:
     input:
         **REGIONS,
+        frames=rules.simulate.output.frames,
+        maps=maps_of_run,
     output:
-        **run_figure("normals", "pial normals in sections", "figure.rst"),
+        **run_figure("normals", "pial normals at two weeks", "figure.rst"),
     log:
         f"{RUN}/logs/normals_figure.log",
     benchmark:
@@ -244,7 +325,7 @@ rule normals_figure:
     params:
         **drawing(),
         caption=(
-            "Normals that orient growth in run *{run}* at the start, for a sample of vertices within "
+            "Normals that orient growth in run *{run}* at its first and last week, for a sample of vertices within "
             "about two millimetres of the sections. An inner vertex has the normal of the nearest "
             "pial vertex. Arrows show the component within the section, so those that cross it look "
             "short. Growth is tangential to the pial surface, across these arrows. The normals are "
@@ -278,6 +359,8 @@ rule steps_figure:
 # figures of every run; those for a paper first
 PAPER_FIGURES_OF_RUNS = [
     rules.weekly_figure,
+    rules.outlines_figure,
+    rules.mesh_figure,
     rules.displacement_maps,
     rules.shape_maps,
     rules.zones_figure,

@@ -3,7 +3,64 @@ FIGURES = f"{STUDY}/figures"
 # the last week of which every run has a surface, where there is one
 COMMON_WEEKS = set.intersection(*(set(week_tags(*pair)) for pair in FOLDED))
 LAST_WEEK = max(COMMON_WEEKS, default=None)
+FIRST_AND_LAST = list(
+    dict.fromkeys(
+        pick(CONFIG.brains, key=lambda brain: brain.week).id for pick in (min, max)
+    )
+)
+TOUCHED = [pair for pair in FOLDED if pair[0] in TOUCHING]
 LAST_BRAINS = [brain.id for brain in CONFIG.brains if week_tag(brain.week) == LAST_WEEK]
+
+
+rule inputs_figure:
+    input:
+        [PIAL["whole"].format(brain=brain) for brain in FIRST_AND_LAST],
+    output:
+        **figure(f"{FIGURES}/inputs", "brains that went in", "figure.rst", "Inputs"),
+    log:
+        f"{STUDY}/logs/inputs_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/inputs_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(*FIRST_AND_LAST),
+        headings=[
+            f"{brain}\n{CONFIG.brain(brain).week:g} GW" for brain in FIRST_AND_LAST
+        ],
+        caption="The youngest and the oldest brain that went in, at one scale.",
+    script:
+        "../scripts/inputs_figure.py"
+
+
+rule scores_figure:
+    input:
+        rules.validation_table.output,
+    output:
+        **figure(
+            f"{FIGURES}/scores",
+            "simulated beside real brains, scores",
+            "figure.rst",
+            "Validation",
+        ),
+    log:
+        f"{STUDY}/logs/scores_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/scores_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
+        measured=CONFIG.measured_name(BRAINS),
+        caption=(
+            "Correlation of the shape index with the real brain of the week (a): of the runs, of the start brain "
+            "merely scaled up, and of the real brain of the week before. What folding gains over the scaled start, "
+            "with its 95 % interval (b): at zero it says nothing about where folds are. Differences of area (c) and "
+            "volume (d)."
+        ),
+    script:
+        "../scripts/scores_figure.py"
 
 
 rule displacement_figure:
@@ -190,6 +247,14 @@ rule figures:
         rules.metrics_figure.output,
         rules.spectra_figure.output,
         rules.displacement_figure.output,
+        rules.inputs_figure.output,
+        rules.scores_figure.output if VALIDATED else [],
+        expand(
+            rules.contact_scheme.output,
+            zip,
+            run=[run for run, _ in TOUCHED],
+            brain=[brain for _, brain in TOUCHED],
+        ),
         rules.age_profile_figure.output if CONFIG.age_reference else [],
         OF_THE_LAST_WEEK,
         rules.growth.input,
@@ -199,6 +264,14 @@ rule figures:
 rule paper:
     input:
         [of_runs(rule.output, measure=SHAPE_MEASURES) for rule in PAPER_FIGURES_OF_RUNS],
+        expand(
+            rules.contact_scheme.output,
+            zip,
+            run=[run for run, _ in TOUCHED],
+            brain=[brain for _, brain in TOUCHED],
+        ),
+        rules.inputs_figure.output,
+        rules.scores_figure.output if VALIDATED else [],
         rules.displacement_figure.output,
         rules.spectra_figure.output,
         OF_THE_LAST_WEEK,

@@ -249,7 +249,7 @@ rule overlay_figure:
             f"{BRAIN}/figures/overlay",
             "surface over the image",
             "figure.rst",
-            "Brains and growth",
+            "Inputs",
             brain="{brain}",
         ),
     log:

@@ -1,6 +1,7 @@
 """Charts of the SpAnGy spectra: relative power of the folds' frequency bands."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 from matplotlib.artist import Artist
@@ -74,6 +75,7 @@ def spectra_chart(
     week: float,
     bands: Sequence[int] = FOLD_BANDS,
     runs: Sequence[str] = (),
+    colours: Mapping[str, Any] | None = None,
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -89,6 +91,8 @@ def spectra_chart(
         Week in GW.
     runs
         All runs of the study, which settle the colours.
+    colours : {run: colour}
+        Other colours, in this order.
 
     Raises
     ------
@@ -99,7 +103,7 @@ def spectra_chart(
     rows = rows[(rows["week"] - week).abs() < 1e-6]
     if rows.empty:
         raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
-    colours = chosen_colours(rows["run"], runs)
+    colours = chosen_colours(rows["run"], runs) if colours is None else colours
     figure = new_figure(FULL_WIDTH_IN, 3.0, synthetic=synthetic, measured=measured)
     panels = figure.subplots(1, 2, sharey=True)
     width = 0.8 / max(len(colours), 1)
