@@ -226,7 +226,7 @@ rule cost_figure:
     input:
         rules.study_resources.output.csv,
     output:
-        **figure(f"{STUDY}/figures/cost", "time and energy", "figure.rst", "Resources"),
+        **figure(f"{STUDY}/figures/cost", "time and energy", "cost.rst", "Resources"),
     log:
         f"{STUDY}/logs/cost_figure.log",
     benchmark:
@@ -235,10 +235,6 @@ rule cost_figure:
         ENVIRONMENT
     params:
         dpi=CONFIG.report.dpi,
-        caption=(
-            "Time (a) and energy (b) of the stages, the longest first. Times are summed over the jobs of a stage, which "
-            "may have run side by side; energy is an estimate, whose assumptions stand under the table."
-        ),
     script:
         "../scripts/cost_figure.py"
 

@@ -57,7 +57,7 @@ rule weekly_figure:
         simulated=run_surfaces("whole"),
         real=measured_surfaces("whole"),
     output:
-        **run_figure("weekly", "simulated beside measured brains", "figure.rst"),
+        **run_figure("weekly", "simulated beside measured brains", "weekly.rst"),
     log:
         f"{RUN}/logs/weekly_figure.log",
     benchmark:
@@ -66,11 +66,6 @@ rule weekly_figure:
         ENVIRONMENT
     params:
         **BESIDE,
-        caption=(
-            "Simulated brain of run *{run}* (blue) beside the measured brain of the same week "
-            "(beige), all at one scale. At the first week the simulation is the start brain as it was "
-            "meshed."
-        ),
     script:
         "../scripts/weekly_figure.py"
 
@@ -79,7 +74,7 @@ rule displacement_maps:
     input:
         rules.simulate.output.frames,
     output:
-        **run_figure("displacement_maps", "displacement maps", "figure.rst"),
+        **run_figure("displacement_maps", "displacement maps", "displacement_maps.rst"),
     log:
         f"{RUN}/logs/displacement_maps.log",
     benchmark:
@@ -88,10 +83,6 @@ rule displacement_maps:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Norm of the displacement between output weeks on the pial surface of run *{run}*, on one "
-            "scale."
-        ),
     script:
         "../scripts/displacement_maps.py"
 
@@ -162,7 +153,7 @@ rule zones_figure:
         data=rules.tetrahedralise.output.data,
         params=rules.parameters.output[0],
     output:
-        **run_figure("zones", "zones of the boundary", "figure.rst"),
+        **run_figure("zones", "zones of the boundary", "zones.rst"),
     log:
         f"{RUN}/logs/zones_figure.log",
     benchmark:
@@ -171,12 +162,6 @@ rule zones_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Zones of the boundary at the start of run *{run}*: free, clamped (inside the ellipsoid "
-            "of no growth), the facets of each hemisphere that may come into contact at the fissure, "
-            "and those between the contact planes. In medial views the tissue that joins the "
-            "hemispheres is left open: grey is the inside of the surface behind it."
-        ),
     script:
         "../scripts/zones_figure.py"
 
@@ -194,7 +179,7 @@ rule mesh_figure:
         mesh=rules.regions.output.mesh,
         data=rules.regions.output.data,
     output:
-        **run_figure("mesh", "the mesh, cut open", "figure.rst"),
+        **run_figure("mesh", "the mesh, cut open", "mesh.rst"),
     log:
         f"{RUN}/logs/mesh_figure.log",
     benchmark:
@@ -203,10 +188,6 @@ rule mesh_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Tetrahedral mesh at the start of run *{run}*: from the left (a), and cut open across the "
-            "middle, seen from the front (b), and along it, seen from above (c). Elements are left out whole."
-        ),
     script:
         "../scripts/mesh_figure.py"
 
@@ -217,7 +198,7 @@ rule contact_scheme:
         data=rules.tetrahedralise.output.data,
         params=rules.parameters.output[0],
     output:
-        **run_figure("contact_scheme", "scheme of contact", "figure.rst"),
+        **run_figure("contact_scheme", "scheme of contact", "contact_scheme.rst"),
     log:
         f"{RUN}/logs/contact_scheme.log",
     benchmark:
@@ -228,10 +209,6 @@ rule contact_scheme:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Contact in run *{run}* at the start: an axial section with the walls that may touch (a), "
-            "the fissure enlarged, with the pressure that acts (b), and the law of contact (c)."
-        ),
     script:
         "../scripts/contact_scheme.py"
 
@@ -244,7 +221,7 @@ rule outlines_figure:
         ],
         real=measured_surfaces("whole"),
     output:
-        **run_figure("outlines", "outlines over each other", "figure.rst"),
+        **run_figure("outlines", "outlines over each other", "outlines.rst"),
     log:
         f"{RUN}/logs/outlines_figure.log",
     benchmark:
@@ -255,11 +232,6 @@ rule outlines_figure:
         **drawing(),
         measured=BESIDE["measured"],
         weeks=BESIDE["real_weeks"],
-        caption=(
-            "Outlines of the simulated brain of run *{run}* over those of the measured brain of the same "
-            "week, laid onto each other by rigid alignment, in coronal and axial planes through the middle "
-            "and a sagittal plane through the right hemisphere."
-        ),
     script:
         "../scripts/outlines_figure.py"
 
@@ -268,7 +240,7 @@ rule growth_zone_figure:
     input:
         **REGIONS,
     output:
-        **run_figure("growth_zone", "growth on the surface", "figure.rst"),
+        **run_figure("growth_zone", "growth on the surface", "growth_zone.rst"),
     log:
         f"{RUN}/logs/growth_zone_figure.log",
     benchmark:
@@ -277,11 +249,6 @@ rule growth_zone_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Tangential growth of the pial surface in one time step of run *{run}*, at the start. "
-            "Nothing grows inside the ellipsoid of no growth, nor where tissue bridges the two planes "
-            "at the fissure."
-        ),
     script:
         "../scripts/growth_zone_figure.py"
 
@@ -290,7 +257,7 @@ rule layers_figure:
     input:
         **REGIONS,
     output:
-        **run_figure("layers", "regions and growth in sections", "figure.rst"),
+        **run_figure("layers", "regions and growth in sections", "layers.rst"),
     log:
         f"{RUN}/logs/layers_figure.log",
     benchmark:
@@ -299,12 +266,6 @@ rule layers_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Regions of the start brain of run *{run}* in sections through its middle: elements by "
-            "hemisphere (between the contact planes they belong to neither), whether they grow, "
-            "the cortical weight, tangential growth in one time step, and shear modulus. Dashed: the ellipsoid of no "
-            "growth, where there is one."
-        ),
     script:
         "../scripts/layers_figure.py"
 
@@ -315,7 +276,7 @@ rule normals_figure:
         frames=rules.simulate.output.frames,
         maps=maps_of_run,
     output:
-        **run_figure("normals", "pial normals at two weeks", "figure.rst"),
+        **run_figure("normals", "pial normals at two weeks", "normals.rst"),
     log:
         f"{RUN}/logs/normals_figure.log",
     benchmark:
@@ -324,13 +285,6 @@ rule normals_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Normals that orient growth in run *{run}* at its first and last week, for a sample of vertices within "
-            "about two millimetres of the sections. An inner vertex has the normal of the nearest "
-            "pial vertex. Arrows show the component within the section, so those that cross it look "
-            "short. Growth is tangential to the pial surface, across these arrows. The normals are "
-            "computed again in every step."
-        ),
     script:
         "../scripts/normals_figure.py"
 
@@ -339,7 +293,7 @@ rule steps_figure:
     input:
         rules.simulate.output.steps,
     output:
-        **run_figure("steps", "steps of the solver", "figure.rst"),
+        **run_figure("steps", "steps of the solver", "steps.rst"),
     log:
         f"{RUN}/logs/steps_figure.log",
     benchmark:
@@ -348,10 +302,6 @@ rule steps_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Solver of run *{run}*: iterations, smallest det F (an element would be inverted at 0), "
-            "displacement and time of each step."
-        ),
     script:
         "../scripts/steps_figure.py"
 

@@ -16,7 +16,7 @@ rule inputs_figure:
     input:
         [PIAL["whole"].format(brain=brain) for brain in FIRST_AND_LAST],
     output:
-        **figure(f"{FIGURES}/inputs", "brains that went in", "figure.rst", "Inputs"),
+        **figure(f"{FIGURES}/inputs", "brains that went in", "inputs.rst", "Inputs"),
     log:
         f"{STUDY}/logs/inputs_figure.log",
     benchmark:
@@ -28,7 +28,6 @@ rule inputs_figure:
         headings=[
             f"{brain}\n{CONFIG.brain(brain).week:g} GW" for brain in FIRST_AND_LAST
         ],
-        caption="The youngest and the oldest brain that went in, at one scale.",
     script:
         "../scripts/inputs_figure.py"
 
@@ -40,7 +39,7 @@ rule scores_figure:
         **figure(
             f"{FIGURES}/scores",
             "simulated beside real brains, scores",
-            "figure.rst",
+            "scores.rst",
             "Validation",
         ),
     log:
@@ -53,12 +52,6 @@ rule scores_figure:
         **drawing(*CONFIG.start_brains),
         folded=FOLDED,
         measured=CONFIG.measured_name(BRAINS),
-        caption=(
-            "Correlation of the shape index with the real brain of the week (a): of the runs, of the start brain "
-            "merely scaled up, and of the real brain of the week before. What folding gains over the scaled start, "
-            "with its 95 % interval (b): at zero it says nothing about where folds are. Differences of area (c) and "
-            "volume (d)."
-        ),
     script:
         "../scripts/scores_figure.py"
 
@@ -70,7 +63,7 @@ rule displacement_figure:
         **figure(
             f"{FIGURES}/displacement",
             "displacement per week",
-            "figure.rst",
+            "displacement.rst",
             "Folding",
         ),
         table=report(
@@ -88,11 +81,6 @@ rule displacement_figure:
     params:
         **drawing(*CONFIG.start_brains),
         folded=FOLDED,
-        caption=(
-            "Largest and mean norm of the displacement between output weeks, over all nodes, beside "
-            "the values that the FetalFoldSim paper reports for its simulation and for real brains. "
-            "Those are other brains: compare orders of magnitude only."
-        ),
     script:
         "../scripts/displacement_figure.py"
 
@@ -102,7 +90,7 @@ rule metrics_figure:
         f"{STUDY}/metrics.csv",
     output:
         **figure(
-            f"{FIGURES}/metrics", "metrics over the weeks", "figure.rst", "Metrics"
+            f"{FIGURES}/metrics", "metrics over the weeks", "metrics.rst", "Metrics"
         ),
         table=report(
             f"{STUDY}/metrics_table.html",
@@ -119,11 +107,6 @@ rule metrics_figure:
     params:
         **drawing(*CONFIG.start_brains),
         folded=FOLDED,
-        caption=(
-            "Metrics over the weeks: runs as lines, measured brains as stars. The gyrification index "
-            "is the pial area divided by that of the convex hull, or by that of a tighter envelope. "
-            "Shape index: −1 is a cup, +1 a cap, so gyri are positive."
-        ),
         measured=CONFIG.measured_name(BRAINS),
     script:
         "../scripts/metrics_figure.py"
@@ -136,7 +119,7 @@ rule spectra_figure:
         **figure(
             f"{FIGURES}/spectra",
             "SpAnGy bands B4-B6 over the weeks",
-            "figure.rst",
+            "spectra.rst",
             "Metrics",
         ),
     log:
@@ -148,11 +131,6 @@ rule spectra_figure:
     params:
         **drawing(*CONFIG.start_brains),
         folded=FOLDED,
-        caption=(
-            "Relative power of the shape measure's spectrum in the bands B4, B5 and B6 (primary, "
-            "secondary and tertiary folds) over the weeks, per hemisphere (SpAnGy, Germanaud et al. "
-            "2012). Open marks: the band is cut off, or finer than the surface resolves."
-        ),
         measured=CONFIG.measured_name(BRAINS),
     script:
         "../scripts/spectra_figure.py"
