@@ -142,7 +142,8 @@ def nearest_chart(
     InputError
         If no distance is known.
     """
-    rows = comparison[comparison["distance"].notna()].assign(at=comparison[varied])
+    rows = comparison[comparison["distance"].notna()]
+    rows = rows.assign(at=rows[varied])
     measures = list(dict.fromkeys(rows["measure"]))
     if not measures:
         raise InputError("no distance to a measured brain is known", found=f"{len(comparison)} rows")
