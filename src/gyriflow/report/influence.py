@@ -198,7 +198,7 @@ def _nearest_panel(axes: Axes, rows: pd.DataFrame, sides: Sequence[str]) -> None
             markeredgewidth=1.0,
         )
         axes.annotate(
-            f"{best['value']:g}",
+            f"{best['at']:g}",
             (best["at"], best["distance"]),
             xytext=(0, -8),
             textcoords="offset points",
