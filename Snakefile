@@ -5,8 +5,13 @@ from pathlib import Path
 from snakemake.utils import min_version
 
 min_version("9.0")
-SOURCE = f"{workflow.basedir}/src"
-sys.path.insert(0, SOURCE)
+# beside this file in a checkout; an installed package holds this file and is found without
+CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
+SOURCE = str(
+    Path(workflow.basedir, "src") if CHECKED_OUT else Path(workflow.basedir).parents[1]
+)
+if CHECKED_OUT:
+    sys.path.insert(0, SOURCE)
 from gyriflow.provenance import code_hash
 
 # a configuration given on the command line replaces the demo instead of being mixed with it
@@ -24,15 +29,19 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/retrieve.smk"
 include: "workflow/rules/input.smk"
 include: "workflow/rules/surface.smk"
-include: "workflow/rules/mesh.smk"
 include: "workflow/rules/growth.smk"
+include: "workflow/rules/mesh.smk"
 include: "workflow/rules/registration.smk"
 include: "workflow/rules/folding.smk"
 include: "workflow/rules/metrics.smk"
+include: "workflow/rules/regions.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
+include: "workflow/rules/studies.smk"
+include: "workflow/rules/calibration.smk"
 include: "workflow/rules/run_figures.smk"
 include: "workflow/rules/study_figures.smk"
+include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -47,7 +56,10 @@ localrules:
     validate,
     metrics,
     figures,
+    quality,
     report,
+    studies,
+    calibrate,
     paper,
     parameters,
     html_report,
@@ -62,6 +74,8 @@ rule all:
         rules.folding.input,
         rules.metrics.input,
         rules.figures.input,
+        rules.quality.input,
+        rules.study_warnings.output,
         rules.report.input,
 
 

@@ -1,14 +1,18 @@
 """The house rules, checked on the source itself: import arrows, open files, sizes, names, and lists that must agree."""
 
 import ast
+import json
 import re
+import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 import yaml
 
+from gyriflow.launch import SETTINGS
 from gyriflow.provenance import imported_modules, room_of
+from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
@@ -21,16 +25,23 @@ ARROWS = {
     "geometry": {"errors", "units"},
     "parameters": {"errors", "units"},
     # a configuration names atlases, which are described in files
-    "config": PLAIN | {"io"},
+    "config": PLAIN | {"io", "shipped"},
     "mechanics": set(),
     # the solve is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io"},
     **dict.fromkeys(("io", "phantom", "surface", "mesh", "registration", "growth", "metrics"), PLAIN),
-    **dict.fromkeys(("validation", "report"), PLAIN),
+    **dict.fromkeys(("validation", "study", "report"), PLAIN),
     # the shell around the rooms: how a workflow starts, how a step ends, which code it depends on
-    "provenance": set(),
+    "provenance": {"version"},
+    "shipped": set(),
+    "version": {"shipped"},
     "step": {"errors"},
-    "launch": {"errors", "io", "step"},
+    "terminal": set(),
+    "launch": {"errors", "io", "shipped", "step", "terminal"},
+    # what a study takes is told from its configuration
+    "cost": PLAIN | {"config", "io"},
+    # the command line is above everything
+    "cli": PLAIN | {"config", "cost", "folding", "io", "launch", "shipped", "surface", "terminal", "version"},
 }
 """The rooms, and what each may import besides itself. Siblings do not know each other; they meet in plain geometry, in
 the vocabulary and in files."""
@@ -41,7 +52,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
-OPENING_ROOMS = {"io", "folding", "provenance", "step", "launch"}
+OPENING_ROOMS = {"io", "folding", "provenance", "step", "launch", "terminal"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
     *("open", "read_text", "read_bytes", "write_text", "write_bytes", "tofile", "to_filename", "savefig"),
@@ -186,6 +197,7 @@ def test_conda_environment_sets_what_the_launcher_sets():
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
     # what concerns the checkout and the user's Python is the launcher's own
     assert environment["variables"] == {name: exports[name] for name in exports if not name.startswith("PYTHON")}
+    assert environment["variables"] == SETTINGS
 
 
 def test_conda_environment_holds_no_path():
@@ -213,9 +225,20 @@ def test_images_and_launcher_use_the_same_debian():
 
 def test_citation_has_the_version_of_the_package():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
-    (version,) = re.findall(r'__version__ = "(.+)"', (PACKAGE / "__init__.py").read_text())
-    assert citation["version"] == version
-    assert f"## {version}" in (ROOT / "CHANGELOG.md").read_text()
+    zenodo = json.loads((ROOT / ".zenodo.json").read_text())
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    fallback = project["tool"]["hatch"]["version"]["raw-options"]["fallback_version"]
+    assert citation["version"] == zenodo["version"] == fallback == RELEASE
+    assert f"## {RELEASE}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_package_needs_what_the_environment_has():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    needed = {re.split(r"[<>=~!]", entry)[0] for entry in project["dependencies"]}
+    there = {re.split(r"[<>=~!]", entry)[0] for entry in listed(ROOT / "envs" / "requirements.txt")}
+    # what is for development and benchmarks only
+    assert there - needed == {"scikit-learn", "pytest", "ruff", "snakefmt", "mypy", "pandas-stubs", "types-PyYAML"}
+    assert needed - there <= {"click", "numpy"}
 
 
 def test_links_in_the_documentation_lead_somewhere():

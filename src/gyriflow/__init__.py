@@ -1,3 +1,1 @@
 """gyriflow: from fetal brain MRI to cortical-folding metrics."""
-
-__version__ = "0.1.0"

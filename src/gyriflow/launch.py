@@ -1,31 +1,75 @@
 """`python -m gyriflow.launch ARG...`: Snakemake with this checkout's workflow, which is what `./run snakemake` calls.
 
 It clears a lock that an interrupted run has left (never that of a live run) and ends with the exit code of the first
-failed step. Everything else is Snakemake's own command line.
+failed step. Where a run is asked for, the terminal shows stages, weeks, warnings and failures, and a log all else;
+`--verbose`, `--quiet`, `--printshellcmds` or `--logger` give Snakemake's own messages. Everything else is Snakemake's
+own command line.
 """
 
 import fcntl
 import os
 import re
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
+from datetime import datetime
 from pathlib import Path
 from types import FrameType
 from typing import IO
 
 from .errors import GyriflowError, InputError, StorageError
+from .io.files import read_json, write_json
 from .io.yaml_files import read_yaml
+from .shipped import SHIPPED
 from .step import EXIT_FILE, INTERRUPTED, recorded_exit_code
+from .terminal.redirection import prints_go_to
 
-CHECKOUT = Path(__file__).resolve().parents[2]
+SETTINGS = {
+    **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "OMPI_MCA_btl": "self,sm",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "PRTE_MCA_hwloc_default_binding_policy": "none",
+}
+"""Variables of MPI and BLAS where the user sets no others, as `./run` and the conda environment have them."""
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 LOOKS_ONLY = frozenset(
     ("-n", "--dry-run", "--dryrun", "--nolock", "--summary", "-D", "--detailed-summary", "--rulegraph", "--dag")
     + ("--filegraph", "--list-rules", "--list", "-l", "--lint", "-h", "--help", "-v", "--version")
 )
 """Options under which Snakemake takes no lock."""
+GOES_ON = "GYRIFLOW_KEEP_GOING"
+"""Environment variable that is set where a call has an option of `KEEP_GOING`."""
+KEEP_GOING = frozenset(("--keep-going", "-k"))
+REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
+"""Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
+
+
+HELD: list[IO[str]] = []
+"""Files whose locks this process holds."""
+SAYS_ITSELF = frozenset(
+    (
+        "--verbose",
+        "--quiet",
+        "-q",
+        "--printshellcmds",
+        "-p",
+        "--logger",
+        "--debug",
+        "--debug-dag",
+        "--unlock",
+        "--touch",
+        "-t",
+    )
+    + ("--report", "--archive", "--delete-all-output", "--delete-temp-output", "--cleanup-metadata", "--cm")
+    + ("--list-input-changes", "--list-params-changes", "--list-code-changes", "--generate-unit-tests", "--mode")
+)
+"""Options under which Snakemake's own messages are wanted, or no steps are run."""
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
@@ -47,7 +91,17 @@ def hold_lock(directory: Path) -> IO[str] | None:
     except BlockingIOError:
         file.close()
         return None
+    HELD.append(file)
     return file
+
+
+def release_locks() -> None:
+    """Gives up the locks of the Snakemake run that this process has ended."""
+    # the Snakefile has imported this module by its name, beside the program
+    from gyriflow import launch
+
+    while launch.HELD:
+        launch.HELD.pop().close()
 
 
 def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
@@ -80,6 +134,12 @@ def looks_only(arguments: Sequence[str]) -> bool:
     """Returns whether Snakemake takes no lock for these arguments; short options may be bundled, as in `-np`."""
     bundled = any(re.fullmatch("-[npqrF]*n[npqrF]*", argument) for argument in arguments)
     return bundled or bool(LOOKS_ONLY.intersection(arguments))
+
+
+def runs_quietly(arguments: Sequence[str]) -> bool:
+    """Returns whether steps are run and only the essential is to be on the terminal."""
+    names = {argument.partition("=")[0] for argument in arguments if argument.startswith("-")}
+    return not looks_only(arguments) and not names & SAYS_ITSELF
 
 
 def value_of(arguments: Sequence[str], *names: str) -> str | None:
@@ -118,11 +178,60 @@ def add_snakefile(arguments: Sequence[str]) -> list[str]:
     """Returns Snakemake's arguments, with this checkout's Snakefile if the user names none and none is here."""
     if value_of(arguments, "--snakefile", "-s") is not None or any(Path(name).is_file() for name in SNAKEFILES):
         return list(arguments)
-    return ["--snakefile", str(CHECKOUT / "Snakefile"), *arguments]
+    return ["--snakefile", str(SHIPPED / "Snakefile"), *arguments]
+
+
+def refused_brains() -> dict[str, str]:
+    """Returns the cause by the id of each brain that an earlier pass of this call has refused."""
+    path = os.environ.get(REFUSED_FILE)
+    return read_json(path) if path else {}
+
+
+def keeps_going() -> bool:
+    """Returns whether the call that this process belongs to goes on where a step or a row of a table fails."""
+    return GOES_ON in os.environ
+
+
+def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
+    """Returns the cause by the id of each brain of which a step has failed since a time (s, of the epoch)."""
+    from .io.logs import gather_messages  # takes a second, which a good run need not wait for
+
+    found: dict[str, str] = {}
+    folders = directory.glob("results/brains/*")
+    messages = gather_messages(directory, [folder.name for folder in folders], [], since_s=since_s)
+    errors = messages[(messages["level"] == "error") & (messages["subject"] != "")]
+    for subject, message in zip(errors["subject"], errors["message"], strict=True):
+        found.setdefault(subject, message)
+    return found
+
+
+def finish_without(refused: dict[str, str], arguments: Sequence[str], directory: Path) -> None:
+    """Runs the same call again without refused brains, so that they don't hold up the tables and figures of the rest.
+
+    Where the call asks for files of such a brain there is nothing to finish.
+    """
+    if any(argument.startswith(f"results/brains/{brain}/") for argument in arguments for brain in refused):
+        return
+    print(f"gyriflow: refused: {', '.join(refused)}; finishing the study without", file=sys.stderr, flush=True)
+    path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
+    write_json(path, refused)
+    release_locks()
+    try:
+        again = [sys.executable, "-m", "gyriflow.launch", *arguments]
+        subprocess.run(again, env=os.environ | {REFUSED_FILE: str(path)}, check=False)
+    except KeyboardInterrupt:
+        # the same command goes on from here
+        pass
+    finally:
+        path.unlink(missing_ok=True)
 
 
 def main(arguments: Sequence[str]) -> int:
     """Runs Snakemake and returns the exit code: its own, or that of the first failed step."""
+    for name, value in SETTINGS.items():
+        os.environ.setdefault(name, value)
+    # steps call `python`, which is to be this one
+    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     refuse_bad_configfiles(arguments)
     directory = Path(value_of(arguments, "--directory", "-d") or ".")
     if not looks_only(arguments):
@@ -132,24 +241,38 @@ def main(arguments: Sequence[str]) -> int:
     # beside the results, where jobs on other machines of a cluster find it too
     exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
     os.environ[EXIT_FILE] = str(exit_file)
+    if KEEP_GOING.intersection(arguments):
+        os.environ[GOES_ON] = "1"
     interrupts: list[int] = []
+    began = time.time()
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         interrupts.append(number)
         signal.default_int_handler(number, frame)
 
     signal.signal(signal.SIGINT, interrupt)
-    try:
-        cli.main(add_snakefile(arguments))
-    except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else int(end.code is not None)
-    except KeyboardInterrupt:
-        code = INTERRUPTED
+    # the name under which usage and mistakes in it are told
+    sys.argv[0] = "snakemake"
+    complete = add_snakefile(arguments)
+    details = directory.absolute() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
+    quiet = runs_quietly(arguments)
+    if quiet:
+        complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]
+    with prints_go_to(details) if quiet else nullcontext():
+        try:
+            cli.main(complete)
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        except KeyboardInterrupt:
+            code = INTERRUPTED
     recorded = recorded_exit_code(exit_file)
     exit_file.unlink(missing_ok=True)
     if code and interrupts:
         print("gyriflow: interrupted; the same command resumes from here", file=sys.stderr)
         return INTERRUPTED
+    may_finish = REFUSED_FILE not in os.environ and not looks_only(arguments)
+    if code and may_finish and KEEP_GOING.intersection(arguments) and (refused := failed_brains(directory, began)):
+        finish_without(refused, arguments, directory)
     return (recorded or code) if code else 0
 
 

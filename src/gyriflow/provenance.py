@@ -1,11 +1,55 @@
-"""Which code a step of the workflow depends on: the modules that its program imports, directly or through others."""
+"""Where results come from: the code that a step depends on, and the versions of everything that made them.
+
+The code of a step is the modules that its program imports, directly or through others.
+"""
 
 import ast
 import hashlib
+import platform
+import sys
+from datetime import UTC, datetime
 from functools import cache
+from importlib import metadata
 from pathlib import Path
+from typing import Any
+
+from .version import commit, version
 
 PACKAGE = Path(__file__).resolve().parent
+PACKAGES = (
+    *(
+        "fenics-dolfinx",
+        "fenics-basix",
+        "fenics-ffcx",
+        "fenics-ufl",
+        "petsc4py",
+        "slepc4py",
+        "mpi4py",
+        "numpy",
+        "scipy",
+    ),
+    *("snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk", "lapy", "pandas"),
+    *("picsl-greedy", "SimpleITK", "pyvista", "h5py", "pydantic"),
+)
+"""Packages whose versions are recorded: those that results depend on."""
+
+
+def software() -> dict[str, Any]:
+    """Returns the versions of gyriflow, of Python and of the packages that results depend on, the commit, and now (UTC)."""
+    packages = {}
+    for name in PACKAGES:
+        try:
+            packages[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            packages[name] = None
+    return {
+        "gyriflow": version(),
+        "commit": commit(),
+        "recorded": datetime.now(UTC).isoformat(timespec="seconds"),
+        "python": sys.version.split()[0],
+        "system": platform.platform(),
+        "packages": packages,
+    }
 
 
 def code_hash(program: Path) -> str:

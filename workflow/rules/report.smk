@@ -10,6 +10,10 @@ from gyriflow.report.style import run_names
 BENCHMARKS = {
     job.name: job.benchmark.regex().pattern for job in workflow.rules if job.benchmark
 }
+# the brains of the atlas are among the brains by now
+USED_CONFIG = WHOLE_CONFIG.model_dump(
+    mode="json", exclude_defaults=True, exclude={"atlas", "participants"}
+)
 
 
 rule study_resources:
@@ -48,6 +52,7 @@ MADE = [
     *rules.metrics.input,
     *rules.study_resources.output,
     f"{STUDY}/figures/cost.png",
+    *rules.quality.input,
 ]
 PICTURE_BYTES = 9_000_000
 
@@ -113,7 +118,7 @@ def described_brains():
             **{key: getattr(brain, key) for key in ("source", "synthetic")},
             "licence": known.get(brain.id),
         }
-        for brain in CONFIG.brains
+        for brain in WHOLE_CONFIG.brains
     ]
 
 
@@ -145,14 +150,15 @@ def described_settings(settings):
 
 
 # the hemispheres of a brain at a week, and the folder of their maps
-def timed(week, folder, maps):
-    sides = [surfaces_in(folder)[side] for side in SIDES]
+def timed(brain, week, folder, maps):
+    sides = [surfaces_in(folder)[side] for side in sides_of(brain)]
     return [float(week), sides, maps]
 
 
 VIEWED_RUNS = {
     name: [
         timed(
+            brain,
             week,
             f"results/runs/{run}/{brain}/surfaces/week-{week}",
             f"results/runs/{run}/{brain}/metrics/week-{week}",
@@ -161,14 +167,21 @@ VIEWED_RUNS = {
     ]
     for name, (run, brain) in zip(run_names(FOLDED), FOLDED)
 }
+# the measured brains that are shown beside the runs
+VIEWED = [
+    brain
+    for brain in CONFIG.brains
+    if not CONFIG.start_brains
+    or brain.population == CONFIG.brain(CONFIG.start_brains[0]).population
+]
 VIEWED_BRAINS = [
     timed(
+        brain.id,
         brain.week,
         f"results/brains/{brain.id}/surface",
         f"results/brains/{brain.id}/metrics",
     )
-    for brain in sorted(CONFIG.brains, key=lambda brain: brain.week)
-    if brain.population == CONFIG.brain(CONFIG.start_brains[0]).population
+    for brain in sorted(VIEWED, key=lambda brain: brain.week)
 ]
 
 
@@ -192,26 +205,20 @@ rule view_surfaces:
     params:
         runs=VIEWED_RUNS,
         real=VIEWED_BRAINS,
-        measured=CONFIG.measured_name(
-            [
-                brain.id
-                for brain in CONFIG.brains
-                if brain.population == CONFIG.brain(CONFIG.start_brains[0]).population
-            ]
-        ),
+        measured=CONFIG.measured_name([brain.id for brain in VIEWED]),
     script:
         "../scripts/view_surfaces.py"
 
 
-rule provenance:
+rule report_provenance:
     input:
         rules.metrics.input,
     output:
         "results/report/provenance.json",
     log:
-        "results/report/logs/provenance.log",
+        "results/report/logs/report_provenance.log",
     benchmark:
-        "results/report/benchmarks/provenance.tsv"
+        "results/report/benchmarks/report_provenance.tsv"
     conda:
         ENVIRONMENT
     params:
@@ -219,7 +226,7 @@ rule provenance:
         paths=CONFIG.report.paths,
         source=workflow.basedir,
     script:
-        "../scripts/provenance.py"
+        "../scripts/report_provenance.py"
 
 
 rule cost_figure:
@@ -244,13 +251,15 @@ rule html_report:
         MADE,
         surfaces=expand(PIAL["report"], brain=BRAINS),
         runs=rules.study_runs.output.csv,
+        quality=rules.quality_table.output.csv,
+        warnings=rules.study_warnings.output[0],
         validation=rules.validation_table.output[0] if VALIDATED else [],
         displacement=(
             rules.displacement_agreement_table.output[0]
             if any(brain in CARRIED for _, brain in VALIDATED)
             else []
         ),
-        provenance=rules.provenance.output[0],
+        provenance=rules.report_provenance.output[0],
         view=rules.view_surfaces.output[0],
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
@@ -269,19 +278,43 @@ rule html_report:
         runtime=20,
     params:
         entries=marked_files(),
-        first=rules.weekly_figure.output.png.format(
-            run=FOLDED[0][0], brain=FOLDED[0][1]
+        first=(
+            rules.weekly_figure.output.png.format(run=FOLDED[0][0], brain=FOLDED[0][1])
+            if FOLDED
+            else None
         ),
         picture_bytes=PICTURE_BYTES,
         brains=described_brains(),
         surfaced=BRAINS,
         metrics=described_settings(CONFIG.metrics),
-        # the brains of the atlas are among the brains by now
-        config=(lambda plain: plain if CONFIG.report.paths else hide_paths(plain))(
-            CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"})
-        ),
+        config=USED_CONFIG if CONFIG.report.paths else hide_paths(USED_CONFIG),
     script:
         "../scripts/html_report.py"
+
+
+rule provenance:
+    input:
+        rules.figures.input,
+        rules.metrics.input,
+    output:
+        study=f"{STUDY}/provenance.json",
+        brains=expand(f"{BRAIN}/provenance.json", brain=BRAINS),
+        runs=of_runs(f"{RUN}/provenance.json"),
+    log:
+        f"{STUDY}/logs/provenance.log",
+    benchmark:
+        f"{STUDY}/benchmarks/provenance.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        config=USED_CONFIG,
+        brains=[
+            brain.model_dump(mode="json", exclude_defaults=True)
+            for brain in CONFIG.brains
+        ],
+        folded=FOLDED,
+    script:
+        "../scripts/provenance.py"
 
 
 # the configuration with its paths, for those who have the files
@@ -295,7 +328,7 @@ rule report_config:
     conda:
         ENVIRONMENT
     params:
-        config=CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}),
+        config=USED_CONFIG,
     script:
         "../scripts/report_config.py"
 
@@ -304,3 +337,4 @@ rule report:
     input:
         rules.html_report.output,
         rules.report_config.output,
+        rules.provenance.output,

@@ -8,7 +8,8 @@ from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    tables = runs_by_name(read_table(files.profile)), read_table(files.check)
+    profile, similarity = (runs_by_name(read_table(files[name])) for name in ("profile", "similarity"))
     shown = {"measured": params.measured, "synthetic": params.synthetic}
-    figure = age_profile_chart(*tables, runs=run_names(params.folded), **shown)
+    runs = run_names(params.folded)
+    figure = age_profile_chart(profile, read_table(files.check), similarity, runs=runs, **shown)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -1,26 +1,34 @@
-"""Where the results come from: versions, commit, and the hashes of the input files."""
+"""Where the results come from, beside those of each brain, each run and the study: versions, settings, hashes."""
 
-import platform
-from datetime import UTC, datetime
+from pathlib import Path
 
-import gyriflow
-from gyriflow.io.downloads import sha256_of
 from gyriflow.io.files import write_json
-from gyriflow.io.versions import package_versions, source_commit
+from gyriflow.io.fingerprints import files_in, fingerprints
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.provenance import software
 from gyriflow.step import step
 
-PACKAGES = (
-    *("fenics-dolfinx", "fenics-basix", "fenics-ufl", "fenics-ffcx", "petsc4py", "mpi4py", "numpy", "scipy", "pandas"),
-    *("h5py", "nibabel", "pyvista", "vtk", "pymeshlab", "pytetwild", "libigl", "trimesh", "lapy", "picsl-greedy"),
-    *("matplotlib", "pydantic", "snakemake"),
-)
+output, params = snakemake.output, snakemake.params
+OF_JOBS = ("logs", "benchmarks", "provenance.json")
 
-params = snakemake.params
+
+def texts(value):
+    """Returns all texts in a brain's entry, files among them."""
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else []
+    return [value] if isinstance(value, str) else [text for item in items for text in texts(item)]
+
+
 with step(snakemake.log[0]):
-    versions = {"gyriflow": gyriflow.__version__, "Python": platform.python_version()} | package_versions(PACKAGES)
-    files = [
-        {"brain": brain, "what": what, "sha256": sha256_of(path)} | ({"path": path} if params.paths else {})
-        for brain, what, path in params.files
-    ]
-    content = {"commit": source_commit(params.source), "versions": versions, "files": files}
-    write_json(snakemake.output[0], content | {"made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")})
+    used = software()
+    inputs = {brain["id"]: fingerprints(texts(brain)) for brain in params.brains}
+    for path, brain in zip(output.brains, params.brains, strict=True):
+        results = fingerprints(files_in(Path(path).parent, *OF_JOBS))
+        write_json(path, used | {"configuration": brain, "inputs": inputs[brain["id"]], "results": results})
+    for path, (run, brain) in zip(output.runs, params.folded, strict=True):
+        folder = Path(path).parent
+        start = fingerprints([f"results/brains/{brain}/mesh/brain.h5", folder / "folding" / "maps.h5"])
+        results = fingerprints(files_in(folder, *OF_JOBS))
+        settings = {"run": run, "start": brain, "parameters": read_yaml(folder / "params.yaml")}
+        write_json(path, used | {"configuration": settings, "inputs": start | inputs[brain], "results": results})
+    results = fingerprints(files_in(Path(output.study).parent, *OF_JOBS))
+    write_json(output.study, used | {"configuration": params.config, "inputs": inputs, "results": results})

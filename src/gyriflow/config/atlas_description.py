@@ -8,8 +8,9 @@ from pydantic import Field, field_validator, model_validator
 from ..parameters.settings import Settings, setting
 from ..parameters.terms import AffineSource, Coordinates
 from ..parameters.varying import Week
+from ..shipped import SHIPPED
 
-ATLASES = Path(__file__).resolve().parents[3] / "atlases"
+ATLASES = SHIPPED / "atlases"
 """Folder of the atlases that come with gyriflow, each in a folder of its own."""
 
 FileKey = Literal["labels", "image", "left", "right", "pial"]

@@ -98,9 +98,21 @@ def write_table(path: AnyPath, table: pd.DataFrame) -> None:
         table.to_csv(temporary, index=False, float_format="%.10g")
 
 
-def read_table(path: AnyPath) -> pd.DataFrame:
-    """Returns a CSV table; InputError where it is missing or torn."""
+def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
+    """Returns the rows of a tab-separated table with a heading, as texts by column; InputError where it is none."""
     try:
-        return pd.read_csv(path)
+        table = pd.read_csv(path, sep="\t", dtype=str, keep_default_na=False, encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read as a tab-separated table: {error}", path=path) from error
+    rows = [{str(name).strip(): value.strip() for name, value in row.items()} for row in table.to_dict("records")]
+    if not rows:
+        raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
+    return rows
+
+
+def read_table(path: AnyPath, separator: str = ",") -> pd.DataFrame:
+    """Returns a CSV table, or one with another separator; InputError where it is missing or torn."""
+    try:
+        return pd.read_csv(path, sep=separator)
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read as a CSV table: {error}", path=path) from error

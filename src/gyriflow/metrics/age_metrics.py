@@ -21,6 +21,9 @@ OF_THE_ANALYSIS = (
 )
 """Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
 
+OF_LABELS = ("volume_tissue", "volume_ventricles", "volume_cortex")
+"""Metrics of the labels, which simulated brains do not have."""
+
 FAMILIES = {
     "size": ("volume", "area"),
     "gyrification": ("gyrification_",),
@@ -63,7 +66,9 @@ def comparable_metrics(metrics: pd.DataFrame, spectra: pd.DataFrame, reference: 
 
     InputError for a unit whose dimension is not known.
     """
-    chosen = metrics[~metrics["metric"].isin(OF_THE_ANALYSIS) & ~metrics["metric"].str.endswith("_relative_power")]
+    chosen = metrics[
+        ~metrics["metric"].isin((*OF_THE_ANALYSIS, *OF_LABELS)) & ~metrics["metric"].str.endswith("_relative_power")
+    ]
     units = chosen.drop_duplicates("metric").set_index("metric")["unit"].astype(str)
     if unknown := sorted(set(units) - set(DIMENSIONS)):
         raise InputError("units without a known dimension", found=", ".join(unknown), expected=", ".join(DIMENSIONS))

@@ -21,6 +21,7 @@ class Results:
     runs, validation, displacement : as for `runs_table`
     provenance : commit, versions, files (brain, what, sha256, and path where it may be shown) and made, the time
     metrics : {setting: {"value", "unit", "description"}}
+    warnings : columns subject, run, step, level, message
     configuration : text, without paths unless they may be shown
     """
 
@@ -33,6 +34,7 @@ class Results:
     validation: pd.DataFrame | None = None
     displacement: pd.DataFrame | None = None
     quality: pd.DataFrame | None = None
+    warnings: pd.DataFrame | None = None
 
 
 def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) -> dict[str, Any]:
@@ -47,6 +49,7 @@ def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) 
         "done": what_was_done(results.brains, results.runs),
         "brains": table_html(brains_table(results.brains, results.surfaces, results.quality)),
         "runs": table_html(runs_table(results.runs, results.validation, results.displacement)),
+        "warnings": "" if results.warnings is None or results.warnings.empty else table_html(results.warnings),
         "weeks": weeks,
         "has_view": bool(view["groups"]),
         "sections": sections([item for item in shown if not item.first]),

@@ -46,12 +46,12 @@ def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh) ->
     brightest = float(np.quantile(lit, BRIGHTEST)) if lit.size else 1.0
     for axes, plane in zip(panels, PLANES, strict=True):
         across, right, up = PLANES[plane]
-        points, extent = _grid(plane, at[plane], low, high)
+        points, extent = plane_grid(plane, at[plane], low, high)
         inverse = np.linalg.inv(np.asarray(affine, dtype=float))
         index = np.moveaxis(points @ inverse[:3, :3].T + inverse[:3, 3], -1, 0)
         grey = map_coordinates(values, index, order=1)
         axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, origin="lower", extent=extent, interpolation="none")
-        _outline(axes, surface, plane, at[plane])
+        draw_outline(axes, surface, plane, at[plane])
         axes.set(xlabel=AXIS_NAMES[right], ylabel=AXIS_NAMES[up], xlim=extent[:2], ylim=extent[2:])
         axes.set_title(f"{plane}, {'xyz'[across]} = {at[plane]:.1f} mm")
         axes.set_aspect("equal")
@@ -59,7 +59,7 @@ def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh) ->
     return figure
 
 
-def _grid(plane: str, at: float, low: Floats, high: Floats) -> tuple[Floats, tuple[float, float, float, float]]:
+def plane_grid(plane: str, at: float, low: Floats, high: Floats) -> tuple[Floats, tuple[float, float, float, float]]:
     """Returns the (rows, columns, 3) points of a picture of a plane, and its left, right, lower and upper end in mm."""
     across, right, up = PLANES[plane]
     begin, end = low - MARGIN_MM, high + MARGIN_MM
@@ -69,10 +69,10 @@ def _grid(plane: str, at: float, low: Floats, high: Floats) -> tuple[Floats, tup
     return points, (begin[right], columns[-1] + PIXEL_MM, begin[up], rows[-1] + PIXEL_MM)
 
 
-def _outline(axes: Axes, surface: TriangleMesh, plane: str, at: float) -> None:
+def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colour: str = RUN_COLOURS[4]) -> None:
     """Draws the lines in which a plane cuts a surface."""
     lines = section_lines(surface, plane, at)
-    axes.add_collection(LineCollection(lines, colors=RUN_COLOURS[4], linewidths=0.8, capstyle="round"))
+    axes.add_collection(LineCollection(lines, colors=colour, linewidths=0.8, capstyle="round"))
 
 
 def section_lines(surface: TriangleMesh, plane: str, at: float) -> list[Floats]:

@@ -118,7 +118,8 @@ def panel_grid(
     panel_in = _dots(min(1.75, (FULL_WIDTH_IN - label_in) / most))
     width = _dots(max(SINGLE_COLUMN_IN, label_in + most * panel_in))
     left_in = _dots(label_in + (width - label_in - most * panel_in) / 2)
-    layout = _Layout(width, left_in, panel_in, 0.66 if colour_bars or legend else 0.46, half_width)
+    foot_in = max(0.66 if colour_bars or legend else 0.46, 0.15 * -(-len(legend) // _legend_columns(width)) + 0.16)
+    layout = _Layout(width, left_in, panel_in, _dots(foot_in), half_width)
 
     # a letter of a column's heading is about 0.055 in wide
     columns = [wrap(column, int(panel_in / 0.055)) for column in columns]
@@ -245,6 +246,10 @@ def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
     figure.text(_EDGE_IN / layout.width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
 
 
+def _legend_columns(width_in: float) -> int:
+    return 2 if width_in > 1.5 * SINGLE_COLUMN_IN else 1
+
+
 def _draw_keys(
     figure: Figure, layout: _Layout, colour_bars: Sequence[tuple[ScalarMappable, str]], legend: Sequence[Patch]
 ) -> None:
@@ -258,5 +263,5 @@ def _draw_keys(
         bar.ax.tick_params(pad=1, length=2)
         bar.outline.set_linewidth(0.5)
     if legend:
-        columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
+        columns = _legend_columns(width)
         figure.legend(handles=legend, loc="lower right", ncols=columns, bbox_to_anchor=(1.0, 0.0), borderaxespad=0.2)

@@ -17,6 +17,7 @@ from ..parameters.terms import (
     FLAT_CUTS,
     FREE,
     LEFT_CONTACT,
+    MEDIAL_WALL,
     RIGHT_CONTACT,
     SIDE_X,
     SIDE_Y,
@@ -25,7 +26,7 @@ from ..parameters.terms import (
 from ..units import CM2_PER_MM2
 from .panels import Panel, Row, panel_grid
 from .renders import magnitude_scale
-from .scene import MAP, named_views, paint, restricted
+from .scene import MAP, hemisphere_faces, named_views, paint, restricted
 from .style import MAGNITUDES, NEUTRAL_COLOUR, styled
 
 ZONE_VIEWS = ("left", "bottom", "left medial", "right medial")
@@ -38,6 +39,7 @@ COLOURS = {
     BASE: "#999999",
     SIDE_X: "#56B4E9",
     SIDE_Y: "#E69F00",
+    MEDIAL_WALL: "#999999",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
 ZONES: Mapping[int, tuple[str, str]] = {code: (ZONE_NAMES[code], colour) for code, colour in COLOURS.items()}
@@ -118,8 +120,7 @@ def field_picture(
 def _one_row(
     mesh: TriangleMesh, colours: Floats, views: Sequence[str], fissure_x_mm: float
 ) -> tuple[list[str], list[Row]]:
-    panels = [
-        Panel(*restricted(mesh, colours, view.hemisphere, fissure_x_mm), view, material=MAP)
-        for view in named_views(views)
-    ]
-    return [f"{name} view" for name in views], [Row("", panels)]
+    # a brain of one hemisphere has no medial view of the other
+    shown = [view for view in named_views(views) if hemisphere_faces(mesh, view.hemisphere, fissure_x_mm).any()]
+    panels = [Panel(*restricted(mesh, colours, view.hemisphere, fissure_x_mm), view, material=MAP) for view in shown]
+    return [f"{view.name} view" for view in shown], [Row("", panels)]

@@ -16,7 +16,6 @@ from gyriflow.report.cost import MOST_STAGES, cost_chart
 from gyriflow.report.cut_mesh import CORE_COLOUR, CORTEX_COLOUR, mesh_picture
 from gyriflow.report.influence import ABSENT, influence_picture, influence_spectra, nearest_chart
 from gyriflow.report.outlines import outlines_chart
-from gyriflow.report.scores import scores_chart
 from gyriflow.report.style import SIMULATED_SURFACE_COLOUR
 
 BALL = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
@@ -154,22 +153,6 @@ def test_the_scheme_shows_the_planes_where_there_are_any():
     assert "left contact" in words(with_planes)
     without = contact_scheme(mesh, zones, law, planes_mm=None, distance="d̂ = 0.2 mm")
     assert "left contact" not in words(without)
-
-
-def test_scores_show_the_run_and_what_no_folding_gives():
-    table = pd.DataFrame(
-        {
-            "run": "thin", "start_week": 21.0, "week": [22.0, 23.0], "horizon": [1, 2], "r_shape_index": [0.7, 0.6],
-            "r_start_shape_index": [0.65, 0.5], "r_adjacent_shape_index": [0.65, 0.66], "gain_shape_index": [0.05, 0.1],
-            "gain_low_shape_index": [0.0, 0.05], "gain_high_shape_index": [0.1, 0.15], "area_difference": [0.01, -0.08],
-            "volume_difference": [0.02, -0.17],
-        }
-    )  # fmt: skip
-    figure = scores_chart(table)
-    fold, _, area, _ = figure.axes
-    assert [line.get_ydata().tolist() for line in fold.lines] == [[0.65, 0.5], [0.66], [0.7, 0.6]]
-    assert area.lines[0].get_ydata() == pytest.approx([1.0, -8.0])
-    assert {"scaled start", "thin"} <= words(figure)
 
 
 def test_cost_has_the_longest_stages_first_and_the_others_together():

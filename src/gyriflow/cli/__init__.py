@@ -1,0 +1,1 @@
+"""The command `gyriflow`: a study begun, checked, run, looked at and compared from the terminal."""

@@ -1,0 +1,134 @@
+"""Checks a study before it is run: its configuration, its files, what will run, and what that will take."""
+
+import shutil
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+
+from ..config import load
+from ..config.brains import Brain
+from ..config.root import Config
+from ..cost import MEASURED
+from ..cost.prediction import Prediction, predict
+from ..errors import GyriflowError
+from ..io.files import read_json
+from ..io.surfaces import read_surface
+from ..io.volumes import read_label_volume
+from ..io.yaml_files import read_yaml
+from ..parameters.schemes import LabelScheme
+from ..shipped import SHIPPED
+from ..surface.labels import cerebrum_mask, require_cortex_outside
+from ..terminal.stages import stages
+from ..terminal.time_left import as_duration
+from .plan import plan, reasons
+
+DEMO = SHIPPED / "config" / "config.yaml"
+MIB_PER_GIB = 1024
+
+
+def check_study(
+    config: Path | None, directory: Path, cores: int, read_files: bool = True
+) -> Iterator[tuple[str, bool]]:
+    """Yields lines on a study, each with whether it is a problem.
+
+    InputError for a configuration that is not valid, with all its problems.
+    """
+    path = config or DEMO
+    settings = load(read_yaml(path), path.resolve().parent)
+    folded = len(settings.folded)
+    yield (
+        f"{path}: {len(settings.brains)} brain{'s' if len(settings.brains) > 1 else ''}, "
+        f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(settings.runs)})",
+        False,
+    )
+    bad = False
+    if read_files:
+        for line in input_problems(settings):
+            bad = True
+            yield f"  {line}", True
+        if not bad:
+            yield "  input files: all can be read and fit their schemes", False
+    missing = sum(len(atlas.missing) for atlas in settings.atlases)
+    if missing:
+        yield f"  {missing} files of atlases are not there yet and will be downloaded", False
+    if not bad:
+        yield from _work(path, settings, directory, cores)
+
+
+def input_problems(config: Config) -> Iterator[str]:
+    """Yields what is wrong with the input files of the brains: files that cannot be read, labels of another scheme."""
+    for brain in config.brains:
+        try:
+            _check_files(brain, config)
+        except GyriflowError as error:
+            yield f"brain {brain.id}: {error}"
+
+
+def _check_files(brain: Brain, config: Config) -> None:
+    if brain.labels is not None and Path(brain.labels).is_file():
+        labels = read_label_volume(brain.labels, brain.affine_from).labels
+        scheme = LabelScheme(**config.scheme(brain))
+        cerebrum_mask(labels, scheme)
+        if scheme.cortex:
+            require_cortex_outside(labels, scheme)
+    for file in brain.files:
+        # files of atlases may be missing yet
+        if file != brain.labels and Path(file).is_file():
+            read_surface(file)
+
+
+def _work(path: Path, config: Config, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
+    """Yields what will run, by stage, and what it will take of time, memory and disk."""
+    jobs = plan(["--configfile", str(path.resolve()), "--directory", str(directory.resolve())])
+    if not jobs:
+        yield "nothing to run: all results are up to date", False
+        return
+    of_rule = stages(SHIPPED / "workflow" / "rules")
+    by_stage = defaultdict(list)
+    for job in jobs:
+        by_stage[of_rule.get(job.rule, job.rule)].append(job)
+    yield f"to run: {len(jobs)} steps", False
+    for stage, planned in by_stage.items():
+        yield f"  {stage:<12} {len(planned):4d}  {reasons(planned)}", False
+    # the solver's own rule for its memory is heavy to import
+    from ..folding.__main__ import predicted_memory_mib
+
+    predicted = predict([job.job for job in jobs], config, read_json(MEASURED), cores, predicted_memory_mib)
+    yield from _needs(predicted, directory, cores)
+
+
+def _needs(predicted: Prediction, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
+    def between(value: float, error: float) -> str:
+        return f"{as_duration(value / error)} to {as_duration(value * error)}"
+
+    yield (
+        f"time    about {as_duration(predicted.wall_seconds)} on {cores} core{'s' if cores > 1 else ''} without other "
+        f"load ({between(predicted.wall_seconds, predicted.time_error)}, by the errors of studies left out; "
+        f"{predicted.core_seconds / 3600:.2g} core hours)",
+        False,
+    )
+    available = psutil.virtual_memory().available / 2**20
+    too_much = predicted.memory_mib > available
+    yield (
+        f"memory  about {_gib(predicted.memory_mib)}, at most {_gib(predicted.memory_mib * predicted.memory_error)}; "
+        f"{_gib(available)} are free" + (": too little; use fewer cores, or larger edges" if too_much else ""),
+        too_much,
+    )
+    free = shutil.disk_usage(_there(directory)).free / 2**20
+    full = predicted.disk_mib > free
+    yield (
+        f"disk    about {_gib(predicted.disk_mib)}, at most {_gib(predicted.disk_mib * predicted.disk_error)}; "
+        f"{_gib(free)} are free" + (": too little" if full else ""),
+        full,
+    )
+
+
+def _gib(mib: float) -> str:
+    return f"{mib / MIB_PER_GIB:.1f} GB" if mib >= 100 else f"{mib:.0f} MB"
+
+
+def _there(folder: Path) -> Path:
+    """Returns the folder, or the first one around it that exists."""
+    return next(path for path in (folder.absolute(), *folder.absolute().parents) if path.is_dir())

@@ -1,0 +1,224 @@
+"""The commands of `gyriflow`, thin: each reads its arguments, calls one function and prints what it returns."""
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import get_completion_class
+
+from ..errors import GyriflowError
+
+STAGES = ("surface", "mesh", "growth", "folding", "metrics", "figures", "report", "paper", "retrieve", "validate")
+"""Targets of the workflow that a user asks for by name."""
+CONFIG = "gyriflow.yaml"
+"""The configuration that is taken where none is named."""
+CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
+SHELLS = ("bash", "zsh", "fish")
+
+FOLDER = click.Path(file_okay=False, path_type=Path)
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+directory_option = click.option(
+    "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
+)
+cores_option = click.option(
+    "-c",
+    "--cores",
+    type=click.IntRange(1),
+    default=os.cpu_count() or 1,
+    show_default="all",
+    help="How many cores to use.",
+)
+config_argument = click.argument("config", type=FILE, required=False)
+
+
+def told(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Has a command end in one message and the exit code of its error, without a traceback."""
+
+    @wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return command(*args, **kwargs)
+        except GyriflowError as error:
+            click.echo(f"gyriflow: {error}", err=True)
+            sys.exit(error.exit_code)
+
+    return wrapped
+
+
+def version(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+    """Prints the version, with the commit where there is one, and ends."""
+    if value and not context.resilient_parsing:
+        from ..version import version as own
+
+        click.echo(f"gyriflow {own()}")
+        context.exit()
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=version, help="Show the version.")
+def main() -> None:
+    """From fetal brain MRI to folding metrics.
+
+    \b
+    A study, from its data to its report:
+      gyriflow init my-data         write my-data/gyriflow.yaml from the files there
+      cd my-data
+      gyriflow check                is all there, what will run, how long will it take
+      gyriflow run                  run it; the same command goes on after an interruption
+      gyriflow status               how far it is (from another terminal)
+      gyriflow view                 open the report
+
+    Without a configuration, `gyriflow run` runs the demo in the current folder.
+    """
+
+
+@main.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
+@click.option("--force", is_flag=True, help="Replace a configuration that is there.")
+@told
+def init(folder: Path, output: Path | None, force: bool) -> None:
+    """Write a configuration from the files of a FOLDER.
+
+    It knows tissue label volumes (its scheme is found from the labels), pairs of hemisphere surfaces, files named as in
+    the dHCP, CRL and spina bifida atlases, and ages from participants.tsv or from names such as week21, GA21, 25w.
+    """
+    from .beginning import write_configuration
+
+    path = output or folder / CONFIG
+    for line in write_configuration(folder, path, force):
+        click.echo(line)
+    click.echo(f"wrote {path}; next: gyriflow check {path}")
+
+
+@main.command()
+@config_argument
+@directory_option
+@cores_option
+@click.option("--no-files", is_flag=True, help="Check the configuration only, not what is in the input files.")
+@told
+def check(config: Path | None, directory: Path, cores: int, no_files: bool) -> None:
+    """Check a configuration and its files; say what will run and what it will take.
+
+    Nothing is run or written. CONFIG is gyriflow.yaml where none is named, or else the demo.
+    """
+    from .checking import check_study
+
+    problems = 0
+    for line, bad in check_study(_chosen(config, directory), directory, cores, read_files=not no_files):
+        click.echo(line)
+        problems += bad
+    if problems:
+        click.echo(f"gyriflow: {problems} problem{'s' if problems > 1 else ''} found", err=True)
+        sys.exit(2)
+
+
+@main.command(context_settings={"ignore_unknown_options": True})
+@directory_option
+@cores_option
+@click.option("-s", "--stage", "stages", multiple=True, type=click.Choice(STAGES), help="Up to this stage only.")
+@click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
+@click.option("-v", "--verbose", is_flag=True, help="All that Snakemake says, on the terminal.")
+@click.argument("further", nargs=-1, type=click.UNPROCESSED, metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]")
+@told
+def run(
+    directory: Path, cores: int, stages: Sequence[str], dry_run: bool, verbose: bool, further: Sequence[str]
+) -> None:
+    """Run a study; what is there and up to date is kept.
+
+    CONFIG is gyriflow.yaml where none is named, or else the demo. Further arguments go to Snakemake, such as
+    `--profile profiles/slurm`.
+    """
+    from ..launch import main as launch
+
+    named = bool(further) and further[0].endswith(CONFIG_SUFFIXES)
+    chosen = _chosen(Path(further[0]) if named else None, directory)
+    arguments = ["--configfile", str(chosen.resolve())] if chosen else []
+    arguments += ["--dry-run"] if dry_run else []
+    arguments += ["--verbose"] if verbose else []
+    # an option of one value stands before the targets
+    arguments += ["--cores", str(cores), "--directory", str(directory), *stages, *further[int(named) :]]
+    sys.exit(launch(arguments))
+
+
+@main.command()
+@click.argument("directory", type=FOLDER, default=Path())
+@click.option("--json", "as_json", is_flag=True, help="As JSON, for programs.")
+@told
+def status(directory: Path, as_json: bool) -> None:
+    """How far a study is: done, running, time left, failed and why."""
+    from . import status as module
+
+    found = module.status(directory)
+    click.echo(module.as_json(found) if as_json else "\n".join(module.as_text(found)))
+
+
+@main.command()
+@click.argument("directory", type=FOLDER, default=Path())
+@click.option("--print", "only_print", is_flag=True, help="Print where the report is instead of opening it.")
+@told
+def view(directory: Path, only_print: bool) -> None:
+    """Open the report of a study."""
+    from .status import report_of
+
+    report = report_of(directory)
+    click.echo(report)
+    if not only_print:
+        click.launch(str(report))
+
+
+@main.command()
+@click.argument("first", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("second", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0),
+    default=1e-6,
+    show_default=True,
+    help="Relative difference that counts as none.",
+)
+@told
+def compare(first: Path, second: Path, tolerance: float) -> None:
+    """Compare two results folders: settings, versions, inputs, and every number of their tables.
+
+    Ends with 0 where all numbers agree, with 1 where some differ.
+    """
+    from .comparison import compare_results
+
+    found = compare_results(first, second, tolerance)
+    if found.settings:
+        click.echo("\n".join(["settings that differ:", *(f"  {line}" for line in found.settings)]))
+    for difference in found.differences:
+        click.echo(f"{difference.file}: {difference.text}")
+    click.echo(
+        f"{found.numbers} numbers of {found.tables} tables compared: "
+        + (f"all within {tolerance:g}" if found.same else f"{len(found.differences)} differences")
+    )
+    sys.exit(0 if found.same else 1)
+
+
+@main.command()
+@click.argument("shell", type=click.Choice(SHELLS))
+def completion(shell: str) -> None:
+    """Print the script that completes commands and options in a SHELL.
+
+    \b
+    For bash:  gyriflow completion bash >> ~/.bashrc
+    For zsh:   gyriflow completion zsh >> ~/.zshrc
+    For fish:  gyriflow completion fish > ~/.config/fish/completions/gyriflow.fish
+    """
+    complete = get_completion_class(shell)
+    if complete is None:
+        raise click.ClickException(f"no completion for {shell}")
+    click.echo(complete(main, {}, "gyriflow", "_GYRIFLOW_COMPLETE").source())
+
+
+def _chosen(config: Path | None, directory: Path) -> Path | None:
+    """Returns the configuration that is meant: the one named, gyriflow.yaml here or there, or none, the demo."""
+    if config is not None:
+        return config
+    return next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)
