@@ -75,7 +75,7 @@ COMPARED_MEMBERS = sorted(
 
 
 # brains whose labels can be counted
-WITH_VOLUMES = [brain.id for brain in CONFIG.brains if brain.source in WITH_LABELS]
+WITH_VOLUMES = [brain.id for brain in CONFIG.brains if brain.has_labels]
 
 
 def report_of(wildcards):

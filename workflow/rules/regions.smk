@@ -89,7 +89,7 @@ rule carried_regions:
     params:
         # masks of surfaces are in the surfaces' own pose
         posed=lambda wildcards: [
-            CONFIG.brain(brain).source not in WITH_LABELS
+            not CONFIG.brain(brain).has_labels
             for brain in (CONFIG.regions_from(wildcards.brain), wildcards.brain)
         ],
     script:

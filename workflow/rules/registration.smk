@@ -30,13 +30,13 @@ def earlier_brains(brain):
     """Returns the brains of a start brain's growth series up to it, one a week, where some run is to predict from them."""
     start = CONFIG.brain(brain)
     chosen = {start.week: brain}
-    if start.source in WITH_LABELS and any(
+    if start.has_labels and any(
         predicts(run) for run, folded in FOLDED if folded == brain
     ):
         for other in map(
             CONFIG.brain, CONFIG.growth_series.get(CONFIG.estimated_from(brain), [])
         ):
-            if other.week < start.week and other.source in WITH_LABELS:
+            if other.week < start.week and other.has_labels:
                 chosen.setdefault(other.week, other.id)
     return [chosen[week] for week in sorted(chosen)]
 
@@ -71,14 +71,14 @@ WITH_CHAIN = [brain for brain in CONFIG.start_brains if len(chain_of(brain)) > 1
 
 def registered_volume(brain):
     """Returns the volume by which a brain is registered: its labels, or a mask made of its surface."""
-    if CONFIG.brain(brain).source in WITH_LABELS:
+    if CONFIG.brain(brain).has_labels:
         return label_volume_of(brain)
     return rules.surface_mask.output[0].format(brain=brain)
 
 
 def registered_scheme(brain):
     """Returns the scheme of that volume."""
-    if CONFIG.brain(brain).source in WITH_LABELS:
+    if CONFIG.brain(brain).has_labels:
         return CONFIG.scheme(CONFIG.brain(brain))
     return SCHEMES["binary"].model_dump()
 
