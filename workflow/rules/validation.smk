@@ -381,6 +381,7 @@ rule validation_figure:
         ENVIRONMENT
     params:
         smoothing_mm=None,
+        runs=list(CONFIG.runs),
         dpi=CONFIG.report.dpi,
         caption=(
             "Correlation of curvature with that of the real brain, less that of the start brain merely scaled up: "
