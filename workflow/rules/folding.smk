@@ -181,10 +181,10 @@ rule simulate:
         f"{RUN}/logs/simulate.log",
     benchmark:
         f"{RUN}/benchmarks/simulate.tsv"
-    conda:
-        ENVIRONMENT
     wildcard_constraints:
         run=one_of(CONFIG.runs),
+    conda:
+        ENVIRONMENT
     threads: ranks
     resources:
         mpi="mpiexec",

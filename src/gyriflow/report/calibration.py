@@ -52,7 +52,9 @@ def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, best: pd.Series,
     axes.axvspan(best["low"], best["high"], color=OPTIMUM_COLOUR, alpha=0.15, linewidth=0, label="95 % of the optima")
     axes.axvline(best["value"], color=OPTIMUM_COLOUR, linestyle="--", label="optimum")
     band = 2 * line["sd"]
-    axes.fill_between(line["value"], line["mean"] - band, line["mean"] + band, color=LINE_COLOUR, alpha=0.15, linewidth=0)
+    axes.fill_between(
+        line["value"], line["mean"] - band, line["mean"] + band, color=LINE_COLOUR, alpha=0.15, linewidth=0
+    )
     axes.plot(line["value"], line["mean"], color=LINE_COLOUR, label="surrogate")
     finished = runs[runs["score"].notna()]
     rounds = sorted(runs["round"].unique())
