@@ -18,7 +18,7 @@ STUDY = {
         "rate": {
             "base": "reference",
             "vary": {"growth_rate_per_s": [1.0e-7, 1.0e-5]},
-            "fixed": {"solver.max_newton": 1, "solver.max_halvings": 0},
+            "fixed": {"solver.max_newton": 3, "solver.max_halvings": 0},
             "compare_week": 22,
         }
     },
