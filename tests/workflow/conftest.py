@@ -94,7 +94,7 @@ class Workflow:
 @pytest.fixture(scope="session")
 def checkout_copy(tmp_path_factory):
     copy = tmp_path_factory.mktemp("checkout")
-    for name in ("src", "workflow", "config", "profiles", "envs", "atlases"):
+    for name in ("src", "workflow", "config", "profiles", "envs", "atlases", "norms"):
         shutil.copytree(CHECKOUT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(CHECKOUT / "Snakefile", copy)
     return copy

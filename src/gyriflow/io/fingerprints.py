@@ -26,5 +26,6 @@ def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
     return [
         path
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
+        if path.is_file()
+        and not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
     ]
