@@ -1,8 +1,9 @@
 """Fits what studies take to finished ones: `./run python benchmarks/cost.py STUDY ...` (working directories).
 
 Times are of one core: what a job kept busy. Each rule has a constant and a part that grows with its brain: faces of the
-surface, nodes of the mesh, nodes times steps of a folding. The error is that of studies left out: the fit to the others,
-with sizes predicted from the configuration alone, against what was measured. Writes `src/gyriflow/cost/measured.json`, which the terminal and `gyriflow check` read.
+surface, nodes of the mesh, nodes times steps of a folding. The error is that of studies left out: a fit to the others,
+with sizes predicted from the configuration alone, against what was measured. It writes
+`src/gyriflow/cost/measured.json`, which the terminal and `gyriflow check` read.
 """
 
 import argparse

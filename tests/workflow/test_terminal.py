@@ -4,6 +4,7 @@ import os
 import pty
 import re
 import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -17,7 +18,7 @@ ONE_BRAIN = SMALL_STUDY | {"brains": SMALL_STUDY["brains"][:1]}
 
 def log_of(said):
     (path,) = re.findall(r"all details: (\S+)", said)
-    return path
+    return Path(path).read_text()
 
 
 @pytest.mark.slow
@@ -32,8 +33,7 @@ def test_a_run_names_its_stage_and_brain_and_all_else_is_in_the_log(workflow):
     assert len(lines) < 10
     assert sum("surface      brain a" in line for line in lines) == 1
     assert re.fullmatch(r"gyriflow: done in .*", lines[-1])
-    with open(log_of(said)) as file:
-        details = file.read()
+    details = log_of(said)
     assert "rule pial_from_labels:" in details
     assert "results/brains/a/surface/pial.surf.gii" in details
     state = read_json(workflow.directory / STATE)

@@ -95,7 +95,8 @@ def test_a_failure_begins_with_its_cause_and_names_its_log(clock, tmp_path):
     assert shown(display).splitlines()[2:] == [
         "failed  surface, brain a: a.nii: is no image",
         f"        log: {log}",
-        "gyriflow: 1 step failed after 5 s, 2 are not done; once the cause is mended, the same command goes on from here",
+        "gyriflow: 1 step failed after 5 s, 2 are not done; once the cause is mended, the same command goes on from "
+        "here",
     ]
     assert display.state()["failed"] == [{"what": "surface, brain a", "why": "a.nii: is no image", "logs": [str(log)]}]
 
