@@ -1,4 +1,4 @@
-"""Which rules run again after a change: of code, environment, brains, runs, files. Changes of settings are in test_dag.py."""
+"""Which rules run again after a change of code, environment, brains, runs or files; of settings: test_dag.py."""
 
 import copy
 import os
