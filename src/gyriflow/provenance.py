@@ -35,7 +35,7 @@ PACKAGES = (
 
 
 def software() -> dict[str, Any]:
-    """Returns the versions of gyriflow, of Python and of the packages that results depend on, the commit, and now (UTC)."""
+    """Returns the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
     packages = {}
     for name in PACKAGES:
         try:

@@ -210,7 +210,7 @@ def test_nothing_is_to_be_done_after_all_was_made(finished):
     assert finished.jobs("--configfile", "study.yaml") == {}
 
 
-REPORT = {"html_report": 1, "all": 1}
+REPORT = {"html_report": 1, "provenance": 1, "all": 1}
 NEW_RESULTS = REPORT | {"study_resources": 1}
 SHAPE = NEW_RESULTS | {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1, "asymmetry": 1, "centiles": 1,
