@@ -1,6 +1,7 @@
 """How much simulated brains are folded beside the real ones of their week, hemisphere by hemisphere."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -42,7 +43,7 @@ def folding_agreement(
     return pd.concat(tables, ignore_index=True)[COLUMNS] if tables else pd.DataFrame(columns=COLUMNS)
 
 
-def _side_by_side(table: pd.DataFrame, simulated: Mapping[str, object], real: Mapping[str, object]) -> pd.DataFrame:
+def _side_by_side(table: pd.DataFrame, simulated: Mapping[str, Any], real: Mapping[str, Any]) -> pd.DataFrame:
     keys = ["hemisphere", "metric"]
     one, other = (
         table.loc[(table[list(labels)] == pd.Series(labels)).all(axis=1), [*keys, "value"]]
