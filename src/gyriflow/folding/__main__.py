@@ -34,7 +34,7 @@ MIB_PER_RANK = 250.0
 KIB_PER_TET = {1: 0.9, 2: 21.9}
 KIB_PER_TET_AND_RANK = {1: 1.6, 2: 7.3}
 """Peak memory of a solve by the order of its elements: a part of the mesh, and positions and searches on every rank.
-From runs of 60 k to 1 M linear elements, met within 10 %, and of 23 k to 55 k quadratic ones, met within 3 %, on one
+From runs of 60 k to 1 M linear elements, met within 10 %, and of 23 k to 55 k quadratic ones, met within 5 %, on one
 rank and on two (docs/benchmarks.md)."""
 GLOBAL_CONTACT = {1: 1.3, 2: 1.0}
 """Factor on what the elements take, where folds press on each other up to 36 GW; not measured with quadratic ones."""
