@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from gyriflow.report.style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, light_grid, new_figure, style
 
@@ -12,7 +12,7 @@ STYLES = {1: ("linear", "--", "o"), 2: ("quadratic", "-", "s")}
 SHOWN = {
     "area": "area",
     "gyrification_index": "gyrification index",
-    "sulcal_depth_95": "sulcal depth",
+    "mean_sulcal_depth": "mean sulcal depth",
     "mean_curvedness": "curvedness",
 }
 
@@ -23,35 +23,44 @@ def draw(runs: pd.DataFrame, weeks: pd.DataFrame, pairs: pd.DataFrame, finest: s
     runs = runs[runs["run"].isin(weeks["run"])]
     at_end = weeks[weeks["week"] == end].set_index("run")
     against = pairs[(pairs["week"] == end) & (pairs["other"] == finest)].merge(runs, on="run")
+    against["uncorrelated"] = 1 - against["r_mean_curvature"]
+    for metric in SHOWN:
+        against[metric] = against[metric].abs() / abs(at_end.loc[finest, metric])
     with style():
-        figure = new_figure(FULL_WIDTH_IN, 5.4, title="", synthetic=False)
+        figure = new_figure(FULL_WIDTH_IN, 5.6, title="", synthetic=False)
         by_week, statistics, places, costs = figure.subplots(2, 2).ravel()
         _by_week(by_week, runs, weeks)
-        for order, (name, line, mark) in STYLES.items():
-            own = against[(against["order"] == order) & ~against["turned"]].sort_values("nodes_to_cortex")
-            for colour, metric in zip(RUN_COLOURS, SHOWN, strict=False):
-                error = np.abs(own[metric]) / abs(at_end.loc[finest, metric])
-                statistics.plot(
-                    own["nodes_to_cortex"], error, line + mark, color=colour, label=f"{SHOWN[metric]}, {name}"
-                )
-            for colour, value in zip(RUN_COLOURS, ("displacement_share", "r_mean_curvature"), strict=False):
-                label = {"displacement_share": "displacement", "r_mean_curvature": "1 − r of mean curvature"}[value]
-                shown = own[value] if value == "displacement_share" else 1 - own[value]
-                places.plot(own["nodes_to_cortex"], shown, line + mark, color=colour, label=f"{label}, {name}")
-            costs.plot(own["cpu_seconds"], own["displacement_rms_mm"], line + mark, color=RUN_COLOURS[0], label=name)
-            costs.plot(own["cpu_seconds"], own["surface_distance_mm"], line + mark, color=RUN_COLOURS[1])
-        chance = against[against["turned"]]
-        for axes, value in ((places, chance["displacement_share"]), (places, 1 - chance["r_mean_curvature"])):
-            axes.plot(chance["nodes_to_cortex"], value, "x", color=MUTED_COLOUR)
-        costs.plot(chance["cpu_seconds"], chance["displacement_rms_mm"], "x", color=MUTED_COLOUR, label="second mesh")
-        statistics.set(xlabel="node distances to H", ylabel=f"difference at {end:g} GW, of the value", yscale="log")
-        places.set(xlabel="node distances to H", ylabel=f"difference at {end:g} GW", yscale="log")
-        costs.set(xlabel="processor seconds", ylabel="difference (mm)", xscale="log", yscale="log")
-        costs.set_title("places (blue) and distance of surfaces (orange), from the finest run")
-        for axes in (statistics, places, costs):
-            light_grid(axes, "both")
-            axes.legend(fontsize=6)
+        _against(statistics, against, "nodes_to_cortex", SHOWN)
+        placed = {"displacement_share": "displacement", "uncorrelated": "1 − r of curvature"}
+        _against(places, against, "nodes_to_cortex", placed)
+        distances = {"displacement_rms_mm": "displacement", "surface_distance_mm": "surface"}
+        _against(costs, against, "cpu_seconds", distances)
+        for axes in (statistics, places):
+            axes.set_xlabel("node distances to the cortical thickness")
+            axes.set_xticks(sorted(against["nodes_to_cortex"].unique()), minor=False)
+        statistics.set(ylabel=f"difference at {end:g} GW, of the value")
+        places.set(ylabel=f"difference at {end:g} GW, of 1")
+        costs.set(xlabel="processor seconds", ylabel=f"difference at {end:g} GW (mm)", xscale="log")
+        costs.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        costs.xaxis.set_major_formatter("{x:g}")
+        costs.xaxis.set_minor_formatter(NullFormatter())
         figure.savefig(file, dpi=200)
+
+
+def _against(axes: Axes, against: pd.DataFrame, across: str, values: dict[str, str]) -> None:
+    """Draws the differences from the finest run: solid for quadratic elements, crosses for the second mesh."""
+    for colour, (value, label) in zip(RUN_COLOURS, values.items(), strict=False):
+        for order, (_, line, mark) in STYLES.items():
+            own = against[(against["order"] == order) & ~against["turned"]].sort_values(across)
+            axes.plot(own[across], own[value], line + mark, color=colour, label=label if order == 2 else None)
+        chance = against[against["turned"]]
+        axes.plot(chance[across], chance[value], "x", color=MUTED_COLOUR, zorder=5)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    light_grid(axes, "both")
+    axes.legend(fontsize=6, loc="lower left")
 
 
 def _by_week(axes: Axes, runs: pd.DataFrame, weeks: pd.DataFrame) -> None:

@@ -41,8 +41,8 @@ def test_runs_of_both_orders_are_compared_with_the_finest_and_kept(tmp_path):
 
 
 def test_without_budget_nothing_is_folded_after_the_coarsest(tmp_path):
-    command = [sys.executable, str(BENCHMARK), "--folder", str(tmp_path), "--nodes", "0.8", "1.0", "--end-week", "21.15"]
-    command += ["--parts", "resolution", "--orders", "2", "--budget-min", "0.01"]
+    command = [sys.executable, str(BENCHMARK), "--folder", str(tmp_path), "--nodes", "0.8", "1.0", "--orders", "2"]
+    command += ["--parts", "resolution", "--end-week", "21.15", "--budget-min", "0.01"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     lines = [json.loads(line) for line in done.stdout.splitlines()]
     assert [line["run"] for line in lines[:2]] == ["quadratic-0.8", "quadratic-1"]
