@@ -228,7 +228,8 @@ MESH = {"tetrahedralise": 1, "quality_figure": 1}
 FIGURES = {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "displacement_figure": 1, "quality_figure": 1,
     "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 8,
-    "norms_figure": 1, "zones_figure": 2, "growth_zone_figure": 2, "layers_figure": 2, "normals_figure": 2, "steps_figure": 2,
+    "norms_figure": 1,
+    "zones_figure": 2, "growth_zone_figure": 2, "layers_figure": 2, "normals_figure": 2, "steps_figure": 2,
 }  # fmt: skip
 
 
