@@ -17,7 +17,17 @@ from .version import commit, version
 
 PACKAGE = Path(__file__).resolve().parent
 PACKAGES = (
-    *("fenics-dolfinx", "fenics-basix", "fenics-ffcx", "fenics-ufl", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy"),
+    *(
+        "fenics-dolfinx",
+        "fenics-basix",
+        "fenics-ffcx",
+        "fenics-ufl",
+        "petsc4py",
+        "slepc4py",
+        "mpi4py",
+        "numpy",
+        "scipy",
+    ),
     *("snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk", "lapy", "pandas"),
     *("picsl-greedy", "SimpleITK", "pyvista", "h5py", "pydantic"),
 )
@@ -25,7 +35,7 @@ PACKAGES = (
 
 
 def software() -> dict[str, Any]:
-    """Returns the versions of gyriflow, of Python and of the packages that results depend on, the commit, and now (UTC)."""
+    """Returns the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
     packages = {}
     for name in PACKAGES:
         try:

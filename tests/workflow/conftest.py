@@ -41,7 +41,7 @@ class Workflow:
         paths = [self.packages, self.checkout / "src"]
         return os.environ | {"PYTHONPATH": os.pathsep.join(str(path) for path in paths if path)}
 
-    def run(self, *arguments: str, timeout_s: float = 300.0) -> subprocess.CompletedProcess[str]:
+    def run(self, *arguments: str, timeout_s: float = 300) -> subprocess.CompletedProcess[str]:
         """Runs the launcher in the working directory."""
         return subprocess.run(
             self.command(*arguments),

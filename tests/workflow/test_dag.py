@@ -62,7 +62,7 @@ def test_the_paper_is_planned_with_each_equal_run_once(workflow):
 
 
 @pytest.mark.parametrize(
-    "atlas", ['[{name: dhcp-surface}, {name: dhcp-volume, accept_licence: true}]', "{name: crl, accept_licence: true}"]
+    "atlas", ["[{name: dhcp-volume, accept_licence: true}, {name: dhcp-surface}]", "{name: crl, accept_licence: true}"]
 )
 def test_the_paper_is_planned_of_another_atlas_by_one_line(workflow, atlas):
     lines = (workflow.checkout / "config" / "examples" / "paper.yaml").read_text().splitlines()
@@ -210,13 +210,16 @@ def test_nothing_is_to_be_done_after_all_was_made(finished):
     assert finished.jobs("--configfile", "study.yaml") == {}
 
 
-REPORT = {"html_report": 1, "all": 1}
+REPORT = {"html_report": 1, "provenance": 1, "all": 1}
 NEW_RESULTS = REPORT | {"study_resources": 1}
-SHAPE = NEW_RESULTS | {"metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1}
+SHAPE = NEW_RESULTS | {
+    "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1, "asymmetry": 1, "centiles": 1,
+    "norms_figure": 1, "group_tables": 1,
+}  # fmt: skip
 ONE_RUN = SHAPE | {
     "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "displacement": 1,
     "similarity": 1, "study_table": 4, "study_runs": 1, "zones_figure": 1, "steps_figure": 1, "weekly_figure": 1,
-    "displacement_maps": 1, "shape_maps": 3, "displacement_figure": 1, "runs_figure": 1, "growth_zone_figure": 1,
+    "displacement_maps": 1, "shape_maps": 4, "displacement_figure": 1, "runs_figure": 1, "growth_zone_figure": 1,
     "layers_figure": 1, "normals_figure": 1,
 }  # fmt: skip
 OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "runs_figure"}
@@ -224,8 +227,8 @@ BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count 
 MESH = {"tetrahedralise": 1, "quality_figure": 1}
 FIGURES = {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "displacement_figure": 1, "quality_figure": 1,
-    "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 6,
-    "zones_figure": 2, "growth_zone_figure": 2, "layers_figure": 2, "normals_figure": 2, "steps_figure": 2,
+    "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 8,
+    "norms_figure": 1, "zones_figure": 2, "growth_zone_figure": 2, "layers_figure": 2, "normals_figure": 2, "steps_figure": 2,
 }  # fmt: skip
 
 
@@ -236,7 +239,7 @@ FIGURES = {
         (
             "metrics",
             {"curvature_radius_mm": 4.0},
-            SHAPE | {"measure": 6, "study_table": 2, "shape_maps": 6},
+            SHAPE | {"measure": 6, "study_table": 2, "shape_maps": 8},
         ),
         ("runs", {"thick": {"thickness_mm": 3.5}}, ONE_RUN),
         ("folding", {"growth_rate_per_s": 1e-7}, BOTH_RUNS | {"growth_figure": 1}),

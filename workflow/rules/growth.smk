@@ -92,12 +92,12 @@ rule growth_figure:
             f"{STUDY}/growth/growth",
             "cortical growth rates",
             "growth.rst",
-            "Brains and growth",
+            "Growth",
         ),
         table=report(
             f"{STUDY}/growth/rates.html",
             caption="../report/growth_table.rst",
-            category="Brains and growth",
+            category="Growth",
             labels={"figure": "growth rates, table"},
         ),
     log:

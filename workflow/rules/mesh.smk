@@ -54,8 +54,8 @@ rule quality_figure:
         **figure(
             f"{BRAIN}/figures/mesh_quality",
             "mesh quality",
-            "figure.rst",
-            "Brains and growth",
+            "mesh_quality.rst",
+            "Inputs",
             brain="{brain}",
         ),
     log:
@@ -66,13 +66,6 @@ rule quality_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Quality of the tetrahedra: radius ratio (3 × inscribed / circumscribed radius, 1 for a "
-            "regular element), smallest and largest dihedral angle, and volume. Dashed lines: the "
-            "limits of the configuration. Below: distance between the mesh's surface and the pial "
-            "surface, number of crossing faces, difference in volume, and the fraction of gaps "
-            "narrower than 3 mm, such as the fissure, that is still open."
-        ),
         gates=MESH_GATES,
     script:
         "../scripts/quality_figure.py"

@@ -51,6 +51,7 @@ MADE = [
     *rules.figures.input,
     *rules.metrics.input,
     *rules.study_resources.output,
+    f"{STUDY}/figures/cost.png",
     *rules.quality.input,
 ]
 PICTURE_BYTES = 9_000_000
@@ -226,6 +227,23 @@ rule report_provenance:
         source=workflow.basedir,
     script:
         "../scripts/report_provenance.py"
+
+
+rule cost_figure:
+    input:
+        rules.study_resources.output.csv,
+    output:
+        **figure(f"{STUDY}/figures/cost", "time and energy", "cost.rst", "Resources"),
+    log:
+        f"{STUDY}/logs/cost_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/cost_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        dpi=CONFIG.report.dpi,
+    script:
+        "../scripts/cost_figure.py"
 
 
 rule html_report:

@@ -41,6 +41,10 @@ BESIDE = {
 }
 
 
+# runs in which something may touch
+TOUCHING = [run for run in CONFIG.runs if CONFIG.run(run).contact.kind != "none"]
+
+
 def run_figure(name, title, caption, category="Folding"):
     """Returns the outputs of a rule that draws a figure of a run."""
     return figure(
@@ -53,7 +57,7 @@ rule weekly_figure:
         simulated=run_surfaces("whole"),
         real=measured_surfaces("whole"),
     output:
-        **run_figure("weekly", "simulated beside measured brains", "figure.rst"),
+        **run_figure("weekly", "simulated beside measured brains", "weekly.rst"),
     log:
         f"{RUN}/logs/weekly_figure.log",
     benchmark:
@@ -62,11 +66,6 @@ rule weekly_figure:
         ENVIRONMENT
     params:
         **BESIDE,
-        caption=(
-            "Simulated brain of run *{run}* (blue) beside the measured brain of the same week "
-            "(beige), all at one scale. At the first week the simulation is the start brain as it was "
-            "meshed."
-        ),
     script:
         "../scripts/weekly_figure.py"
 
@@ -75,7 +74,7 @@ rule displacement_maps:
     input:
         rules.simulate.output.frames,
     output:
-        **run_figure("displacement_maps", "displacement maps", "figure.rst"),
+        **run_figure("displacement_maps", "displacement maps", "displacement_maps.rst"),
     log:
         f"{RUN}/logs/displacement_maps.log",
     benchmark:
@@ -84,10 +83,6 @@ rule displacement_maps:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Norm of the displacement between output weeks on the pial surface of run *{run}*, on one "
-            "scale."
-        ),
     script:
         "../scripts/displacement_maps.py"
 
@@ -164,7 +159,7 @@ rule zones_figure:
         data=rules.tetrahedralise.output.data,
         params=rules.parameters.output[0],
     output:
-        **run_figure("zones", "zones of the boundary", "figure.rst"),
+        **run_figure("zones", "zones of the boundary", "zones.rst"),
     log:
         f"{RUN}/logs/zones_figure.log",
     benchmark:
@@ -173,12 +168,6 @@ rule zones_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Zones of the boundary at the start of run *{run}*: free, clamped (inside the ellipsoid "
-            "of no growth), the facets of each hemisphere that may come into contact at the fissure, "
-            "and those between the contact planes. In medial views the tissue that joins the "
-            "hemispheres is left open: grey is the inside of the surface behind it."
-        ),
     script:
         "../scripts/zones_figure.py"
 
@@ -191,11 +180,73 @@ REGIONS = {
 }
 
 
+rule mesh_figure:
+    input:
+        mesh=rules.regions.output.mesh,
+        data=rules.regions.output.data,
+    output:
+        **run_figure("mesh", "the mesh, cut open", "mesh.rst"),
+    log:
+        f"{RUN}/logs/mesh_figure.log",
+    benchmark:
+        f"{RUN}/benchmarks/mesh_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+    script:
+        "../scripts/mesh_figure.py"
+
+
+rule contact_scheme:
+    input:
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        params=rules.parameters.output[0],
+    output:
+        **run_figure("contact_scheme", "scheme of contact", "contact_scheme.rst"),
+    log:
+        f"{RUN}/logs/contact_scheme.log",
+    benchmark:
+        f"{RUN}/benchmarks/contact_scheme.tsv"
+    wildcard_constraints:
+        run=one_of(TOUCHING),
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+    script:
+        "../scripts/contact_scheme.py"
+
+
+rule outlines_figure:
+    input:
+        simulated=lambda wildcards: [
+            f"{RUN}/surfaces/week-{week}/pial.surf.gii"
+            for week in measured_beside(wildcards.run, wildcards.brain)
+        ],
+        real=measured_surfaces("whole"),
+    output:
+        **run_figure("outlines", "outlines over each other", "outlines.rst"),
+    log:
+        f"{RUN}/logs/outlines_figure.log",
+    benchmark:
+        f"{RUN}/benchmarks/outlines_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(),
+        measured=BESIDE["measured"],
+        weeks=BESIDE["real_weeks"],
+    script:
+        "../scripts/outlines_figure.py"
+
+
 rule growth_zone_figure:
     input:
         **REGIONS,
     output:
-        **run_figure("growth_zone", "growth on the surface", "figure.rst"),
+        **run_figure("growth_zone", "growth on the surface", "growth_zone.rst"),
     log:
         f"{RUN}/logs/growth_zone_figure.log",
     benchmark:
@@ -204,11 +255,6 @@ rule growth_zone_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Tangential growth of the pial surface in one time step of run *{run}*, at the start. "
-            "Nothing grows inside the ellipsoid of no growth, nor where tissue bridges the two planes "
-            "at the fissure."
-        ),
     script:
         "../scripts/growth_zone_figure.py"
 
@@ -217,7 +263,7 @@ rule layers_figure:
     input:
         **REGIONS,
     output:
-        **run_figure("layers", "regions and growth in sections", "figure.rst"),
+        **run_figure("layers", "regions and growth in sections", "layers.rst"),
     log:
         f"{RUN}/logs/layers_figure.log",
     benchmark:
@@ -226,12 +272,6 @@ rule layers_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Regions of the start brain of run *{run}* in sections through its middle: elements by "
-            "hemisphere (between the contact planes they belong to neither), whether they grow, "
-            "tangential growth in one time step, and shear modulus. Dashed: the ellipsoid of no "
-            "growth, where there is one."
-        ),
     script:
         "../scripts/layers_figure.py"
 
@@ -239,8 +279,10 @@ rule layers_figure:
 rule normals_figure:
     input:
         **REGIONS,
+        frames=rules.simulate.output.frames,
+        maps=maps_of_run,
     output:
-        **run_figure("normals", "pial normals in sections", "figure.rst"),
+        **run_figure("normals", "pial normals at two weeks", "normals.rst"),
     log:
         f"{RUN}/logs/normals_figure.log",
     benchmark:
@@ -249,13 +291,6 @@ rule normals_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Normals that orient growth in run *{run}* at the start, for a sample of vertices within "
-            "about two millimetres of the sections. An inner vertex has the normal of the nearest "
-            "pial vertex. Arrows show the component within the section, so those that cross it look "
-            "short. Growth is tangential to the pial surface, across these arrows. The normals are "
-            "computed again in every step."
-        ),
     script:
         "../scripts/normals_figure.py"
 
@@ -264,7 +299,7 @@ rule steps_figure:
     input:
         rules.simulate.output.steps,
     output:
-        **run_figure("steps", "steps of the solver", "figure.rst"),
+        **run_figure("steps", "steps of the solver", "steps.rst"),
     log:
         f"{RUN}/logs/steps_figure.log",
     benchmark:
@@ -273,10 +308,6 @@ rule steps_figure:
         ENVIRONMENT
     params:
         **drawing(),
-        caption=(
-            "Solver of run *{run}*: iterations, smallest det F (an element would be inverted at 0), "
-            "displacement and time of each step."
-        ),
     script:
         "../scripts/steps_figure.py"
 
@@ -284,6 +315,8 @@ rule steps_figure:
 # figures of every run; those for a paper first
 PAPER_FIGURES_OF_RUNS = [
     rules.weekly_figure,
+    rules.outlines_figure,
+    rules.mesh_figure,
     rules.displacement_maps,
     rules.shape_maps,
     rules.zones_figure,

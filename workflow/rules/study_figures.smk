@@ -5,7 +5,33 @@ COMMON_WEEKS = (
     set.intersection(*(set(week_tags(*pair)) for pair in FOLDED)) if FOLDED else set()
 )
 LAST_WEEK = max(COMMON_WEEKS, default=None)
+FIRST_AND_LAST = list(
+    dict.fromkeys(
+        pick(CONFIG.brains, key=lambda brain: brain.week).id for pick in (min, max)
+    )
+)
+TOUCHED = [pair for pair in FOLDED if pair[0] in TOUCHING]
 LAST_BRAINS = [brain.id for brain in CONFIG.brains if week_tag(brain.week) == LAST_WEEK]
+
+
+rule inputs_figure:
+    input:
+        [PIAL["whole"].format(brain=brain) for brain in FIRST_AND_LAST],
+    output:
+        **figure(f"{FIGURES}/inputs", "brains that went in", "inputs.rst", "Inputs"),
+    log:
+        f"{STUDY}/logs/inputs_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/inputs_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(*FIRST_AND_LAST),
+        headings=[
+            f"{brain}\n{CONFIG.brain(brain).week:g} GW" for brain in FIRST_AND_LAST
+        ],
+    script:
+        "../scripts/inputs_figure.py"
 
 
 rule displacement_figure:
@@ -15,7 +41,7 @@ rule displacement_figure:
         **figure(
             f"{FIGURES}/displacement",
             "displacement per week",
-            "figure.rst",
+            "displacement.rst",
             "Folding",
         ),
         table=report(
@@ -33,11 +59,6 @@ rule displacement_figure:
     params:
         **drawing(*CONFIG.start_brains),
         folded=FOLDED,
-        caption=(
-            "Largest and mean norm of the displacement between output weeks, over all nodes, beside "
-            "the values that the FetalFoldSim paper reports for its simulation and for real brains. "
-            "Those are other brains: compare orders of magnitude only."
-        ),
     script:
         "../scripts/displacement_figure.py"
 
@@ -47,7 +68,7 @@ rule metrics_figure:
         f"{STUDY}/metrics.csv",
     output:
         **figure(
-            f"{FIGURES}/metrics", "metrics over the weeks", "figure.rst", "Metrics"
+            f"{FIGURES}/metrics", "metrics over the weeks", "metrics.rst", "Metrics"
         ),
         table=report(
             f"{STUDY}/metrics_table.html",
@@ -64,11 +85,6 @@ rule metrics_figure:
     params:
         **drawing(*CONFIG.start_brains),
         folded=FOLDED,
-        caption=(
-            "Metrics over the weeks: runs as lines, measured brains as stars. The gyrification index "
-            "is the pial area divided by that of the convex hull, or by that of a tighter envelope. "
-            "Shape index: −1 is a cup, +1 a cap, so gyri are positive."
-        ),
         measured=CONFIG.measured_name(BRAINS),
     script:
         "../scripts/metrics_figure.py"
@@ -81,7 +97,7 @@ rule spectra_figure:
         **figure(
             f"{FIGURES}/spectra",
             "SpAnGy bands B4-B6 over the weeks",
-            "figure.rst",
+            "spectra.rst",
             "Metrics",
         ),
     log:
@@ -93,11 +109,6 @@ rule spectra_figure:
     params:
         **drawing(*CONFIG.start_brains),
         folded=FOLDED,
-        caption=(
-            "Relative power of the shape measure's spectrum in the bands B4, B5 and B6 (primary, "
-            "secondary and tertiary folds) over the weeks, per hemisphere (SpAnGy, Germanaud et al. "
-            "2012). Open marks: the band is cut off, or finer than the surface resolves."
-        ),
         measured=CONFIG.measured_name(BRAINS),
     script:
         "../scripts/spectra_figure.py"
@@ -285,6 +296,13 @@ rule figures:
         rules.metrics_figure.output,
         rules.spectra_figure.output,
         rules.displacement_figure.output,
+        rules.inputs_figure.output,
+        expand(
+            rules.contact_scheme.output,
+            zip,
+            run=[run for run, _ in TOUCHED],
+            brain=[brain for _, brain in TOUCHED],
+        ),
         rules.age_profile_figure.output if CONFIG.age_reference else [],
         rules.norms_figure.output if CONFIG.norm_reference else [],
         rules.regions_figure.output if WITH_REGIONS else [],
@@ -300,6 +318,13 @@ PAPER_FIGURES = [rule for rule in PAPER_FIGURES_OF_RUNS if rule is not rules.sha
 rule paper:
     input:
         [of_runs(rule.output) for rule in PAPER_FIGURES],
+        expand(
+            rules.contact_scheme.output,
+            zip,
+            run=[run for run, _ in TOUCHED],
+            brain=[brain for _, brain in TOUCHED],
+        ),
+        rules.inputs_figure.output,
         rules.displacement_figure.output,
         rules.growth.input,
         rules.published_tables.output,

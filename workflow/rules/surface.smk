@@ -295,8 +295,8 @@ rule overlay_figure:
         **figure(
             f"{BRAIN}/figures/overlay",
             "surface over the image",
-            "figure.rst",
-            "Brains and growth",
+            "overlay.rst",
+            "Inputs",
             brain="{brain}",
         ),
     log:
@@ -308,11 +308,6 @@ rule overlay_figure:
     conda:
         ENVIRONMENT
     params:
-        caption=(
-            "Outline of the pial surface of *{brain}* over the image that its labels belong to, in a "
-            "coronal and an axial plane through the middle and a sagittal plane through one "
-            "hemisphere."
-        ),
         dpi=CONFIG.report.dpi,
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
     script:

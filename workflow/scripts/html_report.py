@@ -29,7 +29,11 @@ with step(snakemake.log[0]):
         provenance=read_json(files.provenance),
         metrics=params.metrics,
         configuration=yaml_text(params.config),
-        **{name: read_table(files[name]) for name in ("validation", "displacement", "quality", "warnings") if files.get(name)},
+        **{
+            name: read_table(files[name])
+            for name in ("validation", "displacement", "quality", "warnings")
+            if files.get(name)
+        },
     )
     view = read_json(files.view)
     parts = {name: read_text(path) for name, path in files.items() if name in ("style", "three", "controls", "viewer")}

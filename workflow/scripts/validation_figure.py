@@ -9,7 +9,7 @@ files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     validation, ceiling = read_table(files.validation), read_table(files.ceiling) if files.ceiling else None
     if params.smoothing_mm is None:
-        figure = validation_chart(validation, ceiling)
+        figure = validation_chart(validation, ceiling, runs=params.runs)
     else:
         smoothing = {run: float(length) for run, length in params.smoothing_mm.items()}
         figure = smoothing_chart(validation, smoothing, ceiling)

@@ -80,7 +80,7 @@ def recognise(folder: Path) -> list[Found]:
             "no brain was recognised",
             path=folder,
             found=f"{len(files)} files",
-            expected="tissue label volumes (.nii.gz), or pairs of hemisphere surfaces with left and right in their names",
+            expected="tissue label volumes (.nii.gz), or pairs of surfaces with left and right in their names",
             remedy="Write the configuration by hand: config/README.md.",
         )
     _tell_apart(found)

@@ -49,7 +49,9 @@ class Config(Settings):
     )
     schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
     start: Start | None = setting(
-        None, "", "Id of the brain to fold, a list of ids, `first` (of the list of brains, of an atlas the earliest) or `all`; "
+        None,
+        "",
+        "Id of the brain to fold, a list of ids, `first` (of the list of brains, of an atlas the earliest) or `all`; "
         "required if a run has no `start` of its own.",
     )
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
@@ -61,7 +63,9 @@ class Config(Settings):
         "Runs by name, each with its `start` and what differs from `folding`; without any, one run named `reference`.",
     )  # fmt: skip
     studies: dict[str, Study] = setting(
-        {}, "", "Studies by name: runs that differ from one in a few parameters, compared with the real brains of a week."
+        {},
+        "",
+        "Studies by name: runs that differ from one in a few parameters, compared with the real brains of a week.",
     )
     calibrate: Calibration | None = setting(None, "", "A search for the parameters that meet a real brain best.")
     metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")

@@ -47,7 +47,9 @@ class Study(Settings):
         "Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; an inner key is written with "
         "dots (`contact.gap_mm`). With several keys each combination is a run.",
     )  # fmt: skip
-    fixed: dict[str, Value] = setting({}, "", "Keys of `folding` that all runs of the study have in place of the base's.")
+    fixed: dict[str, Value] = setting(
+        {}, "", "Keys of `folding` that all runs of the study have in place of the base's."
+    )
     compare_week: float = setting(..., "GW", "Week at which the runs are compared with real brains.", gt=15, le=45)
     compare_with: tuple[str, ...] | None = setting(
         None, "",
@@ -145,9 +147,7 @@ def real_brains(compared: Compared, start: Brain, brains: Sequence[Brain]) -> li
     return [brain.id for brain in own or of_week]
 
 
-def study_problems(
-    studies: Mapping[str, Study], runs: Mapping[str, Run], brains: Sequence[Brain]
-) -> Iterator[Problem]:
+def study_problems(studies: Mapping[str, Study], runs: Mapping[str, Run], brains: Sequence[Brain]) -> Iterator[Problem]:
     """Yields what is wrong between the studies, the runs and the brains."""
     weeks = {brain.id: brain.week for brain in brains if brain.has("id", "week")}
     names: dict[str, str] = {}

@@ -41,7 +41,9 @@ def write_printed(
     write_table(paths["csv"], table)
     shown = (table if printed is None else printed).map(as_printed)
     with replaced(paths["md"]) as temporary:
-        plain = shown.rename(columns=lambda name: str(name).replace("|", r"\|")).map(lambda cell: cell.replace("|", r"\|"))
+        plain = shown.rename(columns=lambda name: str(name).replace("|", r"\|")).map(
+            lambda cell: cell.replace("|", r"\|")
+        )
         text = plain.to_markdown(index=False, disable_numparse=True)
         temporary.write_text(f"{caption}\n\n{text}\n", encoding="utf-8")
     with replaced(paths["tex"]) as temporary:

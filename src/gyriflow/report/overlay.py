@@ -71,8 +71,14 @@ def plane_grid(plane: str, at: float, low: Floats, high: Floats) -> tuple[Floats
 
 def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colour: str = RUN_COLOURS[4]) -> None:
     """Draws the lines in which a plane cuts a surface."""
+    lines = section_lines(surface, plane, at)
+    axes.add_collection(LineCollection(lines, colors=colour, linewidths=0.8, capstyle="round"))
+
+
+def section_lines(surface: TriangleMesh, plane: str, at: float) -> list[Floats]:
+    """Returns the (2, 2) ends of the pieces of the line in which a plane at a place in mm cuts a surface."""
     across, right, up = PLANES[plane]
     body = pv.PolyData.from_regular_faces(np.array(surface.vertices), np.array(surface.faces, dtype=int))
     cut = body.slice(normal=np.eye(3)[across], origin=np.eye(3)[across] * at)
     segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
-    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=0.8, capstyle="round"))
+    return list(segments)

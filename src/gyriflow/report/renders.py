@@ -95,6 +95,26 @@ def runs_comparison(
     return panel_grid(columns, rows, synthetic=synthetic, measured=measured)
 
 
+@styled
+def brains_picture(
+    brains: Mapping[str, TriangleMesh], *, views: Sequence[str] = ("left", "top", "bottom"), synthetic: bool = False
+) -> Figure:
+    """Returns measured brains side by side, a row per view.
+
+    Parameters
+    ----------
+    brains : {heading: surface in RAS+ mm}
+    """
+    rows = [
+        Row(
+            f"{view.name} view",
+            [Panel(mesh, uniform_colours(mesh, REAL_SURFACE_COLOUR), view) for mesh in brains.values()],
+        )
+        for view in named_views(views)
+    ]
+    return panel_grid(list(brains), rows, synthetic=synthetic)
+
+
 def _surface_rows(
     groups: Mapping[str, tuple[Mapping[float, TriangleMesh], str]],
     *,

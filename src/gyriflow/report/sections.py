@@ -1,6 +1,7 @@
 """Plane sections through tetrahedral meshes: fields, tags, and vectors as arrows."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import matplotlib as mpl
 import numpy as np
@@ -18,7 +19,7 @@ from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..parameters.terms import BRIDGE, LEFT, RIGHT
-from .style import FULL_WIDTH_IN, MAGNITUDES, RUN_COLOURS, add_letters, new_figure, styled
+from .style import FULL_WIDTH_IN, MAGNITUDES, RUN_COLOURS, add_letters, new_figure, styled, week_label
 
 PLANES = {
     # name: (axis across the plane, axes to the right and up)
@@ -31,9 +32,10 @@ SHOWN = ("coronal", "axial")
 HEMISPHERES = {LEFT: ("left", "#0072B2"), RIGHT: ("right", "#F0E442"), BRIDGE: ("between the planes", "#CC79A7")}
 GROWING = {1: ("growing", "#D55E00"), 0: ("no growth", "#56B4E9")}
 """Codes of the elements' tags, their names and colours, those of the boundary's zones, near the paper's."""
-GROWTH, STIFFNESS = "tangential growth per step (10⁻³)", "shear modulus (Pa)"
+WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth per step (10⁻³)", "shear modulus (Pa)"
 _FOOT_IN, _LABEL_IN = 0.66, 1.3
 _ARROWS_ACROSS = 26
+_ARROWS = {"pial vertices": RUN_COLOURS[0], "vertices inside": RUN_COLOURS[1]}
 
 Tag = tuple[NDArray[np.integer], Mapping[int, tuple[str, str]]]
 Ellipsoid = tuple[Floats, Floats]
@@ -47,13 +49,17 @@ def region_sections(
     *,
     synthetic: bool = False,
 ) -> Figure:
-    """Returns coronal and axial sections with the hemispheres, what grows, growth of a step, and stiffness.
+    """Returns coronal and axial sections with the hemispheres, what grows, cortex, growth of a step, and stiffness.
 
     Fields at vertices, tags of elements, and the ellipsoid are those of the folding's regions.
     """
     return cross_sections(
         mesh,
-        {GROWTH: 1e3 * fields["tangential_growth_per_step"], STIFFNESS: fields["shear_modulus_pa"]},
+        {
+            WEIGHT: fields["cortex_weight"],
+            GROWTH: 1e3 * fields["tangential_growth_per_step"],
+            STIFFNESS: fields["shear_modulus_pa"],
+        },
         tags={"hemispheres": (tags["hemisphere"], HEMISPHERES), "growing": (tags["growing"], GROWING)},
         ellipsoid=ellipsoid,
         synthetic=synthetic,
@@ -117,58 +123,69 @@ def cross_sections(
     return figure
 
 
+@dataclass(frozen=True, eq=False)
+class Normals:
+    """A mesh in RAS+ mm with the (n, 3) unit normals and the (n,) cortical weight at its vertices.
+
+    `facets`, (f, 3), are the pial ones, whose vertices have arrows of another colour.
+    """
+
+    mesh: TetrahedralMesh
+    normals: Floats
+    weight: Floats
+    facets: NDArray[np.integer]
+
+
 @styled
-def normal_arrows(
-    mesh: TetrahedralMesh,
-    normals: Floats,
-    weight: Floats,
-    facets: NDArray[np.integer],
-    *,
-    planes: Sequence[str] = SHOWN,
-    synthetic: bool = False,
-) -> Figure:
+def normal_arrows(weeks: Mapping[float, Normals], *, planes: Sequence[str] = SHOWN, synthetic: bool = False) -> Figure:
     """Returns sections with the normals of a sample of vertices near them as arrows, over the cortical weight.
 
-    Parameters
-    ----------
-    normals : (n, 3) unit vectors at the vertices
-    weight : (n,) cortical weight at the vertices
-    facets : (f, 3) pial facets, whose vertices have arrows of another colour
+    A row per week, a column per plane through the middle of the mesh, all at one scale.
     """
-    label = "cortical weight"
-    _require_fitting(mesh, {label: weight, "normals": normals}, {})
-    grid, middle = _grid(mesh, {label: weight}, {}), _middle(mesh)
-    pial = np.zeros(len(mesh.vertices), dtype=bool)
-    pial[np.unique(facets)] = True
-    step = float(np.ptp(mesh.vertices, axis=0).max()) / _ARROWS_ACROSS
+    for shown in weeks.values():
+        _require_fitting(shown.mesh, {WEIGHT: shown.weight, "normals": shown.normals}, {})
+    extents = np.max([np.ptp(shown.mesh.vertices, axis=0) for shown in weeks.values()], axis=0)
+    step = float(extents.max()) / _ARROWS_ACROSS
     length = 1.3 * step
-    half = np.ptp(mesh.vertices, axis=0) / 2 + 1.1 * length
+    half = extents / 2 + 1.1 * length
     wide = [half[PLANES[plane][1]] for plane in known(planes)]
     tall = max(half[PLANES[plane][2]] for plane in planes)
-    height = (FULL_WIDTH_IN - 0.55 * len(planes)) * tall / sum(wide) + 0.95 + 0.17 * synthetic
+    each = (FULL_WIDTH_IN - 0.55 * len(planes)) * tall / sum(wide)
+    height = each * len(weeks) + 0.35 + 0.55 * len(weeks) + 0.17 * synthetic
     figure = new_figure(FULL_WIDTH_IN, height, synthetic=synthetic)
-    panels = figure.subplots(1, len(planes), squeeze=False, gridspec_kw={"width_ratios": wide})[0]
-    groups = {"pial vertices": (pial, RUN_COLOURS[0]), "vertices inside": (~pial, RUN_COLOURS[1])}
-    for axes, plane, width in zip(panels, planes, wide, strict=True):
-        across, right, up = PLANES[plane]
-        axes.set_xlim(middle[right] - width, middle[right] + width)
-        axes.set_ylim(middle[up] - tall, middle[up] + tall)
-        points, triangles, section = _section(grid, plane)
-        cortex = section.point_data[label][triangles].mean(axis=1)
-        # half of the scale, so that arrows stand out
-        _draw(axes, points, triangles, cortex, mpl.colormaps["Greys"], (0.0, 2.0))
-        for among, colour in groups.values():
-            shown = _sample(mesh.vertices, among, plane, middle[across], step)
-            axes.quiver(
-                *mesh.vertices[shown][:, (right, up)].T, *(length * normals[shown][:, (right, up)]).T, color=colour,
-                angles="xy", scale_units="xy", scale=1.0, width=0.005, headwidth=3.5, headlength=4, headaxislength=3.5,
-            )  # fmt: skip
-        axes.set_title(f"{plane}, {'xyz'[across]} = {middle[across]:.1f} mm")
-        axes.set(xlabel=AXIS_NAMES[right], ylabel=AXIS_NAMES[up])
-    keys = [Patch(color=colour, label=f"normals, {name}") for name, (_, colour) in groups.items()]
+    panels = figure.subplots(len(weeks), len(planes), squeeze=False, gridspec_kw={"width_ratios": wide})
+    for line, (week, shown) in zip(panels, weeks.items(), strict=True):
+        for axes, plane, width in zip(line, planes, wide, strict=True):
+            _arrows(axes, shown, plane, (width, tall), step, length)
+            across = PLANES[plane][0]
+            at = _middle(shown.mesh)[across]
+            axes.set_title(f"{week_label(week)}, {plane}, {'xyz'[across]} = {at:.1f} mm")
+    add_letters(panels.flat)
+    keys = [Patch(color=colour, label=f"normals, {name}") for name, colour in _ARROWS.items()]
     keys.append(Patch(color=mpl.colormaps["Greys"](0.5), label="cortex (weight 1; white: core, 0)"))
     figure.legend(handles=keys, loc="outside lower center", ncols=3)
     return figure
+
+
+def _arrows(axes: Axes, shown: Normals, plane: str, half: tuple[float, float], step: float, length: float) -> None:
+    mesh = shown.mesh
+    across, right, up = PLANES[plane]
+    middle = _middle(mesh)
+    axes.set_xlim(middle[right] - half[0], middle[right] + half[0])
+    axes.set_ylim(middle[up] - half[1], middle[up] + half[1])
+    points, triangles, section = _section(_grid(mesh, {WEIGHT: shown.weight}, {}), plane)
+    # half of the scale, so that arrows stand out
+    cortex = section.point_data[WEIGHT][triangles].mean(axis=1)
+    _draw(axes, points, triangles, cortex, mpl.colormaps["Greys"], (0.0, 2.0))
+    pial = np.zeros(len(mesh.vertices), dtype=bool)
+    pial[np.unique(shown.facets)] = True
+    for among, colour in zip((pial, ~pial), _ARROWS.values(), strict=True):
+        chosen = _sample(mesh.vertices, among, plane, middle[across], step)
+        axes.quiver(
+            *mesh.vertices[chosen][:, (right, up)].T, *(length * shown.normals[chosen][:, (right, up)]).T, color=colour,
+            angles="xy", scale_units="xy", scale=1.0, width=0.005, headwidth=3.5, headlength=4, headaxislength=3.5,
+        )  # fmt: skip
+    axes.set(xlabel=AXIS_NAMES[right], ylabel=AXIS_NAMES[up])
 
 
 def known(planes: Sequence[str]) -> Sequence[str]:

@@ -1,6 +1,7 @@
 """Charts of the SpAnGy spectra: relative power of the folds' frequency bands."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 from matplotlib.artist import Artist
@@ -79,6 +80,7 @@ def spectra_chart(
     week: float,
     bands: Sequence[int] = FOLD_BANDS,
     runs: Sequence[str] = (),
+    colours: Mapping[str, Any] | None = None,
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -94,6 +96,8 @@ def spectra_chart(
         Week in GW.
     runs
         All runs of the study, which settle the colours.
+    colours : {run: colour}
+        Other colours, in this order.
 
     Raises
     ------
@@ -104,7 +108,7 @@ def spectra_chart(
     rows = rows[(rows["week"] - week).abs() < 1e-6]
     if rows.empty:
         raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
-    colours = chosen_colours(rows["run"], runs)
+    colours = chosen_colours(rows["run"], runs) if colours is None else colours
     figure = new_figure(FULL_WIDTH_IN, 3.0, synthetic=synthetic, measured=measured)
     sides = _sides_of(rows)
     panels = figure.subplots(1, len(sides), sharey=True, squeeze=False)[0]

@@ -1,6 +1,6 @@
 """Charts of what simulations are worth beside real brains: gain over no folding, and how local growth must be known."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,8 @@ from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
     REAL_COLOUR,
+    add_letters,
+    chosen_colours,
     light_grid,
     new_figure,
     run_colours,
@@ -27,7 +29,11 @@ CEILING = "registration alone"
 
 @styled
 def validation_chart(
-    validation: pd.DataFrame, ceiling: pd.DataFrame | None = None, *, synthetic: bool = False
+    validation: pd.DataFrame,
+    ceiling: pd.DataFrame | None = None,
+    *,
+    runs: Sequence[str] = (),
+    synthetic: bool = False,
 ) -> Figure:
     """Returns by week how much better a run's curvature correlates with the real brain's than the scaled start's does.
 
@@ -41,16 +47,19 @@ def validation_chart(
         `MEASURES`.
     ceiling
         The same of the start carried by registration.
+    runs
+        All runs of the study, which settle the colours.
     """
     figure = new_figure(FULL_WIDTH_IN, 3.2, synthetic=synthetic)
-    runs = list(dict.fromkeys(validation["run"]))
-    colours = run_colours(runs)
-    for axes, (measure, name) in zip(figure.subplots(1, 2), MEASURES.items(), strict=True):
+    colours = chosen_colours(validation["run"], runs)
+    panels = figure.subplots(1, 2)
+    add_letters(panels)
+    for axes, (measure, name) in zip(panels, MEASURES.items(), strict=True):
         for number, (run, start) in enumerate(
             dict.fromkeys(zip(validation["run"], validation["start_week"], strict=True))
         ):
             rows = validation[(validation["run"] == run) & (validation["start_week"] == start)].sort_values("week")
-            _gain_line(axes, rows, measure, colours[run], shift=0.03 * (number - (len(runs) - 1) / 2))
+            _gain_line(axes, rows, measure, colours[run], shift=0.03 * (number - (len(colours) - 1) / 2))
         for _, rows in validation.groupby("start_week"):
             adjacent = (rows[f"r_adjacent_{measure}"] - rows[f"r_start_{measure}"]).groupby(rows["week"]).first()
             axes.plot(adjacent.index, adjacent, "*", color=REAL_COLOUR, markersize=6)

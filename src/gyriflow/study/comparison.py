@@ -179,6 +179,6 @@ def _flags(best: pd.Series, of_best: pd.Series, members: pd.DataFrame, varied: S
         flags.append(str(of_best["resolution"]))
     for name in varied:
         known = pd.to_numeric(members[name], errors="coerce")
-        if members[name].nunique() > 1 and of_best[name] in (known.min(), known.max()):
+        if known.min() < known.max() and of_best[name] in (known.min(), known.max()):
             flags.append(ENDS)
     return "; ".join(dict.fromkeys(flags)) or "ok"

@@ -54,10 +54,12 @@ def touched(folder, *names):
 
 def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     for side in ("left", "right"):
-        touched(tmp_path, *(f"fetal.week22.{side}.{kind}.surf.gii" for kind in ("pial", "wm", "sphere", "midthickness")))
+        touched(
+            tmp_path, *(f"fetal.week22.{side}.{kind}.surf.gii" for kind in ("pial", "wm", "sphere", "midthickness"))
+        )
     touched(tmp_path, "fetal.week23.left.pial.surf.gii")
     touched(tmp_path, *(f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white")))
-    (tmp_path / "participants.tsv").write_text("participant_id\tsex\tgestational_age\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
+    (tmp_path / "participants.tsv").write_text("participant_id\tsex\tga\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
     assert participants(tmp_path) == {"sub-07": 27.3}
     first, second = (brain.entry for brain in recognise(tmp_path))
     assert first == {

@@ -15,7 +15,7 @@ from gyriflow.parameters.terms import ZONE_NAMES
 from gyriflow.report.panels import round_length
 from gyriflow.report.renders import displacement_maps, round_up, runs_comparison, scalar_maps, weekly_comparison
 from gyriflow.report.scene import MAP, TISSUE, VIEWS, render, uniform_colours
-from gyriflow.report.sections import cross_sections, normal_arrows
+from gyriflow.report.sections import Normals, cross_sections, normal_arrows
 from gyriflow.report.zones import ZONES, field_picture, zones_picture
 
 
@@ -305,8 +305,13 @@ def test_normals_are_arrows_at_vertices_near_the_plane():
     brain = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
     facets = boundary_faces(brain)[0]
     normals = brain.vertices / np.maximum(np.linalg.norm(brain.vertices, axis=1, keepdims=True), 1e-9)
-    figure = normal_arrows(brain, normals, np.ones(len(normals)), facets, planes=("axial",))
-    (axes,) = figure.axes
+    shown = Normals(brain, normals, np.ones(len(normals)), facets)
+    bigger = Normals(TetrahedralMesh(1.2 * brain.vertices, brain.tets), normals, shown.weight, facets)
+    figure = normal_arrows({21.0: shown, 23.0: bigger}, planes=("axial",))
+    axes, later = figure.axes
+    # both weeks have one scale
+    assert np.ptp(axes.get_xlim()) == np.ptp(later.get_xlim())
+    assert later.get_title().startswith("23 GW, axial")
     pial, inside = (drawn for drawn in axes.collections if hasattr(drawn, "XY"))
     for arrows in (pial, inside):
         assert len(arrows.XY) > 10
