@@ -216,11 +216,11 @@ rule regions_figure:
             for where in SHOWN_WITH_REGIONS.values()
         ],
         left_regions=[
-            f"results/{sides_of(where)}/left.regions.label.gii"
+            f"results/{regions_in(where)}/left.regions.label.gii"
             for where in SHOWN_WITH_REGIONS.values()
         ],
         right_regions=[
-            f"results/{sides_of(where)}/right.regions.label.gii"
+            f"results/{regions_in(where)}/right.regions.label.gii"
             for where in SHOWN_WITH_REGIONS.values()
         ],
         regions=f"{STUDY}/regions.csv",
