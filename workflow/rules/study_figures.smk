@@ -329,3 +329,4 @@ rule paper:
         rules.growth.input,
         rules.published_tables.output,
         rules.studies.input,
+        rules.influence_figures.input,
