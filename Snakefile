@@ -40,6 +40,7 @@ include: "workflow/rules/study.smk"
 include: "workflow/rules/studies.smk"
 include: "workflow/rules/calibration.smk"
 include: "workflow/rules/run_figures.smk"
+include: "workflow/rules/influence_figures.smk"
 include: "workflow/rules/study_figures.smk"
 include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
@@ -59,6 +60,7 @@ localrules:
     quality,
     report,
     studies,
+    influence_figures,
     calibrate,
     paper,
     parameters,

@@ -33,7 +33,7 @@ def source_of_regions(pattern):
     return lambda wildcards: pattern.format(brain=CONFIG.regions_from(wildcards.brain))
 
 
-def regions_folder(where):
+def regions_in(where):
     """Returns the folder with the regions of what is measured in a folder: those of a run hold at all its weeks."""
     return where if where.startswith("brains/") else where.rsplit("/", 1)[0]
 
@@ -119,11 +119,7 @@ rule simulated_regions:
 
 rule region_metrics:
     input:
-        unpack(
-            lambda wildcards: region_files(
-                f"results/{regions_folder(wildcards.where)}"
-            )
-        ),
+        unpack(lambda wildcards: region_files(f"results/{regions_in(wildcards.where)}")),
         unpack(
             lambda wildcards: surfaces_in(f"results/{surface_folder(wildcards.where)}")
         ),

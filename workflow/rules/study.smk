@@ -156,9 +156,7 @@ def exported(where):
     labels, folder = brain_labels(where), f"results/{surface_folder(where)}"
     brain = CONFIG.brain(labels["subject"])
     regions = (
-        region_files(f"results/{regions_folder(where)}")
-        if where in WITH_REGIONS
-        else {}
+        region_files(f"results/{regions_in(where)}") if where in WITH_REGIONS else {}
     )
     return {
         "brain": brain.id,

@@ -216,11 +216,11 @@ rule regions_figure:
             for where in SHOWN_WITH_REGIONS.values()
         ],
         left_regions=[
-            f"results/{regions_folder(where)}/left.regions.label.gii"
+            f"results/{regions_in(where)}/left.regions.label.gii"
             for where in SHOWN_WITH_REGIONS.values()
         ],
         right_regions=[
-            f"results/{regions_folder(where)}/right.regions.label.gii"
+            f"results/{regions_in(where)}/right.regions.label.gii"
             for where in SHOWN_WITH_REGIONS.values()
         ],
         regions=f"{STUDY}/regions.csv",
@@ -329,3 +329,4 @@ rule paper:
         rules.growth.input,
         rules.published_tables.output,
         rules.studies.input,
+        rules.influence_figures.input,

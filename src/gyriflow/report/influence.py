@@ -38,6 +38,12 @@ ABSENT = "ended\nbefore\nthis week"
 """What stands in the place of a member of a study that has not come to the week."""
 HEMISPHERE_MARKERS = {"whole": "o", "left": "<", "right": ">"}
 _COLUMNS = 3
+_UNITS = {"_mm_per_gw": "mm/GW", "_per_s": "s⁻¹", "_pa_per_m": "Pa/m", "_mm": "mm", "_pa": "Pa", "_gw": "GW", "_s": "s"}
+_NAMES = {
+    "thickness": "cortical thickness",
+    "shear_modulus_cortex": "shear modulus of the cortex",
+    "shear_modulus_core": "shear modulus of the core",
+}
 
 
 @styled
@@ -231,3 +237,30 @@ def _nearest_legend(drawn: set[str], published: bool, untrusted: bool) -> list[A
     if published:
         handles.append(Line2D([], [], color=MUTED_COLOUR, linestyle="--", label="nearest in the publication"))
     return handles
+
+
+def parameter_label(key: str) -> str:
+    """Returns what a key of the folding is called on an axis, with its unit, for example "cortical thickness (mm)"."""
+    name, unit = key.rpartition(".")[2], ""
+    for ending, shown in _UNITS.items():
+        if name.endswith(ending):
+            name, unit = name.removesuffix(ending), f" ({shown})"
+            break
+    return _NAMES.get(name, name.replace("_", " ")) + unit
+
+
+def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Returns a heading for each member of a study: its values with their units, for example "1.5 mm".
+
+    Where several keys are varied, each is named.
+    """
+    labels = []
+    for member in values:
+        parts = []
+        for key, value in member.items():
+            name, _, unit = parameter_label(key).partition(" (")
+            text = f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
+            text += f" {unit.removesuffix(')')}" if unit else ""
+            parts.append(text if len(member) == 1 and unit else f"{name} {text}")
+        labels.append("\n".join(parts))
+    return labels
