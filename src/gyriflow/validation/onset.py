@@ -32,14 +32,15 @@ BOTTOM, CROWN = 0.9, 0.1
 """Quantiles of depth by area that stand for the bottom of a region and for the crowns beside it."""
 
 
-def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats) -> Ints:
+def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> Ints:
     """Returns the (n,) number of the sulcus at each vertex of a hemisphere, 1 for the largest, 0 outside of sulci.
 
-    A sulcus is a connected area deeper than `DEEP_MM` below the hull, of `LEAST_REGION_MM2` or more. That on the
-    medial wall is one of them.
+    A sulcus is a connected valley (mean curvature below 0, positive on gyri) deeper than `DEEP_MM` below the hull, of
+    `LEAST_REGION_MM2` or more. Valleys of the medial wall and the Sylvian fissure are among them.
     """
     regions = np.zeros(len(mesh.vertices), dtype=np.int64)
-    deep = depth_mm[mesh.faces].min(axis=1) >= DEEP_MM
+    valley = (depth_mm >= DEEP_MM) & (mean_curvature < 0)
+    deep = valley[mesh.faces].all(axis=1)
     if not deep.any():
         return regions
     part, used = submesh(mesh, deep)
