@@ -238,7 +238,7 @@ rule onset:
     conda:
         ENVIRONMENT
     params:
-        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+        radius_mm=CONFIG.metrics.curvature_radius_mm,
         run=lambda wildcards: wildcards.run,
         subject=lambda wildcards: wildcards.brain,
         run_weeks=lambda wildcards: CONFIG.weeks(wildcards.run, wildcards.brain),

@@ -12,15 +12,15 @@ from gyriflow.metrics.depth import convex_hull, sulcal_depth
 from gyriflow.parameters.terms import SIDES
 from gyriflow.registration.carrying import carry_over_weeks
 from gyriflow.step import step
-from gyriflow.validation.onset import onset, regions_on, relief, sulcal_regions
+from gyriflow.validation.onset import numbered, onset_on_surfaces, regions_on, sulcal_regions
 
 files, params, tables = snakemake.input, snakemake.params, []
 
 
 def carried(mesh, index):
     """Returns the vertices of a surface in the pose of the brain of an index, carried to the last brain's."""
-    start = transform_points(mesh.vertices, np.linalg.inv(poses[index]))
-    return transform_points(carry_over_weeks(start, deformations[index:])[-1], poses[-1])
+    points = carry_over_weeks(transform_points(mesh.vertices, np.linalg.inv(poses[index])), deformations[index:])[-1]
+    return transform_points(points, poses[-1])
 
 
 with step(snakemake.log[0]):
@@ -28,16 +28,13 @@ with step(snakemake.log[0]):
     poses = [np.array(read_json(path)["pose"]) for path in files.reports]
     for side in SIDES:
         real, run = ([read_surface(path) for path in files[f"{who}_{side}"]] for who in ("real", "run"))
-        bend = curvature(real[-1], radius_mm=params.curvature_radius_mm).mean
-        last = sulcal_regions(real[-1], sulcal_depth(real[-1], convex_hull(real[-1])), bend)
-        names = {number: f"{side} {number}" for number in range(1, last.max() + 1)}
+        deep, bend = sulcal_depth(real[-1], convex_hull(real[-1])), curvature(real[-1], radius_mm=params.radius_mm)
+        last = sulcal_regions(real[-1], deep, bend.mean)
         places = [regions_on(mesh, carried(mesh, index), real[-1], last) for index, mesh in enumerate(real)]
         start = regions_on(run[0], carried(run[0], 0), real[-1], last)  # the same vertices in all weeks
         brains = {"real": (params.real_weeks, real, places), params.run: (params.run_weeks, run, [start] * len(run))}
         for who, (weeks, meshes, regions) in brains.items():
-            found = (
-                relief(m, sulcal_depth(m, convex_hull(m)), at, names) for m, at in zip(meshes, regions, strict=True)
-            )
-            table = onset(dict(zip(weeks, found, strict=True)))
+            depths = [sulcal_depth(mesh, convex_hull(mesh)) for mesh in meshes]
+            table = onset_on_surfaces(weeks, meshes, depths, regions, numbered(last, side))
             tables.append(table.assign(run=who, subject=params.subject, hemisphere=side))
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

@@ -1,6 +1,6 @@
 """In which week a sulcus appears that is not there at the start."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -115,6 +115,23 @@ def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
             week = weeks[before] + part * (weeks[after] - weeks[before]) if np.isfinite(part) else weeks[after]
         rows.append((name, there, week, depths[0], depths[-1]))
     return pd.DataFrame(rows, columns=["region", "there_at_start", "onset_week", "first_relief_mm", "last_relief_mm"])
+
+
+def numbered(regions: NDArray[np.integer], side: str) -> dict[int, str]:
+    """Returns the names of numbered regions of a side, such as "left 1"."""
+    return {number: f"{side} {number}" for number in range(1, int(regions.max()) + 1)}
+
+
+def onset_on_surfaces(
+    weeks: Sequence[float],
+    meshes: Sequence[TriangleMesh],
+    depths_mm: Sequence[Floats],
+    regions: Sequence[NDArray[np.integer]],
+    names: Mapping[int, str],
+) -> pd.DataFrame:
+    """Returns the table of `onset` of surfaces by week, each with its depths and regions as for `relief`."""
+    found = (relief(*surface, names) for surface in zip(meshes, depths_mm, regions, strict=True))
+    return onset(dict(zip(weeks, found, strict=True)))
 
 
 def _quantile(values: Floats, weights: Floats, share: float) -> float:
