@@ -241,6 +241,7 @@ rule onset:
     conda:
         ENVIRONMENT
     params:
+        radius_mm=CONFIG.metrics.curvature_radius_mm,
         run=lambda wildcards: wildcards.run,
         subject=lambda wildcards: wildcards.brain,
         sides=lambda wildcards: sides_of(wildcards.brain),

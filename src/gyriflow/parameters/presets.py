@@ -23,8 +23,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5, "gap_mm": 2.5},
         "no_growth": {"kind": "ellipsoid", "shift_y": 0.05, "shift_z": -0.15, "semi_axes": [0.35, 0.40, 0.50]},
     },
-    # growth that follows the brain, in measured directions: everything grows and nothing is held; with a cortex as stiff
-    # as the core, growth makes the folds rather than buckling (docs/science.md)
+    # growth that follows the brain, in measured directions: everything grows and nothing is held; with a cortex as
+    # stiff as the core, growth makes the folds rather than buckling (docs/science.md)
     "measured": {
         "step_s": 86_400.0,
         "stress_memory_gw": 0.0,
