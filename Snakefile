@@ -29,15 +29,19 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/retrieve.smk"
 include: "workflow/rules/input.smk"
 include: "workflow/rules/surface.smk"
-include: "workflow/rules/mesh.smk"
 include: "workflow/rules/growth.smk"
+include: "workflow/rules/mesh.smk"
 include: "workflow/rules/registration.smk"
 include: "workflow/rules/folding.smk"
 include: "workflow/rules/metrics.smk"
+include: "workflow/rules/regions.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
+include: "workflow/rules/studies.smk"
+include: "workflow/rules/calibration.smk"
 include: "workflow/rules/run_figures.smk"
 include: "workflow/rules/study_figures.smk"
+include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -52,7 +56,10 @@ localrules:
     validate,
     metrics,
     figures,
+    quality,
     report,
+    studies,
+    calibrate,
     paper,
     parameters,
     html_report,
@@ -67,6 +74,8 @@ rule all:
         rules.folding.input,
         rules.metrics.input,
         rules.figures.input,
+        rules.quality.input,
+        rules.study_warnings.output,
         rules.report.input,
 
 

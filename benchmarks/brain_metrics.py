@@ -12,10 +12,12 @@ import json
 import os
 import time
 
+import numpy as np
+
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.parameters.schemes import SCHEMES
-from gyriflow.surface.from_labels import from_labels
+from gyriflow.surface.from_labels import from_labels, thickness_from_labels
 
 
 def cpu_seconds() -> float:
@@ -36,12 +38,14 @@ def main() -> None:
         volume = read_label_volume(path)
         scheme = SCHEMES["spina-bifida-atlas"]
         surface = from_labels(volume.labels, volume.affine, scheme, week=float(week), edge_length_mm=options.edge)
+        pose = np.array(surface.report["pose"])
+        thickness = thickness_from_labels(volume.labels, volume.affine, scheme, surface.whole, pose)
         clock, cpu = time.perf_counter(), cpu_seconds()
         found = measure_brain(
             surface.whole,
             surface.left,
             surface.right,
-            thickness_mm=surface.thickness.measured_mm if surface.thickness else None,
+            thickness_mm=thickness.measured_mm,
             spangy_modes=options.last_band,
             threads=options.threads,
         )

@@ -20,10 +20,10 @@ from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, s
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_hemispheres, read_surface
 from gyriflow.surface.from_surfaces import from_hemispheres, hemisphere
-from gyriflow.surface.hemisphere_pose import Pair, pair_by_shape
+from gyriflow.surface.hemisphere_pose import Pair
 from gyriflow.surface.repair import pieces
 from gyriflow.surface.size import expected_volume_ml
-from gyriflow.surface.study_poses import Poses, poses
+from gyriflow.surface.study_poses import Poses, pairs_by_shape, poses
 
 Floats = NDArray[np.float64]
 Files = tuple[Path, Path]
@@ -60,17 +60,24 @@ def pairs_of_files(folder: Path) -> list[Files]:
 
 def posed(files: list[Files]) -> tuple[dict[Files, Poses], list[str]]:
     """Returns the poses of the brains, and what was refused."""
-    pairs: dict[Files, tuple[Pair, bool]] = {}
+    brains: dict[Files, tuple[TriangleMesh, TriangleMesh]] = {}
+    named: dict[Files, bool] = {}
     refused = []
     for brain in files:
         try:
-            *read, named = read_hemispheres(*brain)
-            pairs[brain] = pair_by_shape(*(hemisphere(side, MAX_HOLE_MM)[0] for side in read)), named
+            *read, named[brain] = read_hemispheres(*brain)
+            left, right = (hemisphere(side, MAX_HOLE_MM)[0] for side in read)
+            brains[brain] = left, right
         except GyriflowError as error:
             refused.append(f"{brain[0].name}: {error}")
+    # as the workflow does: a brain that is doubtful alone is posed like the others of the study
+    found = dict(zip(brains, pairs_by_shape(list(brains.values())), strict=True))
+    refused += [f"{brain[0].name}: {pair}" for brain, pair in found.items() if isinstance(pair, InputError)]
+    pairs = {brain: pair for brain, pair in found.items() if isinstance(pair, Pair)}
     if not pairs:
         raise InputError("no pair of hemispheres could be posed", found="; ".join(refused) or "no pair of files")
-    return dict(zip(pairs, poses(*zip(*pairs.values(), strict=True)), strict=True)), refused
+    posed_as = poses(list(pairs.values()), [named[brain] for brain in pairs])
+    return dict(zip(pairs, posed_as, strict=True)), refused
 
 
 def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:

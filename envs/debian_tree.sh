@@ -1,27 +1,43 @@
 # The Debian tree of ./run, which reads this file: making it, entering it, running a command in it.
-# Uses `env` (folder of the environment), `here`, `cache`, `suite`, `bind`, `certificates`, `debian_keys` of ./run and
-# its functions say, fail, part, listed and apt_install; fills `enter`.
+# Uses `env` (folder of the environment), `here`, `cache`, `suite`, `bind`, `certificates` of ./run and its functions say,
+# fail, part, listed and apt_install; fills `enter`.
 # shellcheck shell=bash disable=SC2154
 
+# whose a suite is: fills `vendor`, `keys`, `keyring` (the package of the keys), `mirror` and `components`
+know_suite() {
+    vendor=Debian keys=/usr/share/keyrings/debian-archive-keyring.gpg keyring=debian-archive-keyring
+    mirror=http://deb.debian.org/debian components=main
+    case $suite in
+        trixie | forky | sid | testing | unstable) ;;
+        *)
+            vendor=Ubuntu keys=/usr/share/keyrings/ubuntu-archive-keyring.gpg keyring=ubuntu-keyring
+            mirror=http://archive.ubuntu.com/ubuntu components="main universe"
+            ;;
+    esac
+}
+
 install_tools() {
-    local keyring=()
-    command -v mmdebstrap >/dev/null && command -v bwrap >/dev/null && [ -e "$debian_keys" ] && return
+    know_suite
+    command -v mmdebstrap >/dev/null && command -v bwrap >/dev/null && [ -e "$keys" ] && return
     say "installing mmdebstrap and bubblewrap on this machine"
-    [ -e "$debian_keys" ] || keyring=(debian-archive-keyring) # on Ubuntu
-    apt_install mmdebstrap bubblewrap "${keyring[@]}"
+    # the keys are missing on a machine of the other vendor
+    if [ -e "$keys" ]; then keyring=; fi
+    apt_install mmdebstrap bubblewrap ${keyring:+"$keyring"}
 }
 
 create_tree() {
-    local mirror include option options=()
+    local own_mirror include option options=()
     [ ! -e "$env/tree.ready" ] || return 0
     say "making a Debian $suite tree (about 1.5 minutes, 2 GB)"
     rm -rf --one-file-system "$env/tree"
-    # the mirror and apt settings (proxies, dates) of this machine, where it is a Debian
+    # the mirror and apt settings (proxies, dates) of this machine, where it is of that vendor
     # shellcheck disable=SC2016  # apt expands these
-    mirror=$(apt-get indextargets --format '$(REPO_URI) $(ORIGIN) $(LABEL)' 'Created-By: Packages' |
-        awk '$2 == "Debian" && $3 == "Debian" {print $1; exit}')
+    own_mirror=$(apt-get indextargets --format '$(REPO_URI) $(ORIGIN) $(LABEL)' 'Created-By: Packages' |
+        awk -v vendor="$vendor" '$2 == vendor && $3 == vendor {print $1; exit}')
     while IFS= read -r option; do options+=("--aptopt=$option"); done < <(apt-config dump |
         grep -E '^Acquire::(https?::(Proxy|Proxy-Auto-Detect|CaInfo|Verify-Peer|Verify-Host)|Check-Valid-Until|Check-Date)\b.* ".+";')
+    # mirrors that keep a day of a suite that changes daily say rightly that it is an old one
+    [ "$suite" = trixie ] || options+=(--aptopt='Acquire::Check-Valid-Until "false"')
     include=$(listed "$here/envs/debian.txt" | tr ' ' ,)
     # in namespaces of its own: killed, it leaves neither processes nor mounts behind
     part unshare --mount --pid --fork --kill-child --mount-proc \
@@ -29,7 +45,7 @@ create_tree() {
         --aptopt='APT::Install-Recommends "false"' --dpkgopt='path-exclude=/usr/share/man/*' \
         --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/locale/*' \
         "$suite" "$env/tree" \
-        "deb [signed-by=$debian_keys] ${mirror:-http://deb.debian.org/debian} $suite main" || return
+        "deb [signed-by=$keys] ${own_mirror:-$mirror} $suite $components" || return
     # files of the machine that are bound over the tree's need a place to be bound to
     touch "$env/tree/etc/"{resolv.conf,hosts,pip.conf,passwd,group} "$env/tree/etc/ssl/certs/ca-certificates.crt"
     touch "$env/tree.ready"

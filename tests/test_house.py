@@ -30,7 +30,7 @@ ARROWS = {
     # the solve is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io"},
     **dict.fromkeys(("io", "phantom", "surface", "mesh", "registration", "growth", "metrics"), PLAIN),
-    **dict.fromkeys(("validation", "report"), PLAIN),
+    **dict.fromkeys(("validation", "study", "report"), PLAIN),
     # the shell around the rooms: how a workflow starts, how a step ends, which code it depends on
     "provenance": {"version"},
     "shipped": set(),

@@ -10,6 +10,7 @@ import fcntl
 import os
 import re
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from types import FrameType
 from typing import IO
 
 from .errors import GyriflowError, InputError, StorageError
+from .io.files import read_json, write_json
 from .io.yaml_files import read_yaml
 from .shipped import SHIPPED
 from .step import EXIT_FILE, INTERRUPTED, recorded_exit_code
@@ -41,6 +43,15 @@ LOOKS_ONLY = frozenset(
     + ("--filegraph", "--list-rules", "--list", "-l", "--lint", "-h", "--help", "-v", "--version")
 )
 """Options under which Snakemake takes no lock."""
+GOES_ON = "GYRIFLOW_KEEP_GOING"
+"""Environment variable that is set where a call has an option of `KEEP_GOING`."""
+KEEP_GOING = frozenset(("--keep-going", "-k"))
+REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
+"""Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
+
+
+HELD: list[IO[str]] = []
+"""Files whose locks this process holds."""
 SAYS_ITSELF = frozenset(
     (
         "--verbose",
@@ -80,7 +91,17 @@ def hold_lock(directory: Path) -> IO[str] | None:
     except BlockingIOError:
         file.close()
         return None
+    HELD.append(file)
     return file
+
+
+def release_locks() -> None:
+    """Gives up the locks of the Snakemake run that this process has ended."""
+    # the Snakefile has imported this module by its name, beside the program
+    from gyriflow import launch
+
+    while launch.HELD:
+        launch.HELD.pop().close()
 
 
 def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
@@ -160,6 +181,51 @@ def add_snakefile(arguments: Sequence[str]) -> list[str]:
     return ["--snakefile", str(SHIPPED / "Snakefile"), *arguments]
 
 
+def refused_brains() -> dict[str, str]:
+    """Returns the cause by the id of each brain that an earlier pass of this call has refused."""
+    path = os.environ.get(REFUSED_FILE)
+    return read_json(path) if path else {}
+
+
+def keeps_going() -> bool:
+    """Returns whether the call that this process belongs to goes on where a step or a row of a table fails."""
+    return GOES_ON in os.environ
+
+
+def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
+    """Returns the cause by the id of each brain of which a step has failed since a time (s, of the epoch)."""
+    from .io.logs import gather_messages  # takes a second, which a good run need not wait for
+
+    found: dict[str, str] = {}
+    folders = directory.glob("results/brains/*")
+    messages = gather_messages(directory, [folder.name for folder in folders], [], since_s=since_s)
+    errors = messages[(messages["level"] == "error") & (messages["subject"] != "")]
+    for subject, message in zip(errors["subject"], errors["message"], strict=True):
+        found.setdefault(subject, message)
+    return found
+
+
+def finish_without(refused: dict[str, str], arguments: Sequence[str], directory: Path) -> None:
+    """Runs the same call again without refused brains, so that they don't hold up the tables and figures of the rest.
+
+    Where the call asks for files of such a brain there is nothing to finish.
+    """
+    if any(argument.startswith(f"results/brains/{brain}/") for argument in arguments for brain in refused):
+        return
+    print(f"gyriflow: refused: {', '.join(refused)}; finishing the study without", file=sys.stderr, flush=True)
+    path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
+    write_json(path, refused)
+    release_locks()
+    try:
+        again = [sys.executable, "-m", "gyriflow.launch", *arguments]
+        subprocess.run(again, env=os.environ | {REFUSED_FILE: str(path)}, check=False)
+    except KeyboardInterrupt:
+        # the same command goes on from here
+        pass
+    finally:
+        path.unlink(missing_ok=True)
+
+
 def main(arguments: Sequence[str]) -> int:
     """Runs Snakemake and returns the exit code: its own, or that of the first failed step."""
     for name, value in SETTINGS.items():
@@ -175,7 +241,10 @@ def main(arguments: Sequence[str]) -> int:
     # beside the results, where jobs on other machines of a cluster find it too
     exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
     os.environ[EXIT_FILE] = str(exit_file)
+    if KEEP_GOING.intersection(arguments):
+        os.environ[GOES_ON] = "1"
     interrupts: list[int] = []
+    began = time.time()
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         interrupts.append(number)
@@ -201,6 +270,9 @@ def main(arguments: Sequence[str]) -> int:
     if code and interrupts:
         print("gyriflow: interrupted; the same command resumes from here", file=sys.stderr)
         return INTERRUPTED
+    may_finish = REFUSED_FILE not in os.environ and not looks_only(arguments)
+    if code and may_finish and KEEP_GOING.intersection(arguments) and (refused := failed_brains(directory, began)):
+        finish_without(refused, arguments, directory)
     return (recorded or code) if code else 0
 
 

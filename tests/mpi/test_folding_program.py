@@ -273,6 +273,24 @@ def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_pat
     assert pd.read_csv(tmp_path / "steps.csv")["week"].iloc[-1] == pytest.approx(21.25)
 
 
+def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tmp_path, monkeypatch):
+    brain = read_tetrahedral_mesh(mesh)
+    parameters = parameters_from(WEEK)
+    monkeypatch.setattr(Folding, "step", failing_after(5))
+    zones = zones_of_run(brain, parameters)
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path, may_diverge=True)
+    summary = read_json(tmp_path / "summary.json")
+    assert read_weeks(tmp_path / "frames.h5") == summary["weeks"] == [21.0, 21.25]
+    assert "no way on" in summary["diverged"]
+    assert summary["reached_week"] == pytest.approx(21.25 + 1 / 14)
+    assert not list(tmp_path.glob("checkpoint-*"))
+    # one that cannot take a single step has its start
+    monkeypatch.setattr(Folding, "step", failing_after(0))
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path, may_diverge=True)
+    summary = read_json(tmp_path / "summary.json")
+    assert (summary["steps"], summary["weeks"], summary["reached_week"]) == (0, [21.0], 21.0)
+
+
 def test_stress_is_remembered_across_an_interruption(mesh, tmp_path, monkeypatch, capsys):
     brain = read_tetrahedral_mesh(mesh)
     parameters = parameters_from(WEEK | {"stress_memory_gw": 0.5, "solver": TIGHT})

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
     [
         *("solver_cases.py", "growth_cases.py", "memory_cases.py", "ladder_cases.py", "consistency_cases.py"),
         *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py"),
-        *("leak_cases.py", "rate_cases.py", "quadratic_cases.py", "following_cases.py"),
+        *("leak_cases.py", "rate_cases.py", "quadratic_cases.py", "following_cases.py", "kept_cases.py"),
     ],
 )
 def test_cases_hold_on(ranks, cases):

@@ -51,6 +51,33 @@ def test_examples_are_planned_from_the_checkout_alone(workflow, example, expecte
     assert "atlas_file" not in jobs
 
 
+def test_the_paper_is_planned_with_each_equal_run_once(workflow):
+    example = str(workflow.checkout / "config" / "examples" / "paper.yaml")
+    jobs = workflow.jobs("paper", "--configfile", example)
+    # eleven members, of which one is the reference and one stands in both studies
+    assert (jobs["simulate"], jobs["simulate_member"], jobs["compare_member"]) == (2, 9, 11)
+    assert (jobs["study_tables"], jobs["published_tables"], jobs["tetrahedralise"]) == (2, 1, 1)
+    # the reference and the real brains of 28 and 29 GW; other runs once they are solved
+    assert jobs["measure"] == 3
+
+
+@pytest.mark.parametrize(
+    "atlas", ['[{name: dhcp-surface}, {name: dhcp-volume, accept_licence: true}]', "{name: crl, accept_licence: true}"]
+)
+def test_the_paper_is_planned_of_another_atlas_by_one_line(workflow, atlas):
+    lines = (workflow.checkout / "config" / "examples" / "paper.yaml").read_text().splitlines()
+    lines = [f"atlas: {atlas}" if line.startswith("atlas:") else line for line in lines]
+    (workflow.directory / "other.yaml").write_text("\n".join(lines))
+    jobs = workflow.jobs("paper", "--configfile", "other.yaml")
+    assert (jobs["simulate"], jobs["simulate_member"]) == (2, 9)
+
+
+def test_a_calibration_is_planned_round_by_round(workflow):
+    example = str(workflow.checkout / "config" / "examples" / "calibration.yaml")
+    jobs = workflow.jobs("calibrate", "--configfile", example)
+    assert (jobs["calibration_design"], jobs["simulate_member"], jobs["calibration_score"]) == (4, 24, 24)
+
+
 @pytest.mark.parametrize(
     ("example", "expected"),
     [

@@ -2,7 +2,7 @@
 import re
 
 from gyriflow.errors import GyriflowError
-from gyriflow.launch import hold_lock
+from gyriflow.launch import hold_lock, keeps_going, refused_brains
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
@@ -30,17 +30,30 @@ def validated_config():
             content = read_yaml(file)
             if isinstance(content, dict) and {"brains", "atlas"} & set(content):
                 base = file.resolve().parent
-        return load(config, base)
+        return load(config, base, keep_going=keeps_going())
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
 
 
-CONFIG = validated_config()
+WHOLE_CONFIG = validated_config()
+# brains that an earlier pass of this call has refused, and why; without them it finishes the study
+REFUSED = {
+    brain: cause
+    for brain, cause in refused_brains().items()
+    if brain in [known.id for known in WHOLE_CONFIG.brains]
+}
+CONFIG = WHOLE_CONFIG.without(REFUSED)
+if workflow.is_main_process:
+    for row in WHOLE_CONFIG.left_out.values():
+        print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 BRAINS = [brain.id for brain in CONFIG.brains]
 # every run with each of the brains that it folds
 FOLDED = CONFIG.folded
+# runs of studies and of the calibration, which may diverge: each with each of the brains that it folds
+STUDIED = [(run, brain) for run in CONFIG.study_runs for brain in CONFIG.starts(run)]
+CALIBRATED = CONFIG.calibrate.runs if CONFIG.calibrate else {}
 
 # held as long as this process lives: how `gyriflow.launch` tells a live run from one that was interrupted
 if workflow.is_main_process and not workflow.dryrun:
@@ -54,9 +67,19 @@ STUDY = "results/study"
 SURFACES = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
 
 
-def surfaces_in(folder):
-    """Returns the surface files of a brain in a folder, by part."""
-    return {part: f"{folder}/{name}.surf.gii" for part, name in SURFACES.items()}
+def surfaces_in(folder, sides=SIDES):
+    """Returns the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
+    return {part: f"{folder}/{SURFACES[part]}.surf.gii" for part in ("whole", *sides)}
+
+
+def sides_of(brain):
+    """Returns the hemispheres that a brain has."""
+    return CONFIG.brain(brain).sides
+
+
+def with_sides(*sides):
+    """Returns the ids of the brains that have these hemispheres and no other."""
+    return [brain for brain in BRAINS if sides_of(brain) == sides]
 
 
 def one_of(names):
@@ -99,15 +122,30 @@ def of_weeks(pattern):
 
 
 def comparable(brain):
-    """Returns the brains that a start brain may be compared with: those of its population where it has one, else all."""
+    """Returns the brains that a start brain may be compared with.
+
+    They have the same hemispheres, and are of its population where it has one.
+    """
     population = CONFIG.brain(brain).population
-    return [other for other in CONFIG.brains if population in (None, other.population)]
+    return [
+        other
+        for other in CONFIG.brains
+        if population in (None, other.population) and other.sides == sides_of(brain)
+    ]
 
 
 def measured_after_start(run, brain):
-    """Returns, by output week after the start, the ids of the measured brains that a run is compared with."""
+    """Returns, by output week after the start, the ids of the measured brains that a run is compared with.
+
+    Later scans of the start's own subject come first.
+    """
+    subject = CONFIG.brain(brain).subject
+    ordered = sorted(
+        comparable(brain),
+        key=lambda other: subject is None or other.subject != subject,
+    )
     found = {
-        week: [other.id for other in comparable(brain) if week_tag(other.week) == week]
+        week: [other.id for other in ordered if week_tag(other.week) == week]
         for week in week_tags(run, brain)[1:]
     }
     return {week: brains for week, brains in found.items() if brains}
@@ -148,6 +186,6 @@ def drawing(*brains):
 
 wildcard_constraints:
     brain=one_of(BRAINS),
-    run=one_of(CONFIG.runs),
+    run=one_of([*CONFIG.runs, *CONFIG.study_runs, *CALIBRATED]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

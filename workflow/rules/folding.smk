@@ -1,10 +1,19 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
-RUNS_WITH_MAPS = [run for run in CONFIG.runs if CONFIG.maps(run) or regional(run)]
+from gyriflow.io.files import read_json
+
+RUNS_WITH_MAPS = [
+    run
+    for run in [*CONFIG.runs, *CONFIG.study_runs]
+    if CONFIG.maps(run) or regional(run)
+]
 
 
 def maps_of_run(wildcards):
-    """Returns the file with the maps of a run, if it has any."""
-    return rules.parameter_maps.output[0] if wildcards.run in RUNS_WITH_MAPS else []
+    """Returns the file with the maps of a run, if it has any; runs of the calibration have those of its base."""
+    run = CONFIG.calibrate.base if wildcards.run in CALIBRATED else wildcards.run
+    if run not in RUNS_WITH_MAPS:
+        return []
+    return rules.parameter_maps.output[0].format(run=run, brain=wildcards.brain)
 
 
 def rates_of_run(wildcards):
@@ -16,7 +25,11 @@ def rates_of_run(wildcards):
 def curves_of_run(wildcards):
     """Returns the table of the measured curves where the run follows one of them."""
     follow = CONFIG.run(wildcards.run).follow
-    measured = follow is not None and "measured" in (follow.area_cm2, follow.volume_ml)
+    measured = follow is not None and "measured" in (
+        follow.area_cm2,
+        follow.volume_ml,
+        follow.thickness_mm,
+    )
     return rules.growth_curves.output.curves if measured else []
 
 
@@ -36,6 +49,8 @@ rule parameters:
         f"{RUN}/logs/parameters.log",
     benchmark:
         f"{RUN}/benchmarks/parameters.tsv"
+    wildcard_constraints:
+        run=one_of([*CONFIG.runs, *CONFIG.study_runs]),
     conda:
         ENVIRONMENT
     params:
@@ -47,9 +62,7 @@ rule parameters:
             else None
         ),
         regional_weeks=lambda wildcards: (
-            [CONFIG.brain(brain).week for brain in later_brains(wildcards.brain)]
-            if regional(wildcards.run)
-            else []
+            weeks_of_chain(wildcards.brain) if regional(wildcards.run) else []
         ),
     script:
         "../scripts/parameters.py"
@@ -104,8 +117,7 @@ rule regions:
         params=rules.parameters.output[0],
         maps=maps_of_run,
         # the hemispheres of the folded brain are those of the measured one
-        left=PIAL["left"],
-        right=PIAL["right"],
+        sides=lambda wildcards: [PIAL[side] for side in sides_of(wildcards.brain)],
     output:
         mesh=f"{RUN}/folding/regions.xdmf",
         data=f"{RUN}/folding/regions.h5",
@@ -122,43 +134,116 @@ rule regions:
         "../scripts/regions.py"
 
 
+SOLVED_FROM = {
+    "mesh": rules.tetrahedralise.output.mesh,
+    "data": rules.tetrahedralise.output.data,
+    "params": rules.parameters.output[0],
+    "maps": maps_of_run,
+    # that rule refuses impossible zones, before the ranks start
+    "regions": rules.regions.output.mesh,
+}
+FOLDING = {
+    "steps": f"{RUN}/folding/steps.csv",
+    "frames": f"{RUN}/folding/frames.h5",
+    "series": f"{RUN}/folding/frames.xdmf",
+    "zones": f"{RUN}/folding/zones.json",
+    "summary": f"{RUN}/folding/summary.json",
+}
+SOLVE = (
+    # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
+    "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
+    "{resources.mpi} -n {resources.tasks} python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
+    " {params.options:q} --out {params.folder:q} 2>&1"
+    " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
+)
+FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
+
+
+def ranks(wildcards):
+    """Returns the MPI ranks of a run: on one machine its threads; a cluster's profile sets threads to 1 and counts tasks."""
+    run = CONFIG.calibrate.base if wildcards.run in CALIBRATED else wildcards.run
+    return CONFIG.run(run).ranks
+
+
+def solve_options(*more):
+    """Returns the options of the folding program: the maps of a run where it has some, and `more`."""
+    return lambda wildcards, input: [
+        *(["--maps", input.maps] if input.maps else []),
+        *more,
+    ]
+
+
 rule simulate:
     input:
-        mesh=rules.tetrahedralise.output.mesh,
-        data=rules.tetrahedralise.output.data,
-        params=rules.parameters.output[0],
-        maps=maps_of_run,
-        # that rule refuses impossible zones, before the ranks start
-        regions=rules.regions.output.mesh,
+        **SOLVED_FROM,
     output:
-        steps=f"{RUN}/folding/steps.csv",
-        frames=f"{RUN}/folding/frames.h5",
-        series=f"{RUN}/folding/frames.xdmf",
-        zones=f"{RUN}/folding/zones.json",
-        summary=f"{RUN}/folding/summary.json",
+        **FOLDING,
     log:
         f"{RUN}/logs/simulate.log",
     benchmark:
         f"{RUN}/benchmarks/simulate.tsv"
+    wildcard_constraints:
+        run=one_of(CONFIG.runs),
     conda:
         ENVIRONMENT
-    # on one machine the ranks are its threads; a cluster's profile sets threads to 1 and counts tasks
-    threads: lambda wildcards: CONFIG.run(wildcards.run).ranks
+    threads: ranks
     resources:
         mpi="mpiexec",
-        tasks=lambda wildcards: CONFIG.run(wildcards.run).ranks,
+        tasks=ranks,
         mem_mb=8000,
         runtime=1440,
     params:
         folder=subpath(output.steps, parent=True),
-        maps=lambda wildcards, input: ["--maps", input.maps] if input.maps else [],
-        code=code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py")),
+        options=solve_options(),
+        code=FOLDING_CODE,
     shell:
-        # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
-        "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
-        "{resources.mpi} -n {resources.tasks} python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
-        " {params.maps:q} --out {params.folder:q} 2>&1"
-        " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
+        SOLVE
+
+
+# A run of a study or a calibration may diverge: it then ends well with the weeks that it has reached, and only what
+# needs those is made of it. What is needed is known once the summary is there.
+checkpoint simulate_member:
+    input:
+        **SOLVED_FROM,
+    output:
+        **FOLDING,
+    log:
+        f"{RUN}/logs/simulate.log",
+    benchmark:
+        f"{RUN}/benchmarks/simulate.tsv"
+    wildcard_constraints:
+        run=one_of([*CONFIG.study_runs, *CALIBRATED]),
+    conda:
+        ENVIRONMENT
+    threads: ranks
+    resources:
+        mpi="mpiexec",
+        tasks=ranks,
+        mem_mb=8000,
+        runtime=1440,
+    params:
+        folder=subpath(output.steps, parent=True),
+        options=solve_options("--may-diverge"),
+        code=FOLDING_CODE,
+    shell:
+        SOLVE
+
+
+def reaches(run, brain, week):
+    """Returns whether a run from a brain has come to a week; runs of a study are solved before that is known."""
+    if run in CONFIG.runs:
+        return True
+    summary = checkpoints.simulate_member.get(run=run, brain=brain).output.summary
+    return week_tag(week) in map(week_tag, read_json(summary)["weeks"])
+
+
+def folded_of(*sides):
+    """Returns the surfaces of a simulated brain at a week with some hemispheres, and its thickness."""
+    folder = f"{RUN}/surfaces/week-{{week}}"
+    return {
+        **surfaces_in(folder, sides),
+        "thickness": f"{folder}/thickness.shape.gii",
+    }
 
 
 rule folded_surface:
@@ -167,19 +252,43 @@ rule folded_surface:
         regions=rules.regions.output.mesh,
         data=rules.regions.output.data,
     output:
-        **surfaces_in(f"{RUN}/surfaces/week-{{week}}"),
-        thickness=f"{RUN}/surfaces/week-{{week}}/thickness.shape.gii",
+        **folded_of(*SIDES),
     log:
         f"{RUN}/logs/folded_surface.week-{{week}}.log",
     benchmark:
         f"{RUN}/benchmarks/folded_surface.week-{{week}}.tsv"
+    wildcard_constraints:
+        brain=one_of(with_sides(*SIDES)),
     conda:
         ENVIRONMENT
     script:
         "../scripts/folded_surface.py"
 
 
+# from hemispheres that are alone
+use rule folded_surface as folded_left with:
+    output:
+        **folded_of("left"),
+    wildcard_constraints:
+        brain=one_of(with_sides("left")),
+
+
+use rule folded_surface as folded_right with:
+    output:
+        **folded_of("right"),
+    wildcard_constraints:
+        brain=one_of(with_sides("right")),
+
+
 rule folding:
     input:
         of_runs(rules.simulate.output),
-        of_weeks(rules.folded_surface.output),
+        [
+            expand(
+                list(folded_of(*sides_of(brain)).values()),
+                run=run,
+                brain=brain,
+                week=week_tags(run, brain),
+            )
+            for run, brain in FOLDED
+        ],

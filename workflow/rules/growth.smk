@@ -8,6 +8,21 @@ GROWTH_SERIES = [
 GROWTH_BRAINS = [brain for _, brain in GROWTH_SERIES]
 
 
+def follows_thickness(run):
+    """Returns whether a run's cortex is as thick as measured."""
+    follow = CONFIG.run(run).follow
+    return follow is not None and follow.thickness_mm == "measured"
+
+
+# brains whose cortical thickness gives a curve, where some run follows it
+GROWTH_THICKNESS = [
+    brain
+    for brain in GROWTH_BRAINS
+    if brain in (*WITH_CORTEX, *WITH_WHITE)
+    and any(follows_thickness(run) for run in CONFIG.runs)
+]
+
+
 def folding_rate():
     """Returns the folding's growth rate: a number, {week: number}, `estimated`, or None where it has a map."""
     rate = CONFIG.folding.growth_rate_per_s
@@ -19,8 +34,8 @@ def folding_rate():
 rule growth_rates:
     input:
         whole=expand(PIAL["whole"], brain=GROWTH_BRAINS),
-        left=expand(PIAL["left"], brain=GROWTH_BRAINS),
-        right=expand(PIAL["right"], brain=GROWTH_BRAINS),
+        reports=expand(PIAL["report"], brain=GROWTH_BRAINS),
+        thickness=expand(THICKNESS["report"], brain=GROWTH_THICKNESS),
     output:
         areas=f"{STUDY}/growth/areas.csv",
         rates=f"{STUDY}/growth/rates.csv",
@@ -34,6 +49,7 @@ rule growth_rates:
     params:
         series=[series for series, _ in GROWTH_SERIES],
         brains=GROWTH_BRAINS,
+        with_thickness=GROWTH_THICKNESS,
         weeks=[CONFIG.brain(brain).week for brain in GROWTH_BRAINS],
     script:
         "../scripts/growth_rates.py"
@@ -53,6 +69,15 @@ rule growth_curves:
         ENVIRONMENT
     params:
         may_shrink=CONFIG.folding.allow_negative_growth,
+        # predictions know the brains up to some week only
+        known_until_gw=sorted(
+            {
+                CONFIG.run(run).follow.known_until_gw
+                for run in CONFIG.runs
+                if CONFIG.run(run).follow is not None
+                and CONFIG.run(run).follow.known_until_gw is not None
+            }
+        ),
     script:
         "../scripts/growth_curves.py"
 
@@ -83,7 +108,8 @@ rule growth_figure:
         ENVIRONMENT
     params:
         folding_rate_per_s=folding_rate(),
-        estimated_from=CONFIG.estimated_from(CONFIG.start_brains[0]),
+        estimated_from=CONFIG.start_brains
+        and CONFIG.estimated_from(CONFIG.start_brains[0]),
         series_names=list(CONFIG.growth_series),
         measured=CONFIG.measured_name(GROWTH_BRAINS),
         dpi=CONFIG.report.dpi,

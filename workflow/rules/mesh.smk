@@ -6,9 +6,23 @@ MESH_GATES = {
 }
 
 
+def stretched_until(wildcards):
+    """Returns what tells how far a mesh will be stretched if it is made for the end of the runs, else nothing."""
+    if CONFIG.mesh.sized_for == "start":
+        return None
+    return {
+        "series": CONFIG.estimated_from(wildcards.brain),
+        "week": CONFIG.brain(wildcards.brain).week,
+        "end_week": CONFIG.last_week(wildcards.brain),
+    }
+
+
 rule tetrahedralise:
     input:
         PIAL["whole"],
+        curves=(
+            rules.growth_curves.output.curves if CONFIG.mesh.sized_for == "end" else []
+        ),
     output:
         mesh=f"{BRAIN}/mesh/brain.xdmf",
         data=f"{BRAIN}/mesh/brain.h5",
@@ -24,7 +38,8 @@ rule tetrahedralise:
         mem_mb=6000,
         runtime=60,
     params:
-        settings=CONFIG.mesh.model_dump(exclude=set(MESH_GATES)),
+        settings=CONFIG.mesh.model_dump(exclude={*MESH_GATES, "sized_for"}),
+        stretched=stretched_until,
         gates=MESH_GATES,
         # not an output, so that it stays if the rule fails
         refused=f"{BRAIN}/mesh/refused",

@@ -8,6 +8,28 @@ def surface_folder(where):
     )
 
 
+def brain_of(where):
+    """Returns the id of the brain that metrics in a folder are of: the measured one, or the start of the run."""
+    kind, *names = where.split("/")
+    return names[0] if kind == "brains" else names[1]
+
+
+def of_sides(*sides):
+    """Returns a pattern of the folders with metrics of brains that have these hemispheres."""
+    return one_of(
+        [
+            where
+            for where in MEASURED + SIMULATED + COMPARED_MEMBERS
+            if sides_of(brain_of(where)) == sides
+        ]
+    )
+
+
+def maps_of(*sides):
+    """Returns the files with maps on some hemispheres, beside the metrics of a brain."""
+    return {side: f"results/{{where}}/{side}.shape.gii" for side in sides}
+
+
 def brain_labels(where):
     """Returns the first columns of a brain's tables: its id, the run ("real" for measured brains), its week."""
     match where.split("/"):
@@ -32,21 +54,45 @@ def thickness_of(wildcards):
     return []
 
 
+# made for every brain, whatever hemispheres it has
+MEASURES = {
+    name: f"results/{{where}}/{name}.csv"
+    for name in ("metrics", "spectra", "coefficients")
+}
 # where the metrics of a brain lie under results
 MEASURED = [f"brains/{brain}/metrics" for brain in BRAINS]
 SIMULATED = of_weeks("runs/{run}/{brain}/metrics/week-{week}")
+# the brains of runs of studies, at the weeks of comparison
+COMPARED_MEMBERS = sorted(
+    {
+        f"runs/{member.run}/{brain}/metrics/week-{week_tag(study.compare_week)}"
+        for name, study in CONFIG.studies.items()
+        for member in CONFIG.members[name]
+        for brain in CONFIG.starts(member.run)
+    }
+    - set(SIMULATED)
+)
+
+
+# brains whose labels can be counted
+WITH_VOLUMES = [brain.id for brain in CONFIG.brains if brain.has_labels]
+
+
+def report_of(wildcards):
+    """Returns the report of a measured brain's surface, which has the volumes of its tissues."""
+    match wildcards.where.split("/"):
+        case ["brains", brain, "metrics"]:
+            return PIAL["report"].format(brain=brain)
+    return []
 
 
 # Only a common number of modes makes brains depend on each other: measured ones then wait for all simulations.
 rule weyl_numbers:
     input:
-        left=[
-            f"results/{surface_folder(where)}/left.pial.surf.gii"
+        [
+            surfaces_in(f"results/{surface_folder(where)}")[side]
             for where in MEASURED + SIMULATED
-        ],
-        right=[
-            f"results/{surface_folder(where)}/right.pial.surf.gii"
-            for where in MEASURED + SIMULATED
+            for side in sides_of(brain_of(where))
         ],
     output:
         f"{STUDY}/weyl_numbers.csv",
@@ -60,6 +106,7 @@ rule weyl_numbers:
         runtime=20,
     params:
         labels=[brain_labels(where) for where in MEASURED + SIMULATED],
+        sides=[sides_of(brain_of(where)) for where in MEASURED + SIMULATED],
         formula=CONFIG.metrics.spangy_wavelength,
     script:
         "../scripts/weyl_numbers.py"
@@ -68,26 +115,27 @@ rule weyl_numbers:
 rule measure:
     input:
         unpack(
-            lambda wildcards: surfaces_in(f"results/{surface_folder(wildcards.where)}")
+            lambda wildcards: surfaces_in(
+                f"results/{surface_folder(wildcards.where)}",
+                sides_of(brain_of(wildcards.where)),
+            )
         ),
         thickness=thickness_of,
+        report=report_of,
         mode_numbers=(
             rules.weyl_numbers.output[0]
             if CONFIG.metrics.spangy_modes == "common"
             else []
         ),
     output:
-        metrics="results/{where}/metrics.csv",
-        spectra="results/{where}/spectra.csv",
-        coefficients="results/{where}/coefficients.csv",
-        left="results/{where}/left.shape.gii",
-        right="results/{where}/right.shape.gii",
+        **MEASURES,
+        **maps_of(*SIDES),
     log:
         "results/{where}/logs/measure.log",
     benchmark:
         "results/{where}/benchmarks/measure.tsv"
     wildcard_constraints:
-        where=one_of(MEASURED + SIMULATED),
+        where=of_sides(*SIDES),
     conda:
         ENVIRONMENT
     resources:
@@ -95,9 +143,33 @@ rule measure:
         runtime=60,
     params:
         labels=lambda wildcards: brain_labels(wildcards.where),
-        settings=CONFIG.metrics.model_dump(exclude={"age_reference"}),
+        settings=CONFIG.metrics.model_dump(
+            include={
+                "curvature_radius_mm",
+                "spangy_proxy",
+                "spangy_modes",
+                "spangy_wavelength",
+            }
+        ),
     script:
         "../scripts/measure.py"
+
+
+# of hemispheres that are alone
+use rule measure as measure_left with:
+    output:
+        **MEASURES,
+        **maps_of("left"),
+    wildcard_constraints:
+        where=of_sides("left"),
+
+
+use rule measure as measure_right with:
+    output:
+        **MEASURES,
+        **maps_of("right"),
+    wildcard_constraints:
+        where=of_sides("right"),
 
 
 rule displacement:
@@ -119,8 +191,16 @@ rule displacement:
 
 rule similarity:
     input:
-        simulated=list(surfaces_in(f"{RUN}/surfaces/week-{{week}}").values()),
-        real=list(surfaces_in("results/brains/{measured}/surface").values()),
+        simulated=lambda wildcards: list(
+            surfaces_in(
+                f"{RUN}/surfaces/week-{{week}}", sides_of(wildcards.brain)
+            ).values()
+        ),
+        real=lambda wildcards: list(
+            surfaces_in(
+                "results/brains/{measured}/surface", sides_of(wildcards.brain)
+            ).values()
+        ),
     output:
         f"{RUN}/metrics/week-{{week}}/similarity.{{measured}}.csv",
     log:
@@ -140,6 +220,29 @@ rule similarity:
             "week": float(wildcards.week),
             "real": wildcards.measured,
         },
-        parts=list(SURFACES),
+        parts=lambda wildcards: ["whole", *sides_of(wildcards.brain)],
     script:
         "../scripts/similarity.py"
+
+
+rule label_volumes:
+    input:
+        labels=label_volume,
+        norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
+    output:
+        volumes=f"{BRAIN}/metrics/volumes.csv",
+        scores=f"{BRAIN}/metrics/published_centiles.csv",
+    log:
+        f"{BRAIN}/logs/label_volumes.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/label_volumes.tsv"
+    wildcard_constraints:
+        brain=one_of(WITH_VOLUMES),
+    conda:
+        ENVIRONMENT
+    params:
+        labels=lambda wildcards: brain_labels(f"brains/{wildcards.brain}/metrics"),
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
+    script:
+        "../scripts/label_volumes.py"

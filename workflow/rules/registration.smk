@@ -1,4 +1,7 @@
 # Correspondence between brains of successive weeks: where each point of a start brain goes in the real ones.
+from gyriflow.parameters.schemes import SCHEMES
+
+
 def later_brains(brain):
     """Returns a start brain and the brains of its growth series up to where its runs end, one a week.
 
@@ -16,30 +19,91 @@ def later_brains(brain):
     last = within[0] if within else end
     chosen = {start.week: brain}
     for other in map(CONFIG.brain, series):
-        if start.week < other.week <= last and other.source in WITH_LABELS:
+        if start.week < other.week <= last and other.has_labels:
             chosen.setdefault(other.week, other.id)
-    if start.source not in WITH_LABELS:
+    if not start.has_labels:
         return [brain]
     return [chosen[week] for week in sorted(chosen)]
 
 
-def registrations(brain):
-    """Returns the files of the registrations from a start brain through the later ones."""
-    chain = later_brains(brain)
+def earlier_brains(brain):
+    """Returns the brains of a start brain's growth series up to it, one a week, where some run is to predict from them."""
+    start = CONFIG.brain(brain)
+    chosen = {start.week: brain}
+    if start.has_labels and any(
+        predicts(run) for run, folded in FOLDED if folded == brain
+    ):
+        for other in map(
+            CONFIG.brain, CONFIG.growth_series.get(CONFIG.estimated_from(brain), [])
+        ):
+            if other.week < start.week and other.has_labels:
+                chosen.setdefault(other.week, other.id)
+    return [chosen[week] for week in sorted(chosen)]
+
+
+def predicts(run):
+    """Returns whether a run's regional growth is extrapolated from what was known by some week."""
+    return regional(run) and CONFIG.run(run).follow.known_until_gw is not None
+
+
+def chain_of(brain):
+    """Returns the brains, one a week, that a start brain's mesh is carried through, itself among them."""
+    return earlier_brains(brain)[:-1] + later_brains(brain)
+
+
+def weeks_of_chain(brain):
+    """Returns the weeks of the brains that a start brain's mesh is carried through."""
+    return [CONFIG.brain(name).week for name in chain_of(brain)]
+
+
+def registrations(chain):
+    """Returns the files of the registrations from each brain of a chain to the next."""
     return [
         f"{STUDY}/registration/{earlier}/{later}.h5"
         for earlier, later in zip(chain, chain[1:])
     ]
 
 
-# start brains that real ones of later weeks follow
+# start brains that real ones of later weeks follow, and those that real ones of any week are registered with
 CARRIED = [brain for brain in CONFIG.start_brains if len(later_brains(brain)) > 1]
+WITH_CHAIN = [brain for brain in CONFIG.start_brains if len(chain_of(brain)) > 1]
+
+
+def registered_volume(brain):
+    """Returns the volume by which a brain is registered: its labels, or a mask made of its surface."""
+    if CONFIG.brain(brain).has_labels:
+        return label_volume_of(brain)
+    return rules.surface_mask.output[0].format(brain=brain)
+
+
+def registered_scheme(brain):
+    """Returns the scheme of that volume."""
+    if CONFIG.brain(brain).has_labels:
+        return CONFIG.scheme(CONFIG.brain(brain))
+    return SCHEMES["binary"].model_dump()
+
+
+rule surface_mask:
+    input:
+        PIAL["whole"],
+    output:
+        f"{BRAIN}/surface/mask.nii.gz",
+    log:
+        f"{BRAIN}/logs/surface_mask.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/surface_mask.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        voxel_mm=CONFIG.surface.edge_length_mm,
+    script:
+        "../scripts/surface_mask.py"
 
 
 rule register:
     input:
-        earlier=lambda wildcards: label_volume_of(wildcards.earlier),
-        later=lambda wildcards: label_volume_of(wildcards.later),
+        earlier=lambda wildcards: registered_volume(wildcards.earlier),
+        later=lambda wildcards: registered_volume(wildcards.later),
     output:
         f"{STUDY}/registration/{{earlier}}/{{later}}.h5",
     log:
@@ -63,8 +127,7 @@ rule register:
             for brain in (wildcards.earlier, wildcards.later)
         ],
         schemes=lambda wildcards: [
-            CONFIG.scheme(CONFIG.brain(brain))
-            for brain in (wildcards.earlier, wildcards.later)
+            registered_scheme(brain) for brain in (wildcards.earlier, wildcards.later)
         ],
     script:
         "../scripts/register.py"
@@ -75,7 +138,8 @@ rule carried_mesh:
         mesh=rules.tetrahedralise.output.mesh,
         data=rules.tetrahedralise.output.data,
         report=PIAL["report"],
-        registrations=lambda wildcards: registrations(wildcards.brain),
+        earlier=lambda wildcards: registrations(earlier_brains(wildcards.brain)),
+        later=lambda wildcards: registrations(later_brains(wildcards.brain)),
     output:
         f"{BRAIN}/mesh/carried.h5",
     log:
@@ -83,16 +147,19 @@ rule carried_mesh:
     benchmark:
         f"{BRAIN}/benchmarks/carried_mesh.tsv"
     wildcard_constraints:
-        brain=one_of(CARRIED),
+        brain=one_of(WITH_CHAIN),
     conda:
         ENVIRONMENT
     resources:
         mem_mb=8000,
         runtime=30,
     params:
-        weeks=lambda wildcards: [
-            CONFIG.brain(brain).week for brain in later_brains(wildcards.brain)
-        ],
+        weeks=lambda wildcards: weeks_of_chain(wildcards.brain),
+        strain=lambda wildcards: any(
+            regional(run) and CONFIG.run(run).follow.directional > 0
+            for run, brain in FOLDED
+            if brain == wildcards.brain
+        ),
         # the smoothing lengths that runs from this brain ask for
         smoothing_mm=lambda wildcards: sorted(
             {

@@ -117,19 +117,25 @@ rule contact_maps:
 
 rule shape_maps:
     input:
-        simulated_left=run_surfaces("left"),
-        simulated_right=run_surfaces("right"),
-        real_left=measured_surfaces("left"),
-        real_right=measured_surfaces("right"),
-        # the maps lie beside the metrics
+        # of one hemisphere after the other; the maps lie beside the metrics
+        simulated=lambda wildcards: [
+            file
+            for side in sides_of(wildcards.brain)
+            for file in run_surfaces(side)(wildcards)
+        ],
+        real=lambda wildcards: [
+            file
+            for side in sides_of(wildcards.brain)
+            for file in measured_surfaces(side)(wildcards)
+        ],
         simulated_maps=lambda wildcards: [
             f"{RUN}/metrics/week-{week}/{side}.shape.gii"
-            for side in SIDES
+            for side in sides_of(wildcards.brain)
             for week in week_tags(wildcards.run, wildcards.brain)
         ],
         real_maps=lambda wildcards: [
             f"results/brains/{brain}/metrics/{side}.shape.gii"
-            for side in SIDES
+            for side in sides_of(wildcards.brain)
             for brain in beside(wildcards)
         ],
     output:

@@ -4,6 +4,9 @@ COMPARED = comparisons()
 JOINED = {
     "metrics": [f"results/{where}/metrics.csv" for where in MEASURED + SIMULATED],
     "spectra": [f"results/{where}/spectra.csv" for where in MEASURED + SIMULATED],
+    "regions": [f"results/{where}/regions.csv" for where in WITH_REGIONS],
+    "volumes": expand(rules.label_volumes.output.volumes, brain=WITH_VOLUMES),
+    "published_centiles": expand(rules.label_volumes.output.scores, brain=WITH_VOLUMES),
     "displacement": of_runs(rules.displacement.output),
     "similarity": [
         f"results/runs/{run}/{brain}/metrics/week-{week}/similarity.{measured}.csv"
@@ -51,6 +54,7 @@ rule age_profile:
     output:
         profile=f"{STUDY}/age_profile.csv",
         check=f"{STUDY}/age_profile_check.csv",
+        similarity=f"{STUDY}/week_similarity.csv",
     log:
         f"{STUDY}/logs/age_profile.log",
     benchmark:
@@ -59,8 +63,118 @@ rule age_profile:
         ENVIRONMENT
     params:
         reference=CONFIG.age_reference,
+        followed={run: CONFIG.followed(run) for run in CONFIG.runs},
     script:
         "../scripts/age_profile.py"
+
+
+# the tables that hold metrics, of whole hemispheres and of regions
+METRIC_TABLES = [
+    f"{STUDY}/metrics.csv",
+    *([f"{STUDY}/regions.csv"] if WITH_REGIONS else []),
+]
+
+
+rule asymmetry:
+    input:
+        metrics=f"{STUDY}/metrics.csv",
+        regions=METRIC_TABLES[1:],
+    output:
+        f"{STUDY}/asymmetry.csv",
+    log:
+        f"{STUDY}/logs/asymmetry.log",
+    benchmark:
+        f"{STUDY}/benchmarks/asymmetry.tsv"
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/asymmetry.py"
+
+
+rule centiles:
+    input:
+        metrics=f"{STUDY}/metrics.csv",
+    output:
+        norms=f"{STUDY}/norms.csv",
+        curves=f"{STUDY}/norm_curves.csv",
+        centiles=f"{STUDY}/centiles.csv",
+    log:
+        f"{STUDY}/logs/centiles.log",
+    benchmark:
+        f"{STUDY}/benchmarks/centiles.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        reference=CONFIG.norm_reference,
+    script:
+        "../scripts/centiles.py"
+
+
+rule group_tables:
+    input:
+        METRIC_TABLES,
+    output:
+        long=f"{STUDY}/metrics_long.csv",
+        wide=f"{STUDY}/metrics_wide.csv",
+        change=f"{STUDY}/change.csv",
+    log:
+        f"{STUDY}/logs/group_tables.log",
+    benchmark:
+        f"{STUDY}/benchmarks/group_tables.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        scans=CONFIG.scans,
+    script:
+        "../scripts/group_tables.py"
+
+
+def exported(where):
+    """Returns what the export needs to know of what is measured in a folder: names, and files by side."""
+    labels, folder = brain_labels(where), f"results/{surface_folder(where)}"
+    brain = CONFIG.brain(labels["subject"])
+    regions = (
+        region_files(f"results/{regions_folder(where)}")
+        if where in WITH_REGIONS
+        else {}
+    )
+    return {
+        "brain": brain.id,
+        "run": labels["run"],
+        "week": labels["week"],
+        "subject": brain.subject or brain.id,
+        "surfaces": {side: surfaces_in(folder)[side] for side in brain.sides},
+        "maps": {side: f"results/{where}/{side}.shape.gii" for side in brain.sides},
+        "regions": dict(zip(SIDES, regions.values())),
+    }
+
+
+EXPORTED = [exported(where) for where in MEASURED + SIMULATED]
+
+
+# a target of its own: what a study is handed on as
+rule export:
+    input:
+        [
+            list(brain[kind].values())
+            for brain in EXPORTED
+            for kind in ("surfaces", "maps", "regions")
+        ],
+        long=rules.group_tables.output.long,
+        wide=rules.group_tables.output.wide,
+    output:
+        directory("results/export"),
+    log:
+        f"{STUDY}/logs/export.log",
+    benchmark:
+        f"{STUDY}/benchmarks/export.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        brains=EXPORTED,
+        names=CONFIG.metrics.export,
+    script:
+        "../scripts/export.py"
 
 
 rule study_runs:
@@ -97,6 +211,9 @@ rule metrics:
             table=[name for name, files in JOINED.items() if files],
         ),
         rules.spectral_distance.output,
+        rules.asymmetry.output,
+        rules.centiles.output,
+        rules.group_tables.output,
         rules.validate.input,
         # with brains of too few weeks no apparent age can be estimated
         rules.age_profile.output if CONFIG.age_reference else [],

@@ -1,7 +1,9 @@
 # Figures of the whole study.
 FIGURES = f"{STUDY}/figures"
 # the last week of which every run has a surface, where there is one
-COMMON_WEEKS = set.intersection(*(set(week_tags(*pair)) for pair in FOLDED))
+COMMON_WEEKS = (
+    set.intersection(*(set(week_tags(*pair)) for pair in FOLDED)) if FOLDED else set()
+)
 LAST_WEEK = max(COMMON_WEEKS, default=None)
 LAST_BRAINS = [brain.id for brain in CONFIG.brains if week_tag(brain.week) == LAST_WEEK]
 
@@ -30,6 +32,7 @@ rule displacement_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         caption=(
             "Largest and mean norm of the displacement between output weeks, over all nodes, beside "
             "the values that the FetalFoldSim paper reports for its simulation and for real brains. "
@@ -60,6 +63,7 @@ rule metrics_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         caption=(
             "Metrics over the weeks: runs as lines, measured brains as stars. The gyrification index "
             "is the pial area divided by that of the convex hull, or by that of a tighter envelope. "
@@ -88,6 +92,7 @@ rule spectra_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         caption=(
             "Relative power of the shape measure's spectrum in the bands B4, B5 and B6 (primary, "
             "secondary and tertiary folds) over the weeks, per hemisphere (SpAnGy, Germanaud et al. "
@@ -116,6 +121,7 @@ rule bands_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         measured=CONFIG.measured_name(BRAINS),
         week=LAST_WEEK and float(LAST_WEEK),
     script:
@@ -126,6 +132,7 @@ rule age_profile_figure:
     input:
         profile=rules.age_profile.output.profile,
         check=rules.age_profile.output.check,
+        similarity=rules.age_profile.output.similarity,
     output:
         **figure(
             f"{FIGURES}/age_profile",
@@ -141,9 +148,102 @@ rule age_profile_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         measured=CONFIG.measured_name(CONFIG.age_reference),
     script:
         "../scripts/age_profile_figure.py"
+
+
+rule norms_figure:
+    input:
+        metrics=f"{STUDY}/metrics.csv",
+        norms=rules.centiles.output.norms,
+        curves=rules.centiles.output.curves,
+        centiles=rules.centiles.output.centiles,
+    output:
+        **figure(f"{FIGURES}/norms", "norms over the weeks", "norms.rst", "Metrics"),
+        table=report(
+            f"{STUDY}/centiles.html",
+            caption="../report/norms.rst",
+            category="Metrics",
+            labels={"figure": "centiles, table"},
+        ),
+    log:
+        f"{STUDY}/logs/norms_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/norms_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(*CONFIG.start_brains),
+        reference=CONFIG.norm_reference,
+        measured=CONFIG.measured_name(CONFIG.norm_reference or BRAINS),
+    script:
+        "../scripts/norms_figure.py"
+
+
+# what is shown with its regions: the brains, and each run at its last week
+SHOWN_WITH_REGIONS = {
+    **{brain: f"brains/{brain}/metrics" for brain in REGIONED},
+    **{
+        f"{run if len(CONFIG.starts(run)) == 1 else f'{run} · {brain}'}, {CONFIG.weeks(run, brain)[-1]:g} GW": (
+            f"runs/{run}/{brain}/metrics/week-{week_tags(run, brain)[-1]}"
+        )
+        for run, brain in REGIONED_RUNS
+    },
+}
+
+
+rule regions_figure:
+    input:
+        left=[
+            f"results/{surface_folder(where)}/left.pial.surf.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        right=[
+            f"results/{surface_folder(where)}/right.pial.surf.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        left_regions=[
+            f"results/{regions_folder(where)}/left.regions.label.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        right_regions=[
+            f"results/{regions_folder(where)}/right.regions.label.gii"
+            for where in SHOWN_WITH_REGIONS.values()
+        ],
+        regions=f"{STUDY}/regions.csv",
+        asymmetry=rules.asymmetry.output[0],
+    output:
+        **figure(
+            f"{FIGURES}/regions", "regions of the cortex", "regions.rst", "Metrics"
+        ),
+        chart=report(
+            f"{FIGURES}/regions_metrics.png",
+            caption="../report/regions.rst",
+            category="Metrics",
+            labels={"figure": "metrics by region"},
+        ),
+        chart_pdf=f"{FIGURES}/regions_metrics.pdf",
+        table=report(
+            f"{STUDY}/regions.html",
+            caption="../report/regions.rst",
+            category="Metrics",
+            labels={"figure": "metrics by region, table"},
+        ),
+    log:
+        f"{STUDY}/logs/regions_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/regions_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        **drawing(*CONFIG.start_brains),
+        headings=list(SHOWN_WITH_REGIONS),
+        given=GIVEN,
+        measured=CONFIG.measured_name(REGIONED or BRAINS),
+    script:
+        "../scripts/regions_figure.py"
 
 
 rule runs_figure:
@@ -160,8 +260,8 @@ rule runs_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
-        measured=CONFIG.measured_name(LAST_BRAINS),
         folded=FOLDED,
+        measured=CONFIG.measured_name(LAST_BRAINS),
         week=LAST_WEEK and float(LAST_WEEK),
     script:
         "../scripts/runs_figure.py"
@@ -186,15 +286,21 @@ rule figures:
         rules.spectra_figure.output,
         rules.displacement_figure.output,
         rules.age_profile_figure.output if CONFIG.age_reference else [],
+        rules.norms_figure.output if CONFIG.norm_reference else [],
+        rules.regions_figure.output if WITH_REGIONS else [],
         OF_THE_LAST_WEEK,
         rules.growth.input,
 
 
-# the figures and tables of the paper that this study's data allow
+# what shows runs without measuring them week by week
+PAPER_FIGURES = [rule for rule in PAPER_FIGURES_OF_RUNS if rule is not rules.shape_maps]
+
+
+# the figures and tables of the paper; brains are measured at the weeks of comparison only
 rule paper:
     input:
-        [of_runs(rule.output, measure=SHAPE_MEASURES) for rule in PAPER_FIGURES_OF_RUNS],
+        [of_runs(rule.output) for rule in PAPER_FIGURES],
         rules.displacement_figure.output,
-        rules.spectra_figure.output,
-        OF_THE_LAST_WEEK,
         rules.growth.input,
+        rules.published_tables.output,
+        rules.studies.input,

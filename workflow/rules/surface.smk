@@ -1,24 +1,28 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
 from gyriflow.parameters.schemes import LabelScheme
 
-# made for every brain, whatever its source
-PIAL = {
-    **surfaces_in(f"{BRAIN}/surface"),
-    "stl": f"{BRAIN}/surface/pial.stl",
-    "report": f"{BRAIN}/surface/surface.json",
-}
+
+def pial_of(*sides):
+    """Returns the files that are made for every brain with some hemispheres, whatever its source."""
+    return {
+        **surfaces_in(f"{BRAIN}/surface", sides),
+        "stl": f"{BRAIN}/surface/pial.stl",
+        "report": f"{BRAIN}/surface/surface.json",
+    }
+
+
+PIAL = pial_of(*SIDES)
 THICKNESS = {
     "thickness": f"{BRAIN}/surface/thickness.shape.gii",
     # not a number where it could not be measured
     "measured": f"{BRAIN}/surface/measured_thickness.shape.gii",
     "report": f"{BRAIN}/surface/thickness.json",
 }
-WITH_LABELS = ("labels", "segmentation", "phantom")
 # brains whose labels give the cortical thickness
 WITH_CORTEX = [
     brain.id
     for brain in CONFIG.brains
-    if brain.source in WITH_LABELS and LabelScheme(**CONFIG.scheme(brain)).cortex
+    if brain.has_labels and LabelScheme(**CONFIG.scheme(brain)).cortex
 ]
 # brains of which white surfaces are given
 WITH_WHITE = [brain.id for brain in CONFIG.brains if brain.white_files]
@@ -39,7 +43,7 @@ def surface_settings(*names):
 
 def label_volume_of(brain):
     """Returns the label volume of a brain: the user's, or the one that the workflow makes."""
-    own = CONFIG.brain(brain).labels
+    own = CONFIG.brain(brain).label_volume
     return own or f"results/brains/{brain}/surface/labels.nii.gz"
 
 
@@ -69,7 +73,7 @@ rule pial_from_labels:
     benchmark:
         f"{BRAIN}/benchmarks/pial_from_labels.tsv"
     wildcard_constraints:
-        brain=from_source(*WITH_LABELS),
+        brain=from_source("labels", "segmentation", "phantom"),
     conda:
         ENVIRONMENT
     resources:
@@ -89,8 +93,8 @@ rule pial_from_labels:
 rule cortical_thickness:
     input:
         labels=label_volume,
-        surface=rules.pial_from_labels.output.whole,
-        report=rules.pial_from_labels.output.report,
+        surface=PIAL["whole"],
+        report=PIAL["report"],
     output:
         **THICKNESS,
     log:
@@ -191,6 +195,49 @@ rule pial_from_surface:
         "../scripts/pial_from_surface.py"
 
 
+# of a hemisphere that is alone, from its surface or its labels
+rule pial_from_left_hemisphere:
+    input:
+        lambda wildcards: CONFIG.brain(wildcards.brain).hemisphere.file,
+    output:
+        **pial_of("left"),
+    log:
+        f"{BRAIN}/logs/pial_from_hemisphere.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/pial_from_left_hemisphere.tsv"
+    wildcard_constraints:
+        brain=one_of(with_sides("left")),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        side=lambda wildcards: sides_of(wildcards.brain)[0],
+        week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+        coordinates=coordinates_of,
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
+        scheme=lambda wildcards: (
+            CONFIG.scheme(CONFIG.brain(wildcards.brain))
+            if CONFIG.brain(wildcards.brain).has_labels
+            else None
+        ),
+        settings=surface_settings("edge_length_mm", "smoothing_iterations"),
+        of_labels=surface_settings("smoothing_voxels"),
+        of_surfaces=surface_settings("max_hole_mm"),
+    script:
+        "../scripts/pial_from_hemisphere.py"
+
+
+use rule pial_from_left_hemisphere as pial_from_right_hemisphere with:
+    output:
+        **pial_of("right"),
+    benchmark:
+        f"{BRAIN}/benchmarks/pial_from_right_hemisphere.tsv"
+    wildcard_constraints:
+        brain=one_of(with_sides("right")),
+
+
 rule thickness_from_white:
     input:
         unpack(lambda wildcards: CONFIG.brain(wildcards.brain).white_files),
@@ -263,17 +310,19 @@ rule overlay_figure:
     params:
         caption=(
             "Outline of the pial surface of *{brain}* over the image that its labels belong to, in a "
-            "coronal and an axial plane through the middle and a sagittal plane through the right "
+            "coronal and an axial plane through the middle and a sagittal plane through one "
             "hemisphere."
         ),
         dpi=CONFIG.report.dpi,
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
-        title=lambda wildcards: f"{wildcards.brain}, {CONFIG.brain(wildcards.brain).week:g} GW",
     script:
         "../scripts/overlay_figure.py"
 
 
 rule surface:
     input:
-        expand(list(PIAL.values()), brain=BRAINS),
+        [
+            expand(list(pial_of(*sides_of(brain)).values()), brain=brain)
+            for brain in BRAINS
+        ],
         expand(list(THICKNESS.values()), brain=[*WITH_CORTEX, *WITH_WHITE]),

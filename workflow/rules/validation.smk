@@ -23,21 +23,87 @@ def week_before(brain, week):
 VALIDATED = [pair for pair in FOLDED if compared_with(*pair)]
 
 
+# what all runs from a start brain are compared with in a week: surfaces that are ready, with their curvature
+READY = {
+    f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/week-{{week}}/{name}{ending}.gii"
+    for name in ("real", "start", "adjacent")
+    for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
+}
+COMPARED_IN = {
+    (brain, week): real
+    for run, brain in VALIDATED
+    for week, real in compared_with(run, brain).items()
+}
+
+
+def of_compared_weeks(pattern):
+    """Returns an input function: the files of a pattern for every week that a run is compared in."""
+    return lambda wildcards: [
+        pattern.format(run=wildcards.run, brain=wildcards.brain, week=week)
+        for week in compared_with(wildcards.run, wildcards.brain)
+    ]
+
+
+def kinds(run, brain):
+    """Returns by compared week whether growth taken from the brains of that week explains it, or the run predicts it."""
+    follow = CONFIG.run(run).follow
+    measured = follow is not None and (
+        follow.regional > 0 or "measured" in (follow.area_cm2, follow.volume_ml)
+    )
+    explains = measured or "estimated" in CONFIG.parameters(run).values()
+    until = None if follow is None else follow.known_until_gw
+    return {
+        float(week): (
+            "explained"
+            if explains and (until is None or float(week) <= until)
+            else "predicted"
+        )
+        for week in compared_with(run, brain)
+    }
+
+
+def seed_of(run):
+    """Returns the seed of the randomness in a run's growth, 0 where there is none."""
+    follow = CONFIG.run(run).follow
+    return 0 if follow is None else follow.seed
+
+
+rule ready_surfaces:
+    input:
+        real=lambda wildcards: PIAL["whole"].format(
+            brain=COMPARED_IN[wildcards.brain, wildcards.week]
+        ),
+        adjacent=lambda wildcards: PIAL["whole"].format(
+            brain=week_before(wildcards.brain, wildcards.week)
+        ),
+        start=PIAL["whole"],
+    output:
+        **READY,
+    log:
+        f"{STUDY}/validation/logs/{{brain}}.week-{{week}}.log",
+    benchmark:
+        f"{STUDY}/validation/benchmarks/{{brain}}.week-{{week}}.tsv"
+    wildcard_constraints:
+        brain=one_of({brain for brain, _ in COMPARED_IN}),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+    script:
+        "../scripts/ready_surfaces.py"
+
+
 rule validation:
     input:
-        simulated=lambda wildcards: [
-            f"{RUN}/surfaces/week-{week}/pial.surf.gii"
-            for week in compared_with(wildcards.run, wildcards.brain)
-        ],
-        real=lambda wildcards: [
+        **{name: of_compared_weeks(pattern) for name, pattern in READY.items()},
+        simulated=of_compared_weeks(f"{RUN}/surfaces/week-{{week}}/pial.surf.gii"),
+        whole=lambda wildcards: [
             PIAL["whole"].format(brain=brain)
             for brain in compared_with(wildcards.run, wildcards.brain).values()
         ],
-        adjacent=lambda wildcards: [
-            PIAL["whole"].format(brain=week_before(wildcards.brain, week))
-            for week in compared_with(wildcards.run, wildcards.brain)
-        ],
-        start=PIAL["whole"],
         params=rules.parameters.output[0],
         # what the errors of runs that follow no curve are errors against
         curves=lambda wildcards: (
@@ -57,20 +123,65 @@ rule validation:
         mem_mb=4000,
         runtime=60,
     params:
-        weeks=lambda wildcards: [
-            float(week) for week in compared_with(wildcards.run, wildcards.brain)
-        ],
         start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
         series=lambda wildcards: CONFIG.estimated_from(wildcards.brain),
-        # growth taken from the brains that are compared explains them; it predicts nothing
-        kind=lambda wildcards: (
-            "explained"
-            if curves_of_run(wildcards) or rates_of_run(wildcards)
-            else "predicted"
-        ),
+        kinds=lambda wildcards: kinds(wildcards.run, wildcards.brain),
+        seed=lambda wildcards: seed_of(wildcards.run),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/validation.py"
+
+
+def carried_weeks(brain):
+    """Returns the compared weeks, as in file names, of the real brains that a start brain's mesh is carried to."""
+    later = [CONFIG.brain(name) for name in later_brains(brain)[1:]]
+    return (
+        {week_tag(other.week): other.id for other in later} if brain in CARRIED else {}
+    )
+
+
+rule registration_ceiling:
+    input:
+        **{
+            name: lambda wildcards, pattern=pattern: [
+                pattern.format(brain=wildcards.brain, week=week)
+                for week in carried_weeks(wildcards.brain)
+                if (wildcards.brain, week) in COMPARED_IN
+            ]
+            for name, pattern in READY.items()
+        },
+        whole=lambda wildcards: [
+            PIAL["whole"].format(brain=COMPARED_IN[wildcards.brain, week])
+            for week in carried_weeks(wildcards.brain)
+            if (wildcards.brain, week) in COMPARED_IN
+        ],
+        mesh=rules.tetrahedralise.output.mesh,
+        data=rules.tetrahedralise.output.data,
+        report=PIAL["report"],
+        carried=rules.carried_mesh.output[0],
+    output:
+        f"{STUDY}/validation/{{brain}}/registration.csv",
+    log:
+        f"{STUDY}/validation/logs/{{brain}}.registration.log",
+    benchmark:
+        f"{STUDY}/validation/benchmarks/{{brain}}.registration.tsv"
+    wildcard_constraints:
+        brain=one_of(CARRIED),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
+        weeks=lambda wildcards: [
+            float(week)
+            for week in carried_weeks(wildcards.brain)
+            if (wildcards.brain, week) in COMPARED_IN
+        ],
+        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+    script:
+        "../scripts/registration_ceiling.py"
 
 
 rule displacement_agreement:
@@ -91,10 +202,73 @@ rule displacement_agreement:
         labels=lambda wildcards: {
             "run": wildcards.run,
             "start_week": CONFIG.brain(wildcards.brain).week,
-            "seed": 0,
+            "seed": seed_of(wildcards.run),
         },
     script:
         "../scripts/displacement_agreement.py"
+
+
+rule onset:
+    input:
+        **{
+            f"run_{side}": lambda wildcards, side=side: [
+                f"results/runs/{wildcards.run}/{wildcards.brain}/surfaces/week-{week}/{side}.pial.surf.gii"
+                for week in week_tags(wildcards.run, wildcards.brain)
+                if side in sides_of(wildcards.brain)
+            ]
+            for side in SIDES
+        },
+        **{
+            f"real_{side}": lambda wildcards, side=side: (
+                expand(PIAL[side], brain=later_brains(wildcards.brain))
+                if side in sides_of(wildcards.brain)
+                else []
+            )
+            for side in SIDES
+        },
+        reports=lambda wildcards: expand(
+            PIAL["report"], brain=later_brains(wildcards.brain)
+        ),
+        registrations=lambda wildcards: registrations(later_brains(wildcards.brain)),
+    output:
+        f"{RUN}/metrics/onset.csv",
+    log:
+        f"{RUN}/logs/onset.log",
+    benchmark:
+        f"{RUN}/benchmarks/onset.tsv"
+    wildcard_constraints:
+        brain=one_of(CARRIED),
+    conda:
+        ENVIRONMENT
+    params:
+        run=lambda wildcards: wildcards.run,
+        subject=lambda wildcards: wildcards.brain,
+        sides=lambda wildcards: sides_of(wildcards.brain),
+        run_weeks=lambda wildcards: CONFIG.weeks(wildcards.run, wildcards.brain),
+        real_weeks=lambda wildcards: [
+            CONFIG.brain(name).week for name in later_brains(wildcards.brain)
+        ],
+    script:
+        "../scripts/onset.py"
+
+
+rule onset_table:
+    input:
+        [
+            f"results/runs/{run}/{brain}/metrics/onset.csv"
+            for run, brain in VALIDATED
+            if brain in CARRIED
+        ],
+    output:
+        f"{STUDY}/onset.csv",
+    log:
+        f"{STUDY}/logs/onset_table.log",
+    benchmark:
+        f"{STUDY}/benchmarks/onset_table.tsv"
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/join_tables.py"
 
 
 rule validation_table:
@@ -134,11 +308,121 @@ rule displacement_agreement_table:
         "../scripts/join_tables.py"
 
 
+rule registration_ceiling_table:
+    input:
+        [
+            f"{STUDY}/validation/{brain}/registration.csv"
+            for brain in CARRIED
+            if any(start == brain for start, _ in COMPARED_IN)
+        ],
+    output:
+        f"{STUDY}/registration_ceiling.csv",
+    log:
+        f"{STUDY}/logs/registration_ceiling_table.log",
+    benchmark:
+        f"{STUDY}/benchmarks/registration_ceiling_table.tsv"
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/join_tables.py"
+
+
+def smoothing_lengths():
+    """Returns the runs that differ in nothing but the smoothing of measured growth, and their lengths in mm.
+
+    They are those like the first run with regional growth; one that is like it but uniform has an infinite length.
+    """
+    like, found = None, {}
+    for run in CONFIG.runs:
+        settings = CONFIG.run(run).model_dump(exclude={"preset"})
+        follow = settings["follow"]
+        if follow is None:
+            continue
+        length = follow.pop("smoothing_mm") if follow["regional"] > 0 else float("inf")
+        amount = follow.pop("regional")
+        if like is None and amount > 0:
+            like = settings | {"regional": amount}
+        if (
+            like is not None
+            and settings | {"regional": amount or like["regional"]} == like
+        ):
+            found[run] = length
+    return found
+
+
+SMOOTHING = {
+    run: length
+    for run, length in smoothing_lengths().items()
+    if any(run == validated for validated, _ in VALIDATED)
+}
+CEILING = (
+    rules.registration_ceiling_table.output
+    if any(start in CARRIED for start, _ in COMPARED_IN)
+    else []
+)
+
+
+rule validation_figure:
+    input:
+        validation=rules.validation_table.output[0],
+        ceiling=CEILING,
+    output:
+        **figure(
+            f"{STUDY}/figures/validation",
+            "gain over no folding, by week",
+            "figure.rst",
+            "Validation",
+        ),
+    log:
+        f"{STUDY}/logs/validation_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/validation_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        smoothing_mm=None,
+        dpi=CONFIG.report.dpi,
+        caption=(
+            "Correlation of curvature with that of the real brain, less that of the start brain merely scaled up: "
+            "above 0 folding is worth more than none. Bars are 95 % intervals of a bootstrap over patches of the "
+            "surface; full marks explain a week whose own brains gave the growth, open ones predict it."
+        ),
+    script:
+        "../scripts/validation_figure.py"
+
+
+use rule validation_figure as smoothing_figure with:
+    output:
+        **figure(
+            f"{STUDY}/figures/smoothing",
+            "skill by the smoothing of measured growth",
+            "figure.rst",
+            "Validation",
+        ),
+    log:
+        f"{STUDY}/logs/smoothing_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/smoothing_figure.tsv"
+    params:
+        smoothing_mm=SMOOTHING,
+        dpi=CONFIG.report.dpi,
+        caption=(
+            "How local growth must be known: skill of runs that differ in the smoothing of measured growth alone. "
+            "1 is as good as the real brain of the week before, 0 as no folding."
+        ),
+
+
 rule validate:
     input:
-        rules.validation_table.output if VALIDATED else [],
         (
-            rules.displacement_agreement_table.output
+            [rules.validation_table.output, rules.validation_figure.output]
+            if VALIDATED
+            else []
+        ),
+        rules.smoothing_figure.output if len(set(SMOOTHING.values())) > 2 else [],
+        CEILING,
+        (
+            [rules.displacement_agreement_table.output, rules.onset_table.output]
             if any(brain in CARRIED for _, brain in VALIDATED)
             else []
         ),

@@ -3,7 +3,7 @@
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_table
 from gyriflow.report.spectra import spectra_chart
-from gyriflow.report.style import runs_by_name
+from gyriflow.report.style import run_names, runs_by_name
 from gyriflow.step import step
 
 params = snakemake.params
@@ -12,6 +12,7 @@ with step(snakemake.log[0]):
         runs_by_name(read_table(snakemake.input[0])),
         week=params.week,
         bands=range(1, 7),
+        runs=run_names(params.folded),
         measured=params.measured,
         synthetic=params.synthetic,
     )

@@ -3,12 +3,12 @@
 import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.tetrahedra import linear_pieces
+from gyriflow.geometry.tetrahedra import boundary_faces, linear_pieces
 from gyriflow.io.files import read_json
 from gyriflow.io.registrations import CarriedMesh, read_deformation, write_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.registration.carrying import carry_over_weeks
-from gyriflow.registration.growth import local_growth
+from gyriflow.registration.carrying import carry_both_ways
+from gyriflow.registration.growth import local_growth, local_strain
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
@@ -17,9 +17,19 @@ with step(snakemake.log[0]):
     pose = np.array(read_json(files.report)["pose"])
     # the labels' world, in which brains were registered, is not the pose of the mesh
     start = transform_points(mesh.vertices, np.linalg.inv(pose))
-    positions = carry_over_weeks(start, [read_deformation(path)[0] for path in files.registrations])
+    maps = [[read_deformation(path)[0] for path in paths] for paths in (files.earlier, files.later)]
+    positions = carry_both_ways(start, *maps)
+    cells = {"volume": linear_pieces(mesh), "area": boundary_faces(mesh)[0]}
     growth = {
-        length: {"volume": local_growth(positions, linear_pieces(mesh), params.weeks, length)}
+        length: {
+            kind: local_growth(positions, found, params.weeks, length, own=len(maps[0]))
+            for kind, found in cells.items()
+        }
         for length in params.smoothing_mm
     }
+    if params.strain:
+        # directions are those of the mesh's pose
+        turned = positions @ pose[:3, :3].T
+        for length, kinds in growth.items():
+            kinds["strain"] = local_strain(turned, cells["volume"], params.weeks, length, own=len(maps[0]))
     write_carried_mesh(snakemake.output[0], CarriedMesh(np.array(params.weeks), positions, growth))

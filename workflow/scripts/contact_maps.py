@@ -6,13 +6,13 @@ from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.report.renders import scalar_maps
 from gyriflow.step import step
 
-frames, params, run = snakemake.input[0], snakemake.params, snakemake.wildcards.run
+frames, params = snakemake.input[0], snakemake.params
 with step(snakemake.log[0]):
     start, *weeks = read_weeks(frames)
     surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, start), read_tets(frames)))
     maps = {week: (surface, read_field(frames, week, params.quantity)[pial]) for week in weeks}
     figure = scalar_maps(
-        {f"run {run}": maps},
+        {"simulated": maps},
         quantity=params.quantity,
         views=("left", "right", "top", "bottom"),
         synthetic=params.synthetic,

@@ -20,5 +20,5 @@ with step(snakemake.log[0]):
         (a, b): (TriangleMesh(positions[b], surface.faces), np.linalg.norm(positions[b] - positions[a], axis=1))
         for a, b in pairwise(weeks)
     }
-    figure = displacement_maps(maps, title=f"run {snakemake.wildcards.run}", synthetic=params.synthetic)
+    figure = displacement_maps(maps, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -12,7 +12,9 @@ with step(snakemake.log[0]):
     regions = read_regions(snakemake.input.regions)
     positions = read_positions(snakemake.input.frames, float(snakemake.wildcards.week))
     surface, on_left = TriangleMesh(positions, regions.facets), regions.facet_tags["hemisphere"] == LEFT
-    whole, left, right = (submesh(surface, part)[0] for part in (on_left | ~on_left, on_left, ~on_left))
+    parts = on_left, ~on_left
+    left, right = (submesh(surface, part)[0] if part.any() else None for part in parts)
+    whole = submesh(surface, parts[0] | parts[1])[0]
     write_brain(snakemake.output, whole, left, right)
     depth = depth_of_weight(regions.fields["cortex_weight"])
     thickness = simulated_thickness(regions.mesh, depth, positions, whole)

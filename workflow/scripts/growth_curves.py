@@ -7,13 +7,14 @@ from gyriflow.growth.following import fits_of_series
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 
-output = snakemake.output
+params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):
-    series = fits_of_series(read_table(snakemake.input[0]), may_shrink=snakemake.params.may_shrink)
-    curves, away = [], []
-    for name, fits in series.items():
-        table = curve_table({quantity: fit.curve for quantity, fit in fits.items()})
-        curves.append(table.assign(series=name)[["series", *table.columns]])
-        away.append(errors(fits).assign(series=name))
+    areas, curves, away = read_table(snakemake.input[0]), [], []
+    for until in (None, *params.known_until_gw):
+        for name, fits in fits_of_series(areas, until=until, may_shrink=params.may_shrink).items():
+            first = {"series": name, "known_until_gw": until}
+            tables = curve_table({quantity: fit.curve for quantity, fit in fits.items()}), errors(fits)
+            for table, joined in zip(tables, (curves, away), strict=True):
+                joined.append(table.assign(**first)[[*first, *table.columns]])
     write_table(output.curves, pd.concat(curves, ignore_index=True))
     write_table(output.errors, pd.concat(away, ignore_index=True))

@@ -12,7 +12,7 @@ params = snakemake.params
 with step(snakemake.log[0]):
     regions, run = read_regions(snakemake.input.mesh), read_yaml(snakemake.input.params)
     surface, pial = boundary_surface(regions.mesh)
-    growth, title = 1e3 * regions.fields["tangential_growth_per_step"][pial], f"run {snakemake.wildcards.run}"
-    shown = {"fissure_x_mm": run["fissure_x_mm"], "title": title, "synthetic": params.synthetic}
+    growth = 1e3 * regions.fields["tangential_growth_per_step"][pial]
+    shown = {"fissure_x_mm": run["fissure_x_mm"], "synthetic": params.synthetic}
     figure = field_picture(surface, growth, label=GROWTH, **shown)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

@@ -1,20 +1,36 @@
-"""The HTML report: a second Snakemake looks at the finished results with the same configuration."""
+"""The report: one HTML page that needs nothing else."""
 
-import subprocess
-import sys
-
-from gyriflow.errors import GyriflowError
-from gyriflow.io.files import replaced
-from gyriflow.io.yaml_files import write_yaml
+from gyriflow.io.files import read_json, read_table, read_text, write_text
+from gyriflow.io.pictures import picture_addresses, read_body
+from gyriflow.io.yaml_files import yaml_text
+from gyriflow.report.assembly import Results, assemble
+from gyriflow.report.page import Shown, picture, render_caption, report_page
 from gyriflow.step import step
 
-output, params = snakemake.output, snakemake.params
+files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    write_yaml(output.config, params.config)
-    with replaced(output.html) as temporary:
-        options = ["--configfile", output.config, "--snakefile", params.snakefile, "--nolock", "--report", temporary]
-        command = [sys.executable, "-m", "snakemake", "figures", "metrics", "study_resources", *options]
-        outcome = subprocess.run(command, capture_output=True, text=True, check=False)
-        if outcome.returncode:
-            last = "\n".join(outcome.stderr.splitlines()[-8:])
-            raise GyriflowError("the report could not be made", path=output.html, found=last)
+    pictures = [entry["file"] for entry in params.entries if entry["file"].endswith(".png")]
+    addresses = dict(zip(pictures, picture_addresses(pictures, params.picture_bytes), strict=True))
+    shown = [
+        Shown(
+            entry["section"],
+            entry["title"],
+            picture(addresses[path], entry["title"]) if path in addresses else read_body(path),
+            render_caption(read_text(entry["caption"]), entry["values"]),
+            first=path == params.first,
+        )
+        for entry in params.entries
+        for path in [entry["file"]]
+    ]
+    results = Results(
+        brains=params.brains,
+        surfaces={brain: read_json(path) for brain, path in zip(params.surfaced, files.surfaces, strict=True)},
+        runs=read_table(files.runs),
+        provenance=read_json(files.provenance),
+        metrics=params.metrics,
+        configuration=yaml_text(params.config),
+        **{name: read_table(files[name]) for name in ("validation", "displacement", "quality", "warnings") if files.get(name)},
+    )
+    view = read_json(files.view)
+    parts = {name: read_text(path) for name, path in files.items() if name in ("style", "three", "controls", "viewer")}
+    write_text(snakemake.output[0], report_page(read_text(files.page), parts, view, **assemble(results, shown, view)))

@@ -12,6 +12,5 @@ params = snakemake.params
 with step(snakemake.log[0]):
     regions, run = read_regions(snakemake.input.mesh), parameters_from(read_yaml(snakemake.input.params))
     ellipsoid = no_growth_ellipsoid(regions.mesh.vertices, run)
-    shown = {"title": f"run {snakemake.wildcards.run}", "synthetic": params.synthetic}
-    figure = region_sections(regions.mesh, regions.fields, regions.cell_tags, ellipsoid, **shown)
+    figure = region_sections(regions.mesh, regions.fields, regions.cell_tags, ellipsoid, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

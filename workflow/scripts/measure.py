@@ -1,9 +1,10 @@
 """The metrics of one brain, measured or simulated, at one week."""
 
-from gyriflow.io.files import read_table, write_table
-from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_vertex_maps
+from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.metrics.mode_numbers import common_modes
+from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
@@ -13,8 +14,11 @@ with step(snakemake.log[0]):
         settings["spangy_modes"] = common_modes(read_table(files.mode_numbers))
     if files.get("thickness"):
         (settings["thickness_mm"],) = read_vertex_maps(files.thickness).values()
-    brain = measure_brain(*map(read_surface, (files.whole, files.left, files.right)), **settings)
+    if files.report:
+        settings["label_volumes_ml"] = read_json(files.report).get("label_volumes_mL", {})
+    left, right = (read_surface(files[side]) if files.get(side) else None for side in SIDES)
+    brain = measure_brain(read_surface(files.whole), left, right, **settings)
     for name, table in (("metrics", brain.table), ("spectra", brain.spectra), ("coefficients", brain.coefficients)):
         write_table(output[name], table.assign(**params.labels)[[*params.labels, *table.columns]])
-    write_vertex_maps(output.left, brain.maps["left"], "CortexLeft")
-    write_vertex_maps(output.right, brain.maps["right"], "CortexRight")
+    for side, maps in brain.maps.items():
+        write_vertex_maps(output[side], maps, STRUCTURES[side])

@@ -11,6 +11,5 @@ with step(snakemake.log[0]):
     regions = read_regions(snakemake.input.mesh)
     cortex = regions.facets[regions.facet_tags["zone"] < BASE]
     normals, weight = regions.fields["pial_normal"], regions.fields["cortex_weight"]
-    shown = {"title": f"run {snakemake.wildcards.run}", "synthetic": params.synthetic}
-    figure = normal_arrows(regions.mesh, normals, weight, cortex, **shown)
+    figure = normal_arrows(regions.mesh, normals, weight, cortex, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

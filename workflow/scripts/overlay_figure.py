@@ -14,5 +14,5 @@ with step(snakemake.log[0]):
     image = read_volume_map(files.image, params.affine_from)
     # the surface was turned upright
     affine = np.array(read_json(files.report)["pose"]) @ image.affine
-    figure = surface_overlay(image.values, affine, read_surface(files.surface), title=params.title)
+    figure = surface_overlay(image.values, affine, read_surface(files.surface))
     write_figure(output.png, output.pdf, figure, dpi=params.dpi)

@@ -4,7 +4,7 @@ import numpy as np
 
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.tetrahedra import boundary_faces, linear_pieces
-from gyriflow.growth.following import regional_map, relative_growth
+from gyriflow.growth.regional import regional_maps
 from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
 from gyriflow.io.registrations import read_carried_mesh
@@ -31,7 +31,8 @@ with step(snakemake.log[0]):
         require_within(maps[name], snakemake.params.bounds[name], path)
     if files.carried:
         carried, follow = read_carried_mesh(files.carried), snakemake.params.follow
-        rates = carried.growth[follow["smoothing_mm"]]["volume"]
-        local = relative_growth(rates, vertex_sizes(mesh.vertices, linear_pieces(mesh)), follow["regional"])
-        maps |= {regional_map(week): values for week, values in zip(carried.weeks, local, strict=False)}
+        growth, cells = carried.growth[follow["smoothing_mm"]], {"volume": linear_pieces(mesh), "area": facets}
+        sizes = {kind: vertex_sizes(mesh.vertices, found) for kind, found in cells.items()}
+        right = mesh.vertices[:, 0] > report["fissure_x_mm"]
+        maps |= regional_maps(carried.weeks, growth, sizes, mesh.vertices, right, follow)
     write_maps(snakemake.output[0], maps)

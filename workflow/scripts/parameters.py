@@ -1,7 +1,8 @@
 """The validated parameters of a run, which its folding reads and which stay with its results."""
 
-from gyriflow.growth.following import followed_sizes, regional_map
+from gyriflow.growth.following import THICKNESS, followed_sizes
 from gyriflow.growth.rates import FOLDING_RATES, rate_curve
+from gyriflow.growth.regional import CORTEX, STRAIN, known_weeks, regional_map
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.step import step
@@ -20,10 +21,16 @@ with step(snakemake.log[0]):
         shrink = settings["allow_negative_growth"]
         sizes = followed_sizes(settings["follow"], curves, snakemake.params.estimated_from, weeks, shrink)
         settings["follow"] = settings["follow"] | sizes
-        settings["regional_growth"] = {week: regional_map(week) for week in snakemake.params.regional_weeks[:-1]}
-    known = {
-        "start_week": weeks[0],
-        "output_weeks": list(weeks),
-        "fissure_x_mm": read_json(files.surface)["fissure_x_mm"],
-    }
-    write_yaml(snakemake.output[0], known | settings)
+        if THICKNESS in sizes:
+            settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}
+        if snakemake.params.regional_weeks:
+            known = known_weeks(snakemake.params.regional_weeks, settings["follow"]["known_until_gw"])
+            settings["regional_growth"] = {week: regional_map(week) for week in known}
+            if settings["follow"]["directional"] > 0:
+                settings["regional_strain"] = {week: regional_map(week, STRAIN) for week in known}
+            if settings["follow"]["cortex"] == "area":
+                settings["regional_growth_of_cortex"] = {week: regional_map(week, CORTEX) for week in known}
+    surface = read_json(files.surface)
+    start = {"start_week": weeks[0], "output_weeks": list(weeks), "fissure_x_mm": surface["fissure_x_mm"]}
+    start["side"] = surface.get("side")
+    write_yaml(snakemake.output[0], start | settings)

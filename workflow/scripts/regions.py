@@ -1,5 +1,8 @@
 """Zones, tags and fields of a run on the start mesh, for inspection before the solve."""
 
+import numpy as np
+
+from gyriflow.folding.following import growing_at_start
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.regions import cell_tags, facet_tags
 from gyriflow.folding.zone_checks import refuse_impossible
@@ -22,7 +25,12 @@ with step(snakemake.log[0]):
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    fields = layer_fields(mesh.vertices, zones, parameters, maps, parameters.start_week, REGION_FIELDS)
-    on_left = nearer_left(TriangleMesh(mesh.vertices, zones.facets), *map(read_surface, (files.left, files.right)))
+    growing = growing_at_start(parameters, mesh.vertices, zones, maps)
+    fields = layer_fields(mesh.vertices, zones, growing, maps, parameters.start_week, REGION_FIELDS)
+    boundary = TriangleMesh(mesh.vertices, zones.facets)
+    if parameters.side is None:
+        on_left = nearer_left(boundary, *map(read_surface, files.sides))
+    else:
+        on_left = np.full(len(zones.facets), parameters.side == "left")
     tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
     write_regions(snakemake.output.mesh, Regions(mesh, zones.facets, fields, *tags))

@@ -11,7 +11,6 @@ with step(snakemake.log[0]):
     figure = runs_comparison(
         dict(zip(run_names(params.folded), map(read_surface, files.runs), strict=True)),
         read_surface(files.real[0]) if files.real else None,
-        title=f"{params.week:g} GW",
         measured=params.measured,
         synthetic=params.synthetic,
     )

@@ -9,22 +9,24 @@ from gyriflow.report.renders import scalar_maps
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
-run, measure = snakemake.wildcards.run, snakemake.wildcards.measure
+measure = snakemake.wildcards.measure
 
 
-def brains(weeks, left, right, maps):
-    """Returns by week the two hemispheres as one surface with its values; the maps of all left ones come first."""
-    values = [read_vertex_maps(file)[measure] for file in maps]
-    surfaces = [merged(read_surface(a), read_surface(b)) for a, b in zip(left, right, strict=True)]
-    both = map(np.concatenate, zip(values[: len(weeks)], values[len(weeks) :], strict=True))
-    return dict(zip(weeks, zip(surfaces, both, strict=True), strict=True))
+def brains(weeks, surfaces, maps):
+    """Returns by week the hemispheres as one surface with its values; the files of one side come after the other's."""
+    found = {}
+    for number, week in enumerate(weeks):
+        parts = [read_surface(file) for file in surfaces[number :: len(weeks)]]
+        # thickness is not known of every brain
+        values = [read_vertex_maps(file).get(measure) for file in maps[number :: len(weeks)]]
+        values = [np.full(len(p.vertices), np.nan) if v is None else v for p, v in zip(parts, values, strict=True)]
+        found[week] = merged(*parts), np.concatenate(values)
+    return found
 
 
 with step(snakemake.log[0]):
-    simulated = files.simulated_left, files.simulated_right, files.simulated_maps
-    maps = {"simulated": brains(params.simulated_weeks, *simulated)}
-    if files.real_left:
-        maps[params.measured] = brains(params.real_weeks, files.real_left, files.real_right, files.real_maps)
-    shown = {"title": f"run {run}", "measured": params.measured, "synthetic": params.synthetic}
-    figure = scalar_maps(maps, quantity=measure, **shown)
+    maps = {"simulated": brains(params.simulated_weeks, files.simulated, files.simulated_maps)}
+    if files.real:
+        maps[params.measured] = brains(params.real_weeks, files.real, files.real_maps)
+    figure = scalar_maps(maps, quantity=measure, measured=params.measured, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

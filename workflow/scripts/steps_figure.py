@@ -6,6 +6,5 @@ from gyriflow.report.charts import steps_chart
 from gyriflow.step import step
 
 with step(snakemake.log[0]):
-    title = f"run {snakemake.wildcards.run}"
-    figure = steps_chart(read_table(snakemake.input[0]), title=title, synthetic=snakemake.params.synthetic)
+    figure = steps_chart(read_table(snakemake.input[0]), synthetic=snakemake.params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=snakemake.params.dpi)

@@ -2,11 +2,13 @@
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.io.files import emptied, write_json
+from gyriflow.growth.following import stretch_of_surface
+from gyriflow.io.files import emptied, read_table, write_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 from gyriflow.mesh.gates import refuse_bad_mesh
 from gyriflow.mesh.quality import quality_summary, radius_ratios
+from gyriflow.mesh.sizing import finer
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.step import step
 
@@ -14,7 +16,8 @@ output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     refused = emptied(params.refused)
     surface = read_surface(snakemake.input[0])
-    mesh = tetrahedralise(surface, **params.settings)
+    stretch = stretch_of_surface(read_table(snakemake.input.curves), **params.stretched) if params.stretched else 1.0
+    mesh = tetrahedralise(surface, **finer(params.settings, stretch))
     summary, fields = quality_summary(mesh, surface), {"radius_ratio": radius_ratios(mesh)}
     try:
         refuse_bad_mesh(mesh, summary, refused / "brain.xdmf", **params.gates)

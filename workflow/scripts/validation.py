@@ -3,7 +3,7 @@
 from gyriflow.growth.curves import value
 from gyriflow.growth.following import curves_of_run
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
@@ -12,24 +12,19 @@ from gyriflow.validation.shapes import Shape, ready
 from gyriflow.validation.tables import Comparison, ordered, validation_row
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
-
-
-def shape(mesh, real):
-    """Returns a surface ready to be compared with the real brain's, with its curvature."""
-    even = ready(mesh, real)
-    bend = curvature(even, radius_mm=params.curvature_radius_mm)
-    return Shape(even, bend.mean, bend.shape_index)
-
-
 with step(snakemake.log[0]):
-    start, rows, follow = read_surface(files.start), [], read_yaml(files.params).get("follow")
+    rows, follow = [], read_yaml(files.params).get("follow")
     curves = curves_of_run(follow, read_table(files.curves) if files.curves else None, params.series)
-    for week, *paths in zip(params.weeks, files.simulated, files.real, files.adjacent, strict=True):
-        simulated, real, adjacent = map(read_surface, paths)
+    for number, (week, kind) in enumerate(params.kinds.items()):
+        simulated, real = read_surface(files.simulated[number]), read_surface(files.whole[number])
         aim = [float(value(curve, week)) for curve in curves]
         aim = (aim[0] / CM2_PER_MM2, aim[1] / ML_PER_MM3) if aim else None
-        shapes = {name: shape(mesh, real) for name, mesh in (("run", simulated), ("real", real), ("start", start))}
-        shapes["adjacent"] = shape(adjacent, real)
-        comparison = Comparison(names.run, params.kind, params.start_week, week)
+        even = ready(simulated, real)
+        bend = curvature(even, radius_mm=params.curvature_radius_mm)
+        shapes = {"run": Shape(even, bend.mean, bend.shape_index)}
+        for name in ("real", "start", "adjacent"):
+            maps = read_vertex_maps(files[f"{name}_maps"][number])
+            shapes[name] = Shape(read_surface(files[name][number]), **maps)
+        comparison = Comparison(names.run, kind, params.start_week, week, params.seed)
         rows.append(validation_row(comparison, simulated=simulated, real_brain=real, curve=aim, **shapes))
     write_table(snakemake.output[0], ordered(rows))

@@ -10,7 +10,6 @@ with step(snakemake.log[0]):
     figure = weekly_comparison(
         dict(zip(params.simulated_weeks, map(read_surface, files.simulated), strict=True)),
         dict(zip(params.real_weeks, map(read_surface, files.real), strict=True)),
-        title=f"run {snakemake.wildcards.run}",
         measured=params.measured,
         synthetic=params.synthetic,
     )

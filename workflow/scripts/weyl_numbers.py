@@ -7,10 +7,11 @@ from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.mode_numbers import weyl_numbers
 from gyriflow.step import step
 
-files, params = snakemake.input, snakemake.params
+files, params = iter(snakemake.input), snakemake.params
 with step(snakemake.log[0]):
     tables = []
-    for labels, left, right in zip(params.labels, files.left, files.right, strict=True):
-        table = weyl_numbers(read_surface(left), read_surface(right), params.formula)
+    for labels, sides in zip(params.labels, params.sides, strict=True):
+        brain = {side: read_surface(next(files)) for side in sides}
+        table = weyl_numbers(brain, params.formula)
         tables.append(table.assign(**labels)[[*labels, *table.columns]])
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

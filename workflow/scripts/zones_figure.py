@@ -13,8 +13,7 @@ with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(snakemake.input.mesh)
     zones = zones_of_run(mesh, parameters_from(read_yaml(snakemake.input.params)))
     boundary = TriangleMesh(mesh.vertices, zones.facets)
-    title = f"run {snakemake.wildcards.run}"
     synthetic = snakemake.params.synthetic
     x = zones.fissure_x_mm
-    figure = zones_picture(boundary, zones.facet_zone, fissure_x_mm=x, title=title, synthetic=synthetic)
+    figure = zones_picture(boundary, zones.facet_zone, fissure_x_mm=x, synthetic=synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=snakemake.params.dpi)

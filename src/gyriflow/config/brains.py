@@ -6,10 +6,10 @@ from ..parameters.files import InputFile
 from ..parameters.schemes import SCHEMES
 from ..parameters.settings import NotValidError, Problem, Settings, check, setting
 from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
-from ..parameters.terms import AffineSource, Coordinates
+from ..parameters.terms import SIDES, AffineSource, Coordinates, Side
 from ..parameters.varying import Week
 
-SOURCES = ("labels", "segmentation", "hemispheres", "pial", "phantom", "shape")
+SOURCES = ("labels", "segmentation", "hemispheres", "hemisphere", "pial", "phantom", "shape")
 """The keys of which a brain has exactly one."""
 
 KINDS = {
@@ -17,16 +17,19 @@ KINDS = {
     "segmentation": "volume",
     "phantom": "volume",
     "hemispheres": "surface",
+    "hemisphere": "surface",
     "pial": "surface",
     "shape": "surface",
 }
-"""The kind of data behind each source: a label volume, or surfaces as they are given."""
+"""The kind of data behind each source: a label volume, or surfaces as they are given; a `hemisphere` may be either."""
+VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
+"""How the names of volumes end."""
 
 VOLUMES = ("labels", "segmentation")
 """Sources that give a label volume."""
 MEANINGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("scheme", "image", "affine_from"), VOLUMES),
-    "coordinates": ("hemispheres", "pial"),
+    **dict.fromkeys(("scheme", "image", "affine_from"), (*VOLUMES, "hemisphere")),
+    "coordinates": ("hemispheres", "hemisphere", "pial"),
     "white": ("pial",),
     "population": tuple(source for source in SOURCES if source not in ("phantom", "shape")),
 }
@@ -74,8 +77,23 @@ class HemisphereFiles(Settings):
     )
 
 
+class OneHemisphere(Settings):
+    """The only hemisphere of a brain, after hemispherectomy or where the data has one side only."""
+
+    file: InputFile = setting(
+        ..., "",
+        "Its closed pial surface (GIFTI, VTK, STL, PLY or FreeSurfer), or with the brain's `scheme` a label volume "
+        "that holds nothing of the other hemisphere's cortex.",
+    )  # fmt: skip
+    side: Side = setting(..., "", "`left` or `right`.")
+    white: InputFile | None = setting(
+        None, "", "With a pial surface, the white surface in the same coordinates, for the cortical thickness."
+    )
+
+
 class Brain(Settings):
-    """One brain. Exactly one of `labels`, `segmentation`, `hemispheres`, `pial`, `phantom`, `shape` is its source.
+    """One brain. Exactly one of `labels`, `segmentation`, `hemispheres`, `hemisphere`, `pial`, `phantom`, `shape` is
+    its source.
 
     Paths are relative to the configuration file or, if no such file is there, to the working directory.
     """
@@ -87,6 +105,12 @@ class Brain(Settings):
     population: str | None = setting(
         None, "",
         "Name of the population in figures and tables, such as `spina bifida aperta, unoperated`; `null`: real brain.",
+        min_length=1,
+    )  # fmt: skip
+    subject: str | None = setting(
+        None, "",
+        "Subject that was scanned, where several brains are scans of one: change between them is then tabled, and "
+        "simulations from one are compared with the others first.",
         min_length=1,
     )  # fmt: skip
     labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI).")
@@ -105,13 +129,14 @@ class Brain(Settings):
         "auto", "", "Which NIfTI affine of `labels` and `image` is used; `auto` refuses two that disagree."
     )
     hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
+    hemisphere: OneHemisphere | None = setting(None, "", "The only hemisphere, as a surface or as labels.")
     pial: InputFile | None = setting(None, "", "Surface file of the whole brain, closed.")
     white: InputFile | None = setting(
         None, "", "White surface of `pial` in the same coordinates; the distance to it is the cortical thickness."
     )
     coordinates: Coordinates = setting(
         "auto", "",
-        "Axes of the coordinates in `hemispheres` or `pial` files. `auto` finds the pose, whatever it is.",
+        "Axes of the coordinates in surface files. `auto` finds the pose, whatever it is.",
     )  # fmt: skip
     phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
     shape: ShapeSettings | None = setting(None, "", "A simple geometry in place of a brain.")
@@ -130,14 +155,41 @@ class Brain(Settings):
         return self.source in ("phantom", "shape")
 
     @property
+    def sides(self) -> tuple[Side, ...]:
+        """The hemispheres that the brain has."""
+        return SIDES if self.hemisphere is None else (self.hemisphere.side,)
+
+    @property
+    def kind(self) -> str:
+        """The kind of data that the surface is made from, with the side of a hemisphere that is alone."""
+        if self.hemisphere is None:
+            return KINDS[self.source]
+        return f"{self.hemisphere.side} {'surface' if self.label_volume is None else 'volume'}"
+
+    @property
+    def label_volume(self) -> str | None:
+        """The label volume that the user gives; None where there is none, or the workflow makes it."""
+        if self.hemisphere is not None and self.scheme is not None:
+            return self.hemisphere.file
+        return self.labels
+
+    @property
+    def has_labels(self) -> bool:
+        """Whether the surface is made from a label volume."""
+        return self.label_volume is not None or self.source in ("segmentation", "phantom")
+
+    @property
     def files(self) -> list[str]:
         """The files that the surface is made from, the left hemisphere's first."""
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
-        return [path for path in (self.labels, self.pial, *sides) if path is not None]
+        one = None if self.hemisphere is None else self.hemisphere.file
+        return [path for path in (self.labels, self.pial, *sides, one) if path is not None]
 
     @property
     def white_files(self) -> dict[str, str]:
         """The white surfaces by what they are of: left, right, whole."""
+        if self.hemisphere is not None:
+            return {} if self.hemisphere.white is None else {"whole": self.hemisphere.white}
         pair = self.hemispheres.white if self.hemispheres else None
         sides = {} if pair is None else {"left": pair.left, "right": pair.right}
         return sides if self.white is None else {"whole": self.white}
@@ -163,6 +215,21 @@ class Brain(Settings):
     def _labels_have_a_scheme(self) -> Iterator[Problem]:
         if any(self.gives(key) for key in VOLUMES) and not self.gives("scheme"):
             yield Problem("is missing; it says what the labels mean", ("scheme",))
+
+    @check
+    def _a_hemisphere_is_labels_or_surface(self) -> Iterator[Problem]:
+        if self.hemisphere is None or not self.hemisphere.has("file"):
+            return
+        volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
+        if volume and not self.gives("scheme"):
+            yield Problem("is missing; it says what the labels of the hemisphere mean", ("scheme",))
+        if volume and "coordinates" in self.model_fields_set:
+            yield Problem("has no meaning with a label volume, whose affine says them", ("coordinates",))
+        if volume and self.hemisphere.gives("white"):
+            yield Problem("has no meaning with a label volume", ("hemisphere", "white"))
+        for key in () if volume else ("scheme", "image", "affine_from"):
+            if key in self.model_fields_set:
+                yield Problem("has no meaning with a surface; only with labels", (key,))
 
     @check
     def _segmentation_has_an_image(self) -> Iterator[Problem]:

@@ -8,12 +8,12 @@ from ..parameters.messages import nearest
 from ..parameters.schemes import SCHEMES
 from ..parameters.settings import Problem
 from ..parameters.varying import Varying
-from .brains import KINDS, Brain
+from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
-from .metrics import LEAST_AGE_WEEKS
-from .runs import ALL, Run, Start, start_ids
+from .metrics import LEAST_AGE_WEEKS, MetricsSettings
+from .runs import ALL, FIRST, Run, Start, start_ids
 
-RESERVED_BRAINS = ("study", "report", ALL)
+RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Names that stand for something else in results, tables and settings."""
 RESERVED_RUNS = ("real",)
 """What stands for the run in tables of measured brains."""
@@ -76,7 +76,7 @@ def start_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[s
 
 
 def _id_problems(start: Start | None, known: Sequence[str], key: tuple[str, ...]) -> Iterator[Problem]:
-    if start is None or start == ALL or not known:
+    if start is None or start in (ALL, FIRST) or not known:
         return
     names = [start] if isinstance(start, str) else list(start)
     if not names:
@@ -137,7 +137,7 @@ def growth_problems(
         mixed = sorted({populations[brain] or "of no known population" for brain in chosen})
         if len(mixed) > 1:
             yield Problem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", paths[name])
-    series = growth_series({brain.id: KINDS[brain.source] for brain in brains}, weeks, given, populations)
+    series = growth_series({brain.id: brain.kind for brain in brains}, weeks, given, populations)
     wanted = growth.estimated_from if growth.has("estimated_from") else None
     if wanted is not None and series and wanted not in series:
         yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))
@@ -157,6 +157,32 @@ def growth_problems(
                 )
             if found is not None:
                 yield Problem(f"can't be estimated: {found}", _place(name, (key,), runs))
+
+
+def mesh_size_problems(
+    growth: GrowthSettings, start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]
+) -> Iterator[Problem]:
+    """Yields what is wrong where meshes are made for the end of the runs, by what measured brains are stretched."""
+    if not all(brain.has("id", "week", "source") for brain in brains):
+        return
+    known = ids_of(brains)
+    series = growth_series(
+        {brain.id: brain.kind for brain in brains},
+        {brain.id: brain.week for brain in brains},
+        growth.brains,
+        {brain.id: brain.population if brain.has("population") else None for brain in brains},
+    )
+    wanted = growth.estimated_from if growth.has("estimated_from") else None
+    started = {
+        brain for run in runs.values() for brain in start_ids(run.start if run.start is not None else start, known)
+    }
+    without = sorted(brain for brain in started if estimated_from(series, wanted, brain) is None)
+    if without:
+        text = (
+            f"`end` needs brains of other weeks that belong with {', '.join(without)}, which tell how far the surface "
+            "is stretched; list them, or give a smaller surface_edge_mm"
+        )
+        yield Problem(text, ("mesh", "sized_for"))
 
 
 def _too_few_weeks(brains: Sequence[str], weeks: Mapping[str, float]) -> str | None:
@@ -179,3 +205,23 @@ def age_reference_problems(brains: Sequence[Brain], given: Sequence[str] | None)
         if found < LEAST_AGE_WEEKS:
             plural = "" if found == 1 else "s"
             yield Problem(f"found brains of {found} week{plural}; it should have {LEAST_AGE_WEEKS} or more", key)
+
+
+def metrics_problems(brains: Sequence[Brain], metrics: MetricsSettings) -> Iterator[Problem]:
+    """Yields brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
+    known = ids_of(brains)
+    named = {"norm_reference": metrics.norm_reference or (), "regions": tuple(metrics.regions)}
+    for key, ids in named.items():
+        if unknown := [name for name in ids if name not in known]:
+            text = f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}"
+            yield Problem(text, ("metrics", key))
+    # the carrying of regions and their asymmetry are of both sides
+    alone = [brain.id for brain in brains if brain.has("id", "hemisphere") and brain.hemisphere is not None]
+    if wrong := [name for name in metrics.regions if name in alone]:
+        yield Problem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
+    scans: dict[tuple[str, float], int] = Counter(
+        (brain.subject, brain.week) for brain in brains if brain.has("subject", "week") and brain.subject is not None
+    )
+    for (subject, week), count in scans.items():
+        if count > 1:
+            yield Problem(f"{count} scans of the subject {subject} are of week {week:g}; expected one", ("brains",))

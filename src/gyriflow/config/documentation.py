@@ -126,7 +126,10 @@ def _type_name(annotation: Any) -> str:
     if origin is tuple:
         return "list of " + _type_name(parts[0])
     if origin is dict:
-        return "names with lists" if parts[1] == tuple[str, ...] else "names with settings"
+        if get_origin(parts[1]) is tuple:
+            return "names with lists"
+        plain = parts[1] in (str, float, int) or get_origin(parts[1]) is Annotated
+        return "names with values" if plain else "names with settings"
     if annotation is Varying:
         return "varying"
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):

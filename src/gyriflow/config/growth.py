@@ -40,7 +40,8 @@ def growth_series(
     Parameters
     ----------
     kinds
-        Kind of data of each brain by id: "surface" or "volume".
+        Kind of data of each brain by id: "surface" or "volume"; of a hemisphere that is alone with its side in front,
+        such as "left surface". These never share a series with brains of two hemispheres or of the other one.
     weeks
         Gestational week of each.
     given
@@ -52,16 +53,23 @@ def growth_series(
         series = {name: [brain for brain in kinds if brain in ids] for name, ids in given.items()}
     else:
         chosen = [brain for brain in kinds if given is None or brain in given]
-        of = {brain: (populations or {}).get(brain) for brain in chosen}
-        several = len(set(of.values())) > 1
+        of = {brain: ((populations or {}).get(brain), *_side_and_kind(kinds[brain])) for brain in chosen}
+        groups = dict.fromkeys((population, side) for population, side, _ in of.values())
+        several = len(groups) > 1
         series = {}
-        for population in dict.fromkeys(of.values()):
-            ids = [brain for brain in chosen if of[brain] == population]
-            by_kind = _series_by_kind({brain: kinds[brain] for brain in ids}, weeks)
+        for population, side in groups:
+            ids = [brain for brain in chosen if of[brain][:2] == (population, side)]
+            by_kind = _series_by_kind({brain: of[brain][2] for brain in ids}, weeks)
             for kind, brains in by_kind.items():
-                parts = [population or "", kind if len(by_kind) > 1 or not population else ""]
+                parts = [population or "", side, kind if len(by_kind) > 1 or not population else ""]
                 series[", ".join(part for part in parts if part) if several else kind] = brains
     return {name: ids for name, ids in series.items() if _ages(ids, weeks) > 1}
+
+
+def _side_and_kind(kind: str) -> tuple[str, str]:
+    """Returns "left hemisphere", "right hemisphere" or "" where there are both, and "surface" or "volume"."""
+    *side, kind = kind.split()
+    return " ".join([*side, "hemisphere"]) if side else "", kind
 
 
 def _series_by_kind(kinds: Mapping[str, str], weeks: Mapping[str, float]) -> dict[str, list[str]]:

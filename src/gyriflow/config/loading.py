@@ -13,12 +13,13 @@ from ..parameters.messages import dotted, line, messages
 from ..parameters.presets import PRESETS
 from .atlas import AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections, unknown_atlas
 from .atlas_description import Atlas
+from .participants import ParticipantsSettings, participants_brains, participants_section
 from .root import Config
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
 
 
-def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
+def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool = False) -> Config:
     """Returns the validated configuration, with input files as absolute paths.
 
     Parameters
@@ -27,6 +28,9 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
         The configuration as read from YAML.
     base_dir
         Folder of the configuration file, for relative paths.
+    keep_going
+        Whether rows of `participants` that lack their age or data are left out, as `Config.left_out`; else they are
+        problems.
 
     Raises
     ------
@@ -40,6 +44,11 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
     plain["atlas"], of_atlas, problems = _atlases(plain.get("atlas"), Path(base_dir))
     if of_atlas:
         plain["brains"] = [*(plain.get("brains") or ()), *of_atlas]
+    of_table, left_out = _participants(plain, Path(base_dir), problems)
+    if of_table:
+        plain["brains"] = [*(plain.get("brains") or ()), *of_table]
+    if not (keep_going and plain.get("brains")):
+        problems += [row["cause"] for row in left_out.values()]
     awaited = [path for entry in of_atlas for path in _texts(entry)]
     try:
         config = Config.model_validate(plain, context={"folder": str(base_dir), "awaited": awaited})
@@ -50,8 +59,26 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".") -> Config:
             f"the configuration has {len(problems)} problem{'s' if len(problems) > 1 else ''}:\n  "
             + "\n  ".join(problems)
             + "\nAll keys are explained in config/README.md"
+            + ("; with --keep-going, rows that can't be used are left out" if left_out and not keep_going else "")
         )
-    return config
+    return config.leave_out(left_out)
+
+
+def _participants(
+    plain: dict[str, Any], base_dir: Path, problems: list[str]
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+    """Returns the brains of `participants` and its rows that can't be used, or adds what is wrong to `problems`."""
+    if plain.get("participants") is None:
+        return [], {}
+    plain["participants"] = participants_section(plain["participants"])
+    try:
+        return participants_brains(ParticipantsSettings.model_validate(plain["participants"]), base_dir)
+    except ValidationError:
+        # said with all other keys
+        return [], {}
+    except InputError as error:
+        problems.append(f"participants.file: {error}")
+        return [], {}
 
 
 def _plain(value: Any) -> Any:

@@ -36,6 +36,12 @@ class MeshSettings(Settings):
         ge=100,
         le=2_000_000,
     )
+    sized_for: Literal["start", "end"] = setting(
+        "start",
+        "",
+        "`start`: these distances are those of the start brain, and grow with the tissue; `end`: they are met at the "
+        "last week of its runs: the mesh is finer by what the measured brains' surface is stretched until then.",
+    )
     core_edge_mm: float = setting(2.5, "mm", "Distance of neighbouring nodes deep inside.", gt=0.1, le=20)
     fine_depth_edges: float = setting(
         2.5,

@@ -10,12 +10,14 @@ from ..parameters.metrics import (
     SPANGY_MODES,
     SPANGY_PROXY,
     SPANGY_WAVELENGTH,
+    ExportNames,
     ModesWord,
     SpangyProxy,
     WeylFormula,
 )
 from ..parameters.settings import Settings, setting
 from .brains import Brain
+from .regions import GivenRegions
 
 LEAST_AGE_WEEKS = 5
 """Least number of weeks of reference brains for an age profile."""
@@ -50,15 +52,41 @@ class MetricsSettings(Settings):
         "are not synthetic (of several populations, that of the start brain), or all phantoms if there are no others. "
         "There is no age profile with fewer than five weeks.",
     )  # fmt: skip
+    norm_reference: tuple[str, ...] | None = setting(
+        None, "",
+        "Ids of the measured brains that others, and each of themselves, are compared with in tables of centiles. "
+        "`null`: chosen as for `age_reference`, of any number of weeks.",
+    )  # fmt: skip
+    regions: dict[str, GivenRegions] = setting(
+        {}, "",
+        "Regions of the cortex by the id of the brain that they are given on; they are carried to all other brains by "
+        "registration, and with the tissue to simulated ones.",
+    )  # fmt: skip
+    export: ExportNames = setting(
+        "plain", "", "Names of the files that the target `export` writes: `plain`, or those of `bids` derivatives."
+    )
 
 
 def age_reference(brains: Sequence[Brain], given: tuple[str, ...] | None, population: str | None = None) -> list[str]:
     """Returns the ids of the brains from which apparent ages are estimated; none if they cover too few weeks.
 
-    If none are `given` and the real ones are of several populations, those of `population` are used.
+    Chosen as by `reference_brains`.
+    """
+    chosen = reference_brains(brains, given, population)
+    weeks = {brain.week for brain in brains if brain.id in chosen}
+    return chosen if len(weeks) >= LEAST_AGE_WEEKS else []
+
+
+def reference_brains(
+    brains: Sequence[Brain], given: tuple[str, ...] | None, population: str | None = None
+) -> list[str]:
+    """Returns the ids of the measured brains that others are compared with: the given ones, or else all real ones.
+
+    If none are `given` and the real ones are of several populations, those of `population` are used; phantoms where no
+    brain is real.
     """
     real = [brain for brain in brains if not brain.synthetic] or [b for b in brains if b.source == "phantom"]
     if len({brain.population for brain in real}) > 1:
         real = [brain for brain in real if brain.population == population]
     chosen = real if given is None else [brain for brain in brains if brain.id in given]
-    return [brain.id for brain in chosen] if len({brain.week for brain in chosen}) >= LEAST_AGE_WEEKS else []
+    return [brain.id for brain in chosen]

@@ -29,5 +29,10 @@ class EnergySettings(Settings):
 class ReportSettings(Settings):
     """Figures, and assumptions of the estimated energy."""
 
-    dpi: int = setting(150, "dots per inch", "Resolution of the PNG figures.", ge=50, le=1200)
+    dpi: int = setting(
+        300, "dots per inch", "Resolution of the PNG figures; journals ask for 300 to 600.", ge=50, le=1200
+    )
+    paths: bool = setting(
+        False, "", "Whether the report shows paths of files, which may hold names. It never shows headers of images."
+    )
     energy: EnergySettings = setting(EnergySettings(), "", "Energy and emissions in the table of resources.")

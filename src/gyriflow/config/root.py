@@ -1,9 +1,10 @@
 """The whole configuration."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
+from functools import cached_property
 from typing import Any
 
-from pydantic import field_validator
+from pydantic import PrivateAttr, field_validator
 
 from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING, FoldingSettings, bounds_of, output_weeks
@@ -13,12 +14,16 @@ from ..parameters.varying import Varying, files_of
 from . import checks
 from .atlas import AtlasSettings, UsedAtlas
 from .atlas_description import Atlas
-from .brains import KINDS, Brain
+from .brains import Brain
+from .calibration import Calibration, calibration_problems
 from .growth import GrowthSettings, estimated_from, growth_series
 from .mesh import MeshSettings
-from .metrics import MetricsSettings, age_reference
+from .metrics import MetricsSettings, age_reference, reference_brains
+from .participants import ParticipantsSettings
+from .regions import nearest_given
 from .report import ReportSettings
 from .runs import Run, Start, start_ids
+from .studies import Compared, Member, Study, members_of, real_brains, study_problems
 from .surface import SurfaceSettings
 
 REAL_BRAIN = "real brain"
@@ -32,16 +37,20 @@ class Config(Settings):
 
     brains: tuple[Brain, ...] = setting(
         (), "", "The brains: those to fold, and others to compare with and to estimate growth from. Required without "
-        "`atlas`.",
+        "`atlas` and `participants`.",
     )  # fmt: skip
     atlas: tuple[AtlasSettings, ...] = setting(
         (), "",
         "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of "
         "these.",
     )  # fmt: skip
+    participants: ParticipantsSettings | None = setting(
+        None, "", "A table of brains, such as the `participants.tsv` of BIDS."
+    )
     schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
     start: Start | None = setting(
-        None, "", "Id of the brain to fold, a list of ids, or `all`; required if a run has no `start` of its own."
+        None, "", "Id of the brain to fold, a list of ids, `first` (of the list of brains, of an atlas the earliest) or `all`; "
+        "required if a run has no `start` of its own.",
     )
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
     mesh: MeshSettings = setting(MeshSettings(), "", "Tetrahedral mesh.")
@@ -51,8 +60,13 @@ class Config(Settings):
         {}, "",
         "Runs by name, each with its `start` and what differs from `folding`; without any, one run named `reference`.",
     )  # fmt: skip
+    studies: dict[str, Study] = setting(
+        {}, "", "Studies by name: runs that differ from one in a few parameters, compared with the real brains of a week."
+    )
+    calibrate: Calibration | None = setting(None, "", "A search for the parameters that meet a real brain best.")
     metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")
     report: ReportSettings = setting(ReportSettings(), "", "Figures and report.")
+    _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
 
     @field_validator("brains", mode="before")
     @classmethod
@@ -100,9 +114,29 @@ class Config(Settings):
             yield from checks.growth_problems(self.growth, start, self.brains, self.runs)
 
     @check
+    def _mesh(self) -> Iterator[Problem]:
+        if self.has("atlas", "mesh", "start") and self.mesh.sized_for == "end":
+            yield from checks.mesh_size_problems(self.growth, self.start, self.brains, self.runs)
+
+    @check
+    def _studies(self) -> Iterator[Problem]:
+        if self.has("atlas", "brains", "runs"):
+            yield from study_problems(self.studies, self.runs, self.brains)
+
+    @check
+    def _calibrate(self) -> Iterator[Problem]:
+        if self.has("atlas", "brains", "runs"):
+            yield from calibration_problems(self.calibrate, self.runs, self.brains)
+
+    @check
     def _age_reference(self) -> Iterator[Problem]:
         if self.has("atlas"):
             yield from checks.age_reference_problems(self.brains, self.metrics.age_reference)
+
+    @check
+    def _brains_of_metrics(self) -> Iterator[Problem]:
+        if self.has("atlas"):
+            yield from checks.metrics_problems(self.brains, self.metrics)
 
     def brain(self, name: str) -> Brain:
         """Returns the brain of an id; KeyError if there is none."""
@@ -110,6 +144,21 @@ class Config(Settings):
             if brain.id == name:
                 return brain
         raise KeyError(name)
+
+    @property
+    def left_out(self) -> dict[str, dict[str, Any]]:
+        """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
+        return self._left_out
+
+    def leave_out(self, rows: dict[str, dict[str, Any]]) -> "Config":
+        """Returns the configuration with rows of `participants` that can't be used."""
+        self._left_out = rows
+        return self
+
+    def without(self, names: Collection[str]) -> "Config":
+        """Returns the configuration without some brains, which is left to be finished where these are refused."""
+        kept = tuple(brain for brain in self.brains if brain.id not in names)
+        return self.model_copy(update={"brains": kept}) if names else self
 
     def measured_name(self, brains: Iterable[str]) -> str:
         """Returns the name of measured brains in figures and tables: their populations if known.
@@ -143,13 +192,30 @@ class Config(Settings):
         """The atlases with what their descriptions say, as the files lie at this moment."""
         return [UsedAtlas(section, Atlas(**read_yaml(section.description))) for section in self.atlas]
 
-    def run(self, name: str) -> FoldingSettings:
-        """Returns the complete settings of a run."""
-        return self.runs[name]
+    def run(self, name: str) -> Run:
+        """Returns the complete settings of a run, of one of a study too."""
+        return self.runs[name] if name in self.runs else self.study_runs[name]
+
+    @cached_property
+    def members(self) -> dict[str, list[Member]]:
+        """The members of each study, by its name."""
+        return members_of(
+            self.studies, self.runs, lambda run, week: all(week in self.weeks(run, brain) for brain in self.starts(run))
+        )
+
+    @cached_property
+    def study_runs(self) -> dict[str, Run]:
+        """The runs that studies have besides those of `runs`, by name."""
+        every = {member.run: member.settings for members in self.members.values() for member in members}
+        return {name: run for name, run in every.items() if name not in self.runs}
+
+    def compared_with(self, compared: Compared, brain: str) -> list[str]:
+        """Returns the ids of the brains that the runs of a study or a calibration from a brain are compared with."""
+        return real_brains(compared, self.brain(brain), self.brains)
 
     def starts(self, run: str) -> list[str]:
         """Returns the ids of the brains that a run folds, in the order of `brains`."""
-        own = self.runs[run].start
+        own = self.run(run).start
         return start_ids(self.start if own is None else own, [brain.id for brain in self.brains])
 
     @property
@@ -165,13 +231,25 @@ class Config(Settings):
 
     def weeks(self, run: str, brain: str) -> list[float]:
         """Returns the output weeks of a run from a start brain, whose own week is the first."""
-        settings = self.runs[run]
-        return output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
+        settings = self.run(run)
+        weeks = output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
+        if run in self.runs:
+            return weeks
+        compared = {
+            study.compare_week
+            for name, study in self.studies.items()
+            if run in [member.run for member in self.members[name]]
+        }
+        return sorted({*weeks, *compared})
+
+    def last_week(self, brain: str) -> float:
+        """Returns the last week that a run folds a start brain to."""
+        return max(self.runs[run].end_week for run, start in self.folded if start == brain)
 
     @property
     def growth_series(self) -> dict[str, list[str]]:
         """The ids of the brains of each series of growth rates, by its name; none where they are all of one week."""
-        kinds = {brain.id: KINDS[brain.source] for brain in self.brains}
+        kinds = {brain.id: brain.kind for brain in self.brains}
         populations = {brain.id: brain.population for brain in self.brains}
         weeks = {brain.id: brain.week for brain in self.brains}
         return growth_series(kinds, weeks, self.growth.brains, populations)
@@ -183,14 +261,50 @@ class Config(Settings):
     @property
     def age_reference(self) -> list[str]:
         """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
-        return age_reference(self.brains, self.metrics.age_reference, self.brain(self.start_brains[0]).population)
+        if not self.start_brains:
+            return []
+        start = self.brain(self.start_brains[0])
+        alike = [brain for brain in self.brains if brain.sides == start.sides]
+        return age_reference(alike, self.metrics.age_reference, start.population)
+
+    @property
+    def norm_reference(self) -> list[str]:
+        """The ids of the measured brains that centiles are of."""
+        if not self.start_brains:
+            return []
+        population = self.brain(self.start_brains[0]).population
+        return reference_brains(self.brains, self.metrics.norm_reference, population)
+
+    def regions_from(self, brain: str) -> str | None:
+        """Returns the brain whose regions a brain gets; None where no regions are given, or it has one side only."""
+        if len(self.brain(brain).sides) == 1:
+            return None
+        return nearest_given(brain, self.metrics.regions, {brain.id: brain.week for brain in self.brains})
+
+    @property
+    def scans(self) -> dict[str, list[str]]:
+        """The ids of the brains of each subject that was scanned at several weeks, by week."""
+        named = {brain.subject for brain in self.brains if brain.subject is not None}
+        found = {
+            name: sorted((b for b in self.brains if b.subject == name), key=lambda b: b.week) for name in sorted(named)
+        }
+        return {name: [brain.id for brain in brains] for name, brains in found.items() if len(brains) > 1}
+
+    def followed(self, run: str) -> list[str]:
+        """Returns the metrics that the growth of a run was made to follow, or was estimated from."""
+        settings = self.runs[run]
+        put_in = {
+            "area": settings.follow is not None or settings.growth_rate_per_s == "estimated",
+            "volume": settings.follow is not None or settings.core_growth_rate_per_s == "estimated",
+        }
+        return [metric for metric, used in put_in.items() if used]
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.
 
         The number of ranks is left out, since no result depends on it.
         """
-        settings = self.runs[run].model_dump(mode="json", exclude={"ranks", "start"})
+        settings = self.run(run).model_dump(mode="json", exclude={"ranks", "start"})
         for name, value in self._tables(run).items():
             curve = {"weeks": value.weeks} if value.weeks else {}
             settings[name] = curve | ({"map": name} if value.map is not None else {})
@@ -210,7 +324,7 @@ class Config(Settings):
 
     def _tables(self, run: str) -> dict[str, Varying]:
         """Returns the parameters of a run that are curves or maps."""
-        values = {name: getattr(self.runs[run], name) for name in VARYING}
+        values = {name: getattr(self.run(run), name) for name in VARYING}
         return {name: value for name, value in values.items() if isinstance(value, Varying)}
 
 

@@ -47,6 +47,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
     parser.add_argument("--maps", type=Path, help="maps of parameters at the mesh's vertices (HDF5)")
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument(
+        "--may-diverge",
+        action="store_true",
+        help="a run that diverges ends well with the weeks that it has reached; its summary says why",
+    )
     return parser.parse_args(arguments)
 
 
@@ -132,7 +137,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / ZONES, report)
     comm.barrier()
-    run(comm, mesh, zones, parameters, maps, arguments.out)
+    run(comm, mesh, zones, parameters, maps, arguments.out, may_diverge=arguments.may_diverge)
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:

@@ -12,6 +12,8 @@ from dolfinx.la import MatrixCSR
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from .versions import keeps_old_inverses
+
 # PETSc itself, through the library that is linked with it
 _PETSC = ctypes.CDLL(PETSc.__file__)
 BY_COLUMNS = np.arange(9).reshape(3, 3).T.ravel()
@@ -45,6 +47,7 @@ class BlockMatrix:
         j = (3 * column_map.local_to_global(columns)[:, None] + second).ravel().astype(PETSc.IntType)
         self._entries = len(i)
         self._products: PETSc.Mat | None = None
+        self._handed: PETSc.Mat | None = None  # what was returned last, where it is not the matrix itself
         # PETSc keeps the blocks of its own columns apart from the others, each by row and column
         first_row, end_row = row_map.local_range
         global_columns = column_map.local_to_global(columns)
@@ -85,7 +88,13 @@ class BlockMatrix:
             )
         )
         self._matrix.stateIncrease()
-        return self._matrix
+        if not keeps_old_inverses():
+            return self._matrix
+        if self._handed is not None:
+            self._handed.destroy()  # solvers that use it hold it
+        self._handed = self._matrix.copy()
+        self._handed.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        return self._handed
 
     def for_products(self) -> PETSc.Mat:
         """Returns the PETSc matrix of the same values, stored by blocks, for products and smoothing."""

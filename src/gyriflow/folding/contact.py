@@ -127,6 +127,8 @@ class SelfContact:
         place = np.searchsorted(self._vertices, owned).clip(max=len(self._vertices) - 1)
         self._owned_nodes = np.flatnonzero(self._vertices[place] == owned)
         self._owned_rows = place[self._owned_nodes]
+        self._gathered_rows = np.concatenate(domain.comm.allgather(self._owned_rows))
+        self._counts = [3 * count for count in domain.comm.allgather(len(self._owned_rows))]
         self._columns = domain.node_of_vertex[self._vertices]
         self._search = ipctk.LBVH()
         self._candidates = ipctk.Candidates()
@@ -183,7 +185,11 @@ class SelfContact:
 
     def _on_surface(self, local: Floats) -> Floats:
         """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""
-        return self._at_vertices(self.domain.gathered(local[: self.domain.owned])[self._vertices])
+        received = np.empty((len(self._vertices), 3))
+        self.domain.comm.Allgatherv(np.ascontiguousarray(local[self._owned_nodes]), (received, self._counts))
+        values = np.empty_like(received)
+        values[self._gathered_rows] = received
+        return self._at_vertices(values)
 
     def _at_vertices(self, at_nodes: Floats) -> Floats:
         """Returns the (s, 3) values at the vertices of the surface of contact from those at the surface's nodes."""

@@ -7,7 +7,6 @@ answer on every rank, and output needs no further communication.
 import basix.ufl
 import dolfinx
 import numpy as np
-import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
@@ -22,6 +21,7 @@ from ..geometry.tetrahedra import (
     whole_faces,
 )
 from ..units import M_PER_MM
+from .versions import create_mesh, geometry_nodes
 
 Floats = NDArray[np.float64]
 
@@ -70,15 +70,14 @@ class Domain:
         tets = mesh.tets[:, TO_DOLFINX[self.order]]
         cells = tets if comm.rank == 0 else np.empty((0, tets.shape[1]), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
-        # by keywords, whose order changed between versions; without ghost cells, the default in all of them
-        self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
+        self.mesh = create_mesh(comm, cells, points, element)
         self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", self.order, (3,)))
         nodes_of_cells = self.space.dofmap.list
         self.cells = np.ascontiguousarray(nodes_of_cells[:, FROM_DOLFINX[self.order]])
         self.owned = self.space.dofmap.index_map.size_local
         nodes = self.owned + self.space.dofmap.index_map.num_ghosts
         self._geometry_node = np.empty(nodes, dtype=np.int64)
-        self._geometry_node[nodes_of_cells.ravel()] = self.mesh.geometry.dofmap.ravel()
+        self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes(self.mesh).ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
         self.part = connected_parts(mesh)
         self._counts = [3 * owned for owned in comm.allgather(self.owned)]

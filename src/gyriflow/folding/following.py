@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ..geometry.triangles import TriangleMesh, area, signed_volume
 from ..mechanics.steering import FIRST_SHARE, Aim, GrowthRates, realised_share, steered_rates
-from ..parameters.folding import FoldingParameters
+from ..parameters.folding import STRAIN, FoldingParameters
 from ..parameters.varying import Maps, Varying
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
+from .memory import unpacked
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -54,7 +55,9 @@ class Step:
     before, aim
         The size at the step's start and that to be reached at its end, None where growth is prescribed.
     rates
-        The rates that were set.
+        The rates that were set, as they are over the whole step.
+    at_start
+        What they are at its start; None where the step takes them as constant.
     realised
         Part of tangential growth that turns into area, as taken for this step.
     """
@@ -63,6 +66,7 @@ class Step:
     before: Size
     aim: Size | None = None
     rates: GrowthRates | None = None
+    at_start: GrowthRates | None = None
     realised: float = FIRST_SHARE
 
     def row(self, after: Size, step_s: float) -> dict[str, Any]:
@@ -71,6 +75,11 @@ class Step:
         if self.aim is None or self.rates is None:
             return sizes
         share = realised_share(self.realised, self.rates.tangential, self.before.area_mm2, after.area_mm2, step_s)
+        if self.at_start is not None:
+            sizes |= {
+                "growth_rate_at_start_per_s": self.at_start.tangential,
+                "core_growth_rate_at_start_per_s": self.at_start.core,
+            }
         return sizes | {
             "area_aim_cm2": self.aim.area_mm2 * CM2_PER_MM2,
             "volume_aim_ml": self.aim.volume_mm3 * ML_PER_MM3,
@@ -95,7 +104,7 @@ def missed_curves(row: Mapping[str, Any]) -> str:
 def size_of(positions_mm: Floats, zones: Zones) -> Size:
     """Returns the size of a brain from the (n, 3) positions of its mesh in mm."""
     return Size(
-        area(TriangleMesh(positions_mm, zones.cortex_facets)), signed_volume(TriangleMesh(positions_mm, zones.facets))
+        area(TriangleMesh(positions_mm, zones.measured_facets)), signed_volume(TriangleMesh(positions_mm, zones.facets))
     )
 
 
@@ -129,13 +138,45 @@ def following_step(
         min(before.area_mm2 * thickness / before.volume_mm3, MOST_CORTEX),
         realised,
         poisson_ratio=p.poisson_ratio,
+        isotropic=bool(p.regional_strain),
         bounds=(-FASTEST_PER_S if p.allow_negative_growth else 0.0, FASTEST_PER_S),
     )
-    regional = map_at(p.regional_growth, end_week)
-    values = {"growth_rate_per_s": rates.tangential, "core_growth_rate_per_s": rates.core}
-    if regional is not None:
-        values = {name: Varying(weeks={end_week: rate}, map=regional) for name, rate in values.items()}  # type: ignore[misc]
-    return Step(p.model_copy(update=values), before, aim, rates, realised)
+    at_start = rates_at_start(rates, step_s, last) if p.time_scheme == "adams-bashforth" else None
+    given = at_start or rates
+    values: dict[str, Any] = {}
+    for name, rate, maps_by_week in (
+        ("growth_rate_per_s", given.tangential, p.regional_growth_of_cortex or p.regional_growth),
+        ("core_growth_rate_per_s", given.core, p.regional_growth),
+    ):
+        regional = map_at(maps_by_week, end_week)
+        values[name] = rate if regional is None else Varying(weeks={end_week: rate}, map=regional)
+    return Step(p.model_copy(update=values), before, aim, rates, at_start, realised)
+
+
+def rates_at_start(rates: GrowthRates, step_s: float, last: Mapping[str, Any]) -> GrowthRates:
+    """Returns the rates at a step's start with which two-step Adams-Bashforth takes the given ones over the step.
+
+    The scheme goes by (1 + r/2) a − r/2 a_before, r the step's length over that of the one before, and velocities are
+    linear in the rates. So a = (wanted + r/2 a_before)/(1 + r/2): between the two, in the bounds of both, and without
+    a swing, since a third of an error at most goes on to the next step where steps are equal.
+
+    Parameters
+    ----------
+    last
+        Row of the step table of the step before, empty where there was none.
+    """
+    if not last:
+        return rates
+    part = step_s / last["dt_s"] / 2
+    tangential = (rates.tangential + part * last["growth_rate_at_start_per_s"]) / (1 + part)
+    core = (rates.core + part * last["core_growth_rate_at_start_per_s"]) / (1 + part)
+    return GrowthRates(tangential, core, rates.limited)
+
+
+def growing_at_start(p: FoldingParameters, positions_mm: Floats, zones: Zones, maps: Maps) -> FoldingParameters:
+    """Returns the parameters of a run with the growth of its first step, for (n, 3) positions of its start mesh."""
+    start = size_of(positions_mm, zones)
+    return following_step(p, start, start, 0.0, p.step_s, {}, maps).parameters
 
 
 def joined(curve: Any, at_start: float, start_week: float, week: float) -> float:
@@ -155,6 +196,18 @@ def value_on(curve: Any, week: float) -> float:
         return float(np.exp(np.interp(week, weeks, logs)))
     i, j = (0, 1) if week < weeks[0] else (-1, -2)
     return float(np.exp(logs[i] + (logs[i] - logs[j]) / (weeks[i] - weeks[j]) * (week - weeks[i])))
+
+
+def strain_at(p: FoldingParameters, maps: Maps, week: float) -> Floats | None:
+    """Returns the (6, n) measured strain per week that holds at a week, None where growth has no directions."""
+    name = map_at(p.regional_strain, week)
+    return None if name is None else np.stack([maps[f"{name}_{part}"] for part in STRAIN])
+
+
+def undone(strain: Floats) -> Floats:
+    """Returns the (..., 3, 3) inverse of growth by small (..., 6) strains, which leaves volumes as they are."""
+    inverse = np.linalg.inv(np.eye(3) + unpacked(strain))
+    return np.asarray(inverse / np.cbrt(np.linalg.det(inverse))[..., None, None])
 
 
 def map_at(maps: Mapping[float, str], week: float) -> str | None:

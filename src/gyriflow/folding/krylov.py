@@ -1,5 +1,6 @@
 """PETSc's linear solvers as the folding wants them, and when a kept preconditioner has served its time."""
 
+import ctypes
 from collections.abc import Iterable
 
 import numpy as np
@@ -7,6 +8,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from .multigrid import OrderHierarchy
+
+# PETSc itself, through the library that is linked with it
+_PETSC = ctypes.CDLL(PETSc.__file__)
 
 SETUP = 70.0
 """What a new preconditioner costs, in iterations."""
@@ -118,6 +122,40 @@ def smooth_with(krylov: PETSc.KSP, products: PETSc.Mat, smoothing: PETSc.Mat) ->
     below = multigrid.getMGCoarseSolve().getPC()
     if below.getType() == "gamg":
         _store_by_blocks(below, range(1, below.getMGLevels()))
+
+
+BAND = 0.1, 1.1
+"""Bounds of what Chebyshev's smoother takes on, in largest eigenvalues as they are estimated: PETSc's defaults."""
+
+
+def estimate_bounds(krylov: PETSc.KSP) -> None:
+    """Has the smoother of the finest level estimate its eigenvalue bounds at its next solve, as PETSc does by default."""
+    real = ctypes.c_double
+    _PETSC.KSPChebyshevEstEigSet(_finest_smoother(krylov), real(0.0), real(BAND[0]), real(0.0), real(BAND[1]))
+
+
+def keep_bounds(krylov: PETSc.KSP) -> None:
+    """Has the smoother of the finest level keep the bounds that it has estimated in the last solve.
+
+    PETSc would estimate them anew for each matrix, in ten products. They hold as long as the preconditioner does: what
+    deformation changes is within the tenth that is added, and terms of contact have no eigenvalue above 1 (see
+    `tangent.Tangent.smoothing`).
+    """
+    smoother = _finest_smoother(krylov)
+    address = ctypes.c_void_p()
+    _PETSC.KSPChebyshevEstEigGetKSP(smoother, ctypes.byref(address))
+    if not address.value:  # kept already
+        return
+    largest, least = ctypes.c_double(), ctypes.c_double()
+    code = _PETSC.KSPComputeExtremeSingularValues(address, ctypes.byref(largest), ctypes.byref(least))
+    if code == 0 and np.isfinite(largest.value) and largest.value > 0:
+        low, high = (part * largest.value for part in BAND)
+        _PETSC.KSPChebyshevSetEigenvalues(smoother, ctypes.c_double(high), ctypes.c_double(low))
+
+
+def _finest_smoother(krylov: PETSc.KSP) -> ctypes.c_void_p:
+    multigrid = krylov.getPC()
+    return ctypes.c_void_p(multigrid.getMGSmoother(multigrid.getMGLevels() - 1).handle)
 
 
 def _store_by_blocks(multigrid: PETSc.PC, levels: Iterable[int]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import SolverError
-from .krylov import Wear, new_krylov, smooth_with
+from .krylov import Wear, estimate_bounds, keep_bounds, new_krylov, smooth_with
 from .problem import Problem
 from .tangent import Tangent
 
@@ -61,6 +61,11 @@ class LinearLadder:
 
     def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
         return new_krylov(self.problem.domain.comm, method, preconditioner, self.max_iterations, self.problem.hierarchy)
+
+    def _renew_cg(self) -> None:
+        """Makes conjugate gradients anew: in PETSc 3.25 a solver that is set up again keeps some of the old smoother."""
+        self._cg.destroy()
+        self._cg = self._new_krylov("cg", "gamg")
 
     def solve(
         self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
@@ -136,6 +141,7 @@ class LinearLadder:
                 return reason
             count.rung = max(count.rung, REBUILT)
         system.tangent.whole().setNearNullSpace(self.problem.near_null_space())
+        self._renew_cg()
         reason, iterations = system.run(self._cg, reuse=False, fast=not shifted)
         count.iterations += iterations
         self._wear.renew()
@@ -203,10 +209,15 @@ class _System:
             matrix.setNearNullSpace(self.problem.near_null_space())
             self.problem.hierarchy.renew(multigrid, matrix)
         try:
-            if fast:
+            if krylov.getType() == "cg":
                 krylov.setUp()
-                smooth_with(krylov, tangent.products, tangent.smoothing)
+                if fast:
+                    smooth_with(krylov, tangent.products, tangent.smoothing)
+                if not (fast and reuse):
+                    estimate_bounds(krylov)
             krylov.solve(self.residual, self.direction)
+            if fast:
+                keep_bounds(krylov)
         except PETSc.Error:  # a factorisation that broke down
             return 0, 0
         self.direction.scale(-1.0)

@@ -68,7 +68,9 @@ def layers_at(
         value_at(rate, week, maps)
         for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
     )
-    dg, dr = growth_increments(w, growth, tangential, radial, core, step_s)
+    # where directions are measured, the rates are those of volume
+    across = tangential if p.regional_strain else 0.0
+    dg, dr = growth_increments(w, growth, tangential, radial, core, step_s, across=across)
     return Layers(
         weight=w,
         mu=value_at(p.shear_modulus_core_pa, week, maps) * (1 - w)

@@ -142,9 +142,9 @@ class NewtonSolver:
                     expected=f"at most {tolerance:.2e} N",
                 )
             count.newton += 1
-            if tangent is None or norm > NEAR * tolerance or norm > before / 4:
-                tangent = problem.tangent()
             slow = before / 2 < norm <= SLOW * tolerance
+            if tangent is None or norm > NEAR * tolerance or norm > before / 4:
+                tangent = problem.tangent(may_keep=not slow)
             reduction = self._reduction(norm, before, tolerance)
             linear = self.ladder.solve(tangent, self._residual, self._direction, reduction, convexify=not slow)
             count.krylov += linear.iterations

@@ -35,6 +35,9 @@ Floats = NDArray[np.float64]
 FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""
 
+LINEAR = 0.03
+"""Part by which elastic forces may change otherwise than a tangent foretells, for it to serve another iteration."""
+
 
 class Contribution(Protocol):
     """A further part of the energy, such as contact between folds; all of it at the problem's present displacement."""
@@ -148,8 +151,14 @@ class Problem:
         self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
         self.hierarchy = OrderHierarchy(domain, fixed) if domain.order == 2 else None
         self._sum: SumOperator | None = None
+        self._present: Tangent | None = None
+        self._elastic: tuple[PETSc.Mat, PETSc.Mat] | None = None  # its elastic part, as a whole and for products
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
+        # elastic forces last asked for; displacement and forces when the tangent was; for products
+        self._forces, self._known_u, self._known_forces, self._change, self._product = (
+            self.new_vector() for _ in range(5)
+        )
         self._motions: RigidMotions | None = None
         self._free_operator = FreeOperator(self.vector) if self.free else None
         self.mesh_moved(domain.part)
@@ -170,6 +179,7 @@ class Problem:
         Where the body is unconstrained, its rigid motions are taken out of each of the parts that the (n,) numbers of
         all vertices name.
         """
+        self._elastic = None
         if self._free_operator is not None:
             self._motions = RigidMotions(self.domain, part)
             self._free_operator.set_motions(self._motions)
@@ -195,11 +205,13 @@ class Problem:
 
     def set_layers_at_points(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
         """Sets shear modulus (Pa) and growth increments (c, q), and unit normals (c, q, 3), at integration points."""
+        self._elastic = None
         for function, values in ((self._mu, mu), (self._dg, dg), (self._dr, dr), (self._N, normals)):
             set_at_points(function, values)
 
     def set_stretch(self, V: Floats) -> None:
         """Sets the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
+        self._elastic = None
         set_at_points(self._V, V)
 
     def outcome(self, name: Literal["deformation", "elastic", "stress"]) -> Floats:
@@ -236,6 +248,8 @@ class Problem:
     def residual(self, out: PETSc.Vec) -> float:
         """Assembles the residual in N into `out`, zero where the displacement is fixed, and returns its norm."""
         self._elastic_residual(out)
+        out.array[self._fixed_owned] = 0.0
+        out.copy(self._forces)
         for part in self.contributions:
             part.add_residual(out)
         out.array[self._fixed_owned] = 0.0
@@ -250,19 +264,42 @@ class Problem:
         dolfinx.fem.petsc.assemble_vector(out, self._residual)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
-    def tangent(self) -> Tangent:
-        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed."""
+    def tangent(self, *, may_keep: bool = False) -> Tangent:
+        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
+
+        Terms of the contributions are those of the present displacement. With `may_keep` the elastic part may be that
+        of an earlier displacement in the same step, where it has foretold how forces changed since it was last asked
+        for; the residual must have been asked for at the present displacement then, and at that one.
+        """
         # petsc4py keeps what several ranks share until all of them agree to let go of it
         PETSc.garbage_cleanup(self.domain.comm)
-        matrix, products = self._elastic_tangent()
+        if self._present is not None:
+            self._present.set_parts(())  # else its further blocks would stay on the diagonal
+        if self._elastic is None or not (may_keep and self._foretold()):
+            self._elastic = self._elastic_tangent()
+        self.vector.copy(self._known_u)
+        self._forces.copy(self._known_forces)
+        matrix, products = self._elastic
         if not (self.contributions or self.summed):
-            return Tangent(matrix, products, ())
+            self._present = Tangent(matrix, products, ())
+            return self._present
         if self._sum is None:
             # one object for all iterates, since multigrid keeps the first it is given
             self._sum = SumOperator(products)
             self._sum_matrix = self._sum.as_matrix()
         parts = self._further_parts(convex=False)
-        return Tangent(matrix, self._sum_matrix, parts, NODES_PER_TERM[self.domain.order])
+        self._present = Tangent(matrix, self._sum_matrix, parts, NODES_PER_TERM[self.domain.order])
+        return self._present
+
+    def _foretold(self) -> bool:
+        """Returns whether the kept elastic tangent foretells how elastic forces changed since it was last asked for."""
+        assert self._elastic is not None
+        self._change.waxpy(-1.0, self._known_u, self.vector)
+        self._elastic[1].mult(self._change, self._product)
+        foretold = self._product.norm()
+        self._product.axpy(1.0, self._known_forces)
+        self._product.axpy(-1.0, self._forces)
+        return bool(self._product.norm() <= LINEAR * foretold)
 
     def _elastic_tangent(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Returns the tangent of all but the contributions, as a whole and for products."""

@@ -17,7 +17,6 @@ from .checkpoint import State
 from .ladder import NotConvergedError
 from .newton import NewtonSolver, StepCount
 from .problem import Floats, Problem
-from .tangent import Tangent
 
 SMALL = 1e-3
 """Part of a step's growth by which the load is differenced: the error is of its square, far below all tolerances."""
@@ -43,10 +42,10 @@ class RateProblem(Problem):
             super()._elastic_residual(load)
         self._set_growth(0.0 * growth[0], 0.0 * growth[1])
         self._matrix, self._products = super()._elastic_tangent()
-        self._present: Tangent | None = None
+        self._present, self._elastic = None, None  # assembled anew, in the same place
         self._set_growth(*growth)
-        self._force, self._product = loads
-        self._force.axpy(-1.0, self._product)
+        self._force, other = loads
+        self._force.axpy(-1.0, other)
         self._force.scale(1 / (2 * SMALL))
         self._force.array[self._fixed_owned] = 0.0
         if self._motions is not None:
@@ -92,15 +91,11 @@ class RateProblem(Problem):
         self._products.mult(self.vector, out)
         out.axpy(-1.0, self._force)
 
-    def tangent(self) -> Tangent:
-        """Returns the tangent, of which only the contributions' part is made anew."""
-        if self._present is not None:
-            self._present.set_parts(())  # else its further blocks would stay on the diagonal
-        self._present = super().tangent()
-        return self._present
-
     def _elastic_tangent(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         return self._matrix, self._products
+
+    def _foretold(self) -> bool:
+        return True
 
 
 @dataclass(frozen=True, eq=False)

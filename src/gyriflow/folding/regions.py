@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..parameters.folding import FoldingParameters
 from ..parameters.terms import BRIDGE, CORE, CORTEX, LEFT, RIGHT
-from .zones import Zones
+from .zones import Zones, brain_box
 
 Floats = NDArray[np.float64]
 Tags = dict[str, NDArray[np.int32]]
@@ -52,6 +52,6 @@ def no_growth_ellipsoid(vertices: Floats, parameters: FoldingParameters) -> tupl
     p = parameters.no_growth
     if p.kind == "none":
         return None
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low, high = brain_box(vertices, parameters.side)
     shift = np.array([0.0, p.shift_y, p.shift_z])
     return (low + high) / 2 + shift * (high - low), np.array(p.semi_axes) * (high - low)

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
+from ..parameters.terms import ELEMENTS_NEEDED
 from .domain import Domain
-from .zone_checks import NEEDED
 
 Floats = NDArray[np.float64]
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
@@ -55,9 +55,10 @@ def resolution_warning(rows: Sequence[dict], order: int) -> str:
     # not a number where no element has its centre in the cortex: none lies through it
     found = [0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]]
     now, before = found[-1], found[0] if len(found) > 1 else math.inf
-    if not now < NEEDED[order] <= before:
+    if not now < ELEMENTS_NEEDED[order] <= before:
         return ""
     return (
-        f"from GW {rows[-1]['week']:.2f} on fewer than {NEEDED[order]:g} elements lie through the cortex, "
-        "since it grows: folds may be mesh noise; a smaller mesh.surface_edge_mm resolves it to a later week"
+        f"from GW {rows[-1]['week']:.2f} on fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the cortex, "
+        "since it grows: folds may be mesh noise; "
+        "a smaller mesh.surface_edge_mm, or mesh.sized_for: end, resolves it to a later week"
     )

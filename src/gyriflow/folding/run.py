@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
@@ -28,10 +29,13 @@ def run(
     parameters: FoldingParameters,
     maps: Maps,
     out: Path,
+    *,
+    may_diverge: bool = False,
 ) -> None:
     """Folds a brain from the first to the last output week and writes frames, step table and summary into `out`.
 
-    Goes on from a checkpoint in `out` that belongs to this mesh and these parameters.
+    Goes on from a checkpoint in `out` that belongs to this mesh and these parameters. A run that diverges raises
+    SolverError; where it `may_diverge` it ends with the output weeks that it has reached, and its summary says why.
     """
     began = time.monotonic()
     folding = Folding(comm, mesh, zones, parameters, maps)
@@ -49,11 +53,17 @@ def run(
         contact, elements = folding.contact_fields(parameters.fields), folding.element_fields(parameters.fields)
         if comm.rank == 0:
             save_frame(folder, weeks[0], start, start, zones, folding.present, maps, contact, elements)
-    first, resumed = len(state.rows), time.monotonic()
+    first, resumed, diverged = len(state.rows), time.monotonic(), None
     for week in weeks[1:]:
         until = seconds_to(week, parameters)
-        while state.time_s < until * (1 - 1e-12):
-            state = advance(folding, state, until)
+        while state.time_s < until * (1 - 1e-12) and diverged is None:
+            try:
+                state = advance(folding, state, until)
+            except SolverError as error:
+                if not may_diverge:
+                    raise
+                diverged = str(error)
+                break
             arrived = until - state.time_s < 1e-9 * until
             asked = parameters.fields if arrived else ()
             contact, elements = folding.contact_fields(asked), folding.element_fields(asked)
@@ -70,6 +80,8 @@ def run(
     processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
     if comm.rank == 0:
         steps = [row["seconds"] for row in state.rows]
+        reached = parameters.start_week + state.time_s / SECONDS_PER_GW
+        weeks = tuple(week for week in weeks if week <= reached + 1e-9)
         summary = {
             "tets": len(mesh.tets),
             "dofs": 3 * len(mesh.vertices),
@@ -80,15 +92,19 @@ def run(
             "krylov": sum(row["krylov"] for row in state.rows),
             "seconds": time.monotonic() - began,
             "cpu_seconds": processor,
-            "seconds_per_step": float(np.median(steps)),
+            "seconds_per_step": float(np.median(steps)) if steps else math.nan,
             "peak_memory_MiB": memory,
-            "min_J": min(row["min_J"] for row in state.rows),
+            "min_J": min((row["min_J"] for row in state.rows), default=math.nan),
             "weeks": list(weeks),
+            "reached_week": reached,
+            "diverged": diverged,
             "resumed_after_step": first,
         }
         finish(out, folder, mesh.tets, weeks, state.rows, summary)
         shutil.rmtree(folder)
-        say(f"folded to GW {parameters.end_week:g} in {len(steps)} steps, {summary['seconds']:.0f} s")
+        if diverged is not None:
+            say(f"warning: the run diverges and ends at GW {reached:.3f}: {diverged}")
+        say(f"folded to GW {reached:g} in {len(steps)} steps, {summary['seconds']:.0f} s")
 
 
 def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:

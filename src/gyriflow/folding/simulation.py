@@ -22,7 +22,7 @@ from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
 from .element_layers import Layered, linear_layers, quadratic_layers
-from .following import following_step, size_of
+from .following import following_step, growing_at_start, size_of, strain_at, undone
 from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
@@ -83,7 +83,7 @@ class Folding:
             MATERIALS[parameters.material](parameters.poisson_ratio),
             penalty_pa_per_m=parameters.contact.penalty_pa_per_m if by_planes else 0.0,
             quadrature_degree=quadrature_degree,
-            remembers_stress=self._remembers,
+            remembers_stress=self._remembers or bool(parameters.regional_strain),
         )
         self.contact: SelfContact | None = None
         if parameters.contact.kind == "global":
@@ -104,8 +104,7 @@ class Folding:
         self._through = math.nan  # elements through the cortex in the last step
         self._start_size = size_of(mesh.vertices, zones)
         # those of the last step, with its rates of growth
-        growth = following_step(parameters, self._start_size, self._start_size, 0.0, parameters.step_s, {}, self.maps)
-        self.present = growth.parameters
+        self.present = growing_at_start(parameters, mesh.vertices, zones, self.maps)
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         self._through, self._part = math.nan, self.domain.part  # of its layers
@@ -148,6 +147,16 @@ class Folding:
             return unpacked(unstretched(len(self.domain.cells), len(self.problem.points.weights)))
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
+
+    def _directions(self, state: State, step_s: float) -> Floats | None:
+        """Returns the (c, q, 3, 3) inverse of a step's growth in measured directions, None where there are none."""
+        step_gw = step_s / SECONDS_PER_GW
+        week = self.parameters.start_week + state.time_s / SECONDS_PER_GW + step_gw
+        strain = strain_at(self.parameters, self._local_maps, week)
+        if strain is None:
+            return None
+        at_points = (strain * self._growth)[:, self.domain.cells] @ self.problem.points.bounded.T
+        return undone(step_gw * np.moveaxis(at_points, 0, -1))
 
     def element_fields(self, wanted: Iterable[str]) -> dict[str, Floats]:
         """Returns the fields of the last step that are among `wanted`, (m,) for all elements, equal on every rank.
@@ -296,8 +305,10 @@ class Folding:
         growth = following_step(self.parameters, self._start_size, before, state.time_s, step_s, last, self.maps)
         self.present = growth.parameters
         kept = self._kept_stretch(state, step_s)
-        if kept is not None:
-            problem.set_stretch(kept)
+        directions = self._directions(state, step_s)
+        stretches = [part for part in (kept, directions) if part is not None]
+        if stretches:
+            problem.set_stretch(stretches[0] if len(stretches) == 1 else stretches[0] @ stretches[1])
         count, rate = self._solve(state, step_s)
         ratios = problem.volume_ratios()
         energy = self._energy()

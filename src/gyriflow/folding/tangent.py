@@ -10,6 +10,8 @@ from contextlib import contextmanager
 import numpy as np
 from petsc4py import PETSc
 
+from .versions import keeps_old_inverses
+
 NODES_PER_TERM = {1: 4, 2: 12}
 """Nodes that a single term of a contribution couples at most, by the order of the elements: a corner and a face, or two
 edges, of which each vertex follows the six nodes of a curved face."""
@@ -74,6 +76,8 @@ class Tangent:
 
     def set_parts(self, parts: Sequence[PETSc.Mat]) -> None:
         """Takes other parts in the place of those there are; what acts like the whole must know of them already."""
+        if self._raised and keeps_old_inverses():
+            self.smoothing = self.smoothing.copy()
         for nodes, blocks in self._raised:
             add_block_diagonal(self.smoothing, nodes, -blocks)
         self._parts = parts
@@ -100,17 +104,21 @@ class Tangent:
             yield
             return
         matrix = self.whole()
+        # a copy: PETSc may have kept the inverses of the diagonal's blocks
+        self._whole = matrix.copy()
+        self._whole.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         diagonal = matrix.getDiagonal()
         raised = diagonal.copy()
         raised.abs()
         raised.aypx(part, diagonal)
-        matrix.setDiagonal(raised)
+        self._whole.setDiagonal(raised)
         raised.destroy()
+        diagonal.destroy()
         try:
             yield
         finally:
-            matrix.setDiagonal(diagonal)
-            diagonal.destroy()
+            self._whole.destroy()
+            self._whole = matrix
 
 
 def block_diagonal(matrix: PETSc.Mat) -> tuple[np.ndarray, np.ndarray]:

@@ -7,14 +7,11 @@ from ..errors import InputError, MeshError
 from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
-from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ZONE_NAMES
+from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ELEMENTS_NEEDED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
-NEEDED = {1: 2.0, 2: 0.9}
-"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md): two linear
-ones, or about one quadratic."""
 NAMES_OF_NEEDED = {1: "two elements", 2: "one quadratic element"}
-"""What the elements that `NEEDED` asks for are called, by their order."""
+"""What the elements that `ELEMENTS_NEEDED` asks for are called, by their order."""
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
 
@@ -28,7 +25,7 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
     pial = TriangleMesh(mesh.vertices, zones.facets)
     areas = face_areas(pial)
     centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
-    clamped = np.isin(zones.facet_zone, (CLAMPED, BASE))
+    clamped = np.isin(zones.facet_zone, (CLAMPED, BASE, *((MEDIAL_WALL,) if zones.wall_held else ())))
     sides = {"left": centroid_x < zones.fissure_x_mm, "right": centroid_x >= zones.fissure_x_mm}
     return {
         "zones": {
@@ -49,7 +46,7 @@ def zone_warnings(report: dict) -> list[str]:
     """Returns what a user should know of the zones, from their report, before trusting a run."""
     warnings = []
     through, order = report["elements_through_cortex"], report["order"]
-    if through < NEEDED[order]:
+    if through < ELEMENTS_NEEDED[order]:
         warnings.append(
             f"fewer than {NAMES_OF_NEEDED[order]} through the cortex ({through:.2f}): folds may be mesh noise"
         )
@@ -95,7 +92,8 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
                 remedy="Move the nodes on their edges towards the middles of the edges.",
             )
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
-    if not low < zones.fissure_x_mm < high:
+    alone = (zones.facet_zone == MEDIAL_WALL).any()
+    if not alone and not low < zones.fissure_x_mm < high:
         raise InputError(
             "the fissure lies outside the brain",
             found=f"fissure_x_mm {zones.fissure_x_mm:.2f}",
@@ -110,7 +108,8 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
         raise InputError("no vertex grows", remedy="Make the no-growth ellipsoid smaller (folding.no_growth).")
     if zones.free:
         return
-    clamped = zones.vertices_of(CLAMPED, BASE)
+    # a wall that slides holds what else would turn away
+    clamped = zones.vertices_of(CLAMPED, BASE, *((MEDIAL_WALL,) if zones.wall_held or zones.anchors else ()))
     if not len(clamped):
         raise InputError(
             "no facet is clamped, so the brain would drift",

@@ -18,14 +18,19 @@ from ..parameters.terms import (
     FLAT_CUTS,
     FREE,
     LEFT_CONTACT,
+    MEDIAL_WALL,
     RIGHT_CONTACT,
+    SHAPE_CUTS,
     SIDE_X,
     SIDE_Y,
+    Side,
 )
 from .layers import PialSearch
 
 FLAT = 0.01
 """Part of the extent within which vertices of a flat base or side lie."""
+WALL_MM, WALL_COSINE = 2.0, 0.7
+"""The medial wall of a single hemisphere: how far it lies from its innermost place at most, and faces the midline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +43,7 @@ class Zones:
         Pial facets, outward, as vertex indices; the four triangles of a quadratic element's face follow each other.
     facet_zone : (f,) int
         FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES; BASE, SIDE_X or SIDE_Y where tissue is cut off
-        flat and there is no cortex.
+        flat and there is no cortex; MEDIAL_WALL where the only hemisphere faces the one that is not there.
     growth : (n,) float
         1 where tissue grows, 0 where it does not.
     fissure_x_mm : float
@@ -47,6 +52,11 @@ class Zones:
         The plane that the left, and that the right hemisphere may not pass.
     free : bool
         Whether nothing is fixed on purpose, so that rigid motions are to be removed.
+    wall_held : bool
+        Whether the medial wall is clamped; else it stays in its plane.
+    anchors : (k,) int, (k, 3) bool
+        Vertices, and which of their components are fixed beside the zones', so that a body whose only support is a
+        sliding wall makes no rigid motion. They take no force: as few are fixed as there are such motions.
     """
 
     facets: NDArray[np.int64]
@@ -55,6 +65,8 @@ class Zones:
     fissure_x_mm: float
     planes_mm: tuple[float, float]
     free: bool = False
+    wall_held: bool = False
+    anchors: tuple[NDArray[np.int64], NDArray[np.bool_]] | None = None
 
     def vertices_of(self, *zones: int) -> NDArray[np.int64]:
         """Returns the vertices of the facets of some zones, each once."""
@@ -68,8 +80,13 @@ class Zones:
 
     @property
     def cortex_facets(self) -> NDArray[np.int64]:
-        """The (c, 3) facets under which the cortex lies: all but flat cuts."""
+        """The (c, 3) facets under which the cortex lies: all but flat cuts and the wall of a single hemisphere."""
         return self.facets[~np.isin(self.facet_zone, FLAT_CUTS)]
+
+    @property
+    def measured_facets(self) -> NDArray[np.int64]:
+        """The (k, 3) facets of the pial surface as its area is measured: with the medial wall, without shapes' cuts."""
+        return self.facets[~np.isin(self.facet_zone, SHAPE_CUTS)]
 
     @property
     def fixed(self) -> NDArray[np.bool_]:
@@ -78,14 +95,60 @@ class Zones:
         fixed[self.vertices_of(CLAMPED, BASE)] = True
         fixed[self.vertices_of(SIDE_X), 0] = True
         fixed[self.vertices_of(SIDE_Y), 1] = True
+        wall = self.vertices_of(MEDIAL_WALL)
+        fixed[wall, 0] = True
+        fixed[wall] |= self.wall_held
+        if self.anchors is not None:
+            vertices, components = self.anchors
+            fixed[vertices] |= components
         return fixed
 
 
-def inside_ellipsoid(
-    vertices: NDArray, shift_y: float, shift_z: float, semi_axes: tuple[float, float, float]
-) -> NDArray[np.bool_]:
-    """Returns which vertices lie in the ellipsoid of no growth; all parameters are fractions of the extents."""
+def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns the least and the greatest coordinates (3,) of a brain, for one hemisphere alone with its mirror image.
+
+    The mirror is at the innermost place of the hemisphere `side`.
+    """
     low, high = vertices.min(axis=0), vertices.max(axis=0)
+    width = high[0] - low[0]
+    if side == "left":
+        high[0] += width
+    elif side == "right":
+        low[0] -= width
+    return low, high
+
+
+def medial_wall_facets(mesh: TetrahedralMesh, facets: NDArray[np.int64], side: Side) -> NDArray[np.bool_]:
+    """Returns the (f,) mask of the facets of the only hemisphere that face the other side, near its innermost place."""
+    x = mesh.vertices[:, 0] if side == "left" else -mesh.vertices[:, 0]
+    facing = face_normals(TriangleMesh(mesh.vertices, facets))[:, 0] * (1.0 if side == "left" else -1.0)
+    near = (x[facets] > x.max() - WALL_MM).all(axis=1)
+    return on_whole_faces(near & (facing > WALL_COSINE), mesh.order)
+
+
+def _wall_anchors(
+    vertices: NDArray[np.float64], wall: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Returns the vertices of a wall in a plane x = const, and components, whose fixing leaves it no rigid motion."""
+    places = vertices[wall][:, 1:]
+    middle = int(((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin())
+    away = int(np.abs(places[:, 0] - places[middle, 0]).argmax())
+    # shifts along y and z, and the turn about x
+    return wall[[middle, away]], np.array([[False, True, True], [False, False, True]])
+
+
+def inside_ellipsoid(
+    vertices: NDArray,
+    shift_y: float,
+    shift_z: float,
+    semi_axes: tuple[float, float, float],
+    side: Side | None = None,
+) -> NDArray[np.bool_]:
+    """Returns which vertices lie in the ellipsoid of no growth; all parameters are fractions of the extents.
+
+    The extents of a brain of one hemisphere are those with its mirror image.
+    """
+    low, high = brain_box(vertices, side)
     extent = high - low
     centre = (low + high) / 2 + np.array([0.0, shift_y, shift_z]) * extent
     return (((vertices - centre) / (np.array(semi_axes) * extent)) ** 2).sum(axis=1) <= 1
@@ -121,6 +184,8 @@ def find_zones(
     semi_axes: tuple[float, float, float],
     support: str = "ellipsoid",
     grows_everywhere: bool = False,
+    side: Side | None = None,
+    wall_held: bool = False,
 ) -> Zones:
     """Returns the zones of a brain in RAS+ mm.
 
@@ -138,13 +203,21 @@ def find_zones(
         "ellipsoid", "base", "box" or "free", as in `FoldingParameters`.
     grows_everywhere
         Whether all tissue grows, that in the ellipsoid and that between the planes too.
+    side
+        The only hemisphere that there is. Its wall towards the other one is MEDIAL_WALL, and the plane that it may not
+        pass is that of the wall.
+    wall_held
+        Whether that wall is clamped; else it slides in its plane.
     """
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
     left_plane, right_plane = fissure_x_mm - gap_mm / 4, fissure_x_mm + gap_mm / 4
-    reach = np.ptp(x) / 8
+    if side is not None:
+        left_plane = right_plane = float(x.max() if side == "left" else x.min())
+    low, high = brain_box(mesh.vertices, side)
+    reach = (high - low)[0] / 8
     facet_x = x[facets]
-    still = inside_ellipsoid(mesh.vertices, shift_y, shift_z, semi_axes)
+    still = inside_ellipsoid(mesh.vertices, shift_y, shift_z, semi_axes, side)
 
     def faces_where(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Returns the facets on faces of elements at all of whose vertices something holds."""
@@ -160,12 +233,20 @@ def find_zones(
     if support in ("base", "box"):
         cuts = flat_cuts(mesh, facets, sides=support == "box")
         zone[cuts != FREE] = cuts[cuts != FREE]
+    anchors = None
+    if side is not None:
+        zone[medial_wall_facets(mesh, facets, side)] = MEDIAL_WALL
+        wall = np.unique(facets[zone == MEDIAL_WALL])
+        if support == "free" and not wall_held and len(wall):
+            anchors = _wall_anchors(mesh.vertices, wall)
 
     growth = np.ones(len(mesh.vertices))
     if not grows_everywhere:
         growth[still] = 0.0
-        growth[bridge_vertices(mesh, facets, left_plane, right_plane)] = 0.0
-    return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), support == "free")
+        if side is None:
+            growth[bridge_vertices(mesh, facets, left_plane, right_plane)] = 0.0
+    free = support == "free" and side is None
+    return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, wall_held, anchors)
 
 
 def bridge_vertices(
@@ -193,4 +274,6 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         semi_axes=p.no_growth.semi_axes,
         support=p.support,
         grows_everywhere=p.no_growth.kind == "none",
+        side=p.side,
+        wall_held=p.medial_wall == "held",
     )

@@ -128,7 +128,10 @@ def fitted(
     weeks, values
         Gestational weeks, at least two different ones, and positive sizes; several brains may share a week.
 
-    InputError for other values, and where the sizes shrink and that is not allowed.
+    Raises
+    ------
+    InputError
+        For other values, and where the sizes shrink and that is not allowed.
     """
     weeks_, values_ = _checked(weeks, values, name)
     count = len(np.unique(weeks_))
@@ -227,7 +230,9 @@ def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
 
 
 def _solved(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool) -> Floats:
-    root = np.linalg.cholesky(penalty + 1e-10 * np.eye(len(penalty))).T
+    # a strong penalty has eigenvalues that should be 0 and by round-off are not
+    sizes, directions = np.linalg.eigh(penalty)
+    root = (directions * np.sqrt(np.clip(sizes, 1e-10, None))).T
     rows = np.concatenate([np.sqrt(weights)[:, None] * design, root])
     right = np.concatenate([np.sqrt(weights) * logs, np.zeros(len(root))])
     if may_shrink:

@@ -1,4 +1,4 @@
-"""What a run that follows real brains is given: curves of its size, and maps of where growth is fast or slow."""
+"""What a run that follows real brains is given of their size: curves of area and volume."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,40 +14,52 @@ Floats = NDArray[np.float64]
 
 QUANTITIES = ("area_cm2", "volume_ml")
 """Sizes that growth follows, as columns of the table of areas."""
+THICKNESS = "thickness_mm"
+"""Column of that table with the mean cortical thickness, where it is known."""
 SPACING_GW = 0.25
 """Of the weeks that a run knows a curve at."""
-SLOWEST, FASTEST = -1.0, 3.0
-"""Bounds of local growth as a multiple of the whole brain's."""
 
 
-def fits_of_series(areas: pd.DataFrame, *, may_shrink: bool = False) -> dict[str, dict[str, Fit]]:
+def fits_of_series(
+    areas: pd.DataFrame, *, until: float | None = None, may_shrink: bool = False
+) -> dict[str, dict[str, Fit]]:
     """Returns the curves through the measured sizes of each series of brains, by series and quantity.
 
     Parameters
     ----------
     areas
-        Columns series, week, area_cm2, volume_ml; series of two weeks or more.
+        Columns series, week, area_cm2, volume_ml, thickness_mm; series of two weeks or more. Where brains of less than
+        two weeks have a thickness, no curve of it is fitted; thickness may shrink.
+    until
+        The last week whose brains count; series that then have less than two weeks are left out. None for all.
     """
-    return {
-        str(name): {
-            quantity: fitted(brains["week"].tolist(), brains[quantity].tolist(), name=quantity, may_shrink=may_shrink)
-            for quantity in QUANTITIES
-        }
-        for name, brains in areas.groupby("series", sort=False)
-    }
+    if until is not None:
+        areas = areas[areas["week"] <= until]
+        areas = areas[areas.groupby("series")["week"].transform("nunique") > 1]
+    fits: dict[str, dict[str, Fit]] = {}
+    for name, brains in areas.groupby("series", sort=False):
+        fits[str(name)] = {}
+        for quantity in (*QUANTITIES, THICKNESS):
+            known = brains.dropna(subset=quantity)
+            if quantity in QUANTITIES or len(known["week"].unique()) > 1:
+                shrink = may_shrink or quantity == THICKNESS
+                curve = fitted(known["week"].tolist(), known[quantity].tolist(), name=quantity, may_shrink=shrink)
+                fits[str(name)][quantity] = curve
+    return fits
 
 
 def followed_sizes(
     follow: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float], shrink: bool
 ) -> dict[str, dict[float, float]]:
-    """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week.
+    """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week; thickness if given.
 
     Parameters
     ----------
     follow
         The settings: for each quantity `measured`, or a table of values by week.
     curves
-        Columns series, quantity, week, value of the curves through measured brains; needed where one is `measured`.
+        Columns series, known_until_gw (NaN for curves through all weeks), quantity, week, value of the curves through
+        measured brains; needed where one is `measured`.
     series
         Name of the start brain's series.
     weeks
@@ -55,17 +67,22 @@ def followed_sizes(
     shrink
         Whether a given table may shrink.
 
-    InputError where the start brain is in no series.
+    Raises
+    ------
+    InputError
+        Where the start brain is in no series.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in QUANTITIES:
+    for quantity in (*QUANTITIES, *([THICKNESS] if follow[THICKNESS] is not None else [])):
         given = follow[quantity]
         if given == "measured":
-            curve = _measured(curves, series, quantity)
+            curve = _measured(curves, series, quantity, follow["known_until_gw"])
         else:
             known = {float(week): number for week, number in given.items()}
-            curve = tabulated(list(known), list(known.values()), name=quantity, may_shrink=shrink)
+            curve = tabulated(
+                list(known), list(known.values()), name=quantity, may_shrink=shrink or quantity == THICKNESS
+            )
         sizes = value(curve, at)
         tables[quantity] = {round(float(week), 6): float(size) for week, size in zip(at, sizes, strict=True)}
     return tables
@@ -88,44 +105,30 @@ def curves_of_run(follow: Mapping[str, Any] | None, curves: pd.DataFrame | None,
     return [] if curves is None else [_measured(curves, series, name) for name in QUANTITIES]
 
 
-def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str) -> Curve:
-    """Returns the curve through the measured brains of a series; InputError where there is none."""
-    table = pd.DataFrame(columns=["series", "quantity", "week", "value"]) if curves is None else curves
-    rows = table[(table["series"] == series) & (table["quantity"] == quantity)]
+def stretch_of_surface(curves: pd.DataFrame, series: str | None, week: float, end_week: float) -> float:
+    """Returns by how much lengths on the measured brains' surface grow between two weeks, on average; at least 1.
+
+    Parameters
+    ----------
+    curves, series
+        As for `followed_sizes`.
+    """
+    first, last = value(_measured(curves, series, "area_cm2"), [week, end_week])
+    return max(1.0, float(np.sqrt(last / first)))
+
+
+def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str, until: float | None = None) -> Curve:
+    """Returns the curve through the measured brains of a series up to a week; InputError where there is none."""
+    columns = ["series", "known_until_gw", "quantity", "week", "value"]
+    table = pd.DataFrame(columns=columns) if curves is None else curves
+    known = table["known_until_gw"].isna() if until is None else table["known_until_gw"] == until
+    rows = table[known & (table["series"] == series) & (table["quantity"] == quantity)]
     if not len(rows):
         raise InputError(
             f"no measured curve of {quantity} can be followed",
-            found="the start brain is in no series of brains of two weeks or more",
+            found="the start brain is in no series of brains of two weeks or more"
+            + ("" if until is None else f" up to {until:g} GW"),
             remedy="List brains of other weeks, or give follow a table such as {area_cm2: {21: 99, 30: 252}}",
         )
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
     return Curve(weeks, values, np.zeros(len(rows)))
-
-
-def regional_map(week: float) -> str:
-    """Returns the name of the map of relative growth from a week on."""
-    return f"regional_growth_{week:05.2f}"
-
-
-def relative_growth(rates: Floats, weights: Floats, amplitude: float) -> Floats:
-    """Returns (w, n) local growth as a multiple of the whole's: 1 where all grows alike.
-
-    Parameters
-    ----------
-    rates
-        (w, n) local log growth per week in each interval.
-    weights
-        (n,) sizes that belong to the vertices.
-    amplitude
-        0 for uniform growth, 1 for differences as measured.
-
-    InputError where the whole does not grow in an interval, so that there is nothing to be a multiple of.
-    """
-    whole = np.average(rates, axis=1, weights=weights)[:, None]
-    if (whole <= 0).any():
-        raise InputError(
-            "the brain does not grow between two of the weeks, so that local growth has no measure",
-            found=f"log growth per week {whole.ravel().round(3).tolist()}",
-            remedy="Leave the brain that does not fit out of growth.brains, or set follow.regional to 0.",
-        )
-    return np.clip(1 + amplitude * (rates / whole - 1), SLOWEST, FASTEST)

@@ -16,6 +16,10 @@ FOLDING_RATES = {
 """Parameters of the folding that can be estimated, and the columns they come from."""
 
 
+TISSUES = ("tissue", "ventricles", "cortex")
+"""What labels know of the volume inside the pial surface; the volume itself contains the ventricles."""
+
+
 def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3: Sequence[float]) -> pd.DataFrame:
     """Returns the growth rates between successive weeks.
 
@@ -40,7 +44,10 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
         from_week, to_week, area_ratio (θ), rate_per_s, compound_rate_per_s, volume_ratio, core_rate_per_s,
         core_compound_rate_per_s, by ascending week.
 
-    InputError where a week is there twice, or a number is missing or not positive.
+    Raises
+    ------
+    InputError
+        Where a week is there twice, or a number is missing or not positive.
     """
     columns = {"weeks": weeks, "areas_mm2": areas_mm2, "volumes_mm3": volumes_mm3}
     values = {name: np.asarray(column, dtype=float) for name, column in columns.items()}
@@ -89,7 +96,9 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     areas
-        Columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean.
+        Columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean. Where it has
+        tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and
+        tissue_compound_rate_per_s, …, ln(V₂/V₁)/(3Δt), too; NaN where they are not known.
     """
     tables = []
     for name, brains in areas.groupby("series", sort=False):
@@ -98,6 +107,12 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
         areas_mm2, volumes_mm3 = [a / CM2_PER_MM2 for a in area_cm2], [v / ML_PER_MM3 for v in volume_ml]
         rates = growth_rates(weeks, areas_mm2, volumes_mm3)
         rates.insert(0, "series", name)
+        seconds = (rates["to_week"] - rates["from_week"]) * SECONDS_PER_GW
+        for tissue in TISSUES:
+            if f"{tissue}_ml" in brains:
+                known = brains.groupby("week")[f"{tissue}_ml"].mean().to_numpy(dtype=float)
+                rates[f"{tissue}_ratio"] = known[1:] / known[:-1]
+                rates[f"{tissue}_compound_rate_per_s"] = np.log(rates[f"{tissue}_ratio"]) / (3 * seconds)
         tables.append(rates)
     return pd.concat(tables, ignore_index=True)
 
@@ -155,7 +170,10 @@ def rate_curve(
     allow_negative
         Whether a rate may be below 0.
 
-    InputError where a rate is negative and must not be, all such intervals named.
+    Raises
+    ------
+    InputError
+        Where a rate is negative and must not be, all such intervals named.
     """
     below = rates[rates[column] < 0]
     if len(below) and not allow_negative:

@@ -39,6 +39,24 @@ def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFram
     return pd.DataFrame(rows, columns=["rule", "run", "brain", *COLUMNS.values()])
 
 
+def read_stages(folder: AnyPath) -> pd.DataFrame:
+    """Returns what the jobs of each stage took, by what their benchmark files are called, in the order of their time.
+
+    Returns
+    -------
+    DataFrame with columns stage, jobs, wall_s and cpu_s (sums over the jobs), peak_memory_MiB
+    """
+    found = sorted(Path(folder).glob("results/**/benchmarks/*.tsv"))
+    # files of registrations are called by their brains
+    names = ["register" if path.parts[-3] == "registration" else path.name.split(".")[0] for path in found]
+    table = pd.DataFrame([_measured(path) for path in found], columns=[*COLUMNS.values()]).assign(stage=names)
+    groups = table.groupby("stage")
+    stages = groups[["wall_s", "cpu_s"]].sum()
+    stages.insert(0, "jobs", groups.size())
+    stages["peak_memory_MiB"] = groups["memory_MiB"].max()
+    return stages.sort_values("cpu_s", ascending=False).reset_index()
+
+
 def _measured(path: Path) -> dict[str, float]:
     try:
         table = pd.read_csv(path, sep="\t", dtype=str)

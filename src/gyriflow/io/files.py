@@ -78,8 +78,16 @@ def read_json(path: AnyPath) -> Any:
         raise InputError(f"cannot be read as JSON: {error}", path=path) from error
 
 
+def read_text(path: AnyPath) -> str:
+    """Returns a text file; InputError where it is missing."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read as text: {error}", path=path) from error
+
+
 def write_text(path: AnyPath, text: str) -> None:
-    """Writes a text, in UTF-8."""
+    """Writes a text file."""
     with replaced(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -88,6 +96,18 @@ def write_table(path: AnyPath, table: pd.DataFrame) -> None:
     """Writes a table as CSV without its index, ten significant digits."""
     with replaced(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.10g")
+
+
+def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
+    """Returns the rows of a tab-separated table with a heading, as texts by column; InputError where it is none."""
+    try:
+        table = pd.read_csv(path, sep="\t", dtype=str, keep_default_na=False, encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read as a tab-separated table: {error}", path=path) from error
+    rows = [{str(name).strip(): value.strip() for name, value in row.items()} for row in table.to_dict("records")]
+    if not rows:
+        raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
+    return rows
 
 
 def read_table(path: AnyPath, separator: str = ",") -> pd.DataFrame:

@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import TriangleMesh, is_closed
+from ..parameters.terms import Side
 from .files import AnyPath, replaced
 from .spaces import coordinate_systems, freesurfer_space, read_freesurfer_surface, to_scanner_space
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
+STRUCTURES: dict[str, Structure] = {"left": "CortexLeft", "right": "CortexRight"}
+"""What GIFTI calls the hemispheres."""
 MESH_SUFFIXES = (".stl", ".ply", ".obj")
 VTK_SUFFIXES = (".vtk", ".vtp")
 SURFACE_KINDS = (".surf.gii", *MESH_SUFFIXES, *VTK_SUFFIXES, "FreeSurfer's lh.pial")
@@ -84,19 +87,23 @@ def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, Trian
 
     InputError as for `read_surface`, and where a file names the other hemisphere as its structure.
     """
-    spaces = []
-    for path, structure, other in ((left, "CortexLeft", "CortexRight"), (right, "CortexRight", "CortexLeft")):
-        space, found = declared(path)
-        spaces.append(space)
-        if found == other:
-            raise InputError(
-                "is of the other hemisphere",
-                path=path,
-                found=found,
-                expected=structure,
-                remedy="Swap `left` and `right` in the configuration.",
-            )
-    return read_surface(left), read_surface(right), spaces[0] is not None and len(set(spaces)) == 1
+    meshes = read_one_hemisphere(left, "left"), read_one_hemisphere(right, "right")
+    spaces = [declared(path)[0] for path in (left, right)]
+    return *meshes, spaces[0] is not None and len(set(spaces)) == 1
+
+
+def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
+    """Returns the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
+    found, expected = declared(path)[1], STRUCTURES[side]
+    if found in STRUCTURES.values() and found != expected:
+        raise InputError(
+            "is of the other hemisphere",
+            path=path,
+            found=found,
+            expected=expected,
+            remedy="Swap `left` and `right`, or set the other `side`, in the configuration.",
+        )
+    return read_surface(path)
 
 
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
@@ -125,17 +132,19 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
         nib.save(GiftiImage(darrays=[points, triangles]), temporary)
 
 
-def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> None:
-    """Writes a brain's pial surface and its hemispheres.
+def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, right: TriangleMesh | None) -> None:
+    """Writes a brain's pial surface and its hemispheres, None for one that is not there.
 
     Parameters
     ----------
     files
-        Paths as attributes `whole`, `left` and `right`, and as `get("stl")` one for the whole too, if it is given.
+        Paths as `whole` and, by their names, those of the hemispheres that are there, and as `get("stl")` one for the
+        whole too, if it is given.
     """
     write_surface(files.whole, whole)
-    write_surface(files.left, left, "CortexLeft")
-    write_surface(files.right, right, "CortexRight")
+    for side, mesh in (("left", left), ("right", right)):
+        if mesh is not None:
+            write_surface(files[side], mesh, STRUCTURES[side])
     if stl := files.get("stl"):
         write_surface(stl, whole)
 

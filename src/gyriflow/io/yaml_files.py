@@ -43,7 +43,12 @@ def read_yaml(path: str | PathLike[str]) -> Any:
         raise InputError(f"is not valid YAML{line}: {problem}", path=path) from error
 
 
+def yaml_text(content: Any) -> str:
+    """Returns content as YAML."""
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+
+
 def write_yaml(path: str | PathLike[str], content: Any) -> None:
     """Writes plain dictionaries, lists and numbers, keys in their order."""
     with replaced(path) as part:
-        part.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
+        part.write_text(yaml_text(content), encoding="utf-8")

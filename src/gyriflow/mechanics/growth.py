@@ -9,10 +9,12 @@ import ufl
 from ufl.core.expr import Expr
 
 
-def growth_increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float) -> tuple[Any, Any]:
+def growth_increments(
+    w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float, *, across: Any = 0.0
+) -> tuple[Any, Any]:
     """Returns the increments dg along the pial surface and dr across it, as stretches less 1.
 
-    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt.
+    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = ((α_RAD + α_CORE)(1 − w) + α_ACROSS w) · g · Δt.
 
     Parameters
     ----------
@@ -25,9 +27,11 @@ def growth_increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, s
         all directions, in 1/s.
     step_s
         Length of the step in s.
+    across
+        Rate α_ACROSS of the cortex along the normal, 0 in the paper.
     """
     isotropic = core * (1 - w)
-    return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + isotropic) * (g * step_s)
+    return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + across * w + isotropic) * (g * step_s)
 
 
 def inverse_growth_tensor(dg: Expr, dr: Expr, N: Expr) -> Expr:

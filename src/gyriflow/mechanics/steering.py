@@ -65,6 +65,7 @@ def steered_rates(
     radial: float = 0.0,
     ventricle_share: float = 0.0,
     ventricle: float = 0.0,
+    isotropic: bool = False,
     bounds: tuple[float, float] = (-math.inf, math.inf),
 ) -> GrowthRates:
     """Returns the rates that take area and volume to the aim, to first order in the step.
@@ -86,6 +87,8 @@ def steered_rates(
         Growth rate across the cortex.
     ventricle_share, ventricle
         f_v and a_v: part of the volume, and rate of each direction, of ventricles that grow by a curve of their own.
+    isotropic
+        Whether the cortex grows across itself as along itself, in the place of its radial rate.
     bounds
         Least and largest rate that may be set; the core makes up for a tangential rate that is cut.
 
@@ -98,7 +101,9 @@ def steered_rates(
     least, most = bounds
     wanted = math.log(aim.next_area / aim.area) / (2 * realised * aim.duration)
     tangential = min(max(wanted, least), most)
-    cortex = cortex_share * (2 * tangential * volume_gain(realised, poisson_ratio) + radial)
+    # the deviator that comes along with isotropic growth changes no volume, whatever area it makes
+    own = 3 * tangential if isotropic else 2 * tangential * volume_gain(realised, poisson_ratio) + radial
+    cortex = cortex_share * own
     whole = math.log(aim.next_volume / aim.volume) / aim.duration
     rest = (whole - cortex - 3 * ventricle_share * ventricle) / (3 * core_share)
     core = min(max(rest, least), most)

@@ -1,5 +1,8 @@
 """Edge lengths: at the surface from a number of faces, below it growing with depth, on a background mesh."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -14,6 +17,25 @@ FACE_AREA = np.sqrt(3) / 4
 def edge_length_for(surface: TriangleMesh, faces: int) -> float:
     """Returns the edge length in mm of equilateral triangles that cover a surface in a given number."""
     return float(np.sqrt(area(surface) / (FACE_AREA * faces)))
+
+
+def finer(settings: Mapping[str, Any], stretch: float) -> dict[str, Any]:
+    """Returns the settings of a mesh whose nodes are as far apart as wanted once it is stretched.
+
+    Parameters
+    ----------
+    settings
+        With surface_edge_mm, core_edge_mm and pial_faces.
+    stretch
+        Of lengths, 1 or more.
+    """
+    faces = settings["pial_faces"]
+    return {
+        **settings,
+        "surface_edge_mm": settings["surface_edge_mm"] / stretch,
+        "core_edge_mm": settings["core_edge_mm"] / stretch,
+        "pial_faces": None if faces is None else round(faces * stretch**2),
+    }
 
 
 def edge_length_at(

@@ -21,6 +21,9 @@ OF_THE_ANALYSIS = (
 )
 """Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
 
+OF_LABELS = ("volume_tissue", "volume_ventricles", "volume_cortex")
+"""Metrics of the labels, which simulated brains do not have."""
+
 FAMILIES = {
     "size": ("volume", "area"),
     "gyrification": ("gyrification_",),
@@ -63,7 +66,9 @@ def comparable_metrics(metrics: pd.DataFrame, spectra: pd.DataFrame, reference: 
 
     InputError for a unit whose dimension is not known.
     """
-    chosen = metrics[~metrics["metric"].isin(OF_THE_ANALYSIS) & ~metrics["metric"].str.endswith("_relative_power")]
+    chosen = metrics[
+        ~metrics["metric"].isin((*OF_THE_ANALYSIS, *OF_LABELS)) & ~metrics["metric"].str.endswith("_relative_power")
+    ]
     units = chosen.drop_duplicates("metric").set_index("metric")["unit"].astype(str)
     if unknown := sorted(set(units) - set(DIMENSIONS)):
         raise InputError("units without a known dimension", found=", ".join(unknown), expected=", ".join(DIMENSIONS))
@@ -112,5 +117,6 @@ def _band_shares(powers: pd.DataFrame, known: NDArray[np.bool_]) -> pd.DataFrame
 def _with_means_of_sides(values: pd.DataFrame) -> pd.DataFrame:
     """Returns the values with the mean of left and right for the whole where it has none of its own."""
     sides = values[values["hemisphere"] != "whole"].groupby([*BRAIN, "metric"], sort=False)["value"]
-    means = sides.mean()[sides.count() == 2].reset_index().assign(hemisphere="whole")
+    # of the only one where there is one
+    means = sides.mean()[sides.count() == sides.size()].reset_index().assign(hemisphere="whole")
     return pd.concat([values, means]).drop_duplicates([*BRAIN, "hemisphere", "metric"])

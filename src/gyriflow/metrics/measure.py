@@ -1,6 +1,7 @@
 """All metrics of one brain."""
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -34,6 +35,9 @@ from .hemisphere import (
 from .mode_numbers import SpangyModes
 from .thickness import at_part
 
+LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
+"""The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
+
 
 @dataclass(frozen=True, eq=False)
 class BrainMetrics:
@@ -44,9 +48,9 @@ class BrainMetrics:
     table : DataFrame
         hemisphere (whole, left or right), metric, value, unit: one row per number.
     maps : dict
-        Per hemisphere ("left", "right") arrays per vertex by name: shape_index, curvedness (1/mm), mean_curvature
-        (1/mm), gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm (where it is known;
-        NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
+        Per hemisphere ("left", "right", or the only one) arrays per vertex by name: shape_index, curvedness (1/mm),
+        mean_curvature (1/mm), gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm
+        (where it is known; NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
     spectra : DataFrame
         Per hemisphere and band: hemisphere, band, wavelength_min_mm, wavelength_max_mm, modes, power, relative_power,
         complete, denominator_complete, resolved, weyl_formula.
@@ -63,10 +67,11 @@ class BrainMetrics:
 
 def measure_brain(
     whole: TriangleMesh,
-    left: TriangleMesh,
-    right: TriangleMesh,
+    left: TriangleMesh | None,
+    right: TriangleMesh | None,
     *,
     thickness_mm: Floats | None = None,
+    label_volumes_ml: Mapping[str, float] | None = None,
     curvature_radius_mm: float = CURVATURE_RADIUS_MM,
     spangy_proxy: SpangyProxy = SPANGY_PROXY,
     spangy_modes: SpangyModes = SPANGY_MODES,
@@ -80,12 +85,15 @@ def measure_brain(
     whole
         The closed pial surface, outward, in mm.
     left, right
-        The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure. A cut
+        The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure; None for a
+        hemisphere that the brain does not have. A cut
         counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
         curvature within `curvature_radius_mm` of it out of the means. What is said of the whole but its volume and area
         is of both hemispheres: Σ area over Σ area of the hulls, and means over both.
     thickness_mm : (n,) float
         Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
+    label_volumes_ml
+        Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
     curvature_radius_mm
         Radius of the balls that curvature is fitted in, see `curvature.curvature`.
     spangy_proxy
@@ -97,17 +105,22 @@ def measure_brain(
     threads
         With two or more, the hemispheres are measured at the same time, each in a process of its own.
 
-    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
+    Raises
+    ------
+    MeshError
+        Where a surface looks inwards, or a hemisphere is not in one piece.
     """
-    _check_outward((whole, left, right))
+    meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
+    _check_outward((whole, *meshes.values()))
     settings = Settings(curvature_radius_mm, spangy_proxy, spangy_modes, spangy_wavelength)
-    meshes = {"left": left, "right": right}
     thicknesses = {
         name: None if thickness_mm is None else at_part(thickness_mm, whole, mesh) for name, mesh in meshes.items()
     }
     jobs = [(name, mesh, thicknesses[name], settings) for name, mesh in meshes.items()]
     sides = _measure_sides(jobs, threads)
     rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + folding_rows(sides)]
+    known = label_volumes_ml or {}
+    rows += [("whole", metric, known[name], "mL") for metric, name in LABEL_VOLUMES.items() if name in known]
     for side in sides:
         own = size_rows(side.mesh, side.crossing) + folding_rows([side]) + spectrum_rows(side, spangy_proxy)
         rows += [(side.name, *row) for row in own]

@@ -14,10 +14,10 @@ from .spangy import band_limits, first_eigenvalue, weyl_number
 SpangyModes = int | LastBand | Literal["own"] | Mapping[str, int]
 
 
-def weyl_numbers(left: TriangleMesh, right: TriangleMesh, formula: WeylFormula) -> pd.DataFrame:
-    """Returns per hemisphere: hemisphere, vertices, area_mm2, first_eigenvalue_per_mm2, weyl_number."""
+def weyl_numbers(sides: Mapping[str, TriangleMesh], formula: WeylFormula) -> pd.DataFrame:
+    """Returns per hemisphere of a brain: hemisphere, vertices, area_mm2, first_eigenvalue_per_mm2, weyl_number."""
     rows = []
-    for name, mesh in (("left", left), ("right", right)):
+    for name, mesh in sides.items():
         first = first_eigenvalue(*laplacian(mesh))
         rows.append((name, len(mesh.vertices), area(mesh), first, weyl_number(area(mesh), first, formula)))
     return pd.DataFrame(rows, columns=["hemisphere", "vertices", "area_mm2", "first_eigenvalue_per_mm2", "weyl_number"])

@@ -10,7 +10,8 @@ from scipy import stats
 
 from ..errors import InputError
 from ..geometry.triangles import Floats
-from .age_metrics import BRAIN, MEASURED
+from ..parameters.schemes import LabelScheme
+from .age_metrics import BRAIN, MEASURED, OF_THE_ANALYSIS
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
@@ -27,7 +28,19 @@ WINDOW_GW = 0.5
 
 @dataclass(frozen=True)
 class PublishedNorm:
-    """A published curve: mean and standard deviation as polynomials of the week, highest power first."""
+    """A published curve: mean and standard deviation as polynomials of the week, highest power first.
+
+    Attributes
+    ----------
+    weeks
+        First and last week that the curve is for.
+    scheme, labels
+        The label scheme in which it was measured, and the labels that were counted.
+    tissue
+        The list of a `LabelScheme` that is nearest to it in other schemes; "" where there is none.
+    subjects
+        How many brains it was made of; None where its source does not say.
+    """
 
     mean: tuple[float, ...]
     sd: tuple[float, ...]
@@ -35,6 +48,8 @@ class PublishedNorm:
     labels: tuple[int, ...]
     unit: str
     subjects: int | None
+    scheme: str = ""
+    tissue: str = ""
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
@@ -49,6 +64,8 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
             tuple(entry["labels"]),
             data["unit"],
             data["subjects"],
+            data.get("scheme", ""),
+            entry.get("tissue", ""),
         )
         lowest = float(np.polyval(norm.sd, np.linspace(first, last, 201)).min())
         if lowest <= 0:
@@ -59,20 +76,49 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
     return norms
 
 
-def published_scores(volumes: Mapping[str, float], week: float, norms: Mapping[str, PublishedNorm]) -> pd.DataFrame:
+def structure_volumes(
+    volumes: Mapping[int, float], scheme: LabelScheme, norms: Mapping[str, PublishedNorm]
+) -> tuple[dict[str, float], list[str]]:
+    """Returns the volumes of the structures that norms are of, and those that are of labels of another scheme.
+
+    Parameters
+    ----------
+    volumes
+        By label, in the norms' unit.
+
+    A brain of another scheme has the volumes of its nearest tissues, such as its cortex; a structure that it has no
+    list for, or no voxel of, is left out.
+    """
+    found, others = {}, []
+    for name, norm in norms.items():
+        same = norm.scheme == scheme.name
+        labels = norm.labels if same else getattr(scheme, norm.tissue, ())
+        total = sum(volumes.get(label, 0.0) for label in labels)
+        if total > 0:
+            found[name] = total
+            others += [] if same else [name]
+    return found, others
+
+
+def published_scores(
+    volumes: Mapping[str, float], week: float, norms: Mapping[str, PublishedNorm], others: Sequence[str] = ()
+) -> pd.DataFrame:
     """Returns where the volumes of a brain stand among published ones.
 
     Parameters
     ----------
     volumes
         By structure, in the norms' unit; structures without a norm are left out.
+    others
+        Structures that are of labels of another scheme than the norms'.
 
     Returns
     -------
     DataFrame
         structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution, 0 to
-        100), brains (that the norm was made of; NaN where its source does not say), flag ("ok" or "outside the norm's
-        weeks", then without expected, z and centile).
+        100), brains (that the norm was made of; NaN where its source does not say), flag ("ok"; "other labels": the
+        norm was measured with labels of another scheme; "outside the norm's weeks", then without expected, z and
+        centile).
     """
     rows = []
     for name, value in volumes.items():
@@ -83,7 +129,7 @@ def published_scores(volumes: Mapping[str, float], week: float, norms: Mapping[s
         mean, sd = (float(np.polyval(curve, week)) if inside else np.nan for curve in (norm.mean, norm.sd))
         z = (value - mean) / sd
         brains = np.nan if norm.subjects is None else norm.subjects
-        flag = "ok" if inside else "outside the norm's weeks"
+        flag = ("other labels" if name in others else "ok") if inside else "outside the norm's weeks"
         rows.append((name, week, value, norm.unit, mean, sd, z, 100 * float(stats.norm.cdf(z)), brains, flag))
     columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
     return pd.DataFrame(rows, columns=columns)
@@ -154,32 +200,95 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
 
 
 def _reference(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    return metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+    known = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+    return known[~known["metric"].isin(OF_THE_ANALYSIS)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """A quadratic of the week through reference brains (a line for three weeks, their mean for fewer).
+
+    Attributes
+    ----------
+    factors, centre
+        Coefficients of the powers of (week − centre), highest first.
+    inverse
+        Inverse of the normal matrix, for leverages.
+    sd
+        Scatter round the curve.
+    freedom
+        Degrees of freedom of the scatter.
+    """
+
+    factors: Floats
+    centre: float
+    inverse: Floats
+    sd: float
+    freedom: int
+
+    def at(self, week: float) -> tuple[float, float]:
+        """Returns the expected value at a week, and the leverage h of that week."""
+        here = np.vander([week - self.centre], len(self.factors))[0]
+        return float(here @ self.factors), float(here @ self.inverse @ here)
+
+
+def _curve(weeks: Floats, values: Floats) -> _Curve | None:
+    """Returns the curve through reference brains; None where there are too few for a scatter."""
+    distinct = len(np.unique(weeks))
+    degree = 2 if distinct > 3 else 1 if distinct == 3 else 0
+    freedom = len(weeks) - degree - 1
+    if freedom < LEAST_FREEDOM:
+        return None
+    centre = float(weeks.mean())
+    powers = np.vander(weeks - centre, degree + 1)
+    factors, *_ = np.linalg.lstsq(powers, values, rcond=None)
+    sd = float(np.sqrt(np.sum((values - powers @ factors) ** 2) / freedom))
+    return _Curve(factors, centre, np.linalg.inv(powers.T @ powers), sd, freedom)
+
+
+def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, points: int = 41) -> pd.DataFrame:
+    """Returns the curves that centiles are of, over the reference's weeks.
+
+    Parameters
+    ----------
+    metrics, reference
+        As for `measured_norms`.
+
+    Returns
+    -------
+    DataFrame
+        hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
+        Student's distribution. No rows where there are too few brains.
+    """
+    rows = []
+    for (hemisphere, metric), known in _reference(metrics, reference).groupby(["hemisphere", "metric"], sort=False):
+        weeks, values = known["week"].to_numpy(dtype=float), known["value"].to_numpy(dtype=float)
+        curve = _curve(weeks, values)
+        if curve is None:
+            continue
+        wide = float(stats.t.ppf(0.95, curve.freedom)) * curve.sd
+        for week in np.linspace(weeks.min(), weeks.max(), points if np.ptp(weeks) else 1):
+            expected, leverage = curve.at(float(week))
+            half = wide * np.sqrt(1 + leverage)
+            rows.append((hemisphere, metric, known["unit"].iloc[0], week, expected, expected - half, expected + half))
+    return pd.DataFrame(rows, columns=["hemisphere", "metric", "unit", "week", "expected", "low", "high"])
 
 
 def _score(
     week: float, value: float, weeks: Floats, values: Floats
 ) -> tuple[float, float, float, float, int, int, str]:
     """Returns expected, sd, z, centile, brains, brains_of_week and flag of `measured_scores`."""
-    distinct = np.unique(weeks)
     of_week = int(np.count_nonzero(np.abs(weeks - week) <= WINDOW_GW))
-    degree = 2 if len(distinct) > 3 else 1 if len(distinct) == 3 else 0
-    freedom = len(weeks) - degree - 1
     nothing = (np.nan, np.nan, np.nan, np.nan, len(weeks), of_week)
-    if freedom < LEAST_FREEDOM:
+    curve = _curve(weeks, values) if len(weeks) else None
+    if curve is None:
         return *nothing, "too few brains"
-    if not distinct[0] - WINDOW_GW <= week <= distinct[-1] + WINDOW_GW:
+    if not weeks.min() - WINDOW_GW <= week <= weeks.max() + WINDOW_GW:
         return *nothing, "outside the reference's weeks"
-    centre = weeks.mean()
-    powers = np.vander(weeks - centre, degree + 1)
-    here = np.vander([week - centre], degree + 1)[0]
-    factors, *_ = np.linalg.lstsq(powers, values, rcond=None)
-    expected = float(here @ factors)
-    sd = float(np.sqrt(np.sum((values - powers @ factors) ** 2) / freedom))
-    if sd == 0:
-        return expected, sd, np.nan, np.nan, len(weeks), of_week, "too few brains"
-    leverage = float(here @ np.linalg.solve(powers.T @ powers, here))
-    z = (value - expected) / sd
-    centile = 100 * float(stats.t.cdf(z / np.sqrt(1 + leverage), freedom))
+    expected, leverage = curve.at(week)
+    if curve.sd == 0:
+        return expected, curve.sd, np.nan, np.nan, len(weeks), of_week, "too few brains"
+    z = (value - expected) / curve.sd
+    centile = 100 * float(stats.t.cdf(z / np.sqrt(1 + leverage), curve.freedom))
     single = (np.abs(weeks[:, None] - weeks) <= WINDOW_GW).sum() == len(weeks)
-    return expected, sd, z, centile, len(weeks), of_week, "one brain a week" if single else "ok"
+    return expected, curve.sd, z, centile, len(weeks), of_week, "one brain a week" if single else "ok"

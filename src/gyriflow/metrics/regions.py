@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Ints, TriangleMesh, area, vertex_areas
+from ..parameters.terms import SIDES
 from ..units import CM2_PER_MM2
 
 UNLABELLED = 0
@@ -35,7 +36,7 @@ def region_metrics(
     Parameters
     ----------
     sides
-        The pial surfaces of "left" and "right".
+        The pial surfaces of "left" and "right", or of the only hemisphere.
     maps
         Per hemisphere arrays per vertex by name, as `measure.BrainMetrics.maps`; those of `MAP_UNITS` are used. NaN
         is left out of means, and so is what lies near a cut where `reliable` is 0.
@@ -93,8 +94,10 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
         The other columns, metric, asymmetry_index.
     """
     keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
-    sides = metrics[metrics["hemisphere"].isin(["left", "right"])]
-    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first", sort=False, dropna=False)
+    sides = metrics[metrics["hemisphere"].isin(SIDES)]
+    # of a hemisphere that is alone nothing can be said
+    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(columns=list(SIDES))
+    wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
     total = wide["left"].abs() + wide["right"].abs()
     index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)
     return index.rename("asymmetry_index").reset_index()

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag, ValidationInfo, field_validator
 
 from .settings import Problem, Settings, check, setting, up_to_invalid
-from .terms import FieldName, MaterialName
+from .terms import FieldName, MaterialName, MedialWall, Side
 from .varying import (
     Floats,
     Maps,
@@ -45,6 +45,8 @@ Memory = Annotated[
     PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
 ]
 Fraction = Annotated[float, Field(gt=0, le=2)]
+STRAIN = ("xx", "yy", "zz", "xy", "xz", "yz")
+"""Parts of a symmetric tensor, which end the names of their maps."""
 
 
 class Contact(Settings):
@@ -120,6 +122,11 @@ class Follow(Settings):
     volume_ml: SizeCurve = setting(
         "measured", "mL", "Volume inside the pial surface by gestational week, or `measured`; likewise."
     )
+    thickness_mm: SizeCurve | None = setting(
+        None, "mm",
+        "Cortical thickness by gestational week, or `measured`, a curve through the mean thickness of these brains; "
+        "`null`: the run's `thickness_mm`.",
+    )  # fmt: skip
     regional: float = setting(
         0.0, "",
         "How much of the measured differences between regions growth has: 0 none, 1 all; they come from registering "
@@ -129,6 +136,44 @@ class Follow(Settings):
     smoothing_mm: float = setting(
         6.0, "mm", "Standard deviation of the Gaussian that smooths measured local growth.", ge=1, le=50
     )
+    smoothing_gw: float = setting(
+        0.0, "GW",
+        "Standard deviation of the Gaussian over the weeks that smooths measured local growth: brains of successive "
+        "weeks are other fetuses.",
+        ge=0, le=20,
+    )  # fmt: skip
+    cortex: Literal["volume", "area"] = setting(
+        "volume", "",
+        "What the cortex's regional growth is that of: `volume` of the tissue, like the core's, or `area` of the pial "
+        "surface.",
+    )  # fmt: skip
+    directional: float = setting(
+        0.0, "",
+        "How much of the measured differences between directions growth has: 0 none, 1 all. Cortex and core then grow "
+        "by their rates in all directions, and by the measured strain without change of volume.",
+        ge=0, le=2,
+    )  # fmt: skip
+    known_until_gw: Week | None = setting(
+        None, "GW",
+        "Only brains up to this week give curves and maps, earlier ones than the start's among them, and what comes "
+        "after is extrapolated: a prediction. `null`: all brains.",
+    )  # fmt: skip
+    rotated: bool = setting(
+        False, "", "Whether the maps are rotated over the brain at random, which keeps their smoothness: a null model."
+    )
+    noise: float = setting(
+        0.0,
+        "",
+        "Standard deviation of random differences of growth, as a part of the mean, vertex by vertex.",
+        ge=0,
+        le=1,
+    )
+    seed: int = setting(0, "", "Of the rotation and of the noise.", ge=0)
+
+    @check
+    def _directions_are_not_rotated(self) -> Iterator[Problem]:
+        if self.gives("directional") and self.directional > 0 and self.gives("rotated") and self.rotated:
+            yield Problem("rotates maps of growth, not of its directions: set directional to 0", ("rotated",))
 
 
 class FoldingSettings(Settings):
@@ -184,6 +229,11 @@ class FoldingSettings(Settings):
         "How the brain is held: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the flat "
         "base; `box` does too and lets the upright sides slide; `free`: unconstrained (rigid motions are removed).",
     )  # fmt: skip
+    medial_wall: MedialWall = setting(
+        "sliding", "",
+        "Of a brain of one hemisphere, how its medial wall is supported: `sliding` keeps it in its plane, as the other "
+        "hemisphere would, `held` clamps it. It has no cortex. No meaning for brains of two hemispheres.",
+    )  # fmt: skip
     contact: Contact = setting(Contact(), "", "Contact.")
     no_growth: NoGrowth = setting(NoGrowth(), "", "Tissue that does not grow.")
     output_every_gw: float = setting(
@@ -238,15 +288,24 @@ class FoldingParameters(FoldingSettings):
     start_week: Week = setting(..., "GW", "Gestational age at the start.")
     output_weeks: tuple[Week, ...] = setting(..., "GW", "Output weeks, from `start_week` to `end_week`.")
     fissure_x_mm: float = setting(..., "mm", "Position of the interhemispheric fissure.")
+    side: Side | None = setting(None, "", "The only hemisphere that the brain has; `null`: it has both.")
     regional_growth: dict[Week, str] = setting(
         {}, "GW", "With `follow.regional`: by the week from which each holds, the names of maps of relative growth."
+    )
+    regional_growth_of_cortex: dict[Week, str] = setting(
+        {}, "GW", "The same of the cortex, where it differs from that of the core."
+    )
+
+    regional_strain: dict[Week, str] = setting(
+        {}, "GW", "With `follow.directional`: likewise what the names of the six maps of measured strain begin with."
     )
 
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
         own = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
-        return own | set(self.regional_growth.values())
+        strain = {f"{name}_{part}" for name in self.regional_strain.values() for part in STRAIN}
+        return own | strain | set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
@@ -339,6 +398,3 @@ def _scheme_problems(p: FoldingSettings, start_week: float, maps: Maps, start: s
         yield Problem(f"found {p.time_scheme}; with stress_memory_gw above 0 it should be implicit", ("time_scheme",))
     if p.contact.kind == "planes":
         yield Problem(f"found {p.time_scheme}; with contact.kind planes it should be implicit", ("time_scheme",))
-    if p.follow is not None and p.time_scheme == "adams-bashforth":
-        # the rate of the step before, which this scheme counts too, would swing against the one that is set
-        yield Problem(f"found {p.time_scheme}; with follow it should be implicit or midpoint", ("time_scheme",))

@@ -16,12 +16,12 @@ class VertexMeasure:
     colours
         Name of a Matplotlib colour map.
     limits
-        Ends of the colour scale; None: 0 and the 98th percentile of all surfaces.
+        Ends of the colour scale; None: from 0 to where few vertices of all surfaces are above.
     """
 
     label: str
     caption: str
-    colours: str = "viridis"
+    colours: str = "YlGnBu"
     limits: tuple[float, float] | None = None
 
 
@@ -37,9 +37,13 @@ SHAPE_MEASURES = {
     ),
     "sulcal_depth_mm": VertexMeasure(
         "sulcal depth (mm)",
-        "Sulcal depth, the straight distance to the envelope of each hemisphere, which bridges sulci narrower than "
-        "10 mm,",
-        colours="YlGnBu",
+        "Sulcal depth, the straight distance to the convex hull of each hemisphere,",
+    ),
+    "thickness_mm": VertexMeasure(
+        "cortical thickness (mm)",
+        "Cortical thickness, of simulated brains to the border that the cortex had at the start, carried with the "
+        "tissue, of measured brains where labels or white surfaces give it (else grey),",
+        colours="magma",
     ),
 }
 """The arrays per vertex of a brain's metrics that are drawn as maps, by name."""

@@ -11,6 +11,9 @@ ModesWord = Literal[LastBand, "common", "own"]
 WeylFormula = Literal["paper", "textbook"]
 """Relation between the shortest wavelength WL and λ: 2π/WL² or (2π/WL)²."""
 
+ExportNames = Literal["plain", "bids"]
+"""How exported files are named."""
+
 CURVATURE_RADIUS_MM = 3.0
 """At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
 SPANGY_PROXY: SpangyProxy = "shape_index"

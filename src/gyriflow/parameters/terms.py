@@ -4,6 +4,8 @@ from typing import Literal, get_args
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = get_args(Side)
+STRUCTURES: dict[Side, Literal["CortexLeft", "CortexRight"]] = {"left": "CortexLeft", "right": "CortexRight"}
+"""What GIFTI files call the cortex of each side."""
 
 VertexField = Literal[
     "displacement",
@@ -33,17 +35,28 @@ Coordinates = Literal["auto", "ras", "lps"]
 AffineSource = Literal["auto", "sform", "qform"]
 """Which affine of a NIfTI file is used; `auto` refuses two that disagree."""
 
+MedialWall = Literal["held", "sliding"]
+"""What holds the medial wall of a hemisphere that is alone."""
 MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
 """Names of the constitutive laws; each is a class of `mechanics.materials`."""
 
-FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y = range(8)
+FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES, BASE, SIDE_X, SIDE_Y, MEDIAL_WALL = range(9)
 """Zones of the boundary's facets."""
-ZONE_NAMES = ("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y")
+ZONE_NAMES = (
+    *("free", "clamped", "left contact", "right contact", "between planes", "base", "side x", "side y"),
+    "medial wall",
+)
 """Their names, by code."""
-FLAT_CUTS = (BASE, SIDE_X, SIDE_Y)
-"""Zones of simple shapes only: flat cuts through tissue, without cortex."""
+SHAPE_CUTS = (BASE, SIDE_X, SIDE_Y)
+"""Zones of simple shapes only: flat cuts through tissue."""
+FLAT_CUTS = (*SHAPE_CUTS, MEDIAL_WALL)
+"""Zones without cortex: the cuts, and the medial wall of a hemisphere that is alone."""
 
 LEFT, RIGHT, BRIDGE = 1, 2, 3
 """Tags of the hemispheres, and of the tissue between the contact planes."""
 CORTEX, CORE = 1, 2
 """Tags of the layers."""
+
+ELEMENTS_NEEDED = {1: 2.0, 2: 0.9}
+"""Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md): two linear
+ones, or about one quadratic."""

@@ -34,6 +34,11 @@ def carry_back_over_weeks(points: Floats, deformations: Sequence[Deformation]) -
     return np.stack(positions[::-1])
 
 
+def carry_both_ways(points: Floats, earlier: Sequence[Deformation], later: Sequence[Deformation]) -> Floats:
+    """Returns the (w, n, 3) positions of (n, 3) points in all weeks: carried back, as given, and carried on."""
+    return np.concatenate([carry_back_over_weeks(points, earlier), carry_over_weeks(points, later)[1:]])
+
+
 def carry_map(values: Floats, source: TriangleMesh, target: TriangleMesh, deformation: Deformation) -> Floats:
     """Returns (n,) or (n, k) values of the vertices of `source` at those of `target`.
 

@@ -16,11 +16,11 @@ from .style import (
     MUTED_COLOUR,
     REAL_BRAIN,
     REAL_COLOUR,
+    add_letters,
+    chosen_colours,
     light_grid,
     new_figure,
-    run_colours,
     run_legend,
-    simulated_runs,
     styled,
     week_axis,
     week_label,
@@ -28,6 +28,8 @@ from .style import (
 )
 
 ALL, FREE_OF_SIZE = "all", "all without size"
+CLIPPED = "range cut at the end"
+"""The flag of an age or range that reaches an end of the reference."""
 MOST_METRICS = 14
 """Metrics in the lower panel: those with most weight."""
 LEAST_WEIGHT = 0.005
@@ -41,19 +43,30 @@ _GAP_GW = 0.1
 
 @styled
 def age_profile_chart(
-    profile: pd.DataFrame, check: pd.DataFrame, *, title: str = "", measured: str = REAL_BRAIN, synthetic: bool = False
+    profile: pd.DataFrame,
+    check: pd.DataFrame,
+    similarity: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+    measured: str = REAL_BRAIN,
+    synthetic: bool = False,
 ) -> Figure:
     """Returns the ages that whole brains look like over their own, and each metric's age at the last simulated week.
 
-    The upper left panel has the simulated brains, the upper right one the reference brains, each left out of its own
-    reference. Large marks are all metrics together, filled, and without those of size, open; bars are ± the error of
-    reference brains left out (left) and the spread of the metrics (right); dots are single metrics; triangles are ages
-    outside the reference. Where the reference has one brain a week, the figure says that it can date no single fetus.
+    The upper left panel has the simulated brains (and measured ones that are no reference), the upper right one the
+    reference brains, each left out of its own reference. Large marks are all metrics together, filled, and without
+    those of size, open; bars are ± the error of reference brains left out (left) and the spread of the metrics (right);
+    dots are single metrics; triangles are ages outside the reference, diamonds ages or ranges cut at its ends. The
+    middle panel has the similarity of the runs' brains of that week to each week of the reference. Where the reference
+    has one brain a week, the figure says that it can date no single fetus.
 
     Parameters
     ----------
     profile, check : columns run, week, hemisphere, metric, kind, estimated_week, low, high, weight, flag
         `profile` has brains_per_week, `check` mean_absolute_error, too.
+    similarity : columns run, week, hemisphere, reference_week, similarity
+    runs
+        All runs of the study, which settle the colours.
 
     Raises
     ------
@@ -62,34 +75,36 @@ def age_profile_chart(
     """
     brains = profile[profile["hemisphere"] == "whole"]
     left_out = check[check["hemisphere"] == "whole"]
-    runs = simulated_runs(brains["run"])
-    if not runs:
+    of_runs = chosen_colours(brains["run"], runs)
+    if not of_runs:
         raise InputError("no simulated brain in the age profile", found=sorted(set(brains["run"])))
-    colours = run_colours(runs) | {MEASURED: REAL_COLOUR}
-    last = max(set.intersection(*(set(brains.loc[brains["run"] == run, "week"]) for run in runs)))
+    colours = of_runs | {MEASURED: REAL_COLOUR}
+    last = max(set.intersection(*(set(brains.loc[brains["run"] == run, "week"]) for run in of_runs)))
     rows = _of_last_week(brains, last)
-    figure = new_figure(
-        FULL_WIDTH_IN, 3.6 + 0.17 * rows["metric"].nunique(), title=title, synthetic=synthetic, measured=measured
-    )
-    grid = figure.add_gridspec(2, 2, height_ratios=[2.9, 0.5 + 0.17 * rows["metric"].nunique()])
+    figure = new_figure(FULL_WIDTH_IN, 5.0 + 0.17 * rows["metric"].nunique(), synthetic=synthetic, measured=measured)
+    grid = figure.add_gridspec(3, 2, height_ratios=[2.9, 1.3, 0.5 + 0.17 * rows["metric"].nunique()])
     panels = [figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])]
     for axes, table in zip(panels, (brains, left_out), strict=True):
         _age_panel(axes, table, colours)
         _frame(axes, [brains, left_out])
     panels[0].set_ylabel("looks like (GW)")
-    panels[0].set_title("simulated")
+    panels[0].set_title("simulated" + (" (stars: other measured brains)" if (brains["run"] == MEASURED).any() else ""))
     panels[1].set_title(_errors(left_out, measured))
-    _metric_panel(figure.add_subplot(grid[1, :]), rows, colours, last)
+    between, below = figure.add_subplot(grid[1, :]), figure.add_subplot(grid[2, :])
+    _similarity_panel(between, similarity[similarity["hemisphere"] == "whole"], colours, last)
+    _metric_panel(below, rows, colours, last)
+    add_letters([*panels, between, below])
     if (profile["brains_per_week"] < 2).all():
-        figure.supxlabel(ONE_A_WEEK, fontsize=6.5, color=MUTED_COLOUR)
+        figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), wrap(ONE_A_WEEK, 90)))))
     dots: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
     extra = [
         Line2D([], [], markersize=5, label="all metrics", **dots),
         Line2D([], [], markersize=5, markerfacecolor="white", label="without those of size", **dots),
         Line2D([], [], markersize=2, label="single metrics", **dots),
         Line2D([], [], markersize=4, label="outside the reference", **dots | {"marker": "^"}),
+        Line2D([], [], markersize=4, label="range cut at its end", **dots | {"marker": "d"}),
     ]
-    run_legend(figure, runs, measured=f"{measured}, left out", extra=extra)
+    run_legend(figure, of_runs, measured=f"{measured}, left out", extra=extra)
     return figure
 
 
@@ -110,6 +125,8 @@ def _errors(left_out: pd.DataFrame, measured: str) -> str:
 
 
 def _marker(flag: str, inside: str) -> str:
+    if flag == CLIPPED:
+        return "d"
     return "v" if flag.startswith("younger") else "^" if flag.startswith("older") else inside
 
 
@@ -155,10 +172,25 @@ def _frame(axes: Axes, tables: Sequence[pd.DataFrame]) -> None:
     light_grid(axes)
 
 
+def _similarity_panel(axes: Axes, similarity: pd.DataFrame, colours: Mapping[str, Any], week: float) -> None:
+    """Draws the similarity of the runs' brains of a week to each week of the reference."""
+    rows = similarity[(similarity["run"] != MEASURED) & (similarity["week"] == week)]
+    for run, own in rows.groupby("run", sort=False):
+        ordered = own.sort_values("reference_week")
+        axes.plot(ordered["reference_week"], ordered["similarity"], "o-", color=colours[str(run)], markersize=3)
+    axes.axvline(week, color=MUTED_COLOUR, linestyle=":", linewidth=0.9, zorder=1)
+    axes.set_ylim(0, 1)
+    axes.set_ylabel("similarity")
+    axes.set_title(f"similarity of {week_label(week)} to each week of the reference (1: as on its curves)")
+    week_axis(axes, similarity["reference_week"])
+    axes.set_xlabel("week of the reference (GW)")
+    light_grid(axes)
+
+
 def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any], week: float) -> None:
     """Draws the age by each metric with its range, most weight on top."""
     metrics = list(dict.fromkeys(rows["metric"]))
-    runs = simulated_runs(rows["run"])
+    runs = list(dict.fromkeys(rows["run"]))
     for index, run in enumerate(runs):
         own = rows[rows["run"] == run]
         columns = (own[name] for name in ("metric", "kind", "flag", "estimated_week", "low", "high"))

@@ -20,13 +20,13 @@ from .style import (
     REAL_COLOUR,
     RUN_COLOURS,
     SINGLE_COLUMN_IN,
+    add_letters,
+    chosen_colours,
     from_zero,
     light_grid,
     new_figure,
-    run_colours,
     run_legend,
     shown_unit,
-    simulated_runs,
     styled,
     week_axis,
 )
@@ -93,8 +93,8 @@ def metrics_chart(
     metrics: pd.DataFrame,
     *,
     names: Sequence[str] = tuple(METRIC_TITLES),
+    runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns a panel per metric over weeks: runs as lines, measured brains as black stars.
@@ -108,6 +108,8 @@ def metrics_chart(
         `run` is "real" for measured brains.
     names
         Metrics to show, in this order; those that the table lacks are left out.
+    runs
+        All runs of the study, which settle the colours.
 
     Raises
     ------
@@ -120,30 +122,31 @@ def metrics_chart(
     columns = min(3, len(present))
     lines = -(-len(present) // columns)
     width, height = FULL_WIDTH_IN * max(columns, 2) / 3, 0.7 + 1.9 * lines
-    figure = new_figure(width, height, title=title, synthetic=synthetic, measured=measured)
+    figure = new_figure(width, height, synthetic=synthetic, measured=measured)
     grid = figure.subplots(lines, columns, squeeze=False)
-    runs = simulated_runs(metrics["run"])
+    colours = chosen_colours(metrics["run"], runs)
     hemispheres: set[str] = set()
     for axes, name in zip(grid.flat, present, strict=False):
         rows = metrics[metrics["metric"] == name]
-        hemispheres |= _metric_panel(axes, rows, run_colours(runs))
+        hemispheres |= _metric_panel(axes, rows, colours)
         unit = shown_unit(rows["unit"].iloc[0])
         axes.set_title(METRIC_TITLES.get(name, name.replace("_", " ")) + (f" ({unit})" if unit else ""))
         week_axis(axes, metrics["week"])
         light_grid(axes)
     for axes in grid.flat[len(present) :]:
         axes.remove()
+    add_letters(grid.flat[: len(present)])
     extra = [
         Line2D([], [], color=MUTED_COLOUR, linestyle=HEMISPHERE_LINES[side], label=f"{side} hemisphere")
         for side in SIDES
         if side in hemispheres
     ]
-    run_legend(figure, runs, measured=measured if MEASURED in set(metrics["run"]) else "", extra=extra)
+    run_legend(figure, colours, measured=measured if MEASURED in set(metrics["run"]) else "", extra=extra)
     return figure
 
 
 @styled
-def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False) -> Figure:
+def steps_chart(steps: pd.DataFrame, *, synthetic: bool = False) -> Figure:
     """Returns what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
 
     Parameters
@@ -152,7 +155,7 @@ def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False
         seconds
         One row per accepted step. Steps on another rung than the most frequent one are marked.
     """
-    figure = new_figure(SINGLE_COLUMN_IN, 8.4, title=title, synthetic=synthetic)
+    figure = new_figure(SINGLE_COLUMN_IN, 8.4, synthetic=synthetic)
     panels = figure.subplots(7, 1, sharex=True)
     week = steps["week"]
     dots = {"markersize": 2.0, "linewidth": 0.8, "marker": "o"}
@@ -181,6 +184,7 @@ def steps_chart(steps: pd.DataFrame, *, title: str = "", synthetic: bool = False
     for axes in panels[4:]:
         from_zero(axes)
     figure.align_ylabels(panels)
+    add_letters(panels)
     week_axis(panels[-1], week)
     unusual = steps[steps["rung"] != steps["rung"].mode().iloc[0]]
     for colour, (rung, rows) in zip(RUN_COLOURS[1:], unusual.groupby("rung", sort=False), strict=False):
@@ -196,7 +200,6 @@ def quality_histogram(
     *,
     gates: Mapping[str, float] | None = None,
     surface: str = "",
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns histograms of the tetrahedra's radius ratio, dihedral angles and volumes.
@@ -210,7 +213,7 @@ def quality_histogram(
     surface
         What is to be said of the mesh's surface, under the histograms.
     """
-    figure = new_figure(FULL_WIDTH_IN, 2.5, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 2.5, synthetic=synthetic)
     panels = figure.subplots(1, len(QUALITY_TITLES), sharey=False)
     for axes, (column, label) in zip(panels, QUALITY_TITLES.items(), strict=True):
         if isinstance(quality, pd.DataFrame):
@@ -233,6 +236,7 @@ def quality_histogram(
         axes.set_title(said, fontsize=7)
         light_grid(axes)
     panels[-1].set_xscale("log")
+    add_letters(panels)
     count = f"{int(counts.sum()):,}".replace(",", "\u2009")
     panels[0].set_ylabel(f"of {count} elements")
     if surface:

@@ -1,5 +1,7 @@
 """Displacement norms of the runs beside published values, as a table and as a chart."""
 
+from collections.abc import Sequence
+
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -7,10 +9,11 @@ from matplotlib.lines import Line2D
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
+    add_letters,
+    chosen_colours,
     from_zero,
     light_grid,
     new_figure,
-    run_colours,
     run_legend,
     styled,
     week_axis,
@@ -71,7 +74,7 @@ def displacement_summary(displacement: pd.DataFrame) -> pd.DataFrame:
 
 @styled
 def displacement_chart(
-    displacement: pd.DataFrame, *, nodes: str = "all", title: str = "", synthetic: bool = False
+    displacement: pd.DataFrame, *, nodes: str = "all", runs: Sequence[str] = (), synthetic: bool = False
 ) -> Figure:
     """Returns the maximal and the mean displacement norm per interval: runs as lines, published values in grey.
 
@@ -80,11 +83,12 @@ def displacement_chart(
     displacement : as for `displacement_table`
     nodes
         "all" nodes, as in the paper, or the "pial" ones.
+    runs
+        All runs of the study, which settle the colours.
     """
     shown = displacement[displacement["nodes"] == nodes]
-    runs = list(dict.fromkeys(shown["run"]))
-    colours = run_colours(runs)
-    figure = new_figure(FULL_WIDTH_IN, 2.6, title=title, synthetic=synthetic)
+    colours = chosen_colours(shown["run"], runs)
+    figure = new_figure(FULL_WIDTH_IN, 2.6, synthetic=synthetic)
     panels = figure.subplots(1, 2)
     markers = {_PAPER: "s", _MEASURED: "^"}
     ends = pd.concat([shown, PUBLISHED])
@@ -93,10 +97,10 @@ def displacement_chart(
             rows = PUBLISHED[PUBLISHED["source"] == source]
             middle = (rows["from_week"] + rows["to_week"]) / 2
             axes.plot(middle, rows[column], marker, linestyle="--", color=MUTED_COLOUR, label=source)
-        for run in runs:
+        for run, colour in colours.items():
             rows = shown[shown["run"] == run].sort_values("from_week")
             middle = (rows["from_week"] + rows["to_week"]) / 2
-            axes.plot(middle, rows[column], "o-", color=colours[run], label=run)
+            axes.plot(middle, rows[column], "o-", color=colour, label=run)
         axes.set_title(f"{label} |u| per interval, {nodes} nodes")
         axes.set_ylabel("displacement (mm)")
         from_zero(axes)
@@ -107,5 +111,6 @@ def displacement_chart(
         Line2D([], [], color=MUTED_COLOUR, marker=marker, linestyle="--", label=source)
         for source, marker in markers.items()
     ]
-    run_legend(figure, runs, extra=extra)
+    add_letters(panels)
+    run_legend(figure, colours, extra=extra)
     return figure

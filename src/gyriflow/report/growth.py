@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from .style import (
     FULL_WIDTH_IN,
     REAL_BRAIN,
     RUN_COLOURS,
+    add_letters,
     column_label,
     from_zero,
     light_grid,
@@ -23,7 +23,7 @@ from .style import (
     wrap,
 )
 
-PANEL_HEIGHT_IN = 2.6
+COLUMNS, PANEL_HEIGHT_IN = 3, 2.4
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series; the one left out is the folding's."""
 
@@ -36,13 +36,12 @@ def growth_chart(
     *,
     folding_rate_per_s: float | Mapping[float, float] | None = None,
     measured: str = REAL_BRAIN,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
-    """Returns cortical area and volume over weeks, and the tangential growth rate of each interval as bars.
+    """Returns cortical area, volume over weeks, and the tangential growth rate of each interval as bars: three panels.
 
-    Several series of brains share the panel of areas and volumes; each has a panel of bars, on one scale, and a further
-    panel shows how their rates differ between common weeks.
+    Several series of brains share the panels of areas and of volumes; each has a panel of bars, on one scale, and a
+    further panel shows how their rates differ between common weeks.
 
     Parameters
     ----------
@@ -56,52 +55,45 @@ def growth_chart(
     names = list(dict.fromkeys(rates["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
     compared = agreement is not None and len(agreement) > 0
-    lines = -(-(1 + compared + len(names)) // 2)
-    figure = new_figure(FULL_WIDTH_IN, PANEL_HEIGHT_IN * lines, title=title, synthetic=synthetic)
-    panels = iter(figure.subplots(lines, 2).flat)
-    _sizes_panel(next(panels), areas, colours, measured)
-    if agreement is not None and compared:
-        _differences_panel(next(panels), agreement, colours)
+    lines = -(-(2 + compared + len(names)) // COLUMNS)
+    figure = new_figure(FULL_WIDTH_IN, PANEL_HEIGHT_IN * lines, synthetic=synthetic)
+    grid = list(figure.subplots(lines, COLUMNS, squeeze=False).flat)
+    panels = iter(grid)
+    for column, label in (("area_cm2", "pial area (cm²)"), ("volume_ml", "volume (mL)")):
+        _sizes_panel(next(panels), areas, column, label, colours, measured)
     drawn: list[Axes] = []
     for name, colour in colours.items():
         axes = next(panels)
-        heading = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 50)
+        heading = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 32)
         _rates_panel(axes, rates[rates["series"] == name], colour, heading, folding_rate_per_s)
         drawn.append(axes)
     limits = np.array([axes.get_ylim() for axes in drawn])
     for axes in drawn:
         axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
-    for axes in panels:
+    if agreement is not None and compared:
+        _differences_panel(next(panels), agreement, colours)
+    add_letters(grid[: len(grid) - len(spare := list(panels))])
+    for axes in spare:
         axes.remove()
     return figure
 
 
-def _sizes_panel(axes: Axes, areas: pd.DataFrame, colours: Mapping[str, str], measured: str) -> None:
-    """Draws areas (left axis) and volumes (right axis) over weeks, a colour per series, or per axis for one series."""
-    alone = len(colours) == 1
-    volume_axes = axes.twinx()
-    volume_axes.spines["right"].set_visible(True)
+def _sizes_panel(
+    axes: Axes, areas: pd.DataFrame, column: str, label: str, colours: Mapping[str, str], measured: str
+) -> None:
+    """Draws areas or volumes over weeks, a colour per series."""
     for number, (name, colour) in enumerate(reversed(list(colours.items()))):
         known = areas[areas["series"] == name].sort_values("week")
-        axes.plot(known["week"], known["area_cm2"], "o-", color=colour)
-        other = RUN_COLOURS[1] if alone else colour
-        # volumes of series often agree: the later ones then are seen within the earlier ones
-        look: dict[str, Any] = {"markersize": 3 + 2.5 * number, "markerfacecolor": "white"}
-        volume_axes.plot(known["week"], known["volume_ml"], "s--", color=other, zorder=2 - 0.1 * number, **look)
-    axes.set_ylabel("pial area (cm²)", color=RUN_COLOURS[0] if alone else "black")
-    volume_axes.set_ylabel("volume (mL)", color=RUN_COLOURS[1] if alone else "black")
-    for each in (axes, volume_axes):
-        from_zero(each)
+        # series often agree: the later ones then are seen within the earlier ones
+        look: dict[str, Any] = {"markersize": 3 + 2.5 * number, "markerfacecolor": "white" if number else colour}
+        axes.plot(known["week"], known[column], "o-", color=colour, zorder=2 - 0.1 * number, label=name, **look)
+    axes.set_ylabel(label)
+    from_zero(axes)
     week_axis(axes, areas["week"])
     light_grid(axes)
-    axes.set_title(wrap(f"{measured}: area and volume", 50))
-    if not alone:
-        handles = [Line2D([], [], color=colour, linewidth=4, label=name) for name, colour in colours.items()]
-        handles.append(Line2D([], [], color="black", linestyle="-", marker="o", label="area"))
-        handles.append(
-            Line2D([], [], color="black", linestyle="--", marker="s", markerfacecolor="white", label="volume")
-        )
-        axes.legend(handles=handles, loc="lower right", ncols=2, columnspacing=1.0)
+    axes.set_title(wrap(measured, 32))
+    if len(colours) > 1:
+        axes.legend(loc="lower right", reverse=True)
 
 
 def _rates_panel(
@@ -122,7 +114,7 @@ def _rates_panel(
         # above the axes, where no bar can be, and below the title
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
-    axes.set_title(title, loc="left", pad=6.0 if folding_rate_per_s is None else 16.0)
+    axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
     axes.margins(y=0.12)
     _interval_axis(axes, labels)
 
@@ -145,7 +137,7 @@ def _differences_panel(axes: Axes, agreement: pd.DataFrame, colours: Mapping[str
     axes.axhline(0, color="black", linewidth=0.6)
     axes.set_ylabel("difference (10⁻⁷ s⁻¹)")
     # the legend is above the axes, where no bar can be, and below the title
-    axes.set_title("difference of the growth rates", loc="left", pad=6.0 + 10.0 * len(series))
+    axes.set_title("difference of the growth rates", pad=6.0 + 10.0 * len(series))
     labels = _interval_labels(intervals)
     axes.set_xticks(range(len(labels)), labels)
     axes.margins(y=0.12)

@@ -2,17 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
+from string import ascii_lowercase
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
-from .scene import View, half_extents, render
+from .scene import PIXELS_PER_INCH, TISSUE, Material, View, half_extents, picture_axes, render, sees
 from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note, wrap
 
-_PIXELS_PER_INCH = 300
+# sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
+_DOTS_PER_INCH = 300
 _MARGIN = 1.04
 _MAX_COLUMNS = 8
 _EDGE_IN = 0.1
@@ -24,20 +28,33 @@ _END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One surface of a grid: the part that is seen, its (n, 3) or (m, 3) colours, the view and a caption."""
+    """One surface of a grid.
+
+    Attributes
+    ----------
+    mesh, colours : the part that is seen, and its (n, 3) or (m, 3) colours
+    caption : what stands below
+    material : how it takes the light
+    mark : (3,) a point of the surface around which a ring is drawn, dotted where it lies on the side turned away
+    edges : whether the edges of its triangles are drawn
+    """
 
     mesh: TriangleMesh
     colours: Floats
     view: View
     caption: str = ""
+    material: Material = TISSUE
+    mark: Floats | None = None
+    edges: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A row of a grid: its label and its panels, None where there is nothing to show."""
+    """A row of a grid: its label, its panels, None where there is nothing to show, and what is said there instead."""
 
     label: str
     panels: Sequence[Panel | None]
+    absent: str = ""
 
 
 @dataclass(frozen=True)
@@ -66,7 +83,7 @@ def _blocks(columns: Sequence[str], rows: Sequence[Row]) -> list[tuple[Sequence[
     number = -(-len(columns) // _MAX_COLUMNS)
     size = -(-len(columns) // number)
     return [
-        (columns[start : start + size], [Row(row.label, row.panels[start : start + size]) for row in rows])
+        (columns[start : start + size], [replace(row, panels=row.panels[start : start + size]) for row in rows])
         for start in range(0, len(columns), size)
     ]
 
@@ -75,7 +92,6 @@ def panel_grid(
     columns: Sequence[str],
     rows: Sequence[Row],
     *,
-    title: str,
     synthetic: bool,
     measured: str = PHANTOM,
     colour_bars: Sequence[tuple[ScalarMappable, str]] = (),
@@ -84,7 +100,8 @@ def panel_grid(
     """Returns the rows of surfaces under column headings, all at one scale in mm, with a scale bar below.
 
     More than eight columns go on in a further block below. Each view is named by its row's label, and the letters of
-    its ends stand in the first panel that shows it.
+    its ends stand in the first panel that shows it. Several rows, or the panels of a single one, have the letters a,
+    b, c … by which a caption calls them.
 
     Parameters
     ----------
@@ -98,28 +115,30 @@ def panel_grid(
     most = max(len(heads) for heads, _ in blocks)
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
-    panel_in = min(1.75, (FULL_WIDTH_IN - label_in) / most)
-    width = max(SINGLE_COLUMN_IN, label_in + most * panel_in)
-    left_in = label_in + (width - label_in - most * panel_in) / 2
-    layout = _Layout(width, left_in, panel_in, 0.66 if colour_bars or legend else 0.46, half_width)
+    panel_in = _dots(min(1.75, (FULL_WIDTH_IN - label_in) / most))
+    width = _dots(max(SINGLE_COLUMN_IN, label_in + most * panel_in))
+    left_in = _dots(label_in + (width - label_in - most * panel_in) / 2)
+    foot_in = max(0.66 if colour_bars or legend else 0.46, 0.15 * -(-len(legend) // _legend_columns(width)) + 0.16)
+    layout = _Layout(width, left_in, panel_in, _dots(foot_in), half_width)
 
-    heading = [line for line in (title, synthetic_note(measured) if synthetic else "") if line]
     # a letter of a column's heading is about 0.055 in wide
     columns = [wrap(column, int(panel_in / 0.055)) for column in columns]
     blocks = _blocks(columns, rows)
-    head_in, caption_line_in = 0.1 + 0.16 * len(heading), 0.13
-    block_head_in = 0.2 + 0.12 * max(column.count("\n") for column in columns)
-    heights = {id(row): _row_height_in(row, layout) for _, part in blocks for row in part}
+    head_in, caption_line_in = 0.1 + 0.16 * synthetic, 0.13
+    block_head_in = _dots(0.2 + 0.12 * max(column.count("\n") for column in columns))
+    heights = {id(row): _dots(_row_height_in(row, layout)) for _, part in blocks for row in part}
     captions = {
-        id(row): caption_line_in * max((len(p.caption.splitlines()) for p in row.panels if p), default=0)
+        id(row): _dots(caption_line_in * max((len(p.caption.splitlines()) for p in row.panels if p), default=0))
         for _, part in blocks
         for row in part
     }
-    total = head_in + layout.foot + len(blocks) * block_head_in + sum(heights.values()) + sum(captions.values())
+    total = _dots(head_in) + layout.foot + len(blocks) * block_head_in + sum(heights.values()) + sum(captions.values())
 
     figure = Figure(figsize=(width, total))
-    figure.suptitle("\n".join(heading), y=1 - 0.05 / total, va="top")
-    top = total - head_in
+    if synthetic:
+        figure.suptitle(synthetic_note(measured), y=1 - 0.05 / total, va="top")
+    top = total - _dots(head_in)
+    letters = iter(ascii_lowercase)
     for heads, part in blocks:
         for index, head in enumerate(heads):
             x = (left_in + (index + 0.5) * panel_in) / width
@@ -127,7 +146,8 @@ def panel_grid(
         top -= block_head_in
         for row in part:
             bottom = top - heights[id(row)]
-            _draw_row(figure, row, layout, bottom=bottom, height=heights[id(row)])
+            marks = len(row.panels) if len(rows) == 1 else 1
+            _draw_row(figure, row, layout, list(islice(letters, marks)), bottom=bottom, height=heights[id(row)])
             top = bottom - captions[id(row)]
     _draw_scale_bar(figure, layout, {end for panel in shown for end in panel.view.ends})
     _draw_keys(figure, layout, colour_bars, legend)
@@ -141,7 +161,14 @@ def _row_height_in(row: Row, layout: _Layout) -> float:
     return max(2 * _MARGIN * max(halves, default=0.0) * layout.inches_per_mm, least)
 
 
-def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, height: float) -> None:
+def _dots(inches: float) -> float:
+    """Returns a length in inches rounded to whole dots."""
+    return round(inches * _DOTS_PER_INCH) / _DOTS_PER_INCH
+
+
+def _draw_row(
+    figure: Figure, row: Row, layout: _Layout, letters: Sequence[str], *, bottom: float, height: float
+) -> None:
     total = figure.get_figheight()
     middle = (bottom + height / 2) / total
     figure.text(
@@ -150,7 +177,25 @@ def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, heigh
     half_height = height / layout.inches_per_mm / 2
     previous = None
     for index, panel in enumerate(row.panels):
+        x = (layout.left + index * layout.panel) / layout.width
+        axes = figure.add_axes((x, bottom / total, layout.panel / layout.width, height / total))
+        axes.set_label(f"{row.label}, column {index}")
+        axes.set_axis_off()
+        if index < len(letters):
+            # beside the row's label, or above the letters of the picture's ends
+            axes.annotate(
+                letters[index],
+                (0.0, 1.0),
+                xytext=(-2, 2),
+                textcoords="offset points",
+                xycoords="axes fraction",
+                ha="right" if row.label else "left",
+                va="bottom" if not row.label else "top",
+                fontsize=9,
+                fontweight="bold",
+            )
         if panel is None:
+            axes.text(0.5, 0.5, row.absent, transform=axes.transAxes, ha="center", va="center", fontsize=6.5)
             continue
         image = render(
             panel.mesh,
@@ -158,21 +203,32 @@ def _draw_row(figure: Figure, row: Row, layout: _Layout, *, bottom: float, heigh
             panel.view,
             half_width_mm=layout.half_width_mm,
             half_height_mm=half_height,
-            pixels_per_mm=_PIXELS_PER_INCH * layout.inches_per_mm,
+            pixels_per_mm=PIXELS_PER_INCH * layout.inches_per_mm,
+            material=panel.material,
+            edges=panel.edges,
         )
-        x = (layout.left + index * layout.panel) / layout.width
-        axes = figure.add_axes((x, bottom / total, layout.panel / layout.width, height / total))
-        axes.set_label(f"{row.label}, column {index}")
         axes.imshow(
             image, extent=(-layout.half_width_mm, layout.half_width_mm, -half_height, half_height), aspect="auto"
         )
-        axes.set_axis_off()
         if panel.view != previous:
             for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):
                 axes.text(place, 1.0, end, transform=axes.transAxes, ha=align, va="top", fontsize=6)
         previous = panel.view
+        if panel.mark is not None:
+            _draw_ring(axes, panel, panel.mark)
         if panel.caption:
             axes.text(0.5, -0.01, panel.caption, transform=axes.transAxes, ha="center", va="top", fontsize=6.5)
+
+
+def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
+    middle = (panel.mesh.vertices.min(axis=0) + panel.mesh.vertices.max(axis=0)) / 2
+    right, up = (float((point - middle) @ axis) for axis in picture_axes(panel.view))
+    line = "-" if sees(panel.mesh, point, panel.view) else ":"
+    for colour, thickness in (("white", 2.0), ("black", 1.0)):
+        ring = Circle((right, up), 0.05 * np.ptp(axes.get_xlim()) / 2, fill=False)
+        ring.set(edgecolor=colour, linewidth=thickness, linestyle=line if colour == "black" else "-")
+        ring.set(clip_on=False, zorder=5)
+        axes.add_patch(ring)
 
 
 def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
@@ -190,6 +246,10 @@ def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
     figure.text(_EDGE_IN / layout.width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
 
 
+def _legend_columns(width_in: float) -> int:
+    return 2 if width_in > 1.5 * SINGLE_COLUMN_IN else 1
+
+
 def _draw_keys(
     figure: Figure, layout: _Layout, colour_bars: Sequence[tuple[ScalarMappable, str]], legend: Sequence[Patch]
 ) -> None:
@@ -203,5 +263,5 @@ def _draw_keys(
         bar.ax.tick_params(pad=1, length=2)
         bar.outline.set_linewidth(0.5)
     if legend:
-        columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
+        columns = _legend_columns(width)
         figure.legend(handles=legend, loc="lower right", ncols=columns, bbox_to_anchor=(1.0, 0.0), borderaxespad=0.2)

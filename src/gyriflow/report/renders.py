@@ -5,13 +5,16 @@ from collections.abc import Hashable, Mapping, Sequence
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from .panels import Panel, Row, panel_grid
-from .scene import colour_scale, named_views, paint, uniform_colours
+from .scene import MAP, View, colour_scale, named_views, paint, uniform_colours
 from .style import (
+    MAGNITUDES,
+    NEUTRAL_COLOUR,
     PHANTOM,
     REAL_BRAIN,
     REAL_SURFACE_COLOUR,
@@ -24,6 +27,10 @@ SurfaceMap = tuple[TriangleMesh, Floats]
 """A surface in RAS+ mm and a value per vertex."""
 
 SIDE_VIEWS = ("left", "top")
+DISPLACEMENT_VIEWS = ("left", "top", "back")
+PRESSURE_COLOURS = "YlOrRd"
+_MOST = 0.995
+"""Part of the vertices that a colour scale reaches."""
 
 
 def _ordered(*groups: Mapping) -> list:
@@ -39,7 +46,6 @@ def weekly_comparison(
     *,
     views: Sequence[str] = SIDE_VIEWS,
     measured: str = REAL_BRAIN,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns simulated (blue) above measured brains (beige), a column per week, a pair of rows per view.
@@ -59,7 +65,6 @@ def weekly_comparison(
             measured: (real, REAL_SURFACE_COLOUR),
         },
         views=views,
-        title=title,
         synthetic=synthetic,
         measured=measured,
     )
@@ -72,7 +77,6 @@ def runs_comparison(
     *,
     views: Sequence[str] = SIDE_VIEWS,
     measured: str = REAL_BRAIN,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns the brains of several runs at one week side by side (blue), the measured one last (beige).
@@ -88,14 +92,13 @@ def runs_comparison(
         if real is not None:
             panels.append(Panel(real, uniform_colours(real, REAL_SURFACE_COLOUR), view))
         rows.append(Row(f"{view.name} view", panels))
-    return panel_grid(columns, rows, title=title, synthetic=synthetic, measured=measured)
+    return panel_grid(columns, rows, synthetic=synthetic, measured=measured)
 
 
 def _surface_rows(
     groups: Mapping[str, tuple[Mapping[float, TriangleMesh], str]],
     *,
     views: Sequence[str],
-    title: str,
     synthetic: bool,
     measured: str,
 ) -> Figure:
@@ -109,43 +112,60 @@ def _surface_rows(
         for name, (meshes, colour) in groups.items()
         if meshes
     ]
-    return panel_grid([column_label(key) for key in keys], rows, title=title, synthetic=synthetic, measured=measured)
+    return panel_grid([column_label(key) for key in keys], rows, synthetic=synthetic, measured=measured)
 
 
 @styled
 def displacement_maps(
     displacements: Mapping[tuple[float, float], SurfaceMap],
     *,
-    views: Sequence[str] = SIDE_VIEWS,
-    title: str = "",
+    views: Sequence[str] = DISPLACEMENT_VIEWS,
     synthetic: bool = False,
 ) -> Figure:
     """Returns the norm of the displacement on the pial surface, a column per interval, on one colour scale.
 
-    The largest and the mean value over the vertices stand below each interval.
+    The scale ends where one vertex in two hundred is above, so that a single maximum does not set it. The maximum is
+    ringed, dotted where it lies on the side turned away; below each interval stand its size, its place in RAS+ mm, and
+    the mean over the vertices.
 
     Parameters
     ----------
     displacements : {(from_week, to_week): (surface, norms in mm)}
     """
     keys = _ordered(displacements)
-    scale = colour_scale("viridis", 0.0, max(float(np.nanmax(norms)) for _, norms in displacements.values()))
+    scale = magnitude_scale(np.concatenate([norms for _, norms in displacements.values()]), MAGNITUDES)
     seen = named_views(views)
     rows = []
     for view in seen:
         panels = []
         for key in keys:
             mesh, norms = displacements[key]
-            caption = f"max {np.nanmax(norms):.2f} mm\nmean {np.nanmean(norms):.2f} mm" if view == seen[-1] else ""
-            panels.append(Panel(mesh, paint(norms, scale), view, caption))
+            place = mesh.vertices[int(np.nanargmax(norms))]
+            where = ", ".join(f"{value:.0f}" for value in place).replace("-", "−")
+            caption = f"max {np.nanmax(norms):.2f} mm at {where}\nmean {np.nanmean(norms):.2f} mm"
+            shown = caption if view == seen[-1] else ""
+            panels.append(Panel(mesh, paint(norms, scale), view, shown, MAP, place))
         rows.append(Row(f"{view.name} view", panels))
     return panel_grid(
         [column_label(key) for key in keys],
         rows,
-        title=title,
         synthetic=synthetic,
         colour_bars=[(scale, "norm of the displacement (mm)")],
     )
+
+
+def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
+    """Returns a scale from zero to a round value that at most a few of the values pass, so that no outlier sets it."""
+    known = values[np.isfinite(values)]
+    high = float(np.quantile(known, _MOST)) if len(known) else 1.0
+    end = round_up(high) if high > 0 else 1.0
+    return colour_scale(colours, 0.0, end, cut=bool((known > end).any()))
+
+
+def round_up(value: float) -> float:
+    """Returns a positive value rounded up to two digits, so that a colour bar ends at a number one can say."""
+    step = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(np.ceil(value / step - 1e-9) * step)
 
 
 PRESSURES = {
@@ -156,15 +176,14 @@ LABELS = {name: measure.label for name, measure in SHAPE_MEASURES.items()} | PRE
 """The quantities that can be drawn as maps, with the labels of their colour bars."""
 
 
-def _scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Returns the colour scale of a quantity; without limits it ends below a few sharp vertices."""
+def scale_of(quantity: str, values: Floats) -> ScalarMappable:
+    """Returns the colour scale of a quantity: its own limits, else from zero to where few vertices are above."""
     if quantity in PRESSURES:
-        touching = values[values > 0]
-        return colour_scale("YlOrRd", 0.0, float(np.percentile(touching, 98)) if len(touching) else 1.0, cut=True)
+        return magnitude_scale(values[values > 0], PRESSURE_COLOURS)
     measure = SHAPE_MEASURES[quantity]
     if measure.limits is not None:
         return colour_scale(measure.colours, *measure.limits)
-    return colour_scale(measure.colours, 0.0, float(np.nanpercentile(values, 98)), cut=True)
+    return magnitude_scale(values, measure.colours)
 
 
 @styled
@@ -174,7 +193,6 @@ def scalar_maps(
     quantity: str,
     views: Sequence[str] = SIDE_VIEWS,
     measured: str = PHANTOM,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns a shape measure on surfaces: a row per group and view, a column per week or run, one colour scale.
@@ -184,7 +202,7 @@ def scalar_maps(
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
     quantity
-        A name of `SHAPE_MEASURES`, or one of `PRESSURES` (up to the 98th percentile where there is contact).
+        A name of `SHAPE_MEASURES`, or one of `PRESSURES`, which leave the surface grey where nothing touches.
     measured
         What the measured brains are called, where there are any.
 
@@ -196,21 +214,26 @@ def scalar_maps(
     if quantity not in LABELS:
         raise InputError("unknown quantity", found=quantity, expected=list(LABELS))
     values = np.concatenate([values for group in maps.values() for _, values in group.values()])
-    scale, label = _scale_of(quantity, values), LABELS[quantity]
+    scale, label = scale_of(quantity, values), LABELS[quantity]
     keys = _ordered(*maps.values())
     rows = [
         Row(
             f"{group}\n{view.name} view",
-            [Panel(known[key][0], paint(known[key][1], scale), view) if key in known else None for key in keys],
+            [_map_panel(*known[key], scale, view, quantity) if key in known else None for key in keys],
         )
         for view in named_views(views)
         for group, known in maps.items()
     ]
+    legend = [Patch(color=NEUTRAL_COLOUR, label="no contact")] if quantity in PRESSURES else []
     return panel_grid(
         [column_label(key) for key in keys],
         rows,
-        title=title,
         synthetic=synthetic,
         measured=measured,
         colour_bars=[(scale, label)],
+        legend=legend,
     )
+
+
+def _map_panel(mesh: TriangleMesh, values: Floats, scale: ScalarMappable, view: View, quantity: str) -> Panel:
+    return Panel(mesh, paint(values, scale, zero_is_nothing=quantity in PRESSURES), view, material=MAP)

@@ -13,6 +13,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, corners, submesh, vertex_normals
+from .style import NEUTRAL_COLOUR
 
 # without a display VTK warns about X before it turns to its off-screen way
 vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
@@ -56,11 +57,31 @@ VIEWS = {
 }
 """The views by name. In the top view the brain's left is on the picture's left."""
 
-_INSIDE_COLOUR = "#D9D9D9"
-_UNKNOWN_COLOUR = (0.72, 0.72, 0.72, 1.0)
+PIXELS_PER_INCH = 600
+"""Resolution of pictures of surfaces: that of the PDF files, and twice that of PNG files at 300 dots per inch."""
 
-# three lamps fixed to the camera: a raking one that lets folds cast shade, two weak ones that fill the dark side
-_LAMPS = (((-0.7, 1.0, 1.1), 0.80), ((1.0, 0.1, 0.7), 0.30), ((0.0, 0.0, 1.0), 0.20))
+UNKNOWN_COLOUR = "#B8B8B8"
+SAME_PLACE_MM = 0.5
+"""How near to a point what is seen first has to be, to be that point."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """How much of its colour a surface shows in any light, in the light of the lamps, and as gloss."""
+
+    ambient: float
+    diffuse: float
+    specular: float
+
+
+TISSUE = Material(0.22, 0.78, 0.08)
+"""For surfaces of one colour, whose shape is read from their shade."""
+MAP = Material(0.58, 0.42, 0.0)
+"""For maps, whose colours are read as values: shade may only hint at the shape."""
+_INSIDE = Material(0.6, 0.4, 0.0)
+
+# lamps fixed to the camera, as strong from the left as from the right: shade makes no difference between hemispheres
+_LAMPS = (((0.0, 1.0, 0.8), 0.24), ((-1.0, 0.2, 0.5), 0.26), ((1.0, 0.2, 0.5), 0.26), ((0.0, 0.0, 1.0), 0.50))
 
 
 def picture_axes(view: View) -> tuple[Floats, Floats]:
@@ -118,11 +139,26 @@ def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -
     return ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
 
 
-def paint(values: Floats, scale: ScalarMappable) -> Floats:
-    """Returns the (n, 3) colours of values, grey where they are not finite."""
-    colours = np.asarray(scale.to_rgba(np.asarray(values, dtype=float)))
-    colours[~np.isfinite(values)] = _UNKNOWN_COLOUR
-    return colours[:, :3]
+def paint(values: Floats, scale: ScalarMappable, *, zero_is_nothing: bool = False) -> Floats:
+    """Returns the (n, 3) colours of values, grey where they are not finite, or, if asked for, not above zero."""
+    values = np.asarray(values, dtype=float)
+    colours = np.asarray(scale.to_rgba(values))[:, :3]
+    colours[~np.isfinite(values)] = to_rgb(UNKNOWN_COLOUR)
+    if zero_is_nothing:
+        colours[values <= 0] = to_rgb(NEUTRAL_COLOUR)
+    return colours
+
+
+def sees(mesh: TriangleMesh, point: Floats, view: View) -> bool:
+    """Returns whether a point of the surface is in front, seen from a side."""
+    away = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
+    towards = np.array(view.towards)
+    right, up = picture_axes(view)
+    # a little aside, since rays through vertices may slip between the triangles around them
+    point = point + 0.013 * right + 0.007 * up
+    hits, _ = body.ray_trace(origin=point + away * towards, end_point=point - 1e-3 * towards)
+    return bool(len(hits) == 0 or ((hits - point) @ towards).max() < SAME_PLACE_MM)
 
 
 def render(
@@ -133,12 +169,16 @@ def render(
     half_width_mm: float,
     half_height_mm: float,
     pixels_per_mm: float,
+    material: Material = TISSUE,
+    edges: bool = False,
 ) -> Image:
     """Returns a picture of the surface in parallel projection, its bounding box in the middle.
 
     Parameters
     ----------
     colours : (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1
+    edges
+        Whether the edges of the triangles are drawn.
 
     Returns
     -------
@@ -157,15 +197,20 @@ def render(
             surface,
             scalars="colour",
             rgb=True,
-            interpolation="phong",
-            ambient=0.30,
-            diffuse=0.75,
-            specular=0.10,
+            interpolation="flat" if edges else "phong",
+            ambient=material.ambient,
+            diffuse=material.diffuse,
+            specular=material.specular,
             specular_power=15,
             culling="back",
+            show_edges=edges,
+            edge_color="#303030",
+            line_width=1.0,
         )
         # the inside of a surface that is open where a connected brain is parted
-        plotter.add_mesh(surface, color=_INSIDE_COLOUR, ambient=0.6, diffuse=0.4, culling="front")
+        plotter.add_mesh(
+            surface, color=NEUTRAL_COLOUR, ambient=_INSIDE.ambient, diffuse=_INSIDE.diffuse, culling="front"
+        )
         for position, intensity in _LAMPS:
             plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
@@ -174,7 +219,8 @@ def render(
         plotter.camera.parallel_projection = True
         plotter.camera.parallel_scale = half_height_mm
         plotter.renderer.ResetCameraClippingRange()
-        plotter.enable_anti_aliasing("ssaa")
+        # twice as fine as most print: smoother edges would cost more than they show
+        plotter.disable_anti_aliasing()
         return np.array(plotter.screenshot(return_img=True))[..., :3]
     finally:
         plotter.close()

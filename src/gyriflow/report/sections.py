@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..parameters.terms import BRIDGE, LEFT, RIGHT
-from .style import FULL_WIDTH_IN, RUN_COLOURS, new_figure, styled
+from .style import FULL_WIDTH_IN, MAGNITUDES, RUN_COLOURS, add_letters, new_figure, styled
 
 PLANES = {
     # name: (axis across the plane, axes to the right and up)
@@ -45,7 +45,6 @@ def region_sections(
     tags: Mapping[str, NDArray[np.integer]],
     ellipsoid: Ellipsoid | None,
     *,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns coronal and axial sections with the hemispheres, what grows, growth of a step, and stiffness.
@@ -57,7 +56,6 @@ def region_sections(
         {GROWTH: 1e3 * fields["tangential_growth_per_step"], STIFFNESS: fields["shear_modulus_pa"]},
         tags={"hemispheres": (tags["hemisphere"], HEMISPHERES), "growing": (tags["growing"], GROWING)},
         ellipsoid=ellipsoid,
-        title=title,
         synthetic=synthetic,
     )
 
@@ -70,7 +68,6 @@ def cross_sections(
     tags: Mapping[str, Tag] | None = None,
     planes: Sequence[str] = SHOWN,
     ellipsoid: Ellipsoid | None = None,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns plane sections through the middle of a mesh in RAS+ mm, a row per plane, a column per tag and field.
@@ -92,12 +89,12 @@ def cross_sections(
     tags = tags or {}
     _require_fitting(mesh, fields, tags)
     grid = _grid(mesh, fields, {name: codes for name, (codes, _) in tags.items()})
-    figure, panels, foot = _rows(mesh, planes, len(tags) + len(fields), title, synthetic)
+    figure, panels, foot = _rows(mesh, planes, len(tags) + len(fields), synthetic)
     for column, name in enumerate((*tags, *fields)):
         panels[0, column].set_title(name.partition(" (")[0], fontsize=7)
         for axes, plane in zip(panels[:, column], planes, strict=True):
             points, triangles, section = _section(grid, plane)
-            scale: Colormap = mpl.colormaps["viridis"]
+            scale: Colormap = mpl.colormaps[MAGNITUDES]
             if name in tags:
                 colours = [colour for _, colour in tags[name][1].values()]
                 values, limits = _ranks(section.cell_data[name], tags[name][1]), (-0.5, len(colours) - 0.5)
@@ -116,6 +113,7 @@ def cross_sections(
             if ellipsoid and name == list(tags)[-1]:
                 keys.append(Line2D([], [], color="black", linestyle="--", linewidth=0.9, label="ellipsoid"))
             foot[column].legend(handles=keys, loc="upper center", borderaxespad=0, labelspacing=0.3, handlelength=1.6)
+    add_letters(panels.flat)
     return figure
 
 
@@ -127,7 +125,6 @@ def normal_arrows(
     facets: NDArray[np.integer],
     *,
     planes: Sequence[str] = SHOWN,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns sections with the normals of a sample of vertices near them as arrows, over the cortical weight.
@@ -149,7 +146,7 @@ def normal_arrows(
     wide = [half[PLANES[plane][1]] for plane in known(planes)]
     tall = max(half[PLANES[plane][2]] for plane in planes)
     height = (FULL_WIDTH_IN - 0.55 * len(planes)) * tall / sum(wide) + 0.95 + 0.17 * synthetic
-    figure = new_figure(FULL_WIDTH_IN, height, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, height, synthetic=synthetic)
     panels = figure.subplots(1, len(planes), squeeze=False, gridspec_kw={"width_ratios": wide})[0]
     groups = {"pial vertices": (pial, RUN_COLOURS[0]), "vertices inside": (~pial, RUN_COLOURS[1])}
     for axes, plane, width in zip(panels, planes, wide, strict=True):
@@ -196,7 +193,7 @@ def _require_fitting(mesh: TetrahedralMesh, fields: Mapping[str, Floats], tags: 
 
 
 def _rows(
-    mesh: TetrahedralMesh, planes: Sequence[str], columns: int, title: str, synthetic: bool
+    mesh: TetrahedralMesh, planes: Sequence[str], columns: int, synthetic: bool
 ) -> tuple[Figure, NDArray, NDArray]:
     """Returns a figure with its panels, a row for each plane, all at one scale, and a place for a key per column."""
     middle, half = _middle(mesh), 0.515 * np.ptp(mesh.vertices, axis=0)
@@ -205,7 +202,7 @@ def _rows(
     tall = [max(half[PLANES[plane][2]], _LABEL_IN / inches_per_mm) for plane in planes]
     heights = [inches_per_mm * height for height in tall] + [_FOOT_IN]
     total = sum(heights) + 0.5 + 0.12 * len(planes) + 0.17 * synthetic
-    figure = new_figure(FULL_WIDTH_IN, total, title=title, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, total, synthetic=synthetic)
     panels = figure.subplots(len(heights), columns, squeeze=False, gridspec_kw={"height_ratios": heights})
     for (row, column), axes in np.ndenumerate(panels[:-1]):
         across, right, up = PLANES[planes[row]]

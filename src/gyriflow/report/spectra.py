@@ -19,12 +19,12 @@ from .style import (
     MUTED_COLOUR,
     REAL_BRAIN,
     REAL_COLOUR,
+    add_letters,
+    chosen_colours,
     from_zero,
     light_grid,
     new_figure,
-    run_colours,
     run_legend,
-    simulated_runs,
     styled,
     week_axis,
     week_label,
@@ -67,13 +67,18 @@ def _untrusted_legend(*, bars: bool = False, points: bool = False, stars: bool =
     return entries
 
 
+def _sides_of(rows: pd.DataFrame) -> list[str]:
+    """Returns the hemispheres that some brain of a table has, left first."""
+    return [side for side in SIDES if (rows["hemisphere"] == side).any()]
+
+
 @styled
 def spectra_chart(
     spectra: pd.DataFrame,
     *,
     week: float,
     bands: Sequence[int] = FOLD_BANDS,
-    title: str = "",
+    runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -87,6 +92,8 @@ def spectra_chart(
     spectra : columns run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
     week
         Week in GW.
+    runs
+        All runs of the study, which settle the colours.
 
     Raises
     ------
@@ -97,17 +104,17 @@ def spectra_chart(
     rows = rows[(rows["week"] - week).abs() < 1e-6]
     if rows.empty:
         raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
-    runs = simulated_runs(rows["run"])
-    colours = run_colours(runs)
-    figure = new_figure(FULL_WIDTH_IN, 3.0, title=title or week_label(week), synthetic=synthetic, measured=measured)
-    panels = figure.subplots(1, 2, sharey=True)
-    width = 0.8 / max(len(runs), 1)
-    for axes, hemisphere in zip(panels, SIDES, strict=True):
+    colours = chosen_colours(rows["run"], runs)
+    figure = new_figure(FULL_WIDTH_IN, 3.0, synthetic=synthetic, measured=measured)
+    sides = _sides_of(rows)
+    panels = figure.subplots(1, len(sides), sharey=True, squeeze=False)[0]
+    width = 0.8 / max(len(colours), 1)
+    for axes, hemisphere in zip(panels, sides, strict=True):
         side = rows[rows["hemisphere"] == hemisphere]
-        for index, run in enumerate(runs):
+        for index, (run, colour) in enumerate(colours.items()):
             of_run = side[side["run"] == run]
             position = [bands.index(band) - 0.4 + (index + 0.5) * width for band in of_run["band"]]
-            bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colours[run])
+            bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colour)
             _untrusted_bars(axes, list(bars), list(of_run["trusted"]))
         for _, real in side[side["run"] == MEASURED].iterrows():
             centre = bands.index(real["band"])
@@ -127,7 +134,9 @@ def spectra_chart(
     untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
     marks = set((untrusted["run"] == MEASURED).to_list())
     extra = _untrusted_legend(bars=False in marks, stars=True in marks)
-    run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
+    add_letters(panels)
+    name = measured if MEASURED in set(rows["run"]) else ""
+    run_legend(figure, colours, measured=name, bars=True, extra=extra)
     return figure
 
 
@@ -136,7 +145,7 @@ def spectra_weeks_chart(
     spectra: pd.DataFrame,
     *,
     bands: Sequence[int] = FOLD_BANDS,
-    title: str = "",
+    runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -150,14 +159,15 @@ def spectra_weeks_chart(
     spectra : columns run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
     """
     rows = _with_band_numbers(spectra, bands)
-    runs = simulated_runs(rows["run"])
-    colours = run_colours(runs)
-    figure = new_figure(FULL_WIDTH_IN, 4.2, title=title, synthetic=synthetic, measured=measured)
-    panels = figure.subplots(2, len(bands), sharex=True, sharey="col", squeeze=False)
-    for line, hemisphere in zip(panels, SIDES, strict=True):
+    colours = chosen_colours(rows["run"], runs)
+    sides = _sides_of(rows)
+    height = 4.2 if len(sides) == 2 else 2.6
+    figure = new_figure(FULL_WIDTH_IN, height, synthetic=synthetic, measured=measured)
+    panels = figure.subplots(len(sides), len(bands), sharex=True, sharey="col", squeeze=False)
+    for line, hemisphere in zip(panels, sides, strict=True):
         for axes, band in zip(line, bands, strict=True):
             here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
-            for run in [*runs, MEASURED]:
+            for run in [*colours, MEASURED]:
                 series = here[here["run"] == run].sort_values("week")
                 colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
                 if run != MEASURED:
@@ -177,8 +187,9 @@ def spectra_weeks_chart(
             if not here["relative_power"].notna().any():
                 _beyond_the_modes(axes, 0.5, axes.transAxes)
                 axes.set_yticks([])
-            if hemisphere == "left":
+            if hemisphere == sides[0]:
                 axes.set_title(f"B{band}, {_FOLDS[band]} folds" if band in _FOLDS else f"B{band}")
+            if hemisphere != sides[-1]:
                 axes.set_xlabel("")
         line[0].set_ylabel(f"{hemisphere} hemisphere\nrelative power")
     for axes in panels[0]:
@@ -186,5 +197,6 @@ def spectra_weeks_chart(
     untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
     marks = set((untrusted["run"] == MEASURED).to_list())
     extra = _untrusted_legend(points=False in marks, stars=True in marks)
-    run_legend(figure, runs, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
+    add_letters(panels.flat)
+    run_legend(figure, colours, measured=measured if MEASURED in set(rows["run"]) else "", extra=extra)
     return figure

@@ -2,9 +2,10 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from functools import wraps
+from string import ascii_lowercase
 from typing import Any
 
 import matplotlib as mpl
@@ -13,6 +14,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 SINGLE_COLUMN_IN = 3.5
 """Width of one column of a journal page, in inches."""
@@ -25,6 +27,11 @@ REAL_COLOUR = "#000000"
 MUTED_COLOUR = "#767676"
 SIMULATED_SURFACE_COLOUR = "#8FB4DC"
 REAL_SURFACE_COLOUR = "#EBD6B4"
+
+MAGNITUDES = "YlGnBu"
+"""Colour map of quantities from zero up: pale at zero, so that dark colours are values and not shade."""
+NEUTRAL_COLOUR = "#D9D9D9"
+"""Tissue without a value: outside, not measured, or exactly zero where only what is above counts."""
 
 MEASURED = "real"
 """The run name of measured brains."""
@@ -47,6 +54,8 @@ _SETTINGS: dict[Any, Any] = {
     "axes.formatter.use_mathtext": True,
     "figure.titlesize": 9.0,
     "figure.dpi": 200.0,
+    # text stays text in PDF files
+    "pdf.fonttype": 42,
     "xtick.labelsize": 7.0,
     "ytick.labelsize": 7.0,
     "xtick.major.width": 0.6,
@@ -77,8 +86,8 @@ def styled[**P](chart: Callable[P, Figure]) -> Callable[P, Figure]:
     return drawn
 
 
-def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool, measured: str = PHANTOM) -> Figure:
-    """Returns an empty figure with its heading.
+def new_figure(width_in: float, height_in: float, *, synthetic: bool, measured: str = PHANTOM) -> Figure:
+    """Returns an empty figure. What it shows is said by its caption; that brains are synthetic, by the figure too.
 
     Parameters
     ----------
@@ -88,10 +97,17 @@ def new_figure(width_in: float, height_in: float, *, title: str, synthetic: bool
         What the brains that it is shown beside are called.
     """
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    heading = "\n".join(line for line in (title, synthetic_note(measured) if synthetic else "") if line)
-    if heading:
-        figure.suptitle(heading)
+    if synthetic:
+        figure.suptitle(synthetic_note(measured))
     return figure
+
+
+def add_letters(panels: Iterable[Axes]) -> None:
+    """Writes a, b, c … at the upper left of panels, by which a caption calls them; nothing for a single panel."""
+    panels = list(panels)
+    if len(panels) > 1:
+        for axes, letter in zip(panels, ascii_lowercase, strict=False):
+            axes.set_title(letter, loc="left", fontweight="bold", fontsize=9)
 
 
 def synthetic_note(measured: str = PHANTOM) -> str:
@@ -137,6 +153,13 @@ def simulated_runs(runs: Iterable[str]) -> list[str]:
     return [run for run in dict.fromkeys(runs) if run != MEASURED]
 
 
+def chosen_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
+    """Returns the colours of the simulated runs that are present, in the order of all `runs` of the study."""
+    simulated = simulated_runs(present)
+    colours = run_colours([*runs, *simulated])
+    return {run: colour for run, colour in colours.items() if run in simulated}
+
+
 def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
     """Returns what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
     pairs = [(run, brain) for run, brain in folded]
@@ -154,7 +177,10 @@ def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def run_colours(runs: Iterable[str]) -> dict[str, Any]:
-    """Returns a colour for each run in the order given: distinct ones, or a sequential scale for a long list."""
+    """Returns a colour for each run in the order given: distinct ones, or a sequential scale for a long list.
+
+    All figures of a study name all of its runs, in the same order: so a run keeps its colour from figure to figure.
+    """
     names = list(dict.fromkeys(runs))
     if len(names) <= len(RUN_COLOURS):
         return dict(zip(names, RUN_COLOURS, strict=False))
@@ -185,13 +211,26 @@ def light_grid(axes: Axes, axis: str = "y") -> None:
     axes.grid(visible=True, axis=axis)  # type: ignore[arg-type]
 
 
-def run_legend(figure: Figure, runs: Sequence[str], *, measured: str = "", extra: Sequence[Artist] = ()) -> None:
+def run_legend(
+    figure: Figure,
+    colours: Mapping[str, Any],
+    *,
+    measured: str = "",
+    bars: bool = False,
+    extra: Sequence[Artist] = (),
+) -> None:
     """Draws below the panels a legend of the runs, of the measured brains where they have a name, and of what else.
 
-    It has as many columns as its longest label allows.
+    Runs are keyed as they are drawn, as lines or as `bars`. The legend has as many columns as its longest label allows.
+
+    Parameters
+    ----------
+    colours : {run: colour}
     """
-    colours = run_colours(runs)
-    handles: list[Artist] = [Line2D([], [], color=colours[run], marker="o", label=run) for run in runs]
+    handles: list[Artist] = [
+        Patch(color=colour, label=run) if bars else Line2D([], [], color=colour, marker="o", label=run)
+        for run, colour in colours.items()
+    ]
     if measured:
         handles.append(Line2D([], [], color=REAL_COLOUR, marker="*", markersize=7, linestyle="none", label=measured))
     handles.extend(extra)

@@ -104,6 +104,30 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     return pd.DataFrame(columns)
 
 
+def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame:
+    """Returns metrics by region: a row per brain, run, week and region, left, right and asymmetry of each metric.
+
+    Parameters
+    ----------
+    regions : columns subject, run, week, hemisphere, region, metric, value, unit
+    asymmetry : columns subject, run, week, region, metric, asymmetry_index
+    """
+    index = ["subject", "run", "week", "region"]
+    units = regions["unit"].map(shown_unit)
+    names = regions["metric"].str.replace("_", " ") + [f" ({unit})" if unit else "" for unit in units]
+    left_right = regions.assign(column=names + ", " + regions["hemisphere"])
+    wide = left_right.pivot_table("value", index, "column", aggfunc="first")
+    of_regions = asymmetry[asymmetry["region"].isin(set(regions["region"]))]
+    indices = of_regions.pivot_table("asymmetry_index", index, "metric", aggfunc="first")
+    order = []
+    for metric, name in dict(zip(regions["metric"], names, strict=True)).items():
+        heading = f"{metric.replace('_', ' ')}, asymmetry"
+        wide[heading] = indices.get(metric, np.nan)
+        order += [f"{name}, left", f"{name}, right", heading]
+    brains = pd.MultiIndex.from_frame(regions[index].drop_duplicates())
+    return wide.reindex(index=brains, columns=order).rename_axis(["brain", "run", "week (GW)", "region"])
+
+
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     """Returns the parameters of the runs: a row per parameter, a column per run, those that differ first.
 

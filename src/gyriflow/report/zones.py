@@ -17,6 +17,7 @@ from ..parameters.terms import (
     FLAT_CUTS,
     FREE,
     LEFT_CONTACT,
+    MEDIAL_WALL,
     RIGHT_CONTACT,
     SIDE_X,
     SIDE_Y,
@@ -24,8 +25,9 @@ from ..parameters.terms import (
 )
 from ..units import CM2_PER_MM2
 from .panels import Panel, Row, panel_grid
-from .scene import colour_scale, named_views, paint, restricted
-from .style import styled
+from .renders import magnitude_scale
+from .scene import MAP, hemisphere_faces, named_views, paint, restricted
+from .style import MAGNITUDES, NEUTRAL_COLOUR, styled
 
 ZONE_VIEWS = ("left", "bottom", "left medial", "right medial")
 COLOURS = {
@@ -37,6 +39,7 @@ COLOURS = {
     BASE: "#999999",
     SIDE_X: "#56B4E9",
     SIDE_Y: "#E69F00",
+    MEDIAL_WALL: "#999999",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
 ZONES: Mapping[int, tuple[str, str]] = {code: (ZONE_NAMES[code], colour) for code, colour in COLOURS.items()}
@@ -51,7 +54,6 @@ def zones_picture(
     fissure_x_mm: float,
     names: Mapping[int, tuple[str, str]] = ZONES,
     views: Sequence[str] = ZONE_VIEWS,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
     """Returns the zones of the brain's boundary from several sides, with their areas.
@@ -83,7 +85,7 @@ def zones_picture(
         if areas[code] or code not in FLAT_CUTS
     ]
     columns, rows = _one_row(mesh, table[zones], views, fissure_x_mm)
-    return panel_grid(columns, rows, title=title, synthetic=synthetic, legend=legend)
+    return panel_grid(columns, rows, synthetic=synthetic, legend=legend)
 
 
 @styled
@@ -94,10 +96,9 @@ def field_picture(
     label: str,
     fissure_x_mm: float,
     views: Sequence[str] = ZONE_VIEWS,
-    title: str = "",
     synthetic: bool = False,
 ) -> Figure:
-    """Returns a field at the pial vertices, such as the growth weight, from several sides.
+    """Returns a field at the pial vertices, such as the growth weight, from several sides; grey where it is zero.
 
     Parameters
     ----------
@@ -105,13 +106,21 @@ def field_picture(
     label
         Name and unit, for example "growth weight" or "tangential growth increment (10⁻³)".
     """
-    scale = colour_scale("viridis", float(np.nanmin(values)), float(np.nanmax(values)))
-    columns, rows = _one_row(mesh, paint(values, scale), views, fissure_x_mm)
-    return panel_grid(columns, rows, title=title, synthetic=synthetic, colour_bars=[(scale, label)])
+    scale = magnitude_scale(values, MAGNITUDES)
+    columns, rows = _one_row(mesh, paint(values, scale, zero_is_nothing=True), views, fissure_x_mm)
+    return panel_grid(
+        columns,
+        rows,
+        synthetic=synthetic,
+        colour_bars=[(scale, label)],
+        legend=[Patch(color=NEUTRAL_COLOUR, label="zero")],
+    )
 
 
 def _one_row(
     mesh: TriangleMesh, colours: Floats, views: Sequence[str], fissure_x_mm: float
 ) -> tuple[list[str], list[Row]]:
-    panels = [Panel(*restricted(mesh, colours, view.hemisphere, fissure_x_mm), view) for view in named_views(views)]
-    return [f"{name} view" for name in views], [Row("", panels)]
+    # a brain of one hemisphere has no medial view of the other
+    shown = [view for view in named_views(views) if hemisphere_faces(mesh, view.hemisphere, fissure_x_mm).any()]
+    panels = [Panel(*restricted(mesh, colours, view.hemisphere, fissure_x_mm), view, material=MAP) for view in shown]
+    return [f"{view.name} view" for view in shown], [Row("", panels)]

@@ -239,7 +239,7 @@ def _require_both(
     tissue: Labels, scheme: LabelScheme, field: NDArray[np.float32], affine: Floats, report: dict[str, Any]
 ) -> None:
     """Raises InputError where there is one hemisphere only, by its labels or by its shape."""
-    remedy = "Give a volume with both hemispheres; a brain of one cannot be folded."
+    remedy = "Give a volume with both hemispheres; or the only one under hemisphere, with its side."
     sides = {
         name: bool(np.isin(tissue, np.intersect1d(numbers, scheme.cortex or scheme.cerebrum)).any())
         for name, numbers in (("left", scheme.left), ("right", scheme.right))

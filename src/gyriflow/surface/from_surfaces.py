@@ -207,7 +207,7 @@ def _require_both(mesh: TriangleMesh, report: dict[str, Any]) -> None:
             "the surface seems to be one hemisphere only",
             found=f"a narrowest extent that is {shape:.2f} of the longest",
             expected=f"{NARROWEST_BRAIN} or more, as in whole cerebra",
-            remedy="Give both hemispheres; a brain of one cannot be folded.",
+            remedy="Give both hemispheres; or the only one under hemisphere, with its side.",
         )
     if shape < DOUBTFUL_BRAIN:
         warn(report, f"the surface is narrow ({shape:.2f} of its length): are both hemispheres there?")

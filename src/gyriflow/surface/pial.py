@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.triangles import TriangleMesh, transformed
+from ..geometry.triangles import TriangleMesh, area, transformed
 from .even_triangles import make_even
-from .hemispheres import cut_sides, split
+from .hemispheres import DOUBTFUL_RATIO, cut_sides, split
 from .orientation import MidPlane, upright
 from .outcome import PialSurface, describe, faults, require_sound
 from .rebuilding import rebuild
@@ -73,6 +73,9 @@ def pose_surface(
         warn(report, "no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
     if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * width:
         warn(report, f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
+    areas = sorted((area(left), area(right)))
+    if areas[1] > DOUBTFUL_RATIO * areas[0]:
+        warn(report, f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
     report |= {
         "pose": (matrix @ motion(rotation)).tolist(),
         "rotation_deg": angle,

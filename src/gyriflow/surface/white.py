@@ -29,11 +29,9 @@ def thickness_from_white(
     white surfaces in the coordinates of the files that the pial one was made from, by side: "left", "right", or
     "whole". InputError where a white surface crosses the pial one.
     """
-    motions = report.get("motions", {})
-    posed = {side: transformed(mesh, np.array(motions.get(side, report["pose"]))) for side, mesh in whites.items()}
-    for side, white in posed.items():
+    for side, white in _posed(report, whites).items():
         _require_inside(white, surface, side)
-    inner = merged(*posed.values())
+    inner = merged(*_posed(report, whites).values())
     values = layer_thickness(surface, inner)
     measured = values >= LEAST_MM
     if not measured.any():
@@ -44,6 +42,16 @@ def thickness_from_white(
             remedy="Give the white surfaces under white.",
         )
     return Thickness(values, measured, summary(values, measured, vertex_areas(surface)))
+
+
+def posed_whites(report: Mapping[str, Any], whites: Mapping[str, TriangleMesh]) -> TriangleMesh | None:
+    """Returns the white surfaces as one, moved as the pial ones were; None where there are none."""
+    return merged(*_posed(report, whites).values()) if whites else None
+
+
+def _posed(report: Mapping[str, Any], whites: Mapping[str, TriangleMesh]) -> dict[str, TriangleMesh]:
+    motions = report.get("motions", {})
+    return {side: transformed(mesh, np.array(motions.get(side, report["pose"]))) for side, mesh in whites.items()}
 
 
 def _require_inside(white: TriangleMesh, pial: TriangleMesh, side: str) -> None:

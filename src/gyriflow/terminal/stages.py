@@ -10,6 +10,7 @@ FILES = {
     "retrieve": "download",
     "validation": "validation",
     "study": "metrics",
+    "regions": "metrics",
     "run_figures": "figures",
     "study_figures": "figures",
 }

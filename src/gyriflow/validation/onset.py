@@ -7,7 +7,17 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
+from ..geometry.matching import labels_at, match_points
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    face_areas,
+    face_components,
+    submesh,
+    vertex_areas,
+    vertex_normals,
+)
 
 DEEP_MM = 2.0
 """A sulcus is there when it is so much below its neighbouring crowns."""
@@ -15,8 +25,42 @@ DEEP_MM = 2.0
 NEIGHBOURHOOD_MM = 10.0
 """Round a region, where its crowns are."""
 
+LEAST_REGION_MM2 = 40.0
+"""Smaller places are no sulci that are looked for."""
+
 BOTTOM, CROWN = 0.9, 0.1
 """Quantiles of depth by area that stand for the bottom of a region and for the crowns beside it."""
+
+
+def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats) -> Ints:
+    """Returns the (n,) number of the sulcus at each vertex of a hemisphere, 1 for the largest, 0 outside of sulci.
+
+    A sulcus is a connected area deeper than `DEEP_MM` below the hull, of `LEAST_REGION_MM2` or more. That on the
+    medial wall is one of them.
+    """
+    regions = np.zeros(len(mesh.vertices), dtype=np.int64)
+    deep = depth_mm[mesh.faces].min(axis=1) >= DEEP_MM
+    if not deep.any():
+        return regions
+    part, used = submesh(mesh, deep)
+    component = face_components(part)
+    sizes = np.bincount(component, face_areas(part))
+    largest = [number for number in np.argsort(-sizes, kind="stable") if sizes[number] >= LEAST_REGION_MM2]
+    for name, number in enumerate(largest, start=1):
+        regions[used[np.unique(part.faces[component == number])]] = name
+    return regions
+
+
+def regions_on(mesh: TriangleMesh, carried: Floats, target: TriangleMesh, regions: NDArray[np.integer]) -> Ints:
+    """Returns the (n,) regions of a surface whose vertices were carried to a later brain that has regions.
+
+    Parameters
+    ----------
+    carried
+        (n, 3) positions of its vertices in the space of the `target`.
+    """
+    match = match_points(carried, vertex_normals(TriangleMesh(carried, mesh.faces)), target)
+    return labels_at(match, regions)
 
 
 def relief(

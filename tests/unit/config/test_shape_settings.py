@@ -92,9 +92,9 @@ def test_a_shape_is_the_only_source_of_its_brain_and_takes_no_keys_of_others():
     ]
     assert problems(study(brains=brains)) == [
         "brains[0]: found phantom and shape as its source; expected exactly one of labels, segmentation, hemispheres, "
-        "pial, phantom, shape",
+        "hemisphere, pial, phantom, shape",
         "brains[1].week: found 50; it should be less than or equal to 45",
-        "brains[1].coordinates: has no meaning with shape; only with hemispheres or pial",
+        "brains[1].coordinates: has no meaning with shape; only with hemispheres or hemisphere or pial",
     ]
 
 

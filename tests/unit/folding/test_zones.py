@@ -8,7 +8,7 @@ from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.zone_checks import refuse_impossible, zone_report, zone_warnings
 from gyriflow.folding.zones import find_zones, inside_ellipsoid
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
-from gyriflow.parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT
+from gyriflow.parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, LEFT_CONTACT, MEDIAL_WALL, RIGHT_CONTACT
 
 OPEN = {"contact": False}
 DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift_y": 0.05, "shift_z": -0.15, "semi_axes": (0.35, 0.40, 0.50)}
@@ -151,3 +151,57 @@ def test_a_floating_part_is_refused(brain):
 def test_a_fissure_outside_the_brain_is_refused(brain):
     with pytest.raises(InputError, match="outside the brain"):
         refuse_impossible(brain, find_zones(brain, fissure_x_mm=50.0, **DEFAULTS))
+
+
+def half(side):
+    """Returns the half of an ellipsoid on one side of x = 0, flat there."""
+    mesh = ellipsoid_mesh(12, (20.0, 26.0, 18.0))
+    sign = -1.0 if side == "left" else 1.0
+    # pressed flat: the other half becomes a sheet, so only elements of one side are kept
+    kept = (sign * mesh.vertices[mesh.tets, 0]).min(axis=1) > -1e-9
+    used, tets = np.unique(mesh.tets[kept], return_inverse=True)
+    return TetrahedralMesh(mesh.vertices[used], tets.reshape(-1, 4))
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("held", [False, True])
+def test_the_medial_wall_of_a_single_hemisphere_slides_or_is_held(side, held):
+    mesh = half(side)
+    fissure = 0.5 if side == "left" else -0.5
+    zones = find_zones(mesh, fissure_x_mm=fissure, **DEFAULTS, side=side, wall_held=held)
+    wall = zones.vertices_of(MEDIAL_WALL)
+    inner = np.flatnonzero(np.abs(mesh.vertices[:, 0]) < 1e-6)
+    assert np.isin(inner, wall).all()
+    assert zones.fixed[wall, 0].all()
+    free_in_plane = np.setdiff1d(wall, zones.vertices_of(CLAMPED))
+    assert zones.fixed[free_in_plane, 1:].all() == held
+    assert zones.fixed[free_in_plane, 1:].any() == held
+    assert zones.penetration_mm(mesh.vertices) == 0.0
+    assert not zones.vertices_of(RIGHT_CONTACT if side == "left" else LEFT_CONTACT).size
+    # without cortex, but part of the area that is measured
+    assert not np.isin(zones.facets[zones.facet_zone == MEDIAL_WALL], zones.cortex_facets).all(axis=1).all()
+    assert len(zones.measured_facets) == len(zones.facets)
+    refuse_impossible(mesh, zones)
+
+
+def test_the_ellipsoid_of_a_single_hemisphere_is_that_of_the_brain_with_its_mirror_image(brain):
+    whole = inside_ellipsoid(brain.vertices, 0.05, -0.15, (0.35, 0.40, 0.50))
+    mesh = half("left")
+    alone = inside_ellipsoid(mesh.vertices, 0.05, -0.15, (0.35, 0.40, 0.50), "left")
+    same = {tuple(place) for place in brain.vertices[whole].round(6)}
+    assert {tuple(place) in same for place in mesh.vertices[alone].round(6)} == {True}
+    assert alone.sum() == sum(x <= 1e-6 for x, _, _ in same)
+
+
+def test_a_sliding_wall_alone_leaves_no_rigid_motion():
+    mesh = half("right")
+    zones = find_zones(mesh, fissure_x_mm=-0.5, **DEFAULTS, side="right", support="free")
+    assert not zones.free
+    x, y, z = mesh.vertices.T
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    turns = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+    motions = np.concatenate([np.array([[one, zero, zero], [zero, one, zero], [zero, zero, one]]), turns])
+    fixed = motions.transpose(0, 2, 1)[:, zones.fixed]
+    assert np.linalg.matrix_rank(fixed) == 6
+    assert zones.fixed[:, 1:].sum() == 3
+    refuse_impossible(mesh, zones)

@@ -6,21 +6,22 @@ import pytest
 
 from gyriflow.errors import InputError
 from gyriflow.growth.curves import curve_table
-from gyriflow.growth.following import fits_of_series, followed_sizes, regional_map, relative_growth
+from gyriflow.growth.following import fits_of_series, followed_sizes, stretch_of_surface
+from gyriflow.growth.regional import regional_map, relative_growth
 
 WEEKS = np.arange(21.0, 26.0)
 AREAS = pd.DataFrame(
     {"series": "volume", "week": WEEKS, "area_cm2": 90 * 1.1 ** (WEEKS - 21), "volume_ml": 46 * 1.2 ** (WEEKS - 21)}
-)
+).assign(thickness_mm=np.nan)
 
 
 def curves():
     (fits,) = fits_of_series(AREAS).values()
-    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume")
+    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=np.nan)
 
 
 def test_measured_sizes_are_followed_every_quarter_of_a_week():
-    follow = {"area_cm2": "measured", "volume_ml": {21: 40.0, 25: 80.0}}
+    follow = {"area_cm2": "measured", "volume_ml": {21: 40.0, 25: 80.0}, "known_until_gw": None, "thickness_mm": None}
     sizes = followed_sizes(follow, curves(), "volume", [21.0, 22.0, 23.0], False)
     assert list(sizes["area_cm2"])[:3] == [21.0, 21.25, 21.5]
     assert max(sizes["area_cm2"]) >= 23.0
@@ -29,17 +30,29 @@ def test_measured_sizes_are_followed_every_quarter_of_a_week():
 
 
 def test_a_brain_without_a_series_has_no_measured_curve():
-    follow = {"area_cm2": "measured", "volume_ml": "measured"}
+    follow = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": None, "thickness_mm": None}
     for table, series in ((None, None), (curves(), "surface")):
         with pytest.raises(InputError, match="no measured curve of area_cm2"):
             followed_sizes(follow, table, series, [21.0, 22.0], False)
 
 
 def test_a_given_table_shrinks_only_where_that_is_allowed():
-    follow = {"area_cm2": {21: 90.0, 25: 80.0}, "volume_ml": {21: 40.0, 25: 80.0}}
+    follow = {
+        "area_cm2": {21: 90.0, 25: 80.0},
+        "volume_ml": {21: 40.0, 25: 80.0},
+        "known_until_gw": None,
+        "thickness_mm": None,
+    }
     with pytest.raises(InputError, match="area_cm2 shrinks"):
         followed_sizes(follow, None, None, [21.0, 22.0], False)
     assert followed_sizes(follow, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
+
+
+def test_the_surface_is_stretched_as_measured_brains_grow():
+    assert stretch_of_surface(curves(), "volume", 21.0, 25.0) == pytest.approx(1.1**2, rel=5e-3)
+    assert stretch_of_surface(curves(), "volume", 25.0, 21.0) == 1.0
+    with pytest.raises(InputError, match="no measured curve"):
+        stretch_of_surface(curves(), None, 21.0, 25.0)
 
 
 def test_local_growth_is_a_multiple_of_the_whole():
@@ -50,3 +63,27 @@ def test_local_growth_is_a_multiple_of_the_whole():
     with pytest.raises(InputError, match="does not grow"):
         relative_growth(-rates, weights, 1.0)
     assert regional_map(21.5) == "regional_growth_21.50"
+
+
+def test_thickness_follows_its_measured_curve_and_may_shrink():
+    (fits,) = fits_of_series(AREAS.assign(thickness_mm=2.4 - 0.1 * (WEEKS - 21))).values()
+    table = curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=np.nan)
+    follow = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": None, "thickness_mm": "measured"}
+    assert followed_sizes(follow, table, "volume", [21.0, 22.0], False)["thickness_mm"][22.0] == pytest.approx(
+        2.3, 5e-3
+    )
+
+
+def test_a_prediction_knows_no_brain_after_its_week():
+    grown_late = AREAS.assign(area_cm2=np.where(WEEKS > 23, 500.0, AREAS["area_cm2"]))
+    tables = [
+        curve_table({name: fit.curve for name, fit in fits["volume"].items()}).assign(
+            series="volume", known_until_gw=week
+        )
+        for week, fits in ((np.nan, fits_of_series(grown_late)), (23.0, fits_of_series(grown_late, until=23.0)))
+    ]
+    follow = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": 23.0, "thickness_mm": None}
+    sizes = followed_sizes(follow, pd.concat(tables), "volume", [23.0, 24.0, 25.0], False)
+    assert sizes["area_cm2"][25.0] == pytest.approx(90 * 1.1**4, rel=0.01)
+    with pytest.raises(InputError, match="up to 22 GW"):
+        followed_sizes(follow | {"known_until_gw": 22.0}, pd.concat(tables), "volume", [23.0, 24.0], False)

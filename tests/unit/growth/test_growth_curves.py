@@ -101,3 +101,10 @@ def test_tables_go_through_their_values_and_are_written_out():
     assert table["value"].tolist() == pytest.approx([50, 60, 90])
     again = tabulated(table["week"], table["value"])
     assert value(again, 23.3) == pytest.approx(value(curve, 23.3))
+
+
+def test_a_straight_curve_goes_through_few_uneven_weeks():
+    weeks = [25.0, 26.0, 27.0, 29.0]
+    for sizes in ([143.5, 165.1, 181.5, 247.6], [88.0, 109.0, 125.8, 181.9]):
+        fit = fitted(weeks, sizes)
+        np.testing.assert_allclose(value(fit.curve, weeks), sizes, rtol=0.03)

@@ -152,10 +152,14 @@ def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(
         ball = trimesh.creation.icosphere(subdivisions=2, radius=radius_mm)
         files.append(tmp_path / f"{number}.gii")
         write_surface(files[-1], TriangleMesh(ball.vertices, ball.faces))
+    thickness = tmp_path / "thickness.json"
+    thickness.write_text('{"mean_mm": 1.8}')
     job = SimpleNamespace(
-        input=SimpleNamespace(whole=files, left=files, right=files),
+        input=SimpleNamespace(whole=files, left=files, right=files, thickness=[thickness]),
         output=SimpleNamespace(**{name: tmp_path / f"{name}.csv" for name in ("areas", "rates", "agreement")}),
-        params=SimpleNamespace(series=["mine", "mine", "atlas", "atlas"], brains=[*"abcd"], weeks=[21, 22, 21, 22]),
+        params=SimpleNamespace(
+            series=["mine", "mine", "atlas", "atlas"], brains=[*"abcd"], weeks=[21, 22, 21, 22], with_thickness=["b"]
+        ),
         log=[str(tmp_path / "log")],
     )
     runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
@@ -165,3 +169,4 @@ def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(
     assert row.difference_per_s == pytest.approx((1.05 - 1.1) / WEEK_S, rel=1e-5)
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]
+    assert areas["thickness_mm"].isna().tolist() == [True, False, True, True]

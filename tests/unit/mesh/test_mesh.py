@@ -11,7 +11,7 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, sign
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, transformed
 from gyriflow.mesh.gates import refuse_bad_mesh
 from gyriflow.mesh.quality import dihedral_angles, elements_through, quality_summary, radius_ratios
-from gyriflow.mesh.sizing import background_mesh, edge_length_at, edge_length_for
+from gyriflow.mesh.sizing import background_mesh, edge_length_at, edge_length_for, finer
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 
 REGULAR = TetrahedralMesh([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 1, 2, 3]])
@@ -193,3 +193,9 @@ def test_an_open_or_inverted_surface_is_refused():
         tetrahedralise(TriangleMesh(shape.vertices, shape.faces[1:]), **SIZES)
     with pytest.raises(MeshError, match="closed and face outwards"):
         tetrahedralise(flipped(shape), **SIZES)
+
+
+def test_a_mesh_that_will_be_stretched_is_made_finer_by_as_much():
+    settings = {"surface_edge_mm": 0.9, "core_edge_mm": 3.0, "pial_faces": None, "order": 2}
+    assert finer(settings, 1.5) == pytest.approx(settings | {"surface_edge_mm": 0.6, "core_edge_mm": 2.0})
+    assert finer(settings | {"pial_faces": 1000}, 1.5)["pial_faces"] == 2250

@@ -17,7 +17,7 @@ def ball(radius_mm: float, stretch: float = 1.0, subdivisions: int = 4) -> Trian
 
 
 def test_weyl_numbers_of_spheres() -> None:
-    found = weyl_numbers(ball(20.0), ball(30.0), "textbook").set_index("hemisphere")
+    found = weyl_numbers({"left": ball(20.0), "right": ball(30.0)}, "textbook").set_index("hemisphere")
     np.testing.assert_allclose(found["area_mm2"], 4 * np.pi * np.array([20.0, 30.0]) ** 2, rtol=5e-3)
     np.testing.assert_allclose(found["first_eigenvalue_per_mm2"], 2 / np.array([20.0, 30.0]) ** 2, rtol=5e-3)
     # the number does not know the size

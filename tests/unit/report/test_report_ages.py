@@ -34,10 +34,21 @@ PROFILE = pd.concat(
 )
 CHECK = pd.concat([brain("real", week, 0.75) for week in (21.0, 22.0, 23.0, 24.0, 25.0)])
 
+SIMILARITY = pd.DataFrame(
+    [
+        (run, week, side, of, 0.9 - 0.2 * abs(week - of) if side == "whole" else 0.0)
+        for run in ("a", "b", "real")
+        for week in (22.0, 23.0)
+        for side in ("whole", "left")
+        for of in (21.0, 22.0, 23.0, 24.0)
+    ],
+    columns=["run", "week", "hemisphere", "reference_week", "similarity"],
+)
+
 
 @pytest.fixture(scope="module")
 def figure() -> Figure:
-    return age_profile_chart(PROFILE, CHECK)
+    return age_profile_chart(PROFILE, CHECK, SIMILARITY)
 
 
 def marks(axes, colour: str, *, open_ones: bool, marker: str) -> list[tuple[float, float]]:
@@ -91,11 +102,27 @@ def test_single_metrics_at_the_last_week_of_all_runs(figure):
 
 def test_without_a_simulated_brain_it_is_refused():
     with pytest.raises(InputError, match="no simulated brain"):
-        age_profile_chart(CHECK, CHECK)
+        age_profile_chart(CHECK, CHECK, SIMILARITY)
 
 
 def test_one_brain_a_week_is_said_in_the_figure() -> None:
-    said = [text.get_text() for text in age_profile_chart(PROFILE, CHECK).texts]
+    said = [text.get_text() for text in age_profile_chart(PROFILE, CHECK, SIMILARITY).texts]
     assert any("no single fetus" in text for text in said)
-    said = [text.get_text() for text in age_profile_chart(PROFILE.assign(brains_per_week=3), CHECK).texts]
+    said = [text.get_text() for text in age_profile_chart(PROFILE.assign(brains_per_week=3), CHECK, SIMILARITY).texts]
     assert not any("no single fetus" in text for text in said)
+
+
+def test_similarity_of_the_last_week_to_each_week_of_the_reference(figure):
+    axes = figure.axes[3]
+    assert "23 GW" in axes.get_title()
+    curves = [line for line in axes.lines if len(line.get_xdata()) == 4]
+    assert len(curves) == 2
+    for line in curves:
+        assert list(line.get_xdata()) == [21, 22, 23, 24]
+        np.testing.assert_allclose(line.get_ydata(), [0.5, 0.7, 0.9, 0.7])
+
+
+def test_an_age_whose_range_is_cut_has_a_mark_of_its_own() -> None:
+    cut = PROFILE.assign(flag=PROFILE["flag"].where(PROFILE["metric"] != "all", "range cut at the end"))
+    axes = age_profile_chart(cut, CHECK, SIMILARITY).axes[0]
+    assert marks(axes, RUN_COLOURS[0], open_ones=False, marker="d") == [(22, 22.25), (23, 23.25), (24, 24.25)]

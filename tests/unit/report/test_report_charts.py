@@ -54,7 +54,8 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
 
 def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     figure = growth_chart(AREAS, RATES, folding_rate_per_s=2e-7)
-    area_axes, rate_axes, volume_axes = figure.axes
+    area_axes, volume_axes, rate_axes = figure.axes
+    assert [axes.get_title("left") for axes in figure.axes] == ["a", "b", "c"]
     assert [bar.get_height() for bar in rate_axes.patches] == pytest.approx([1.2, -0.3])
     assert "10⁻⁷ s⁻¹" in rate_axes.get_ylabel()
     assert [label.get_text() for label in rate_axes.get_xticklabels()] == ["21–22", "22–23"]
@@ -68,7 +69,7 @@ def test_series_have_bars_on_one_scale_and_their_differences_a_panel():
     rates = pd.concat([RATES.assign(series="surface", rate_per_s=[3e-7, 1e-7]), RATES])
     agreement = RATES.assign(reference="surface", difference_per_s=[-1.8e-7, 0.4e-7])
     figure = growth_chart(areas, rates, agreement, folding_rate_per_s=2e-7)
-    area_axes, difference_axes, surface_axes, volume_axes, _ = figure.axes
+    area_axes, _, surface_axes, volume_axes, difference_axes = figure.axes
     assert [line_of(area_axes, colour)[:, 1].tolist() for colour in ("#0072B2", "#009E73")] == [
         [100, 115, 130],
         [200, 230, 260],
@@ -79,7 +80,7 @@ def test_series_have_bars_on_one_scale_and_their_differences_a_panel():
     assert [bar.get_height() for bar in volume_axes.patches] == pytest.approx([1.2, -0.3])
     assert surface_axes.get_ylim() == volume_axes.get_ylim()
     assert {"tangential growth rate: surface", "tangential growth rate: volume"} <= set(words(figure))
-    assert [text.get_text() for text in area_axes.get_legend().get_texts()] == ["surface", "volume", "area", "volume"]
+    assert [text.get_text() for text in area_axes.get_legend().get_texts()] == ["surface", "volume"]
     # a series is of one colour in all panels, and not that of the folding
     for axes, colour in ((surface_axes, "#0072B2"), (volume_axes, "#009E73"), (difference_axes, "#009E73")):
         assert all(mpl.colors.same_color(bar.get_facecolor(), colour) for bar in axes.patches)
@@ -97,7 +98,7 @@ def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
     curve = {21.5: 1e-7, 22.5: 2e-7, 25.0: 4.5e-7}
     figure = growth_chart(AREAS, RATES, folding_rate_per_s=curve)
     # the bars of weeks 21-22 and 22-23 stand at 0 and 1, one wide: constant up to 21.5, linear from there on
-    assert line_of(figure.axes[1], "#D55E00") == pytest.approx(
+    assert line_of(figure.axes[2], "#D55E00") == pytest.approx(
         np.array([[-0.5, 1.0], [0.0, 1.0], [0.5, 1.5], [1.0, 2.0], [1.5, 2.5]])
     )
     assert "folding" in words(figure)
@@ -105,7 +106,7 @@ def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
 
 def test_a_curve_of_one_week_is_a_constant_rate():
     figure = growth_chart(AREAS, RATES, folding_rate_per_s={30.0: 2e-7})
-    assert line_of(figure.axes[1], "#D55E00")[:, 1] == pytest.approx([2.0, 2.0, 2.0])
+    assert line_of(figure.axes[2], "#D55E00")[:, 1] == pytest.approx([2.0, 2.0, 2.0])
 
 
 def test_growth_chart_without_a_folding_has_no_line_of_it():
@@ -307,3 +308,20 @@ def test_spectra_over_weeks_have_a_row_per_side_and_a_column_per_band():
     assert figure.axes[2].lines[0].get_ydata().tolist() == pytest.approx([0.105, 0.11])
     assert {line.get_marker() for line in figure.axes[0].lines} == {"None", "o", "*"}
     assert all(axes.get_ylim()[0] == 0 and axes.get_ylim()[1] > 0.22 for axes in figure.axes)
+
+
+def test_a_run_keeps_its_colour_in_charts_of_other_runs():
+    rows = metric_rows("thick", "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2")
+    (axes,) = metrics_chart(rows, runs=["thin", "thick"]).axes
+    assert axes.lines[0].get_color() == "#D55E00"
+    spectra = pd.concat(spectrum_rows("thick", 28.0, {4: 0.2}))
+    bars = spectra_chart(spectra, week=28.0, runs=["thin", "thick"]).axes[0].patches
+    assert all(mpl.colors.same_color(bar.get_facecolor(), "#D55E00") for bar in bars)
+
+
+def test_bars_are_keyed_as_bars_and_lines_as_lines():
+    spectra = pd.concat([*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("thin", 27.0, {4: 0.2})])
+    (bars,) = spectra_chart(spectra, week=28.0).legends[0].legend_handles
+    (lines,) = spectra_weeks_chart(spectra).legends[0].legend_handles
+    assert isinstance(bars, mpl.patches.Patch)
+    assert isinstance(lines, mpl.lines.Line2D)

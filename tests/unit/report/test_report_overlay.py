@@ -23,7 +23,15 @@ def figure():
     pose = np.eye(4)
     pose[:3, 3] = 1, 2, 3
     posed: TriangleMesh = transformed(surface, pose)
-    return surface_overlay(100.0 * (away < 1), pose @ oblique, posed, title="a"), centre + pose[:3, 3], half
+    return (
+        surface_overlay(
+            100.0 * (away < 1),
+            pose @ oblique,
+            posed,
+        ),
+        centre + pose[:3, 3],
+        half,
+    )
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import pyvista as pv
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from shapes import ellipsoid_mesh
@@ -9,10 +10,11 @@ from shapes import ellipsoid_mesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.geometry.triangles import TriangleMesh, merged
+from gyriflow.io.figures import write_figure
 from gyriflow.parameters.terms import ZONE_NAMES
 from gyriflow.report.panels import round_length
-from gyriflow.report.renders import displacement_maps, runs_comparison, scalar_maps, weekly_comparison
-from gyriflow.report.scene import VIEWS, render, uniform_colours
+from gyriflow.report.renders import displacement_maps, round_up, runs_comparison, scalar_maps, weekly_comparison
+from gyriflow.report.scene import MAP, TISSUE, VIEWS, render, uniform_colours
 from gyriflow.report.sections import cross_sections, normal_arrows
 from gyriflow.report.zones import ZONES, field_picture, zones_picture
 
@@ -33,6 +35,18 @@ def picture(figure: Figure, number: int = 0) -> np.ndarray:
 def covered(image: np.ndarray) -> np.ndarray:
     """Returns which pixels are not background."""
     return (image < 250).any(axis=-1)
+
+
+def ellipsoid_surface() -> TriangleMesh:
+    """Returns a smooth closed surface that is the same left and right."""
+    body = pv.ParametricEllipsoid(20.0, 26.0, 18.0, u_res=60, v_res=40, w_res=10).triangulate().clean()
+    body.compute_normals(auto_orient_normals=True, inplace=True)
+    return TriangleMesh(np.asarray(body.points, dtype=float), body.regular_faces)
+
+
+def pictures(figure: Figure) -> list:
+    """Returns the panels that show a picture."""
+    return [axes for axes in figure.axes if axes.images]
 
 
 def words(figure: Figure) -> set[str]:
@@ -78,12 +92,12 @@ def test_up_is_superior_and_in_the_top_view_anterior():
 
 def test_weekly_comparison_has_a_panel_per_brain_and_leaves_gaps():
     small, large = box((20, 30, 20)), box((25, 36, 25))
-    figure = weekly_comparison({22.0: small, 23.5: large}, {22.0: small}, views=("left", "top"), title="run thin")
+    figure = weekly_comparison({22.0: small, 23.5: large}, {22.0: small}, views=("left", "top"))
     panels = [axes.get_label() for axes in figure.axes if axes.images]
     assert len(panels) == 6
     assert "real brain\nleft view, column 0" in panels
     assert "real brain\nleft view, column 1" not in panels
-    assert {"22 GW", "23.5 GW", "run thin", "simulated\ntop view", "A", "P", "L", "R"} <= words(figure)
+    assert {"22 GW", "23.5 GW", "a", "d", "simulated\ntop view", "A", "P", "L", "R"} <= words(figure)
     assert covered(picture(figure, 0)).sum() < covered(picture(figure, 1)).sum()
 
 
@@ -130,13 +144,70 @@ def test_displacement_maps_share_their_colour_scale():
     maps = {(22.0, 23.0): (mesh, np.full(8, 4.0)), (21.0, 22.0): (mesh, np.full(8, 1.0))}
     figure = displacement_maps(maps, views=("left",))
     (bar,) = [axes for axes in figure.axes if "displacement" in axes.get_xlabel()]
-    assert bar.get_xlim() == (0.0, 4.0)
+    assert bar.get_xlim() == pytest.approx((0.0, 4.0))
     assert "(mm)" in bar.get_xlabel()
-    assert {"21–22 GW", "22–23 GW", "max 1.00 mm\nmean 1.00 mm", "max 4.00 mm\nmean 4.00 mm"} <= words(figure)
+    said = {"max 1.00 mm at −10, −15, −10\nmean 1.00 mm", "max 4.00 mm at −10, −15, −10\nmean 4.00 mm"}
+    assert {"21–22 GW", "22–23 GW"} | said <= words(figure)
     first, second = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
-    # viridis: blue at a quarter, yellow at the upper end
-    assert first[2] > first[0]
-    assert second[0] > second[2]
+    # pale at a quarter of the scale, dark blue at its end
+    assert first.sum() > 1.5 * second.sum()
+    assert second[2] > 1.5 * second[0]
+
+
+def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed():
+    mesh = ellipsoid_surface()
+    norms = np.ones(len(mesh.vertices))
+    top = int(mesh.vertices[:, 2].argmax())
+    norms[top] = 50.0
+    figure = displacement_maps({(21.0, 22.0): (mesh, norms)}, views=("top", "bottom"))
+    (bar,) = [axes for axes in figure.axes if "displacement" in axes.get_xlabel()]
+    assert bar.get_xlim()[1] == pytest.approx(1.0)
+    above, below = (
+        [ring for ring in axes.patches if ring.get_edgecolor()[:3] == (0, 0, 0)] for axes in pictures(figure)
+    )
+    assert [ring.get_linestyle() for ring in (*above, *below)] == ["-", ":"]
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    assert above[0].center == pytest.approx((mesh.vertices[top] - middle)[:2])
+
+
+@pytest.mark.parametrize("material", [TISSUE, MAP])
+def test_light_makes_no_difference_between_the_hemispheres(material):
+    mesh = ellipsoid_surface()
+    image = render(
+        mesh,
+        uniform_colours(mesh, "#8FB4DC"),
+        VIEWS["top"],
+        half_width_mm=25,
+        half_height_mm=30,
+        pixels_per_mm=4,
+        material=material,
+    ).astype(float)
+    inside = covered(image)
+    assert np.abs(image - image[:, ::-1])[inside & inside[:, ::-1]].mean() < 2.0
+
+
+def test_maps_are_darkened_less_by_shade_than_tissue():
+    mesh = ellipsoid_surface()
+    size = {"half_width_mm": 25, "half_height_mm": 30, "pixels_per_mm": 4}
+    spread = []
+    for material in (TISSUE, MAP):
+        image = render(mesh, uniform_colours(mesh, "#8FB4DC"), VIEWS["top"], material=material, **size)
+        spread.append(np.ptp(np.percentile(image[covered(image)].sum(axis=-1), [5, 95])))
+    assert spread[1] < 0.7 * spread[0]
+
+
+def test_pictures_keep_their_pixels_in_print(tmp_path):
+    figure = weekly_comparison({22.0: ellipsoid_surface()}, {}, views=("top",))
+    write_figure(tmp_path / "a.png", tmp_path / "a.pdf", figure, dpi=300)
+    ((axes, image),) = [(axes, axes.images[0]) for axes in figure.axes if axes.images]
+    rows, columns, _ = np.asarray(image.get_array()).shape
+    assert f"/Height {rows}" in (pdf := (tmp_path / "a.pdf").read_bytes().decode("latin-1"))
+    assert f"/Width {columns}" in pdf
+    # the panel covers whole dots of 300 to the inch
+    box = axes.get_window_extent()
+    inches = np.array([box.x0, box.y0, box.width, box.height]) / figure.dpi
+    assert 300 * inches == pytest.approx(np.round(300 * inches), abs=1e-6)
+    assert (columns, rows) == tuple(np.round(600 * inches[2:]).astype(int))
 
 
 def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
@@ -263,7 +334,7 @@ def test_curvedness_and_depth_go_from_zero_to_where_few_vertices_are_above(quant
     values = np.array([0.1] * 7 + [9.0])
     figure = scalar_maps({"simulated": {28.0: (mesh, values)}}, quantity=quantity, views=("left",))
     (bar,) = [axes for axes in figure.axes if label in axes.get_xlabel()]
-    assert bar.get_xlim() == pytest.approx((0.0, np.percentile(values, 98)))
+    assert bar.get_xlim() == pytest.approx((0.0, round_up(np.quantile(values, 0.995))))
 
 
 @pytest.mark.parametrize(
@@ -276,7 +347,19 @@ def test_contact_pressure_is_scaled_by_what_touches(quantity, unit):
         for values in (np.array([0.0] * 6 + [100.0, 300.0]), np.zeros(8))
     ]
     ends = [next(axes for axes in figure.axes if unit in axes.get_xlabel()).get_xlim()[1] for figure in figures]
-    assert ends == pytest.approx([np.percentile([100.0, 300.0], 98), 1.0])
+    assert ends == pytest.approx([round_up(np.quantile([100.0, 300.0], 0.995)), 1.0])
+
+
+def test_a_surface_that_nothing_touches_is_grey_in_the_map_of_pressure():
+    mesh = box((20, 30, 20))
+    # the upper face is in contact, the side is not
+    values = np.where(mesh.vertices[:, 2] > 0, 100.0, 0.0)
+    values[(mesh.vertices[:, 0] < 0) & (mesh.vertices[:, 2] > 0)] = 0.0
+    figure = scalar_maps({"run": {28.0: (mesh, values)}}, quantity="contact_pressure_pa", views=("left", "right"))
+    left, right = (image[covered(image)].astype(float) for image in (picture(figure, 0), picture(figure, 1)))
+    assert np.ptp(left.mean(axis=0)) < 3
+    assert np.ptp(right.mean(axis=0)) > 30
+    assert "no contact" in words(figure)
 
 
 def test_every_zone_has_its_own_colour():

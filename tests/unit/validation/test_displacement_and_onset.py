@@ -5,7 +5,7 @@ import trimesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.validation.displacement import displacement_table, vector_agreement
-from gyriflow.validation.onset import onset, relief
+from gyriflow.validation.onset import onset, regions_on, relief, sulcal_regions
 
 BALL = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
 POINTS, FACES = np.asarray(BALL.vertices), np.asarray(BALL.faces)
@@ -96,3 +96,15 @@ def test_onset_is_when_two_millimetres_are_reached():
     late = onset({week: reliefs[week] for week in (24.0, 25.0)}).set_index("region")
     assert late.loc["central", "there_at_start"]
     assert np.isnan(late.loc["central", "onset_week"])
+
+
+def test_sulci_are_found_by_their_depth_and_carried_to_an_earlier_surface():
+    mesh, depths = groove(4.0)
+    regions = sulcal_regions(mesh, depths)
+    assert set(regions) == {0, 1}
+    inside = regions == 1
+    assert depths[inside].min() >= 2.0 > depths[~inside].min()
+    smooth, _ = groove(0.0)
+    found = regions_on(smooth, np.asarray(smooth.vertices), mesh, regions)
+    assert np.mean((found == 1) == inside) > 0.98
+    assert not sulcal_regions(*groove(1.0)).any()

@@ -7,8 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.motion import fit_onto
+from gyriflow.geometry.spins import spins, spun
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, signed_volume, transformed
-from gyriflow.validation.nulls import spin_test, spins, spun
+from gyriflow.validation.nulls import spin_test
 from gyriflow.validation.placement import correlation, gain_interval, patches, placement, skill
 from gyriflow.validation.shapes import Shape, ready
 

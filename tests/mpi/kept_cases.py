@@ -1,0 +1,77 @@
+"""What the solver keeps from one iteration to the next spares work and changes no result."""
+
+import ctypes
+
+import numpy as np
+import pytest
+from contact_cases import after_steps, closing_sulcus
+
+from gyriflow.folding import ladder
+from gyriflow.folding.krylov import _PETSC, _finest_smoother
+
+TIGHT = {"solver": {"newton_tolerance": 1e-9, "krylov_tolerance": 1e-6}}
+
+
+def counted(monkeypatch, problem):
+    """Returns a list that grows by one with each elastic tangent that is assembled."""
+    assemble, calls = problem._elastic_tangent, []
+
+    def noted():
+        calls.append(None)
+        return assemble()
+
+    monkeypatch.setattr(problem, "_elastic_tangent", noted)
+    return calls
+
+
+@pytest.mark.parametrize("kind", ["global", "none"])
+def test_the_elastic_tangent_serves_several_iterations_and_leads_to_the_same_place(kind, monkeypatch):
+    folding, state = closing_sulcus(kind, **TIGHT)
+    start = state.positions
+    calls = counted(monkeypatch, folding.problem)
+    kept = after_steps(folding, state, 6)
+    newton = sum(row["newton"] for row in kept.rows)
+    assert len(calls) < 0.7 * newton
+
+    folding, state = closing_sulcus(kind, **TIGHT)
+    calls = counted(monkeypatch, folding.problem)
+    monkeypatch.setattr(folding.problem, "_foretold", lambda: False)
+    anew = after_steps(folding, state, 6)
+    assert len(calls) > 0.8 * sum(row["newton"] for row in anew.rows)
+    moved = np.abs(anew.positions - start).max()
+    assert np.abs(kept.positions - anew.positions).max() <= 1e-6 * moved
+
+
+def test_a_tangent_that_foretells_other_forces_is_not_kept():
+    folding, state = closing_sulcus("none")
+    folding.set_layers(state.time_s, state.step_s)
+    problem, residual = folding.problem, folding.problem.new_vector()
+    x, _, z = folding.domain.local(state.positions).T
+    # nothing moves at the base and at the sides, which are held
+    u = 0.2 * np.stack([np.sin(np.pi * x / 6e-3) * z, 0 * z, 0 * z], axis=1)
+    for part, known in ((0.0, False), (1e-4, True), (1.0, False)):
+        problem.set_displacement(part * u)
+        problem.residual(residual)
+        if problem._elastic is not None:
+            assert problem._foretold() == known
+        problem.tangent(may_keep=True)
+
+
+def bounds_estimated(krylov):
+    """Returns whether the smoother of the finest level estimates its bounds for each matrix anew."""
+    address = ctypes.c_void_p()
+    _PETSC.KSPChebyshevEstEigGetKSP(_finest_smoother(krylov), ctypes.byref(address))
+    return bool(address.value)
+
+
+def test_the_smoother_keeps_its_bounds_and_takes_no_more_iterations(monkeypatch):
+    folding, state = closing_sulcus("global", **TIGHT)
+    kept = after_steps(folding, state, 8)
+    assert not bounds_estimated(folding.solver.ladder._cg)
+
+    monkeypatch.setattr(ladder, "keep_bounds", lambda krylov: None)
+    folding, state = closing_sulcus("global", **TIGHT)
+    anew = after_steps(folding, state, 8)
+    assert bounds_estimated(folding.solver.ladder._cg)
+    iterations = [sum(row["krylov"] for row in state.rows) for state in (kept, anew)]
+    assert iterations[0] <= 1.1 * iterations[1]

@@ -1,0 +1,133 @@
+"""A cohort's table becomes brains; rows that can't be used are problems, or left out with their cause."""
+
+import pytest
+
+from gyriflow.config import load
+from gyriflow.errors import InputError
+
+FOLDING = {"end_week": 26}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "bids").mkdir()
+    for name in ("a.nii.gz", "lh.surf.gii", "rh.surf.gii", "sub-9_dseg.nii.gz"):
+        (tmp_path / "bids" / name).touch()
+    return tmp_path
+
+
+def write(folder, *rows):
+    text = "\n".join("\t".join(row) for row in rows)
+    (folder / "bids" / "participants.tsv").write_text(text + "\n")
+
+
+def config(folder, participants="bids/participants.tsv", **more):
+    raw = {"participants": participants, "start": "sub-1", "folding": FOLDING}
+    return load(raw, folder, **more)
+
+
+def test_rows_are_brains_whatever_their_files_are_of(folder):
+    write(
+        folder,
+        ("participant_id", "sex", "age", "files", "side", "scheme", "population"),
+        ("sub-1", "F", "24.5", "a.nii.gz", "n/a", "feta-7", "n/a"),
+        ("sub-2", "M", "25", "rh.surf.gii; lh.surf.gii", "n/a", "n/a", "twins"),
+        ("sub-3", "M", "25", "a.nii.gz", "left", "feta-7", "n/a"),
+    )
+    brains = {brain.id: brain for brain in config(folder).brains}
+    assert brains["sub-1"].labels == str(folder / "bids" / "a.nii.gz")
+    assert (brains["sub-1"].week, brains["sub-1"].scheme, brains["sub-1"].population) == (24.5, "feta-7", None)
+    assert brains["sub-2"].source == "hemispheres"
+    assert brains["sub-2"].population == "twins"
+    assert brains["sub-3"].sides == ("left",)
+    assert brains["sub-3"].label_volume == str(folder / "bids" / "a.nii.gz")
+
+
+def test_values_for_all_rows_stand_in_the_configuration(folder):
+    write(folder, ("id", "gestational_age"), ("sub-9", "24"))
+    section = {
+        "file": "bids/participants.tsv",
+        "columns": {"labels": "{id}_dseg.nii.gz", "scheme": "feta-7"},
+    }
+    (brain,) = load({"participants": section, "start": "sub-9", "folding": FOLDING}, folder).brains
+    assert brain.labels == str(folder / "bids" / "sub-9_dseg.nii.gz")
+
+
+def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(folder):
+    head = ("participant_id", "age", "labels", "scheme")
+    write(
+        folder,
+        head,
+        ("sub-1", "24", "a.nii.gz", "feta-7"),
+        ("sub-2", "n/a", "a.nii.gz", "feta-7"),
+        ("sub-3", "170", "a.nii.gz", "feta-7"),
+        ("sub-4", "24", "none.nii.gz", "feta-7"),
+        ("sub-5", "24", "n/a", "feta-7"),
+    )
+    with pytest.raises(InputError, match=r"4 problems(.|\n)*sub-2: age: found n/a(.|\n)*with --keep-going"):
+        config(folder)
+    found = config(folder, keep_going=True)
+    assert [brain.id for brain in found.brains] == ["sub-1"]
+    causes = {name: row["cause"] for name, row in found.left_out.items()}
+    assert list(causes) == ["sub-2", "sub-3", "sub-4", "sub-5"]
+    assert "not days or years" in causes["sub-3"]
+    assert "no such file" in causes["sub-4"]
+    assert "found no data" in causes["sub-5"]
+    write(folder, head, ("sub-1", "n/a", "a.nii.gz", "feta-7"))
+    with pytest.raises(InputError, match="found n/a"):
+        config(folder, keep_going=True)
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        (("subject", "age", "labels"), "has no column of ids; found subject, age, labels"),
+        (("id", "months", "labels"), "has no column of gestational ages"),
+        (("id", "age", "label", "scheme"), "has a column that seems mistyped; found label; expected labels"),
+    ],
+)
+def test_tables_without_what_is_needed_are_refused(folder, head, said):
+    write(folder, head, ["x"] * len(head))
+    with pytest.raises(InputError, match=said):
+        config(folder)
+
+
+def test_a_hemisphere_is_a_surface_or_labels_with_a_scheme(folder):
+    def problems(**keys):
+        brain = {"id": "a", "week": 24} | keys
+        with pytest.raises(InputError) as caught:
+            load({"brains": [brain], "start": "a", "folding": FOLDING}, folder / "bids")
+        return str(caught.value)
+
+    labels = {"file": "a.nii.gz", "side": "left"}
+    assert "brains[0].scheme: is missing" in problems(hemisphere=labels)
+    assert "scheme: has no meaning with a surface" in problems(
+        hemisphere=labels | {"file": "lh.surf.gii"}, scheme="feta-7"
+    )
+    assert "hemisphere.side" in problems(hemisphere=labels | {"side": "middle"}, scheme="feta-7")
+    assert "coordinates: has no meaning with a label volume" in problems(
+        hemisphere=labels, scheme="feta-7", coordinates="ras"
+    )
+
+
+def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(folder):
+    brains = [
+        {"id": f"{side}{week}", "week": week, "hemisphere": {"file": "lh.surf.gii", "side": side}}
+        for side in ("left", "right")
+        for week in (24, 25)
+    ]
+    brains += [{"id": f"p{week}", "week": week, "phantom": {}} for week in (24, 25)]
+    found = load({"brains": brains, "start": "left24", "folding": FOLDING}, folder / "bids")
+    assert found.growth_series == {
+        "left hemisphere, surface": ["left24", "left25"],
+        "right hemisphere, surface": ["right24", "right25"],
+        "volume": ["p24", "p25"],
+    }
+    assert found.estimated_from("left24") == "left hemisphere, surface"
+
+
+def test_regions_need_both_hemispheres(folder):
+    brains = [{"id": "a", "week": 24, "hemisphere": {"file": "lh.surf.gii", "side": "left"}}]
+    regions = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
+    with pytest.raises(InputError, match=r"metrics\.regions: found a, of one hemisphere; regions need both"):
+        load({"brains": brains, "start": "a", "folding": FOLDING, "metrics": {"regions": regions}}, folder / "bids")

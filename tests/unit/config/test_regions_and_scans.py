@@ -1,0 +1,79 @@
+"""Regions, norms and scans of one subject in a configuration."""
+
+import pytest
+
+from gyriflow.config import load
+from gyriflow.errors import InputError
+
+BRAINS = [{"id": f"p{week}", "week": week, "phantom": {}} for week in (21, 22, 25)]
+NAMES = {"names": {1: "frontal", 2: "frontal", 3: "parietal"}}
+
+
+def study(brains=None, runs=None, **metrics: object) -> dict:
+    return {"brains": brains or BRAINS, "start": "p21", "folding": {"end_week": 22}, "metrics": metrics} | (
+        {"runs": runs} if runs else {}
+    )
+
+
+@pytest.fixture
+def volume(tmp_path) -> str:
+    (tmp_path / "regions.nii.gz").touch()
+    return str(tmp_path / "regions.nii.gz")
+
+
+def test_brains_get_the_regions_of_the_nearest_week(volume):
+    given = {"volume": volume, **NAMES}
+    config = load(study(regions={"p21": given, "p25": given}))
+    assert [config.regions_from(brain) for brain in ("p21", "p22", "p25")] == ["p21", "p21", "p25"]
+    assert load(study()).regions_from("p21") is None
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({}, "found neither; expected volume, or left and right"),
+        ({"volume": "{volume}"}, "names"),
+        ({"left": {"labels": "{volume}", "surface": "{volume}"}}, "right: is missing"),
+        ({"volume": "nowhere.nii.gz", **NAMES}, "no such file"),
+    ],
+)
+def test_wrong_regions_are_refused(volume, given, match):
+    filled = {
+        key: value.replace("{volume}", volume) if isinstance(value, str)
+        else {k: v.replace("{volume}", volume) for k, v in value.items()} if key in ("left", "right")
+        else value
+        for key, value in given.items()
+    }  # fmt: skip
+    with pytest.raises(InputError, match=match):
+        load(study(regions={"p21": filled}))
+
+
+def test_unknown_brains_are_refused(volume):
+    with pytest.raises(InputError, match=r"metrics.regions: found q; expected ids of brains: p21, p22, p25"):
+        load(study(regions={"q": {"volume": volume, **NAMES}}))
+    with pytest.raises(InputError, match=r"metrics.norm_reference: found x"):
+        load(study(norm_reference=["x"]))
+
+
+def test_scans_of_a_subject_by_week():
+    brains = [{"id": "b", "week": 24, "subject": "one", "phantom": {}}, *BRAINS]
+    brains += [{"id": "a", "week": 22.5, "subject": "one", "phantom": {}}]
+    brains += [{"id": "c", "week": 22.5, "subject": "two", "phantom": {}}]
+    assert load(study(brains)).scans == {"one": ["a", "b"]}
+    with pytest.raises(InputError, match="2 scans of the subject one are of week 24"):
+        load(study([*brains, {"id": "d", "week": 24, "subject": "one", "phantom": {}}]))
+
+
+def test_what_growth_was_made_to_follow():
+    runs = {
+        "reference": {},
+        "measured": {"preset": "measured"},
+        "estimated": {"growth_rate_per_s": "estimated"},
+    }
+    config = load(study(runs=runs))
+    assert [config.followed(run) for run in runs] == [[], ["area", "volume"], ["area"]]
+
+
+def test_the_norm_is_of_all_measured_brains_of_one_kind():
+    assert load(study()).norm_reference == ["p21", "p22", "p25"]
+    assert load(study(norm_reference=["p22"])).norm_reference == ["p22"]

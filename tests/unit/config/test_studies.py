@@ -1,0 +1,134 @@
+"""Studies and calibrations in a configuration: the runs that they make, and what is refused."""
+
+import pytest
+
+from gyriflow.config import load
+from gyriflow.errors import InputError
+
+BRAINS = [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 25, "phantom": {}}]
+RUNS = {"reference": {"preset": "fetalfoldsim"}, "short": {"end_week": 22}}
+THICKNESS = {
+    "base": "reference",
+    "vary": {"thickness_mm": [0.8, 1.5]},
+    "fixed": {"shear_modulus_cortex_pa": 3000},
+    "compare_week": 25,
+}
+STIFFNESS = {"base": "reference", "vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]}, "compare_week": 25}
+CALIBRATION = {
+    "base": "reference",
+    "parameters": {"thickness_mm": [1, 3]},
+    "score": {"size": 1},
+    "compare_week": 25,
+}
+
+
+def config(**sections):
+    return load({"brains": BRAINS, "start": "first", "folding": {"end_week": 26}, "runs": RUNS, **sections})
+
+
+def refusal(**sections):
+    with pytest.raises(InputError) as error:
+        config(**sections)
+    return str(error.value)
+
+
+def test_a_study_makes_a_run_of_each_combination():
+    study = config(studies={"both": THICKNESS | {"vary": {"thickness_mm": [1, 2], "contact.gap_mm": [2, 3]}}})
+    runs = {member.run: member.settings for member in study.members["both"]}
+    assert list(runs) == ["both-1-2", "both-1-3", "both-2-2", "both-2-3"]
+    assert [(run.thickness_mm, run.contact.gap_mm) for run in runs.values()] == [(1, 2), (1, 3), (2, 2), (2, 3)]
+    assert {run.shear_modulus_cortex_pa for run in runs.values()} == {3000}
+    assert {run.end_week for run in runs.values()} == {25}
+    assert study.run("both-1-3") == runs["both-1-3"]
+    assert study.parameters("both-1-3")["contact"]["gap_mm"] == 3
+    # they are no runs that everything is made of
+    assert study.folded == [("reference", "a"), ("short", "a")]
+
+
+def test_equal_runs_are_solved_once():
+    study = config(studies={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS})
+    # 1500 Pa is the reference, 3000 Pa stands in the other study too
+    assert [member.run for member in study.members["stiffness"]] == ["stiffness-300", "reference", "thickness-1.5"]
+    assert list(study.study_runs) == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
+
+
+def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
+    brains = [*BRAINS, {"id": "c", "week": 24.5, "phantom": {}}]
+    studies = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
+    study = config(brains=brains, studies=studies)
+    assert study.run("thickness-1.5").end_week == 25
+    assert study.weeks("thickness-1.5", "a") == [21, 22, 23, 24, 24.5, 25]
+    assert study.weeks("thickness-0.8", "a")[-1] == 24.5
+    # the reference itself has no surface of that week, so that it cannot stand in
+    other = config(brains=brains, studies={"stiffness": STIFFNESS | {"compare_week": 24.5}})
+    assert [member.run for member in other.members["stiffness"]][1] == "stiffness-1500"
+
+
+def test_comparison_prefers_the_starts_population(tmp_path):
+    brains = []
+    for name, week, population in (("a", 21, "one"), ("b", 25, "two"), ("c", 25, "one")):
+        (tmp_path / f"{name}.stl").touch()
+        brains.append({"id": name, "week": week, "pial": str(tmp_path / f"{name}.stl"), "population": population})
+    study = config(brains=brains, studies={"thickness": THICKNESS})
+    assert study.compared_with(study.studies["thickness"], "a") == ["c"]
+    others = config(brains=brains[:2], studies={"thickness": THICKNESS})
+    assert others.compared_with(others.studies["thickness"], "a") == ["b"]
+    named = config(brains=brains, studies={"thickness": THICKNESS | {"compare_with": ["b"]}})
+    assert named.compared_with(named.studies["thickness"], "a") == ["b"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"vary": {"thicknes_mm": [1]}}, "studies.s.vary.thicknes_mm: there is no such key"),
+        ({"vary": {"thickness_mm": [-1]}}, "studies.s.vary.thickness_mm: found -1"),
+        ({"vary": {"thickness_mm": [1, 1]}}, "each once"),
+        ({"vary": {"preset": ["measured"]}}, "studies.s.vary.preset: cannot differ"),
+        ({"vary": {}}, "studies.s.vary: found nothing"),
+        ({"fixed": {"contact.gap": 2}}, "studies.s.fixed.contact.gap: there is no such key"),
+        ({"base": "ref"}, "studies.s.base: found 'ref'; expected a run: reference, short"),
+        ({"compare_week": 24}, "studies.s.compare_week: found 24; there are brains of 21, 25 GW"),
+        ({"compare_with": ["a"]}, "studies.s.compare_with: found a, of 21 GW"),
+    ],
+)
+def test_what_is_wrong_with_a_study_is_said(change, said):
+    assert said in refusal(studies={"s": THICKNESS | change})
+
+
+def test_folders_of_results_are_no_names_of_studies():
+    assert "reserved" in refusal(studies={"figures": THICKNESS})
+    assert "rename one" in refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}})
+
+
+def test_a_calibration_knows_its_runs_beforehand():
+    found = config(calibrate=CALIBRATION | {"first_runs": 3, "rounds": 2, "runs_per_round": 1}).calibrate.runs
+    assert found == {
+        "calibration-00": 0, "calibration-01": 0, "calibration-02": 0, "calibration-03": 1, "calibration-04": 2
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"parameters": {"thickness_mm": [3, 1]}}, "the lowest and the highest"),
+        ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm: found -1"),
+        ({"parameters": {"poisson": [0, 0.4]}}, "no such key"),
+        ({"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}}, "growth_rate_per_s is no curve in the base run"),
+        ({"parameters": {"follow.area_cm2.amplitude": [0.5, 2]}}, "the base run follows no curve"),
+        ({"parameters": {"stiffness_ratio": [0, 2]}}, "above 0"),
+        ({"rounds": 8}, "at most 40"),
+        ({"score": {}}, "calibrate.score: found nothing"),
+        ({"score": {"beauty": 1}}, "beauty"),
+        ({"compare_week": 24}, "calibrate.compare_week: found 24"),
+        ({"base": "ref"}, "calibrate.base: found 'ref'"),
+    ],
+)
+def test_what_is_wrong_with_a_calibration_is_said(change, said):
+    assert said in refusal(calibrate=CALIBRATION | change)
+
+
+def test_curves_of_the_base_run_may_be_scaled():
+    runs = {"reference": {"growth_rate_per_s": {"weeks": {21: 1e-7, 25: 2e-7}}}, "led": {"preset": "measured"}}
+    config(runs=runs, calibrate=CALIBRATION | {"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}})
+    led = {"base": "led", "parameters": {"follow.area_cm2.amplitude": [0.5, 2]}}
+    config(runs=runs, calibrate=CALIBRATION | led)

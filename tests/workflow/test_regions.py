@@ -1,0 +1,161 @@
+"""Regions, centiles, change and export with the real commands, on phantoms whose regions are known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gyriflow.geometry.triangles import transformed
+from gyriflow.io.files import read_json
+from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
+from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.volumes import LabelVolume, write_label_volume
+from gyriflow.parameters.terms import SIDES
+from gyriflow.phantom.brain import CORTEX, phantom_labels
+
+VOXEL_MM = 2.0
+STUDY = {
+    "brains": [
+        {"id": f"p{week}", "week": week, "subject": "one", "phantom": {"voxel_mm": VOXEL_MM}} for week in (21, 22)
+    ],
+    "start": "p21",
+    "surface": {"edge_length_mm": 2.5},
+    "mesh": {
+        "order": 1,
+        "mesher": "tetgen",
+        "surface_edge_mm": 3.0,
+        "core_edge_mm": 5.0,
+        "max_surface_distance_mm": 1.0,
+    },
+    "folding": {"end_week": 22, "thickness_mm": 4.0, "step_s": 302400},
+    "metrics": {
+        "curvature_radius_mm": 6,
+        "spangy_modes": 60,
+        "export": "bids",
+        "regions": {"p22": {"volume": "regions.nii.gz", "names": {1: "front", 2: "front", 3: "back", 4: "back"}}},
+    },
+}
+NAMES = ["front", "back"]
+TARGETS = [
+    "metrics",
+    "export",
+    "results/study/figures/regions.png",
+    "results/study/figures/norms.png",
+]
+
+
+def middle(points: np.ndarray) -> float:
+    """Returns where the middle of points is from back to front."""
+    return float(points[:, 1].min() + points[:, 1].max()) / 2
+
+
+def write_regions(path) -> None:
+    """Writes the cortex of the phantom of week 22, in front of its middle and behind it, right and left."""
+    labels, affine = phantom_labels(22, voxel_mm=VOXEL_MM)
+    cortex = np.argwhere(labels == CORTEX)
+    points = cortex @ affine[:3, :3].T + affine[:3, 3]
+    regions = np.zeros_like(labels)
+    regions[tuple(cortex.T)] = np.where(points[:, 1] > middle(points), 1, 3) + (points[:, 0] > points[:, 0].mean())
+    write_label_volume(path, LabelVolume(regions, affine))
+
+
+def plan(workflow, study) -> dict[str, int]:
+    write_regions(workflow.directory / "regions.nii.gz")
+    return workflow.jobs("metrics", "--configfile", workflow.write("study.yaml", study))
+
+
+def test_each_brain_and_each_run_gets_regions(workflow):
+    jobs = plan(workflow, STUDY)
+    rules = ("given_regions", "carried_regions", "register", "simulated_regions", "region_metrics", "surface_mask")
+    assert [jobs.get(rule, 0) for rule in rules] == [1, 1, 1, 1, 4, 0]
+
+
+def test_brains_without_labels_are_registered_by_the_masks_of_their_surfaces(workflow):
+    (workflow.directory / "a.stl").touch()
+    other = {"id": "s23", "week": 23, "pial": "a.stl"}
+    jobs = plan(workflow, STUDY | {"brains": [*STUDY["brains"], other]})
+    rules = ("carried_regions", "register", "surface_mask")
+    assert [jobs.get(rule, 0) for rule in rules] == [2, 2, 1]
+
+
+@pytest.mark.slow
+def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
+    write_regions(workflow.directory / "regions.nii.gz")
+    outcome = workflow.run(*TARGETS, "--cores", "2", "--configfile", workflow.write("study.yaml", STUDY))
+    assert outcome.returncode == 0, outcome.stderr[-3000:]
+    results = workflow.directory / "results"
+
+    places = {
+        "given": ("brains/p22/metrics", "brains/p22/surface"),
+        "carried": ("brains/p21/metrics", "brains/p21/surface"),
+        "simulated": ("runs/reference/p21/metrics", "runs/reference/p21/surfaces/week-21.00"),
+    }
+    for labels, surfaces in places.values():
+        for side in SIDES:
+            mesh = read_surface(results / surfaces / f"{side}.pial.surf.gii")
+            found, names = read_vertex_labels(results / labels / f"{side}.regions.label.gii")
+            assert list(names.values()) == NAMES
+            y = mesh.vertices[:, 1] - middle(mesh.vertices)
+            clear = np.abs(y) > 3.0
+            right = found[clear] == np.where(y[clear] > 0, 1, 2)
+            assert right.mean() > 0.97, (labels, side)
+
+    regions = pd.read_csv(results / "study" / "regions.csv")
+    areas = regions[regions["metric"] == "area"].groupby(["subject", "run", "week", "hemisphere"])["value"].sum()
+    metrics = pd.read_csv(results / "study" / "metrics.csv")
+    whole = metrics[metrics["metric"] == "area"].set_index(["subject", "run", "week", "hemisphere"])["value"]
+    # the regions cover the hemispheres but for what is near the cut
+    assert ((areas / whole.reindex(areas.index)).between(0.93, 1.0001)).all()
+    assert set(regions["metric"]) >= {"area", "mean_sulcal_depth", "mean_curvature", "mean_thickness"}
+    asymmetry = pd.read_csv(results / "study" / "asymmetry.csv")
+    area = asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(NAMES)]
+    # 2 regions of 2 measured brains and of the run at 2 weeks; phantoms are nearly symmetric
+    assert len(area) == 8
+    assert area["asymmetry_index"].abs().max() < 0.1
+
+    change = pd.read_csv(results / "study" / "change.csv").fillna({"region": ""})
+    assert set(change["run"]) == {"real", "reference"}
+    grown = change[(change["metric"] == "area") & (change["region"] == "front")]
+    assert len(grown) == 4
+    assert (grown["change"] > 0).all()
+
+    wide = pd.read_csv(results / "study" / "metrics_wide.csv")
+    assert len(wide) == 4
+    assert wide["left_front_area_cm2"].notna().all()
+    tissues = metrics[metrics["metric"].str.startswith("volume_")].set_index(["subject", "metric"])["value"]
+    volumes = pd.read_csv(results / "study" / "volumes.csv").set_index(["subject", "tissue"])["volume_mL"]
+    assert tissues["p21", "volume_cortex"] == pytest.approx(volumes["p21", "cortex"], rel=0.01)
+    published = pd.read_csv(results / "study" / "published_centiles.csv").set_index(["subject", "structure"])
+    assert published.loc[("p22", "cortex"), "value"] == pytest.approx(volumes["p22", "cortex"])
+    assert set(published["flag"]) == {"other labels"}
+    bids = results / "export" / "sub-one" / "ses-2200w" / "anat"
+    assert (bids / "sub-one_ses-2200w_hemi-L_thickness.shape.gii").exists()
+
+
+@pytest.mark.slow
+def test_labels_of_surfaces_are_given_as_well(workflow):
+    """Labels of both hemispheres' own surfaces, with the names of their tables."""
+    name = workflow.write("study.yaml", STUDY | {"metrics": {}})
+    made = workflow.run("results/brains/p22/surface/pial.surf.gii", "--cores", "2", "--configfile", name)
+    assert made.returncode == 0, made.stderr[-2000:]
+    folder, given = workflow.directory / "results/brains/p22/surface", {}
+    back = np.linalg.inv(read_json(folder / "surface.json")["pose"])
+    for side in SIDES:
+        posed = read_surface(folder / f"{side}.pial.surf.gii")
+        vertices, surface = posed.vertices, workflow.directory / f"{side}.surf.gii"
+        # in the coordinates of the brain's own files
+        write_surface(surface, transformed(posed, back))
+        labels = workflow.directory / f"{side}.label.gii"
+        # numbers differ between the sides, names do not
+        first = {"left": 5, "right": 8}[side]
+        inside = np.where(vertices[:, 1] > middle(vertices), first, first + 1)
+        write_vertex_labels(labels, inside, {first: "front", first + 1: "back"})
+        given[side] = {"labels": str(labels), "surface": str(surface)}
+    config = STUDY | {"metrics": {"regions": {"p22": given}}}
+    target = "results/brains/p22/metrics/left.regions.label.gii"
+    outcome = workflow.run(target, "--cores", "2", "--configfile", workflow.write("study.yaml", config))
+    assert outcome.returncode == 0, outcome.stderr[-2000:]
+    for side in SIDES:
+        found, names = read_vertex_labels(workflow.directory / f"results/brains/p22/metrics/{side}.regions.label.gii")
+        assert names == {1: "front", 2: "back"}
+        vertices = read_surface(folder / f"{side}.pial.surf.gii").vertices
+        np.testing.assert_array_equal(found, np.where(vertices[:, 1] > middle(vertices), 1, 2))

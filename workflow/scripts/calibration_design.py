@@ -1,0 +1,19 @@
+"""The parameters of the runs of a round: spread over the bounds in the first, where the surrogate hopes most later."""
+
+import pandas as pd
+
+from gyriflow.io.files import read_table, write_table
+from gyriflow.step import step
+from gyriflow.study.design import sobol_design
+from gyriflow.study.surrogate import fit, propose
+
+params, earlier = snakemake.params, snakemake.input.scores
+with step(snakemake.log[0]):
+    count = len(params.runs)
+    if earlier:
+        scores = pd.concat(map(read_table, earlier), ignore_index=True)
+        design = propose(fit(scores, params.bounds, params.seed), count)
+    else:
+        design = sobol_design(params.bounds, count, params.seed)
+    design.insert(0, "run", params.runs)
+    write_table(snakemake.output[0], design)

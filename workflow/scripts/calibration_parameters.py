@@ -1,0 +1,13 @@
+"""The parameters of a run of the calibration: those of the base run with the values of the run's round."""
+
+from gyriflow.io.files import read_table
+from gyriflow.io.yaml_files import read_yaml, write_yaml
+from gyriflow.step import step
+from gyriflow.study.design import calibrated_parameters
+
+with step(snakemake.log[0]):
+    design = read_table(snakemake.input.design).set_index("run")
+    values = design.loc[snakemake.wildcards.run].astype(float).to_dict()
+    write_yaml(
+        snakemake.output[0], calibrated_parameters(read_yaml(snakemake.input.base), values, snakemake.params.week)
+    )

@@ -1,0 +1,39 @@
+"""How far the brains of a run of the calibration are from the real ones; no score where the run has diverged."""
+
+import numpy as np
+import pandas as pd
+
+from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.surfaces import read_surface
+from gyriflow.metrics.curvature import curvature
+from gyriflow.metrics.similarity import surface_distance
+from gyriflow.step import step
+from gyriflow.validation.scores import shape_scores, size_score
+from gyriflow.validation.shapes import Shape, ready
+
+files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
+
+
+def shape(mesh, real):
+    """Returns a surface ready to be compared with the real brain's, with its curvature."""
+    even = ready(mesh, real)
+    bend = curvature(even, radius_mm=params.curvature_radius_mm)
+    return Shape(even, bend.mean, bend.shape_index)
+
+
+with step(snakemake.log[0]):
+    values = read_table(files.design).set_index("run").loc[run].to_dict()
+    causes = [summary["diverged"] for summary in map(read_json, files.summaries) if summary["diverged"]]
+    simulated, reals, rows = list(map(read_surface, files.simulated)), list(map(read_surface, files.real)), []
+    pairs = zip(np.repeat(np.arange(len(params.compared)), params.compared), reals, strict=True)
+    for mesh, real in [(simulated[number], real) for number, real in pairs] if not causes else []:
+        shapes = set(params.weights) - {"size", "surface_distance"}
+        row = shape_scores(shape(mesh, real), shape(real, real), shapes) if shapes else {}
+        row |= {"size": size_score(mesh, real)} if "size" in params.weights else {}
+        distance = {"surface_distance": surface_distance(mesh, real)["symmetric_mean_mm"]}
+        rows.append(row | (distance if "surface_distance" in params.weights else {}))
+    found = pd.DataFrame(rows, columns=list(params.weights)).mean()
+    score = sum(weight * found[name] for name, weight in params.weights.items())
+    outcome = {"outcome": "diverged" if causes else "finished", "cause": "; ".join(causes)}
+    labels = {"run": run, "round": params.round, **values, "score": score}
+    write_table(snakemake.output[0], pd.DataFrame([labels | found.to_dict() | outcome]))

@@ -1,0 +1,18 @@
+"""Regions at the vertices of a run's hemispheres: those of the start, which the tissue keeps."""
+
+from gyriflow.geometry.triangles import TriangleMesh, submesh
+from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
+from gyriflow.io.regions import read_regions
+from gyriflow.io.surfaces import read_surface
+from gyriflow.parameters.terms import LEFT, SIDES, STRUCTURES
+from gyriflow.registration.regions import regions_from_surface
+from gyriflow.step import step
+
+files = snakemake.input
+with step(snakemake.log[0]):
+    start = read_regions(files.mesh)
+    surface, on_left = TriangleMesh(start.mesh.vertices, start.facets), start.facet_tags["hemisphere"] == LEFT
+    for side, part in zip(SIDES, (on_left, ~on_left), strict=True):
+        labels, names = read_vertex_labels(files[f"{side}_regions"])
+        found = regions_from_surface(submesh(surface, part)[0], read_surface(files[side]), labels)
+        write_vertex_labels(snakemake.output[f"{side}_regions"], found, names, STRUCTURES[side])
