@@ -62,7 +62,7 @@ def test_the_paper_is_planned_with_each_equal_run_once(workflow):
 
 
 @pytest.mark.parametrize(
-    "atlas", ['[{name: dhcp-surface}, {name: dhcp-volume, accept_licence: true}]', "{name: crl, accept_licence: true}"]
+    "atlas", ["[{name: dhcp-surface}, {name: dhcp-volume, accept_licence: true}]", "{name: crl, accept_licence: true}"]
 )
 def test_the_paper_is_planned_of_another_atlas_by_one_line(workflow, atlas):
     lines = (workflow.checkout / "config" / "examples" / "paper.yaml").read_text().splitlines()

@@ -15,6 +15,11 @@ FILES = {
     "study_figures": "figures",
 }
 """Stages of rule files that are not named after theirs."""
+ORDER = (
+    *("download", "inputs", "surface", "quality", "mesh", "growth", "registration", "folding", "metrics", "validation"),
+    *("studies", "calibration", "figures", "report"),
+)
+"""Stages in the order in which data flow."""
 
 
 @cache
