@@ -6,7 +6,7 @@ import pytest
 
 from gyriflow.shipped import SHIPPED
 from gyriflow.terminal.display import RunDisplay
-from gyriflow.terminal.stages import stages, subject
+from gyriflow.terminal.stages import ORDER, stages, subject
 
 STAGES = {"pial_from_labels": "surface", "simulate": "folding", "html_report": "report"}
 LINE = "GW {week:.3f}/23  step    1  newton 6  krylov  69  max|u| 0.1 mm  min J 0.9  5.24 s  left 2:22\n"
@@ -123,6 +123,8 @@ def test_rules_have_the_stage_of_their_file_and_figures_their_own():
     assert found["overlay_figure"] == found["weekly_figure"] == "figures"
     assert found["measure"] == "metrics"
     assert found["refused_quality_figure"] == "figures"
+    # those that `check` lists
+    assert set(found.values()) <= set(ORDER)
 
 
 @pytest.mark.parametrize(
