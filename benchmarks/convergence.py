@@ -259,8 +259,9 @@ def main(arguments: argparse.Namespace) -> None:
         end = weeks["week"].max()
         finest = max((case for case in folded if not case.turned), key=lambda case: (case.nodes, case.order)).name
         result["finest"] = finest
-        result["against_finest"] = pairs[(pairs["other"] == finest) & (pairs["week"] == end)].to_dict("records")
-        if arguments.figure:
+        if len(folded) > 1:
+            result["against_finest"] = pairs[(pairs["other"] == finest) & (pairs["week"] == end)].to_dict("records")
+        if arguments.figure and len(folded) > 1:
             from convergence_figure import draw
 
             draw(table, weeks, pairs, finest, arguments.figure)
