@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from .conftest import SMALL_STUDY
-from .test_dag import BOTH_RUNS, NEW_RESULTS, ONE_RUN, SHAPE
+from .test_dag import BOTH_RUNS, CONFIGURATION, NEW_RESULTS, ONE_RUN, SHAPE
 
 pytestmark = pytest.mark.slow
 
@@ -32,8 +32,9 @@ def changed_files(root, *names, content=OTHER):
 
 # what is made of the surface of a measured brain that starts no run: its own, and what compares others with it
 OF_THE_OTHER_BRAIN = SHAPE | {
-    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 3, "similarity": 2,
-    "weekly_figure": 2, "shape_maps": 6, "runs_figure": 1, "pial_from_labels": 1,
+    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 5, "similarity": 2,
+    "weekly_figure": 2, "shape_maps": 8, "runs_figure": 1, "pial_from_labels": 1, "label_volumes": 1,
+    "quality_page": 1, "quality_table": 1,
 }  # fmt: skip
 OF_THE_SOLVER = {
     rule: count
@@ -85,8 +86,8 @@ def with_later_end(study):
         (
             with_brain,
             SHAPE
-            | {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 2}
-            | {"growth_rates": 1, "growth_figure": 1},
+            | {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 4}
+            | {"growth_rates": 1, "growth_figure": 1, "label_volumes": 1, "quality_page": 1, "quality_table": 1},
         ),
         (with_run, ONE_RUN),
         (with_other_phantom, OF_THE_OTHER_BRAIN | {"phantom": 1}),
@@ -98,7 +99,7 @@ def test_a_change_of_brains_and_runs_makes_what_is_new_and_what_compares(finishe
     study = copy.deepcopy(SMALL_STUDY)
     change(study)
     name = finished.write(f"{change.__name__}.yaml", study)
-    assert finished.jobs("--configfile", name) == expected
+    assert finished.jobs("--configfile", name) == expected | CONFIGURATION
 
 
 def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(finished):
