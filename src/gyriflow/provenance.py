@@ -36,7 +36,7 @@ PACKAGES = (
 
 def software() -> dict[str, Any]:
     """Returns the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
-    packages = {}
+    packages: dict[str, str | None] = {}
     for name in PACKAGES:
         try:
             packages[name] = metadata.version(name)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from .conftest import SMALL_STUDY
-from .test_dag import BOTH_RUNS, NEW_RESULTS, ONE_RUN, SHAPE
+from .test_dag import BOTH_RUNS, CONFIGURATION, NEW_RESULTS, ONE_RUN, SHAPE
 
 pytestmark = pytest.mark.slow
 
@@ -32,9 +32,12 @@ def changed_files(root, *names, content=OTHER):
 
 # what is made of the surface of a measured brain that starts no run: its own, and what compares others with it
 OF_THE_OTHER_BRAIN = SHAPE | {
-    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 3, "similarity": 2,
-    "weekly_figure": 2, "shape_maps": 6, "runs_figure": 1, "pial_from_labels": 1,
+    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 5, "similarity": 2,
+    "weekly_figure": 2, "shape_maps": 8, "runs_figure": 1, "pial_from_labels": 1, "label_volumes": 1,
+    "quality_page": 1, "quality_table": 1,
 }  # fmt: skip
+# a table of the study is shown by the report
+NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "view_surfaces": 1}
 OF_THE_SOLVER = {
     rule: count
     for rule, count in BOTH_RUNS.items()
@@ -45,7 +48,7 @@ OF_THE_SOLVER = {
 @pytest.mark.parametrize(
     ("names", "expected"),
     [
-        (["src/gyriflow/metrics/similarity.py"], NEW_RESULTS | {"similarity": 2, "study_table": 1}),
+        (["src/gyriflow/metrics/similarity.py"], NEW_TABLE | {"similarity": 2}),
         (["src/gyriflow/report/spectra.py"], NEW_RESULTS | {"spectra_figure": 1, "bands_figure": 1}),
         (["src/gyriflow/folding/contact.py"], OF_THE_SOLVER),
         (["workflow/scripts/steps_figure.py"], NEW_RESULTS | {"steps_figure": 2}),
@@ -85,8 +88,8 @@ def with_later_end(study):
         (
             with_brain,
             SHAPE
-            | {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 2}
-            | {"growth_rates": 1, "growth_figure": 1},
+            | {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 4}
+            | {"growth_rates": 1, "growth_figure": 1, "label_volumes": 1, "quality_page": 1, "quality_table": 1},
         ),
         (with_run, ONE_RUN),
         (with_other_phantom, OF_THE_OTHER_BRAIN | {"phantom": 1}),
@@ -98,7 +101,7 @@ def test_a_change_of_brains_and_runs_makes_what_is_new_and_what_compares(finishe
     study = copy.deepcopy(SMALL_STUDY)
     change(study)
     name = finished.write(f"{change.__name__}.yaml", study)
-    assert finished.jobs("--configfile", name) == expected
+    assert finished.jobs("--configfile", name) == expected | CONFIGURATION
 
 
 def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(finished):
@@ -117,4 +120,4 @@ def test_a_lost_table_is_made_again(finished):
         jobs = finished.jobs("--configfile", "study.yaml")
     finally:
         kept.rename(lost)
-    assert jobs == NEW_RESULTS | {"study_table": 1}
+    assert jobs == NEW_TABLE

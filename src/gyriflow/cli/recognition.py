@@ -145,7 +145,7 @@ def _known_share(present: Iterable[int], scheme: LabelScheme) -> float:
 
 
 def _hemispheres(files: Sequence[Path], ages: dict[str, float]) -> list[Found]:
-    """Returns the brains of which pial surfaces are there, of both sides with their white ones, or of one side alone."""
+    """Returns the brains with pial surfaces, of both sides and then with their white ones, or of one side alone."""
     pairs: dict[tuple[str, str], dict[str, Path]] = {}
     for file in files:
         name = file.name
