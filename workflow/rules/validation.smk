@@ -400,7 +400,7 @@ use rule validation_figure as smoothing_figure with:
     output:
         **figure(
             f"{STUDY}/figures/smoothing",
-            "skill by the smoothing of measured growth",
+            "gain by the smoothing of measured growth",
             "figure.rst",
             "Validation",
         ),
@@ -412,8 +412,8 @@ use rule validation_figure as smoothing_figure with:
         smoothing_mm=SMOOTHING,
         dpi=CONFIG.report.dpi,
         caption=(
-            "How local growth must be known: skill of runs that differ in the smoothing of measured growth alone. "
-            "1 is as good as the real brain of the week before, 0 as no folding."
+            "How local growth must be known: correlation of curvature with that of the real brain, less that of the "
+            "scaled start, of runs that differ in the smoothing of measured growth alone."
         ),
 
 

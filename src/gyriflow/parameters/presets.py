@@ -38,7 +38,7 @@ PRESETS: dict[str, dict[str, Any]] = {
             "volume_ml": "measured",
             "regional": 1.0,
             "directional": 1.0,
-            "smoothing_mm": 3.0,
+            "smoothing_mm": 1.5,
         },
     },
 }

@@ -89,12 +89,12 @@ def smoothing_chart(
     *,
     synthetic: bool = False,
 ) -> Figure:
-    """Returns skill against the length that local growth is smoothed by, a line for each compared week with a skill.
+    """Returns the gain over no folding against the length that local growth is smoothed by, a line for each week.
 
     Parameters
     ----------
     validation
-        Columns run, week, skill_… of each of `MEASURES`.
+        Columns run, week, gain_… of each of `MEASURES`.
     smoothing_mm
         The runs that differ in nothing else, and their lengths; an infinite one is that of uniform growth.
     ceiling
@@ -105,16 +105,16 @@ def smoothing_chart(
     beyond = 1.6 * max(finite, default=1.0)
     rows = validation[validation["run"].isin(lengths)].assign(length=lambda table: table["run"].map(lengths))
     rows["length"] = rows["length"].clip(upper=beyond)
-    weeks = sorted(rows.loc[rows["skill_shape_index"].notna(), "week"].unique())
+    weeks = sorted(rows["week"].unique())
     colours = run_colours([f"{week:g} GW" for week in weeks])
     figure = new_figure(FULL_WIDTH_IN, 3.2, synthetic=synthetic)
     for axes, (measure, name) in zip(figure.subplots(1, 2), MEASURES.items(), strict=True):
         for week, colour in zip(weeks, colours.values(), strict=True):
-            line = rows[rows["week"] == week].groupby("length")[f"skill_{measure}"].mean()
+            line = rows[rows["week"] == week].groupby("length")[f"gain_{measure}"].mean()
             axes.plot(line.index, line, "o-", color=colour)
             if ceiling is not None:
-                for skill in ceiling.loc[ceiling["week"] == week, f"skill_{measure}"]:
-                    axes.axhline(skill, color=colour, linestyle=":", linewidth=0.8)
+                for gain in ceiling.loc[ceiling["week"] == week, f"gain_{measure}"]:
+                    axes.axhline(gain, color=colour, linestyle=":", linewidth=0.8)
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
         axes.set_xscale("log")
         uniform = any(np.isinf(length) for length in lengths.values())
@@ -122,7 +122,7 @@ def smoothing_chart(
         axes.set_xticklabels([f"{length:g}" for length in finite] + (["uniform"] if uniform else []))
         axes.minorticks_off()
         axes.set_xlabel("smoothing of measured growth, standard deviation (mm)")
-        axes.set_title(f"{name}: skill")
+        axes.set_title(f"{name}: r less that of the scaled start")
         light_grid(axes)
     extra = [Line2D([], [], color=MUTED_COLOUR, linestyle=":", label=CEILING)] if ceiling is not None else []
     run_legend(figure, colours, extra=extra)

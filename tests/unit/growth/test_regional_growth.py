@@ -50,6 +50,17 @@ def test_the_cortex_may_grow_by_its_area_and_the_core_by_its_volume():
     assert np.isfinite(cortex).all()
 
 
+def test_strain_of_the_known_weeks_has_six_maps_each():
+    points, right = ball()
+    rates = {"volume": np.full((3, len(points)), 0.1), "strain": np.arange(3 * len(points) * 6.0).reshape(3, -1, 6)}
+    sizes = {"volume": np.ones(len(points))}
+    settings = FOLLOW | {"directional": 0.5, "known_until_gw": 23.0}
+    found = regional_maps(WEEKS, rates, sizes, points, right, settings)
+    names = sorted(name for name in found if "strain" in name)
+    assert len(names) == 12
+    np.testing.assert_allclose(found["regional_growth_strain_22.00_xy"], 0.5 * rates["strain"][1, :, 3])
+
+
 def test_rotated_maps_keep_their_spread_and_lose_their_place():
     _, own = maps()
     _, turned = maps(rotated=True, seed=3)

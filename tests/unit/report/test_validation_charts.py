@@ -37,10 +37,10 @@ def test_gains_are_drawn_with_their_kind_and_the_real_week_before():
     assert any(line.get_linestyle() == ":" for line in axes.lines)
 
 
-def test_skill_stands_over_its_smoothing_length_and_uniform_growth_beyond():
+def test_gain_stands_over_its_smoothing_length_and_uniform_growth_beyond():
     lengths = {"a": 3.0, "b": 6.0, "c": math.inf}
     axes = smoothing_chart(table([*lengths]), lengths, table(["registration"])).axes[0]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["3", "6", "uniform"]
     line = next(line for line in axes.lines if line.get_marker() == "o")
-    np.testing.assert_allclose(line.get_ydata(), np.array([0.02, 0.03, 0.04]) / 0.2)
+    np.testing.assert_allclose(line.get_ydata(), [0.01, 0.02, 0.03])
     assert line.get_xdata()[-1] == pytest.approx(1.6 * 6)
