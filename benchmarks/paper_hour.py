@@ -48,7 +48,8 @@ def nearest_of(folder: Path) -> dict[str, list[dict]]:
     for path in sorted(folder.glob("results/study/*/nearest.csv")):
         table = read_table(path)
         kept = table[table["measure"].str.match("relative_power|spectral_distance|surface_symmetric")]
-        found[path.parent.name] = kept.drop(columns=["subject", "run"]).to_dict("records")
+        rows = kept.drop(columns=["subject", "run"]).astype(object)
+        found[path.parent.name] = rows.where(rows.notna(), None).to_dict("records")
     return found
 
 
