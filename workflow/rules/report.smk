@@ -264,6 +264,7 @@ rule html_report:
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
+        notice=f"{PAGE}/three.LICENSE.txt",
         controls=f"{PAGE}/OrbitControls.js",
         viewer=f"{PAGE}/viewer.js",
     output:

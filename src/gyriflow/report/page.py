@@ -128,8 +128,8 @@ def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any]
     ----------
     template
         Jinja template of the page, which escapes what is put in.
-    parts : style, three, controls, viewer
-        The style sheet and the scripts of the 3D view, put into the page as they are.
+    parts : style, three, notice, controls, viewer
+        The style sheet and the scripts of the 3D view with their licence, put into the page as they are.
     view
         What `view_data` returns.
     content
