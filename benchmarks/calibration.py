@@ -2,10 +2,10 @@
 
     ./run python benchmarks/calibration.py [FOLDER] [--cores 2] [--runs 10] [--rounds 2] [--edge 2.0]
 
-A brain of the shipped atlas is folded from 21 to 22 GW with known thickness and growth rate, on a coarse mesh. Its surface
-then takes the place of a real brain of 22 GW, and the target `calibrate` looks for the two. The last line is one JSON
-object: by parameter `truth`, `value`, `low`, `high` (95 %), `error_of_range` (|value − truth| over the width of the bounds)
-and `held` (whether the interval holds the truth); `runs`, `diverged`, `best_score`, `seconds`.
+A brain of the shipped atlas is folded from 21 to 22 GW with known thickness and growth rate, on a coarse mesh. Its
+surface then takes the place of a real brain of 22 GW, and the target `calibrate` looks for the two. The last line is
+one JSON object: by parameter `truth`, `value`, `low`, `high` (95 %), `error_of_range` (|value − truth| over the width
+of the bounds) and `held` (whether the interval holds the truth); `runs`, `diverged`, `best_score`, `seconds`.
 """
 
 import argparse
@@ -50,7 +50,9 @@ def call(folder: Path, config: dict[str, Any], target: str, cores: int) -> None:
     command = [sys.executable, "-m", "gyriflow.launch", "--cores", str(cores), target, "--snakefile"]
     command += [str(ROOT / "Snakefile"), "--configfile", str(folder / "study.yaml"), "--directory", str(folder)]
     path = os.pathsep.join(filter(None, [str(ROOT / "src"), os.environ.get("PYTHONPATH", "")]))
-    outcome = subprocess.run(command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False)
+    outcome = subprocess.run(
+        command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
+    )
     if outcome.returncode:
         raise GyriflowError(f"{target} failed", path=folder, found="\n".join(outcome.stderr.splitlines()[-15:]))
 

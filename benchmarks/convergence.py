@@ -1,6 +1,6 @@
 """How much folding depends on the mesh and on the time step: one smooth start, several resolutions, both orders.
 
-    ./run python benchmarks/convergence.py --folder /tmp/convergence --budget-min 50 --figure docs/images/brain-convergence.png
+    ./run python benchmarks/convergence.py --folder FOLDER --figure docs/images/brain-convergence.png
 
 A smooth hemisphere of 21 GW (`smooth_hemisphere.py`) whose cortex and core grow, free, in contact with itself, is
 folded on meshes with so many node distances at the surface to the cortical thickness, linear and quadratic elements
@@ -137,7 +137,9 @@ def parameters_of(arguments: argparse.Namespace, **own: Any) -> dict[str, Any]:
 
 def resolution_runs(arguments: argparse.Namespace) -> list[tuple[Case, dict[str, Any]]]:
     """Returns the cases with what their runs took, coarse ones first, as far as the budget goes."""
-    cases = [Case(order, nodes) for nodes in sorted(arguments.nodes) for order in sorted(arguments.orders, reverse=True)]
+    cases = [
+        Case(order, nodes) for nodes in sorted(arguments.nodes) for order in sorted(arguments.orders, reverse=True)
+    ]
     if 2 in arguments.orders and REPEATED in arguments.nodes:
         cases.insert(cases.index(Case(2, REPEATED)) + 1, Case(2, REPEATED, turned=True))
     done, left_s, seconds_per_node = [], 60 * arguments.budget_min, dict.fromkeys(ORDERS, 0.0)
@@ -165,7 +167,9 @@ def measured(arguments: argparse.Namespace, case: Case, week: float) -> Carried:
     file = arguments.folder / "runs" / case.name / f"measured-{week:g}.pickle"
     if not file.exists():
         found = carried(ROOT, file.parent / "frames.h5", week)
-        file.write_bytes(pickle.dumps((found.surface.vertices, found.surface.faces, found.mean_curvature, found.values)))
+        file.write_bytes(
+            pickle.dumps((found.surface.vertices, found.surface.faces, found.mean_curvature, found.values))
+        )
     from gyriflow.geometry.triangles import TriangleMesh
 
     vertices, faces, mean, values = pickle.loads(file.read_bytes())
@@ -255,8 +259,9 @@ def main(arguments: argparse.Namespace) -> None:
         end = weeks["week"].max()
         finest = max((case for case in folded if not case.turned), key=lambda case: (case.nodes, case.order)).name
         result["finest"] = finest
-        result["against_finest"] = pairs[(pairs["other"] == finest) & (pairs["week"] == end)].to_dict("records")
-        if arguments.figure:
+        if len(folded) > 1:
+            result["against_finest"] = pairs[(pairs["other"] == finest) & (pairs["week"] == end)].to_dict("records")
+        if arguments.figure and len(folded) > 1:
             from convergence_figure import draw
 
             draw(table, weeks, pairs, finest, arguments.figure)

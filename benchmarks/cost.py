@@ -1,9 +1,9 @@
 """Fits what studies take to finished ones: `./run python benchmarks/cost.py STUDY ...` (working directories).
 
-Times are of one core: what a job kept busy, which other load on the machine hardly changes. Each rule has a constant and
-a part that grows with its brain: faces of the surface, nodes of the mesh, nodes times steps of a folding. The error
-is that of studies left out: the fit to the others, with sizes predicted from the configuration alone, against what was
-measured. Writes `src/gyriflow/cost/measured.json`, which the terminal and `gyriflow check` read.
+Times are of one core: what a job kept busy. Each rule has a constant and a part that grows with its brain: faces of the
+surface, nodes of the mesh, nodes times steps of a folding. The error is that of studies left out: a fit to the others,
+with sizes predicted from the configuration alone, against what was measured. It writes
+`src/gyriflow/cost/measured.json`, which the terminal and `gyriflow check` read.
 """
 
 import argparse
@@ -190,7 +190,7 @@ def main() -> None:
     parser.add_argument("studies", nargs="+", type=Path, help="working directories of finished studies")
     parser.add_argument(
         "--loaded", nargs="+", type=Path, default=[],
-        help="studies made beside much other load: only their foldings count, whose CPU time the solver measures itself",
+        help="studies made beside other load: only their foldings count, whose CPU time the solver measures itself",
     )  # fmt: skip
     arguments = parser.parse_args()
     studies = [read_study(folder) for folder in arguments.studies]

@@ -2,10 +2,10 @@
 
     ./run python benchmarks/paper_hour.py [FOLDER] [--configfile config/examples/paper.yaml] [--cores 2]
 
-FOLDER (default: `paper-hour`) must not hold results. The last line is one JSON object: `total` (wall seconds of the whole
-command), `exit_code`, `jobs`, and `stages`, by rule: `jobs`, `wall_s` (summed over jobs that ran side by side), `cpu_s`,
-`peak_memory_MiB`; `runs`, by run: how it ended, elements, steps and processor seconds; `nearest`: by study the nearest
-value by each measure of the hemispheres.
+FOLDER (default: `paper-hour`) must not hold results. The last line is one JSON object: `total` (wall seconds of the
+whole command), `exit_code`, `jobs`, and `stages`, by rule: `jobs`, `wall_s` (summed over jobs that ran side by side),
+`cpu_s`, `peak_memory_MiB`; `runs`, by run: how it ended, elements, steps and processor seconds; `nearest`: by study the
+nearest value by each measure of the hemispheres.
 """
 
 import argparse

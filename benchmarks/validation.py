@@ -5,7 +5,8 @@
 STUDY_FOLDER is where the study ran (with `results/study/` in it), its `results`, or `results/study` itself. The tables
 `validation.csv` and `displacement_agreement.csv` there are read. The last line is one JSON object: for each run by its
 name `worst_area_error`, `worst_volume_error`, `skill_shape_index`, `skill_mean_curvature`, `curvature_rms_ratio`,
-`displacement_r`, `displacement_slope` and the skill by horizon.
+`displacement_r`, `displacement_slope` and the skill by horizon; where the metrics are there too, `largest_difference`
+of either hemisphere from the real one in the last week, by metric.
 """
 
 import argparse
@@ -43,7 +44,15 @@ def main() -> None:
     shown += ["r_start_shape_index", "r_adjacent_shape_index", "gain_low_shape_index", "gain_high_shape_index"]
     shown += ["skill_shape_index", "skill_mean_curvature", "curvature_rms_ratio"]
     print(validation[[name for name in shown if name in validation]].to_string(index=False, float_format="%.3f"))
-    print(json.dumps(summary(validation, displacement)))
+    found = summary(validation, displacement)
+    agreement = folder / "folding_agreement.csv"
+    if agreement.exists():
+        table = read_table(agreement)
+        for run, rows in table.groupby("run"):
+            last = rows[rows["week"] == rows["week"].max()]
+            worst = last["difference"].abs().groupby(last["metric"]).max()
+            found[str(run)]["largest_difference"] = {str(name): float(value) for name, value in worst.items()}
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

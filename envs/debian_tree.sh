@@ -28,7 +28,7 @@ install_tools() {
 create_tree() {
     local own_mirror include option options=()
     [ ! -e "$env/tree.ready" ] || return 0
-    say "making a Debian $suite tree (about 1.5 minutes, 2 GB)"
+    say "making a tree of $vendor $suite (about 1.5 minutes, 2 GB)"
     rm -rf --one-file-system "$env/tree"
     # the mirror and apt settings (proxies, dates) of this machine, where it is of that vendor
     # shellcheck disable=SC2016  # apt expands these

@@ -217,7 +217,7 @@ def test_images_are_made_from_the_same_lists(recipe):
 
 
 def test_images_and_launcher_use_the_same_debian():
-    (suite,) = re.findall(r"^suite=(\w+)", (ROOT / "run").read_text(), flags=re.MULTILINE)
+    (suite,) = re.findall(r"^suite=\$\{GYRIFLOW_SUITE:-(\w+)\}", (ROOT / "run").read_text(), flags=re.MULTILINE)
     assert suite == "trixie"
     assert "FROM debian:13\n" in (ROOT / "envs" / "Dockerfile").read_text()
     assert "From: debian:13\n" in (ROOT / "envs" / "gyriflow.def").read_text()

@@ -35,8 +35,8 @@ PACKAGES = (
 
 
 def software() -> dict[str, Any]:
-    """Returns the versions of gyriflow, of Python and of the packages that results depend on, the commit, and now (UTC)."""
-    packages = {}
+    """Returns the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
+    packages: dict[str, str | None] = {}
     for name in PACKAGES:
         try:
             packages[name] = metadata.version(name)

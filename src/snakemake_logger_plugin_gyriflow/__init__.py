@@ -14,6 +14,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 LOOK_EVERY_S = 1.0
 NOTHING_TO_DO = "Nothing to be done"
+INTERRUPTED = ("Terminating processes on user request", "Cancelling snakemake on user request")
 OF_FAILED_JOBS = (
     "Exiting because a job execution failed",
     "At least one job did not complete successfully",
@@ -134,6 +135,8 @@ class LogHandler(LogHandlerBase):
         text = record.getMessage().strip()
         if text.startswith(NOTHING_TO_DO):
             self.display.up_to_date = not self.plan_file
+        elif text.startswith(INTERRUPTED):
+            self.display.interrupted = True
         elif record.levelno >= logging.WARNING and text:
             if text.startswith(OF_FAILED_JOBS):
                 self.of_failed_jobs.append(text)
@@ -150,7 +153,7 @@ class LogHandler(LogHandlerBase):
 
                 write_json(self.plan_file, list(self.planned.values()))
             with suppress(OSError, ValueError):
-                if not self.display.failed:
+                if not self.display.failed and not self.display.interrupted:
                     for text in self.of_failed_jobs:
                         self.display.message(text)
                 self.display.end()

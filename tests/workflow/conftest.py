@@ -41,7 +41,7 @@ class Workflow:
         paths = [self.packages, self.checkout / "src"]
         return os.environ | {"PYTHONPATH": os.pathsep.join(str(path) for path in paths if path)}
 
-    def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def run(self, *arguments: str, timeout_s: float = 300) -> subprocess.CompletedProcess[str]:
         """Runs the launcher in the working directory."""
         return subprocess.run(
             self.command(*arguments),
@@ -49,7 +49,7 @@ class Workflow:
             env=self.environment,
             capture_output=True,
             text=True,
-            timeout=300,
+            timeout=timeout_s,
             check=False,
         )
 

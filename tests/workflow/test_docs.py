@@ -24,11 +24,20 @@ def blocks(page, kind):
 def completed(block):
     """Returns the configuration of a block that shows part of one."""
     given = yaml.safe_load(block)
-    if "brains" in given or "atlas" in given:
+    if {"brains", "atlas", "participants"} & set(given):
         rest = {"start": given["brains"][0]["id"]} if isinstance(given.get("brains"), list) else {"start": "all"}
     else:
         rest = {"brains": BRAINS, "start": "a"}
-    return rest | {"folding": {"end_week": 32}} | given
+    return rest | given | {"folding": {"end_week": 32} | given.get("folding", {})}
+
+
+def study_of(page):
+    """Returns a study of synthetic brains with the settings that a page shows."""
+    study = {"brains": BRAINS, "start": "a", "folding": {"end_week": 24}}
+    for block in blocks(page, "yaml"):
+        shown = yaml.safe_load(block)
+        study |= {name: shown[name] for name in ("runs", "studies", "calibrate") if name in shown}
+    return study
 
 
 CONFIGURATIONS = [
@@ -43,6 +52,8 @@ def test_a_configuration_that_is_shown_is_one(block, tmp_path):
     for name in FILE.findall(block):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
+    (tmp_path / "participants.tsv").write_text("participant_id\tage\tfiles\ns1\t24.1\tlabels.nii.gz\n")
+    (tmp_path / "labels.nii.gz").touch()
     assert load(completed(block), tmp_path).runs
 
 
@@ -59,8 +70,7 @@ COMMANDS = [
 @pytest.mark.parametrize(("page", "line"), COMMANDS)
 def test_a_command_that_is_shown_has_work_to_do(page, line, workflow):
     if "my.yaml" in line:
-        config = {"brains": BRAINS, "start": "a", "folding": {"end_week": 24}}
-        (workflow.directory / "my.yaml").write_text(yaml.safe_dump(config))
+        (workflow.directory / "my.yaml").write_text(yaml.safe_dump(study_of(page)))
     assert workflow.jobs(*shlex.split(line.split("#")[0])[2:])
 
 

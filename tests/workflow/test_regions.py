@@ -80,7 +80,8 @@ def test_brains_without_labels_are_registered_by_the_masks_of_their_surfaces(wor
 @pytest.mark.slow
 def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
     write_regions(workflow.directory / "regions.nii.gz")
-    outcome = workflow.run(*TARGETS, "--cores", "2", "--configfile", workflow.write("study.yaml", STUDY))
+    name = workflow.write("study.yaml", STUDY)
+    outcome = workflow.run(*TARGETS, "--cores", "2", "--configfile", name, timeout_s=900)
     assert outcome.returncode == 0, outcome.stderr[-3000:]
     results = workflow.directory / "results"
 

@@ -161,7 +161,7 @@ def test_what_is_not_the_file_is_refused_and_not_kept(workflow, server, fault):
         "page": "found no whole gzip file; it begins with b'<html>log in</html>'",
         "lacking": "cannot be fetched; found 404",
     }[fault]
-    assert f"gyriflow: {server.url}/{path}: " in outcome.stderr
+    assert f"failed  download, labels.nii.gz: {server.url}/{path}: " in outcome.stderr
     assert said in outcome.stderr
     # what was good stays, and nothing torn
     good = {"w22/labels.nii.gz": FILES["w22/labels.nii.gz"]}
@@ -177,7 +177,7 @@ def test_no_network_ends_in_5_with_one_message_a_file_and_nothing_torn(workflow)
         outcome = workflow.run("retrieve", "--cores", "1", "--configfile", name)
     assert outcome.returncode == 5
     assert "Traceback" not in outcome.stderr
-    assert outcome.stderr.count("gyriflow: http://") == 1
+    assert outcome.stderr.count("failed  download, labels.nii.gz: http://") == 1
     assert "cannot be fetched; found" in outcome.stderr
     assert "Connection refused" in outcome.stderr
     assert files_in(workflow.directory / "resources") == {}

@@ -93,9 +93,9 @@ def from_source(*sources):
 
 
 def regional(run):
-    """Returns whether a run's growth differs between regions as measured by registration."""
+    """Returns whether a run's growth differs between regions or directions as measured by registration."""
     follow = CONFIG.run(run).follow
-    return follow is not None and follow.regional > 0
+    return follow is not None and (follow.regional > 0 or follow.directional > 0)
 
 
 def of_runs(pattern, **wildcards):

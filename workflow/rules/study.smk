@@ -32,6 +32,28 @@ rule study_table:
         "../scripts/join_tables.py"
 
 
+rule folding_agreement:
+    input:
+        metrics=f"{STUDY}/metrics.csv",
+        spectra=f"{STUDY}/spectra.csv",
+    output:
+        f"{STUDY}/folding_agreement.csv",
+    log:
+        f"{STUDY}/logs/folding_agreement.log",
+    benchmark:
+        f"{STUDY}/benchmarks/folding_agreement.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        pairs=[
+            (run, brain, float(week), real)
+            for run, brain in VALIDATED
+            for week, real in compared_with(run, brain).items()
+        ],
+    script:
+        "../scripts/folding_agreement.py"
+
+
 rule spectral_distance:
     input:
         f"{STUDY}/spectra.csv",
@@ -141,8 +163,8 @@ def exported(where):
         "run": labels["run"],
         "week": labels["week"],
         "subject": brain.subject or brain.id,
-        "surfaces": {side: surfaces_in(folder)[side] for side in SIDES},
-        "maps": {side: f"results/{where}/{side}.shape.gii" for side in SIDES},
+        "surfaces": {side: surfaces_in(folder)[side] for side in brain.sides},
+        "maps": {side: f"results/{where}/{side}.shape.gii" for side in brain.sides},
         "regions": dict(zip(SIDES, regions.values())),
     }
 
@@ -213,5 +235,6 @@ rule metrics:
         rules.centiles.output,
         rules.group_tables.output,
         rules.validate.input,
+        rules.folding_agreement.output if VALIDATED else [],
         # with brains of too few weeks no apparent age can be estimated
         rules.age_profile.output if CONFIG.age_reference else [],

@@ -47,8 +47,8 @@ def of_compared_weeks(pattern):
 def kinds(run, brain):
     """Returns by compared week whether growth taken from the brains of that week explains it, or the run predicts it."""
     follow = CONFIG.run(run).follow
-    measured = follow is not None and (
-        follow.regional > 0 or "measured" in (follow.area_cm2, follow.volume_ml)
+    measured = regional(run) or (
+        follow is not None and "measured" in (follow.area_cm2, follow.volume_ml)
     )
     explains = measured or "estimated" in CONFIG.parameters(run).values()
     until = None if follow is None else follow.known_until_gw
@@ -214,12 +214,15 @@ rule onset:
             f"run_{side}": lambda wildcards, side=side: [
                 f"results/runs/{wildcards.run}/{wildcards.brain}/surfaces/week-{week}/{side}.pial.surf.gii"
                 for week in week_tags(wildcards.run, wildcards.brain)
+                if side in sides_of(wildcards.brain)
             ]
             for side in SIDES
         },
         **{
-            f"real_{side}": lambda wildcards, side=side: expand(
-                PIAL[side], brain=later_brains(wildcards.brain)
+            f"real_{side}": lambda wildcards, side=side: (
+                expand(PIAL[side], brain=later_brains(wildcards.brain))
+                if side in sides_of(wildcards.brain)
+                else []
             )
             for side in SIDES
         },
@@ -238,8 +241,10 @@ rule onset:
     conda:
         ENVIRONMENT
     params:
+        radius_mm=CONFIG.metrics.curvature_radius_mm,
         run=lambda wildcards: wildcards.run,
         subject=lambda wildcards: wildcards.brain,
+        sides=lambda wildcards: sides_of(wildcards.brain),
         run_weeks=lambda wildcards: CONFIG.weeks(wildcards.run, wildcards.brain),
         real_weeks=lambda wildcards: [
             CONFIG.brain(name).week for name in later_brains(wildcards.brain)
@@ -334,13 +339,16 @@ def smoothing_lengths():
         follow = settings["follow"]
         if follow is None:
             continue
-        length = follow.pop("smoothing_mm") if follow["regional"] > 0 else float("inf")
-        amount = follow.pop("regional")
-        if like is None and amount > 0:
-            like = settings | {"regional": amount}
+        length = follow.pop("smoothing_mm") if regional(run) else float("inf")
+        amounts = follow.pop("regional"), follow.pop("directional")
+        follow.pop("smoothing_mm", None)
+        if like is None and regional(run):
+            like = settings | {"amounts": amounts}
+        # all that is left of a uniform run is compared, whatever the amounts
         if (
             like is not None
-            and settings | {"regional": amount or like["regional"]} == like
+            and settings | {"amounts": amounts if regional(run) else like["amounts"]}
+            == like
         ):
             found[run] = length
     return found

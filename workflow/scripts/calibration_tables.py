@@ -1,4 +1,4 @@
-"""What a calibration has found: its runs, the optimum with its uncertainty, sensitivities, and the surrogate's lines."""
+"""What a calibration has found: its runs, the optimum and how sure it is, sensitivities, lines of the surrogate."""
 
 import pandas as pd
 

@@ -1,9 +1,9 @@
 """Surfaces, maps, regions and tables of a study in one folder to hand on."""
 
-from gyriflow import __version__
 from gyriflow.io.exports import ExportedBrain, export_bids, export_plain
 from gyriflow.io.files import emptied, read_table
 from gyriflow.step import step
+from gyriflow.version import version
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
@@ -11,6 +11,6 @@ with step(snakemake.log[0]):
     brains = [ExportedBrain(**brain) for brain in params.brains]
     tables = {"metrics_long": read_table(files.long), "metrics_wide": read_table(files.wide)}
     if params.names == "bids":
-        export_bids(folder, brains, tables, __version__)
+        export_bids(folder, brains, tables, version())
     else:
         export_plain(folder, brains, tables)

@@ -7,34 +7,33 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.registrations import read_deformation
 from gyriflow.io.surfaces import read_surface
+from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.depth import convex_hull, sulcal_depth
-from gyriflow.parameters.terms import SIDES
 from gyriflow.registration.carrying import carry_over_weeks
 from gyriflow.step import step
-from gyriflow.validation.onset import onset, regions_on, relief, sulcal_regions
+from gyriflow.validation.onset import numbered, onset_on_surfaces, regions_on, sulcal_regions
 
 files, params, tables = snakemake.input, snakemake.params, []
 
 
 def carried(mesh, index):
     """Returns the vertices of a surface in the pose of the brain of an index, carried to the last brain's."""
-    places = carry_over_weeks(transform_points(mesh.vertices, np.linalg.inv(poses[index])), deformations[index:])
-    return transform_points(places[-1], poses[-1])
+    points = carry_over_weeks(transform_points(mesh.vertices, np.linalg.inv(poses[index])), deformations[index:])[-1]
+    return transform_points(points, poses[-1])
 
 
 with step(snakemake.log[0]):
     deformations = [read_deformation(path)[0] for path in files.registrations]
     poses = [np.array(read_json(path)["pose"]) for path in files.reports]
-    for side in SIDES:
+    for side in params.sides:
         real, run = ([read_surface(path) for path in files[f"{who}_{side}"]] for who in ("real", "run"))
-        last = sulcal_regions(real[-1], sulcal_depth(real[-1], convex_hull(real[-1])))
-        names = {number: f"{side} {number}" for number in range(1, last.max() + 1)}
-        # the vertices of a run are the same in all weeks
-        start = regions_on(run[0], carried(run[0], 0), real[-1], last)
+        deep, bend = sulcal_depth(real[-1], convex_hull(real[-1])), curvature(real[-1], radius_mm=params.radius_mm)
+        last = sulcal_regions(real[-1], deep, bend.mean)
         places = [regions_on(mesh, carried(mesh, index), real[-1], last) for index, mesh in enumerate(real)]
+        start = regions_on(run[0], carried(run[0], 0), real[-1], last)  # the same vertices in all weeks
         brains = {"real": (params.real_weeks, real, places), params.run: (params.run_weeks, run, [start] * len(run))}
         for who, (weeks, meshes, regions) in brains.items():
             depths = [sulcal_depth(mesh, convex_hull(mesh)) for mesh in meshes]
-            found = dict(zip(weeks, map(relief, meshes, depths, regions, [names] * len(meshes)), strict=True))
-            tables.append(onset(found).assign(run=who, subject=params.subject, hemisphere=side))
+            table = onset_on_surfaces(weeks, meshes, depths, regions, numbered(last, side))
+            tables.append(table.assign(run=who, subject=params.subject, hemisphere=side))
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

@@ -3,11 +3,11 @@
 import platform
 from datetime import UTC, datetime
 
-import gyriflow
 from gyriflow.io.downloads import sha256_of
 from gyriflow.io.files import write_json
 from gyriflow.io.versions import package_versions, source_commit
 from gyriflow.step import step
+from gyriflow.version import version
 
 PACKAGES = (
     *("fenics-dolfinx", "fenics-basix", "fenics-ufl", "fenics-ffcx", "petsc4py", "mpi4py", "numpy", "scipy", "pandas"),
@@ -17,7 +17,7 @@ PACKAGES = (
 
 params = snakemake.params
 with step(snakemake.log[0]):
-    versions = {"gyriflow": gyriflow.__version__, "Python": platform.python_version()} | package_versions(PACKAGES)
+    versions = {"gyriflow": version(), "Python": platform.python_version()} | package_versions(PACKAGES)
     files = [
         {"brain": brain, "what": what, "sha256": sha256_of(path)} | ({"path": path} if params.paths else {})
         for brain, what, path in params.files

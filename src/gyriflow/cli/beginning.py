@@ -86,4 +86,6 @@ def _absolute(value: object, folder: Path) -> object:
 def _kind(brain: Found) -> str:
     if "hemispheres" in brain.entry:
         return "pairs of hemisphere surfaces"
+    if "hemisphere" in brain.entry:
+        return "surfaces of one hemisphere"
     return f"label volumes ({brain.entry['scheme'] if brain.entry['scheme'] != UNSET else 'scheme unclear'})"

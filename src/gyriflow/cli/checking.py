@@ -20,7 +20,7 @@ from ..io.yaml_files import read_yaml
 from ..parameters.schemes import LabelScheme
 from ..shipped import SHIPPED
 from ..surface.labels import cerebrum_mask, require_cortex_outside
-from ..terminal.stages import stages
+from ..terminal.stages import ORDER, stages
 from ..terminal.time_left import as_duration
 from .plan import plan, reasons
 
@@ -88,9 +88,9 @@ def _work(path: Path, config: Config, directory: Path, cores: int) -> Iterator[t
     of_rule = stages(SHIPPED / "workflow" / "rules")
     by_stage = defaultdict(list)
     for job in jobs:
-        by_stage[of_rule.get(job.rule, job.rule)].append(job)
+        by_stage[of_rule[job.rule]].append(job)
     yield f"to run: {len(jobs)} steps", False
-    for stage, planned in by_stage.items():
+    for stage, planned in sorted(by_stage.items(), key=lambda item: ORDER.index(item[0])):
         yield f"  {stage:<12} {len(planned):4d}  {reasons(planned)}", False
     # the solver's own rule for its memory is heavy to import
     from ..folding.__main__ import predicted_memory_mib

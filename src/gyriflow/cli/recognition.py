@@ -80,7 +80,7 @@ def recognise(folder: Path) -> list[Found]:
             "no brain was recognised",
             path=folder,
             found=f"{len(files)} files",
-            expected="tissue label volumes (.nii.gz), or pairs of hemisphere surfaces with left and right in their names",
+            expected="tissue label volumes (.nii.gz), or pairs of surfaces with left and right in their names",
             remedy="Write the configuration by hand: config/README.md.",
         )
     _tell_apart(found)
@@ -145,7 +145,7 @@ def _known_share(present: Iterable[int], scheme: LabelScheme) -> float:
 
 
 def _hemispheres(files: Sequence[Path], ages: dict[str, float]) -> list[Found]:
-    """Returns the brains of which pial surfaces of both sides are there, with their white surfaces."""
+    """Returns the brains with pial surfaces, of both sides and then with their white ones, or of one side alone."""
     pairs: dict[tuple[str, str], dict[str, Path]] = {}
     for file in files:
         name = file.name
@@ -163,11 +163,15 @@ def _hemispheres(files: Sequence[Path], ages: dict[str, float]) -> list[Found]:
     for (kind, rest), sides in sorted(pairs.items()):
         plain = OF_SURFACES[kind].sub("", rest)
         if set(sides) != {"left", "right"}:
+            ((side, file),) = sides.items()
+            if kind == "pial":
+                alone = {"hemisphere": {"file": str(file), "side": side}}
+                brains[plain] = Found({"id": _id(file), "week": _week(file, ages)} | alone)
             continue
         if kind == "pial":
             entry = {"id": _id(sides["left"]), "week": _week(sides["left"], ages)}
             brains[plain] = Found(entry | {"hemispheres": {side: str(sides[side]) for side in ("left", "right")}})
-        elif plain in brains:
+        elif "hemispheres" in brains.get(plain, Found({})).entry:
             brains[plain].entry["hemispheres"]["white"] = {side: str(sides[side]) for side in ("left", "right")}
     return list(brains.values())
 

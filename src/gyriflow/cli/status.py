@@ -80,6 +80,8 @@ def _lines(directory: Path, state: dict[str, Any] | None) -> list[str]:
     if live:
         lines = [f"running since {state['began']}: {steps}{left}"]
         lines += [f"  now: {job}" for job in state["running"]]
+    elif state["interrupted"]:
+        lines = [f"interrupted at {state['ended']}, {steps}; the same command goes on"]
     elif state["ended"] is None:
         lines = [f"interrupted: the run of {state['began']} ended without notice, {steps}; the same command goes on"]
     else:

@@ -215,6 +215,10 @@ def metrics_problems(brains: Sequence[Brain], metrics: MetricsSettings) -> Itera
         if unknown := [name for name in ids if name not in known]:
             text = f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}"
             yield Problem(text, ("metrics", key))
+    # the carrying of regions and their asymmetry are of both sides
+    alone = [brain.id for brain in brains if brain.has("id", "hemisphere") and brain.hemisphere is not None]
+    if wrong := [name for name in metrics.regions if name in alone]:
+        yield Problem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
     scans: dict[tuple[str, float], int] = Counter(
         (brain.subject, brain.week) for brain in brains if brain.has("subject", "week") and brain.subject is not None
     )

@@ -280,7 +280,9 @@ class Config(Settings):
         return reference_brains(self.brains, self.metrics.norm_reference, population)
 
     def regions_from(self, brain: str) -> str | None:
-        """Returns the brain whose regions a brain gets; None where no regions are given."""
+        """Returns the brain whose regions a brain gets; None where no regions are given, or it has one side only."""
+        if len(self.brain(brain).sides) == 1:
+            return None
         return nearest_given(brain, self.metrics.regions, {brain.id: brain.week for brain in self.brains})
 
     @property

@@ -99,7 +99,7 @@ def predict(
     factors = mesh["nodes_factor"]
     factor = factors.get(config.mesh.mesher, max(factors.values()))
     sizes = {brain.id: size_of(brain, config, factor, mesh["tets_per_node"]) for brain in config.brains}
-    usual = sizes[config.start_brains[0]]
+    usual = sizes[next(iter((*config.start_brains, *sizes)))]
     seconds: list[float] = []
     spans: dict[str, float] = {}
     memories: list[tuple[float, int]] = []

@@ -120,6 +120,7 @@ class SelfContact:
         self._finer: sparse.csr_array | None = None  # weights of the nodes at the vertices of the surface of contact
         if domain.order == 2:
             self._finer, faces = finer_surface(faces)
+            self._followed = sparse.kron(self._finer, np.eye(3), format="csr")
         self._faces = np.asfortranarray(faces, dtype=np.int32)
         surface = TriangleMesh(self._at_vertices(domain.positions[self._vertices]), faces)
         self._edges = np.asfortranarray(edges(surface)[0], dtype=np.int32)
@@ -268,8 +269,7 @@ class SelfContact:
         kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
         hessian = self._barrier.hessian(pairs, self._surface, positions, kind) * N_PER_M_PER_PA_MM
         if self._finer is not None:
-            followed = sparse.kron(self._finer, np.eye(3), format="csr")
-            hessian = followed.T @ hessian @ followed
+            hessian = self._followed.T @ hessian @ self._followed
         return self._distributed(sparse.csr_matrix(hessian))
 
     def _distributed(self, matrix: sparse.csr_matrix) -> PETSc.Mat:

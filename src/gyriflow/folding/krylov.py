@@ -129,7 +129,7 @@ BAND = 0.1, 1.1
 
 
 def estimate_bounds(krylov: PETSc.KSP) -> None:
-    """Has the smoother of the finest level estimate its eigenvalue bounds at its next solve, as PETSc does by default."""
+    """Has the finest level's smoother estimate its eigenvalue bounds at its next solve, as PETSc does by default."""
     real = ctypes.c_double
     _PETSC.KSPChebyshevEstEigSet(_finest_smoother(krylov), real(0.0), real(BAND[0]), real(0.0), real(BAND[1]))
 

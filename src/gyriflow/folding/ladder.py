@@ -63,7 +63,7 @@ class LinearLadder:
         return new_krylov(self.problem.domain.comm, method, preconditioner, self.max_iterations, self.problem.hierarchy)
 
     def _renew_cg(self) -> None:
-        """Makes conjugate gradients anew: in PETSc 3.25 a solver that is set up again keeps some of the old smoother."""
+        """Makes conjugate gradients anew: set up again, PETSc 3.25's would keep some of the old smoother."""
         self._cg.destroy()
         self._cg = self._new_krylov("cg", "gamg")
 

@@ -8,6 +8,7 @@ from petsc4py import PETSc
 
 from .ladder import KEPT, LinearLadder, NotConvergedError
 from .problem import Problem
+from .tangent import Tangent
 
 ROUND_OFF = 1e-12
 """Relative error of an energy, a sum over elements."""
@@ -143,13 +144,17 @@ class NewtonSolver:
                 )
             count.newton += 1
             slow = before / 2 < norm <= SLOW * tolerance
-            if tangent is None or norm > NEAR * tolerance or norm > before / 4:
-                tangent = problem.tangent(may_keep=not slow)
             reduction = self._reduction(norm, before, tolerance)
-            linear = self.ladder.solve(tangent, self._residual, self._direction, reduction, convexify=not slow)
-            count.krylov += linear.iterations
-            count.rung = max(count.rung, linear.rung)
-            iterate = self._advance(iterate, convex=linear.convex)
+            if tangent is None or norm > NEAR * tolerance or norm > before / 4:
+                # one that is off by no more than the linear solve may leave is as good as a new one
+                tangent = problem.tangent(within=0.0 if slow else reduction)
+            try:
+                iterate = self._iterate(iterate, tangent, reduction, count, convexify=not slow)
+            except NotConvergedError:
+                if not problem.kept_tangent:
+                    raise
+                tangent = problem.tangent()
+                iterate = self._iterate(iterate, tangent, reduction, count, convexify=not slow)
             stalled += iterate.gain < GAIN
             if count.newton == 1:
                 self._first_left = iterate.norm / norm
@@ -157,6 +162,15 @@ class NewtonSolver:
         count.residual = iterate.norm / at_rest if at_rest > 0 else 0.0
         count.converged = iterate.norm <= tolerance
         return count
+
+    def _iterate(
+        self, iterate: Iterate, tangent: Tangent, reduction: float, count: StepCount, *, convexify: bool
+    ) -> Iterate:
+        """Returns where one iteration with a tangent leads, and notes in `count` what its linear solve took."""
+        linear = self.ladder.solve(tangent, self._residual, self._direction, reduction, convexify=convexify)
+        count.krylov += linear.iterations
+        count.rung = max(count.rung, linear.rung)
+        return self._advance(iterate, convex=linear.convex)
 
     def _residual_at(self, displacement: NDArray[np.float64]) -> float:
         self.problem.set_displacement(displacement)

@@ -35,9 +35,6 @@ Floats = NDArray[np.float64]
 FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""
 
-LINEAR = 0.03
-"""Part by which elastic forces may change otherwise than a tangent foretells, for it to serve another iteration."""
-
 
 class Contribution(Protocol):
     """A further part of the energy, such as contact between folds; all of it at the problem's present displacement."""
@@ -82,6 +79,8 @@ class Problem:
         Whether the body is unconstrained.
     hierarchy : OrderHierarchy or None
         The linear level below quadratic elements for multigrid, None for linear ones.
+    kept_tangent : bool
+        Whether the elastic part of the last tangent is that of an earlier displacement.
     points : IntegrationPoints
         Where stiffness, growth, normals and kept stretch are taken: q points in each element.
     """
@@ -152,6 +151,7 @@ class Problem:
         self.hierarchy = OrderHierarchy(domain, fixed) if domain.order == 2 else None
         self._sum: SumOperator | None = None
         self._present: Tangent | None = None
+        self.kept_tangent = False
         self._elastic: tuple[PETSc.Mat, PETSc.Mat] | None = None  # its elastic part, as a whole and for products
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
@@ -264,18 +264,19 @@ class Problem:
         dolfinx.fem.petsc.assemble_vector(out, self._residual)
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
-    def tangent(self, *, may_keep: bool = False) -> Tangent:
+    def tangent(self, *, within: float = 0.0) -> Tangent:
         """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
 
-        Terms of the contributions are those of the present displacement. With `may_keep` the elastic part may be that
-        of an earlier displacement in the same step, where it has foretold how forces changed since it was last asked
-        for; the residual must have been asked for at the present displacement then, and at that one.
+        Terms of the contributions are those of the present displacement. The elastic part may be that of an earlier
+        displacement in the same step, where it has foretold, but for a part `within`, how forces changed since it was
+        last asked for; with `within` above 0 the residual must have been asked for last where the tangent is.
         """
         # petsc4py keeps what several ranks share until all of them agree to let go of it
         PETSc.garbage_cleanup(self.domain.comm)
         if self._present is not None:
             self._present.set_parts(())  # else its further blocks would stay on the diagonal
-        if self._elastic is None or not (may_keep and self._foretold()):
+        self.kept_tangent = self._elastic is not None and within > 0 and self._foretold(within)
+        if self._elastic is None or not self.kept_tangent:
             self._elastic = self._elastic_tangent()
         self.vector.copy(self._known_u)
         self._forces.copy(self._known_forces)
@@ -291,15 +292,15 @@ class Problem:
         self._present = Tangent(matrix, self._sum_matrix, parts, NODES_PER_TERM[self.domain.order])
         return self._present
 
-    def _foretold(self) -> bool:
-        """Returns whether the kept elastic tangent foretells how elastic forces changed since it was last asked for."""
+    def _foretold(self, within: float) -> bool:
+        """Returns whether the kept elastic tangent foretells, but for a part, the change of forces since last asked."""
         assert self._elastic is not None
         self._change.waxpy(-1.0, self._known_u, self.vector)
         self._elastic[1].mult(self._change, self._product)
         foretold = self._product.norm()
         self._product.axpy(1.0, self._known_forces)
         self._product.axpy(-1.0, self._forces)
-        return bool(self._product.norm() <= LINEAR * foretold)
+        return bool(self._product.norm() <= within * foretold)
 
     def _elastic_tangent(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Returns the tangent of all but the contributions, as a whole and for products."""

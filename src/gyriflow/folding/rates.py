@@ -94,7 +94,7 @@ class RateProblem(Problem):
     def _elastic_tangent(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         return self._matrix, self._products
 
-    def _foretold(self) -> bool:
+    def _foretold(self, _: float) -> bool:
         return True
 
 

@@ -22,10 +22,8 @@ def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
 
 def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
     """Returns the files of a folder and those in it, in order, without hidden ones and folders of some names."""
-    folder = Path(folder)
-    return [
-        path
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-        and not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
-    ]
+
+    def wanted(path: Path) -> bool:
+        return not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
+
+    return [path for path in sorted(Path(folder).rglob("*")) if path.is_file() and wanted(path)]

@@ -117,5 +117,6 @@ def _band_shares(powers: pd.DataFrame, known: NDArray[np.bool_]) -> pd.DataFrame
 def _with_means_of_sides(values: pd.DataFrame) -> pd.DataFrame:
     """Returns the values with the mean of left and right for the whole where it has none of its own."""
     sides = values[values["hemisphere"] != "whole"].groupby([*BRAIN, "metric"], sort=False)["value"]
-    means = sides.mean()[sides.count() == 2].reset_index().assign(hemisphere="whole")
+    # of the only one where there is one
+    means = sides.mean()[sides.count() == sides.size()].reset_index().assign(hemisphere="whole")
     return pd.concat([values, means]).drop_duplicates([*BRAIN, "hemisphere", "metric"])

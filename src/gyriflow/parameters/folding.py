@@ -183,7 +183,7 @@ class FoldingSettings(Settings):
         None, "",
         "Parameters to start from; other keys come on top, for a preset of a run the run's own. `fetalfoldsim`: those "
         "of the paper, whose linear elements are `mesh: {order: 1}`; `measured`: growth that follows the brains' areas "
-        "and volumes, regional as registration measures it. All values stand in `params.yaml`.",
+        "and volumes, in places and directions as registration measures it. All values stand in `params.yaml`.",
     )  # fmt: skip
     end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
     step_s: float = setting(

@@ -23,13 +23,22 @@ PRESETS: dict[str, dict[str, Any]] = {
         "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5, "gap_mm": 2.5},
         "no_growth": {"kind": "ellipsoid", "shift_y": 0.05, "shift_z": -0.15, "semi_axes": [0.35, 0.40, 0.50]},
     },
-    # growth that follows the brain: everything grows and nothing is held
+    # growth that follows the brain, in measured directions: everything grows and nothing is held; with a cortex as
+    # stiff as the core, growth makes the folds rather than buckling (docs/science.md)
     "measured": {
         "step_s": 86_400.0,
         "stress_memory_gw": 0.0,
+        "shear_modulus_cortex_pa": 300.0,
+        "shear_modulus_core_pa": 300.0,
         "support": "free",
         "contact": {"kind": "global"},
         "no_growth": {"kind": "none"},
-        "follow": {"area_cm2": "measured", "volume_ml": "measured", "regional": 1.0, "smoothing_mm": 6.0},
+        "follow": {
+            "area_cm2": "measured",
+            "volume_ml": "measured",
+            "regional": 1.0,
+            "directional": 1.0,
+            "smoothing_mm": 3.0,
+        },
     },
 }

@@ -9,6 +9,8 @@ from .style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, light_grid, new_fig
 
 LINE_COLOUR = RUN_COLOURS[0]
 OPTIMUM_COLOUR = RUN_COLOURS[1]
+UNITS = {"_mm": " (mm)", "_pa": " (Pa)", "_gw": " (GW)", "_per_s": " (1/s)"}
+"""Units as shown, by the endings of names."""
 
 
 @styled
@@ -32,7 +34,7 @@ def calibration_chart(
         What the score is called.
     """
     names = list(optimum["parameter"])
-    figure = new_figure(FULL_WIDTH_IN, 2.5, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 2.7, synthetic=synthetic)
     panels = figure.subplots(1, len(names) + 1, width_ratios=[1.0] * len(names) + [0.7])
     rows = optimum.set_index("parameter")
     for number, (axes, name) in enumerate(zip(panels, names, strict=False)):
@@ -42,9 +44,18 @@ def calibration_chart(
             axes.set_ylabel(f"score: {score.replace('_', ' ')}")
     _sensitivity_panel(panels[-1], sensitivities)
     panels[-1].set_title(f"({'abcd'[len(names)]})", loc="left")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6))
+    entries = [panel.get_legend_handles_labels() for panel in (panels[0], panels[-1])]
+    handles, labels = ([item for entry in entries for item in entry[part]] for part in (0, 1))
+    figure.legend(handles, labels, loc="outside lower center", ncols=5)
     return figure
+
+
+def shown_name(name: str) -> str:
+    """Returns the name of a parameter as it is shown, with its unit in brackets."""
+    for ending, unit in UNITS.items():
+        if name.endswith(ending):
+            name = name.removesuffix(ending) + unit
+    return name.replace("_", " ")
 
 
 def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, best: pd.Series, line: pd.DataFrame) -> None:
@@ -67,20 +78,19 @@ def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, best: pd.Series,
     if len(diverged):
         top = np.full(len(diverged), float(finished["score"].max()))
         axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
-    axes.set_xlabel(name.replace("_", " "))
+    axes.set_xlabel(shown_name(name))
     light_grid(axes)
 
 
 def _sensitivity_panel(axes: Axes, sensitivities: pd.DataFrame) -> None:
     places = np.arange(len(sensitivities))
     for shift, column, label, colour in (
-        (-0.18, "first_order", "alone", LINE_COLOUR),
-        (0.18, "total", "with interactions", MUTED_COLOUR),
+        (-0.18, "first_order", "variance by it alone", LINE_COLOUR),
+        (0.18, "total", "and by its interactions", MUTED_COLOUR),
     ):
         values = sensitivities[column].clip(0, 1)
         axes.barh(places + shift, values, height=0.34, color=colour, label=label)
-    axes.set_yticks(places, [name.replace("_", "\n") for name in sensitivities["parameter"]])
+    axes.set_yticks(places, [shown_name(name).replace(" ", "\n") for name in sensitivities["parameter"]])
     axes.invert_yaxis()
     axes.set_xlim(0, 1)
     axes.set_xlabel("part of the variance")
-    axes.legend(loc="lower right")

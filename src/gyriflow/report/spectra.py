@@ -68,6 +68,11 @@ def _untrusted_legend(*, bars: bool = False, points: bool = False, stars: bool =
     return entries
 
 
+def _sides_of(rows: pd.DataFrame) -> list[str]:
+    """Returns the hemispheres that some brain of a table has, left first."""
+    return [side for side in SIDES if (rows["hemisphere"] == side).any()]
+
+
 @styled
 def spectra_chart(
     spectra: pd.DataFrame,
@@ -105,9 +110,10 @@ def spectra_chart(
         raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
     colours = chosen_colours(rows["run"], runs) if colours is None else colours
     figure = new_figure(FULL_WIDTH_IN, 3.0, synthetic=synthetic, measured=measured)
-    panels = figure.subplots(1, 2, sharey=True)
+    sides = _sides_of(rows)
+    panels = figure.subplots(1, len(sides), sharey=True, squeeze=False)[0]
     width = 0.8 / max(len(colours), 1)
-    for axes, hemisphere in zip(panels, SIDES, strict=True):
+    for axes, hemisphere in zip(panels, sides, strict=True):
         side = rows[rows["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
             of_run = side[side["run"] == run]
@@ -158,9 +164,11 @@ def spectra_weeks_chart(
     """
     rows = _with_band_numbers(spectra, bands)
     colours = chosen_colours(rows["run"], runs)
-    figure = new_figure(FULL_WIDTH_IN, 4.2, synthetic=synthetic, measured=measured)
-    panels = figure.subplots(2, len(bands), sharex=True, sharey="col", squeeze=False)
-    for line, hemisphere in zip(panels, SIDES, strict=True):
+    sides = _sides_of(rows)
+    height = 4.2 if len(sides) == 2 else 2.6
+    figure = new_figure(FULL_WIDTH_IN, height, synthetic=synthetic, measured=measured)
+    panels = figure.subplots(len(sides), len(bands), sharex=True, sharey="col", squeeze=False)
+    for line, hemisphere in zip(panels, sides, strict=True):
         for axes, band in zip(line, bands, strict=True):
             here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
             for run in [*colours, MEASURED]:
@@ -183,8 +191,9 @@ def spectra_weeks_chart(
             if not here["relative_power"].notna().any():
                 _beyond_the_modes(axes, 0.5, axes.transAxes)
                 axes.set_yticks([])
-            if hemisphere == "left":
+            if hemisphere == sides[0]:
                 axes.set_title(f"B{band}, {_FOLDS[band]} folds" if band in _FOLDS else f"B{band}")
+            if hemisphere != sides[-1]:
                 axes.set_xlabel("")
         line[0].set_ylabel(f"{hemisphere} hemisphere\nrelative power")
     for axes in panels[0]:

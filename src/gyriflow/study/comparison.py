@@ -1,6 +1,7 @@
 """How near the runs of a study are to a real brain, and which of them is nearest by each measure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -134,20 +135,20 @@ def nearest(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[st
         subject, real, hemisphere, measure, the varied values of the nearest run, run, distance, the next values
         (`next_…`) and their distance, flag: "ok", or that a value is at the end of the range, or not resolved.
     """
-    values = members.drop_duplicates(["subject", "run"]).set_index(["subject", "run"])
+    values = {(row["subject"], row["run"]): row for row in members.to_dict("records")}
     rows = []
     compared = comparison.dropna(subset=["distance"])
     for keys, group in compared.groupby(["subject", "real", "hemisphere", "measure"], sort=False):
         ranked = group.sort_values("distance", kind="stable")
         best = ranked.iloc[0]
         subject = str(keys[0])
-        of_best = values.loc[(subject, str(best["run"]))]
+        of_best = values[(subject, best["run"])]
         row = dict(zip(("subject", "real", "hemisphere", "measure"), keys, strict=True))
         row |= {name: of_best[name] for name in varied}
         row |= {"run": best["run"], "distance": best["distance"]}
         if len(ranked) > 1:
             second = ranked.iloc[1]
-            row |= {f"next_{name}": values.loc[(subject, str(second["run"]))][name] for name in varied}
+            row |= {f"next_{name}": values[(subject, second["run"])][name] for name in varied}
             row["next_distance"] = second["distance"]
         row["flag"] = _flags(best, of_best, members[members["subject"] == subject], varied)
         rows.append(row)
@@ -173,12 +174,12 @@ def side_by_side(comparison: pd.DataFrame, varied: Sequence[str]) -> pd.DataFram
     return real.to_frame().join(wide, how="right").reset_index()
 
 
-def _flags(best: pd.Series, of_best: pd.Series, members: pd.DataFrame, varied: Sequence[str]) -> str:
+def _flags(best: pd.Series, of_best: Mapping[Hashable, Any], members: pd.DataFrame, varied: Sequence[str]) -> str:
     flags = [] if best["flag"] == "ok" else [f"band {best['flag']}"]
     if of_best["resolution"] != "ok":
         flags.append(str(of_best["resolution"]))
     for name in varied:
         known = pd.to_numeric(members[name], errors="coerce")
-        if members[name].nunique() > 1 and of_best[name] in (known.min(), known.max()):
+        if known.min() < known.max() and of_best[name] in (known.min(), known.max()):
             flags.append(ENDS)
     return "; ".join(dict.fromkeys(flags)) or "ok"

@@ -1,4 +1,4 @@
-"""What the FetalFoldSim paper reports, beside the same of this study; the numbers are those of a file of the workflow."""
+"""What the FetalFoldSim paper reports, beside the same of this study; its numbers are in a file of the workflow."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

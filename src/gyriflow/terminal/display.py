@@ -93,7 +93,7 @@ class RunDisplay:
         self.errors = 0
         self.told: set[tuple[str, ...]] = set()
         self.report: str | None = None
-        self.up_to_date = False
+        self.up_to_date = self.interrupted = False
         self._live_shown = False
 
     # --- what happens -----------------------------------------------------------------------------------------
@@ -135,6 +135,9 @@ class RunDisplay:
     def job_fails(self, number: int, rule: str, logs: Sequence[str], otherwise: str = "") -> None:
         """Says what failed and why, the cause first; `otherwise` is told where the job's log is silent."""
         job = self.running.pop(number, None)
+        if self.interrupted:
+            # it was stopped
+            return
         what = job.what if job else rule
         text = "".join(GrowingLog(Path(log)).all_text() for log in logs)
         why = cause(text) or otherwise or "it left no message"
@@ -167,7 +170,9 @@ class RunDisplay:
         self._clear()
         self.ended_at = _now()
         took = as_duration(self.clock() - self.began)
-        if self.failed:
+        if self.interrupted:
+            self.line(f"gyriflow: stopped after {took}, {self.done} of {self.total} steps are done")
+        elif self.failed:
             count = len(self.failed)
             self.line(
                 f"gyriflow: {count} step{'s' if count > 1 else ''} failed after {took}, {self.total - self.done} are "
@@ -188,6 +193,7 @@ class RunDisplay:
             "left_s": self.time_left() if self.total else None,
             "running": [job.now for job in self.running.values()],
             "failed": self.failed,
+            "interrupted": self.interrupted,
             "details": self.details,
         }
 

@@ -10,10 +10,16 @@ FILES = {
     "retrieve": "download",
     "validation": "validation",
     "study": "metrics",
+    "regions": "metrics",
     "run_figures": "figures",
     "study_figures": "figures",
 }
 """Stages of rule files that are not named after theirs."""
+ORDER = (
+    *("download", "inputs", "surface", "quality", "mesh", "growth", "registration", "folding", "metrics", "validation"),
+    *("studies", "calibration", "figures", "report"),
+)
+"""Stages in the order in which data flow."""
 
 
 @cache

@@ -1,6 +1,6 @@
 """In which week a sulcus appears that is not there at the start."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -32,14 +32,15 @@ BOTTOM, CROWN = 0.9, 0.1
 """Quantiles of depth by area that stand for the bottom of a region and for the crowns beside it."""
 
 
-def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats) -> Ints:
+def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> Ints:
     """Returns the (n,) number of the sulcus at each vertex of a hemisphere, 1 for the largest, 0 outside of sulci.
 
-    A sulcus is a connected area deeper than `DEEP_MM` below the hull, of `LEAST_REGION_MM2` or more. That on the
-    medial wall is one of them.
+    A sulcus is a connected valley (mean curvature below 0, positive on gyri) deeper than `DEEP_MM` below the hull, of
+    `LEAST_REGION_MM2` or more. Valleys of the medial wall and the Sylvian fissure are among them.
     """
     regions = np.zeros(len(mesh.vertices), dtype=np.int64)
-    deep = depth_mm[mesh.faces].min(axis=1) >= DEEP_MM
+    valley = (depth_mm >= DEEP_MM) & (mean_curvature < 0)
+    deep: NDArray[np.bool_] = valley[mesh.faces].all(axis=1)
     if not deep.any():
         return regions
     part, used = submesh(mesh, deep)
@@ -114,6 +115,23 @@ def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
             week = weeks[before] + part * (weeks[after] - weeks[before]) if np.isfinite(part) else weeks[after]
         rows.append((name, there, week, depths[0], depths[-1]))
     return pd.DataFrame(rows, columns=["region", "there_at_start", "onset_week", "first_relief_mm", "last_relief_mm"])
+
+
+def numbered(regions: NDArray[np.integer], side: str) -> dict[int, str]:
+    """Returns the names of numbered regions of a side, such as "left 1"."""
+    return {number: f"{side} {number}" for number in range(1, int(regions.max()) + 1)}
+
+
+def onset_on_surfaces(
+    weeks: Sequence[float],
+    meshes: Sequence[TriangleMesh],
+    depths_mm: Sequence[Floats],
+    regions: Sequence[NDArray[np.integer]],
+    names: Mapping[int, str],
+) -> pd.DataFrame:
+    """Returns the table of `onset` of surfaces by week, each with its depths and regions as for `relief`."""
+    found = (relief(*surface, names) for surface in zip(meshes, depths_mm, regions, strict=True))
+    return onset(dict(zip(weeks, found, strict=True)))
 
 
 def _quantile(values: Floats, weights: Floats, share: float) -> float:

@@ -20,8 +20,8 @@ def size_score(simulated: TriangleMesh, real: TriangleMesh) -> float:
 def shape_scores(run: Shape, real: Shape, names: Collection[Score]) -> dict[Score, float]:
     """Returns the scores among `names` that compare shapes that are ready and laid onto each other.
 
-    shape_index and mean_curvature are 1 − r of `placement.placement`, curvature_distribution is curvature_distance_per_mm of
-    `folds.against_real`.
+    shape_index and mean_curvature are 1 − r of `placement.placement`, curvature_distribution is
+    curvature_distance_per_mm of `folds.against_real`.
     """
     found: dict[Score, float] = {}
     wanted = [measure for measure in MEASURES if measure in names]

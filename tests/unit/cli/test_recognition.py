@@ -59,11 +59,9 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
         )
     touched(tmp_path, "fetal.week23.left.pial.surf.gii")
     touched(tmp_path, *(f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white")))
-    (tmp_path / "participants.tsv").write_text(
-        "participant_id\tsex\tgestational_age\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n"
-    )
+    (tmp_path / "participants.tsv").write_text("participant_id\tsex\tga\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
     assert participants(tmp_path) == {"sub-07": 27.3}
-    first, second = (brain.entry for brain in recognise(tmp_path))
+    first, alone, second = (brain.entry for brain in recognise(tmp_path))
     assert first == {
         "id": "fetal.week22",
         "week": 22.0,
@@ -73,6 +71,7 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
             "white": {"left": "fetal.week22.left.wm.surf.gii", "right": "fetal.week22.right.wm.surf.gii"},
         },
     }
+    assert alone["hemisphere"] == {"file": "fetal.week23.left.pial.surf.gii", "side": "left"}
     assert (second["id"], second["week"]) == ("sub-07", 27.3)
     assert second["hemispheres"]["white"] == {"left": "sub-07/surf/lh.white", "right": "sub-07/surf/rh.white"}
 

@@ -17,6 +17,7 @@ RUNNING = {
     "running": ["folding, run r, brain a: GW 21.50 of 23"],
     "failed": [],
     "details": "run.log",
+    "interrupted": False,
 }
 FAILED = [{"what": "surface, brain b", "why": "b.nii: is no image", "logs": ["b.log"]}]
 
@@ -44,6 +45,8 @@ def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
 def test_a_run_that_was_killed_is_called_interrupted(study):
     assert "interrupted: the run of 2026-01-01 10:00:00 ended without notice, 3 of 10 steps done" in text(study)
     assert "now:" not in text(study)
+    write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True})
+    assert "interrupted at 2026-01-01 10:05:00, 3 of 10 steps done" in text(study)
 
 
 def test_failures_are_told_with_their_cause_and_log(study):

@@ -124,3 +124,10 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
         "volume": ["p24", "p25"],
     }
     assert found.estimated_from("left24") == "left hemisphere, surface"
+
+
+def test_regions_need_both_hemispheres(folder):
+    brains = [{"id": "a", "week": 24, "hemisphere": {"file": "lh.surf.gii", "side": "left"}}]
+    regions = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
+    with pytest.raises(InputError, match=r"metrics\.regions: found a, of one hemisphere; regions need both"):
+        load({"brains": brains, "start": "a", "folding": FOLDING, "metrics": {"regions": regions}}, folder / "bids")

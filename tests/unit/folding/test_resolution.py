@@ -71,3 +71,15 @@ def test_a_step_above_its_tolerance_is_told():
 )
 def test_predicted_memory_is_what_runs_have_taken(tets, ranks, contact, measured):
     assert predicted_memory_mib(tets, ranks, contact) == pytest.approx(measured, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("tets", "ranks", "contact", "measured"),
+    [
+        *((22_608, 1, "global", 1071), (22_608, 2, "global", 1709), (22_608, 1, "none", 895)),
+        *((25_892, 1, "global", 1160), (25_892, 2, "global", 1823), (25_892, 2, "none", 1425)),
+        *((55_086, 1, "global", 1914), (55_086, 2, "global", 2791)),
+    ],
+)
+def test_predicted_memory_of_quadratic_elements_is_what_runs_have_taken(tets, ranks, contact, measured):
+    assert predicted_memory_mib(tets, ranks, contact, 2) == pytest.approx(measured, rel=0.05)

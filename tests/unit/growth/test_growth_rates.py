@@ -12,6 +12,7 @@ import trimesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.rates import FOLDING_RATES, agreement, growth_rates, rate_curve, rates_of_series
+from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
 
 WEEK_S = 604_800.0
@@ -154,8 +155,11 @@ def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(
         write_surface(files[-1], TriangleMesh(ball.vertices, ball.faces))
     thickness = tmp_path / "thickness.json"
     thickness.write_text('{"mean_mm": 1.8}')
+    reports = [tmp_path / f"{name}.json" for name in "abcd"]
+    for report, tissue_ml in zip(reports, (30.0, 40.0, None, None), strict=True):
+        write_json(report, {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {})
     job = SimpleNamespace(
-        input=SimpleNamespace(whole=files, left=files, right=files, thickness=[thickness]),
+        input=SimpleNamespace(whole=files, reports=reports, thickness=[thickness]),
         output=SimpleNamespace(**{name: tmp_path / f"{name}.csv" for name in ("areas", "rates", "agreement")}),
         params=SimpleNamespace(
             series=["mine", "mine", "atlas", "atlas"], brains=[*"abcd"], weeks=[21, 22, 21, 22], with_thickness=["b"]
@@ -170,3 +174,10 @@ def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]
     assert areas["thickness_mm"].isna().tolist() == [True, False, True, True]
+    # of the labels where these are known
+    np.testing.assert_array_equal(areas["tissue_ml"], [30.0, 40.0, np.nan, np.nan])
+    rates = pd.read_csv(tmp_path / "rates.csv").set_index("series")
+    assert rates.loc["mine", "tissue_ratio"] == pytest.approx(4 / 3)
+    assert rates.loc["mine", "tissue_compound_rate_per_s"] == pytest.approx(np.log(4 / 3) / (3 * WEEK_S))
+    assert np.isnan(rates.loc["atlas", "tissue_ratio"])
+    assert rates["cortex_ratio"].isna().all()

@@ -33,7 +33,8 @@ def apart() -> BrainMetrics:
     left, right = (trimesh.creation.icosphere(subdivisions=4, radius=radius) for radius in (20.0, 25.0))
     left, right = TriangleMesh(left.vertices, left.faces), TriangleMesh(right.vertices, right.faces)
     left, right = shifted(left, -21.0), shifted(right, 26.0)
-    return measure_brain(merged(left, right), left, right, spangy_modes=60)
+    known = {"cerebrum": 98.0, "tissue": 90.0, "cortex": 20.0}
+    return measure_brain(merged(left, right), left, right, label_volumes_ml=known, spangy_modes=60)
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +75,13 @@ def test_two_spheres(apart: BrainMetrics) -> None:
     for metric in ("volume", "area"):
         both = value(apart, "left", metric) + value(apart, "right", metric)
         assert value(apart, "whole", metric) == pytest.approx(both)
+
+
+def test_volumes_of_tissues_are_of_the_whole_where_labels_know_them(apart: BrainMetrics, cut: BrainMetrics) -> None:
+    found = apart.table[apart.table["metric"].str.startswith("volume_")]
+    assert found["hemisphere"].tolist() == ["whole", "whole"]
+    assert dict(zip(found["metric"], found["value"], strict=True)) == {"volume_tissue": 90.0, "volume_cortex": 20.0}
+    assert not cut.table["metric"].str.startswith("volume_").any()
 
 
 def test_the_whole_has_no_fissure_in_its_index(apart: BrainMetrics, cut: BrainMetrics) -> None:

@@ -9,7 +9,14 @@ import yaml
 from scipy import stats
 
 from gyriflow.errors import InputError
-from gyriflow.metrics.norms import measured_norms, measured_scores, published_norms, published_scores
+from gyriflow.metrics.norms import (
+    measured_norms,
+    measured_scores,
+    published_norms,
+    published_scores,
+    structure_volumes,
+)
+from gyriflow.parameters.schemes import SCHEMES
 
 NORMS = Path(__file__).parents[3] / "norms"
 
@@ -105,3 +112,16 @@ def test_what_cannot_be_scored_is_said() -> None:
     few = measured_scores(*table(weeks[:4], weeks[:4], ("a", 22.0, 1.0))).set_index("run").loc["a"]
     assert few["flag"] == "too few brains"
     assert np.isnan(few["centile"])
+
+
+def test_structures_of_the_norms_scheme_and_of_others() -> None:
+    norms = published_norms(yaml.safe_load((NORMS / "svrtk-volumes.yaml").read_text()))
+    own, others = structure_volumes({3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}, SCHEMES["dhcp-19"], norms)
+    assert own == {"cortex": 9.0, "deep_grey": 3.0, "left_lateral_ventricle": 1.0}
+    assert others == []
+    # 2 is the cortex of FeTA and outer CSF of BOUNTI; it has no sides for the ventricles
+    found, others = structure_volumes({2: 8.0, 3: 40.0, 4: 3.0}, SCHEMES["feta-7"], norms)
+    assert found == {"cortex": 8.0, "white_matter": 40.0}
+    assert others == ["cortex", "white_matter"]
+    scores = published_scores(found | {"cortex": 9.0}, 21.0, norms, others)
+    assert scores["flag"].tolist() == ["other labels"] * 2

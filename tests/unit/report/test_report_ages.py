@@ -106,7 +106,7 @@ def test_without_a_simulated_brain_it_is_refused():
 
 
 def test_one_brain_a_week_is_said_in_the_figure() -> None:
-    said = [text.get_text() for text in age_profile_chart(PROFILE, CHECK, SIMILARITY).texts]
+    said = [" ".join(text.get_text().split()) for text in age_profile_chart(PROFILE, CHECK, SIMILARITY).texts]
     assert any("no single fetus" in text for text in said)
     said = [text.get_text() for text in age_profile_chart(PROFILE.assign(brains_per_week=3), CHECK, SIMILARITY).texts]
     assert not any("no single fetus" in text for text in said)

@@ -6,7 +6,7 @@ import pytest
 
 from gyriflow.shipped import SHIPPED
 from gyriflow.terminal.display import RunDisplay
-from gyriflow.terminal.stages import stages, subject
+from gyriflow.terminal.stages import ORDER, stages, subject
 
 STAGES = {"pial_from_labels": "surface", "simulate": "folding", "html_report": "report"}
 LINE = "GW {week:.3f}/23  step    1  newton 6  krylov  69  max|u| 0.1 mm  min J 0.9  5.24 s  left 2:22\n"
@@ -95,7 +95,8 @@ def test_a_failure_begins_with_its_cause_and_names_its_log(clock, tmp_path):
     assert shown(display).splitlines()[2:] == [
         "failed  surface, brain a: a.nii: is no image",
         f"        log: {log}",
-        "gyriflow: 1 step failed after 5 s, 2 are not done; once the cause is mended, the same command goes on from here",
+        "gyriflow: 1 step failed after 5 s, 2 are not done; once the cause is mended, the same command goes on from "
+        "here",
     ]
     assert display.state()["failed"] == [{"what": "surface, brain a", "why": "a.nii: is no image", "logs": [str(log)]}]
 
@@ -122,6 +123,8 @@ def test_rules_have_the_stage_of_their_file_and_figures_their_own():
     assert found["overlay_figure"] == found["weekly_figure"] == "figures"
     assert found["measure"] == "metrics"
     assert found["refused_quality_figure"] == "figures"
+    # those that `check` lists
+    assert set(found.values()) <= set(ORDER)
 
 
 @pytest.mark.parametrize(
@@ -137,3 +140,16 @@ def test_rules_have_the_stage_of_their_file_and_figures_their_own():
 )
 def test_a_job_is_named_by_what_it_works_on(wildcards, expected):
     assert subject(wildcards) == expected
+
+
+def test_what_was_stopped_is_no_failure(clock, tmp_path):
+    display = display_on(io.StringIO(), clock)
+    display.plan({"simulate": 1, "pial_from_labels": 1}, 1)
+    display.progress(1, 2)
+    display.job_begins(1, "simulate", {"run": "r", "brain": "a"}, ["x"], None)
+    display.interrupted = True
+    display.job_fails(1, "simulate", [])
+    display.end()
+    assert "failed" not in shown(display)
+    assert shown(display).splitlines()[-1] == "gyriflow: stopped after 5 s, 1 of 2 steps are done"
+    assert display.state()["interrupted"]

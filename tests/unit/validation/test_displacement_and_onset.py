@@ -98,13 +98,15 @@ def test_onset_is_when_two_millimetres_are_reached():
     assert np.isnan(late.loc["central", "onset_week"])
 
 
-def test_sulci_are_found_by_their_depth_and_carried_to_an_earlier_surface():
+def test_sulci_are_valleys_found_by_their_depth_and_carried_to_an_earlier_surface():
     mesh, depths = groove(4.0)
-    regions = sulcal_regions(mesh, depths)
+    bend = np.where(depths > 1.0, -0.2, 0.05)
+    regions = sulcal_regions(mesh, depths, bend)
     assert set(regions) == {0, 1}
     inside = regions == 1
     assert depths[inside].min() >= 2.0 > depths[~inside].min()
+    assert not sulcal_regions(mesh, depths, np.abs(bend)).any()
     smooth, _ = groove(0.0)
     found = regions_on(smooth, np.asarray(smooth.vertices), mesh, regions)
     assert np.mean((found == 1) == inside) > 0.98
-    assert not sulcal_regions(*groove(1.0)).any()
+    assert not sulcal_regions(*groove(1.0), bend).any()

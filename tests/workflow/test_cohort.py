@@ -1,0 +1,138 @@
+"""A cohort in the real program: brains of one side, from a surface and from labels, beside subjects that fail."""
+
+from types import SimpleNamespace
+
+import nibabel as nib
+import numpy as np
+import pandas as pd
+import pytest
+
+from gyriflow.io.files import read_json
+from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import phantom_labels
+from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
+
+from .conftest import Workflow
+
+pytestmark = pytest.mark.slow
+
+ROWS = (
+    ("participant_id", "age", "sex", "files", "side", "scheme"),
+    ("sub-01", "22", "F", "surface.surf.gii", "left", "n/a"),
+    ("sub-02", "23", "M", "labels.nii.gz", "left", "spina-bifida-atlas"),
+    ("sub-03", "23", "F", "torn.nii.gz", "n/a", "spina-bifida-atlas"),
+    ("sub-04", "n/a", "F", "labels.nii.gz", "left", "spina-bifida-atlas"),
+    ("sub-05", "23", "M", "labels.nii.gz", "n/a", "spina-bifida-atlas"),
+)
+
+
+def left_half(week):
+    labels, affine = phantom_labels(week, voxel_mm=2.0)
+    return pathologies.one_hemisphere(labels, affine, "left"), affine
+
+
+@pytest.fixture(scope="module")
+def cohort(checkout_copy, tmp_path_factory):
+    """One call for surfaces, mesh, folding, metrics, pages and some figures."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("cohort"))
+    labels, affine = left_half(22.0)
+    mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
+    pial = isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+    write_surface(workflow.directory / "surface.surf.gii", pial)
+    labels, affine = left_half(23.0)
+    image = nib.Nifti1Image(labels.astype(np.int16), affine)
+    image.header.set_xyzt_units("mm")
+    nib.save(image, workflow.directory / "labels.nii.gz")
+    whole = (workflow.directory / "labels.nii.gz").read_bytes()
+    (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
+    table = "\n".join("\t".join(row) for row in ROWS)
+    (workflow.directory / "participants.tsv").write_text(table + "\n")
+    config = {
+        "participants": "participants.tsv",
+        "start": "sub-01",
+        "surface": {"edge_length_mm": 3.0},
+        "mesh": {"order": 1, "mesher": "tetgen", "surface_edge_mm": 3.0, "max_surface_distance_mm": 2.0},
+        "metrics": {"curvature_radius_mm": 7.0, "spangy_modes": 50},
+        "folding": {"end_week": 23, "step_s": 302400, "solver": {"newton_tolerance": 1e-4}},
+    }
+    name = workflow.write("study.yaml", config)
+    refusal = workflow.run("-n", "--configfile", name)
+    wanted = [f"results/runs/reference/sub-01/figures/{figure}.png" for figure in ("zones", "shape_index")]
+    options = ("--cores", "2", "--keep-going", "--configfile", name)
+    outcome = workflow.run("quality", *options, timeout_s=900)
+    later = [workflow.run(*targets, *options, timeout_s=900) for targets in (("folding", *wanted), ("metrics",))]
+    results = workflow.directory / "results"
+    return SimpleNamespace(
+        refusal=refusal, outcome=outcome, later=later, results=results, config=name, workflow=workflow
+    )
+
+
+def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(cohort):
+    assert cohort.refusal.returncode == 2
+    assert "sub-04: age: found n/a" in cohort.refusal.stderr
+
+
+def test_a_failed_subject_holds_up_no_other_and_the_call_ends_in_its_code(cohort):
+    assert cohort.outcome.returncode == 2, cohort.outcome.stderr
+    assert "Traceback" not in cohort.outcome.stderr
+    assert "left out: " in cohort.outcome.stderr
+    assert "refused: sub-03, sub-05; finishing the study without" in cohort.outcome.stderr
+    assert [call.returncode for call in cohort.later] == [2, 2]
+    metrics = pd.read_csv(cohort.results / "study" / "metrics.csv")
+    assert set(metrics["subject"]) == {"sub-01", "sub-02"}
+
+
+def test_the_table_of_quality_has_all_with_their_causes(cohort):
+    table = pd.read_csv(cohort.results / "study" / "quality.csv").set_index("subject")
+    assert list(table.index) == [row[0] for row in (*ROWS[1:4], ROWS[5], ROWS[4])]
+    assert set(table["verdict"][["sub-03", "sub-04", "sub-05"]]) == {"refused"}
+    assert "torn.nii.gz" in table["cause"]["sub-03"]
+    assert "found n/a" in table["cause"]["sub-04"]
+    assert "one hemisphere only" in table["cause"]["sub-05"]
+    for brain in ("sub-01", "sub-02"):
+        assert table["verdict"][brain] in ("fine", "look")
+        assert 0.5 < table["share_of_expected_volume"][brain] < 1.5
+        assert (cohort.results.parent / table["page"][brain]).exists()
+
+
+@pytest.mark.parametrize("brain", ["sub-01", "sub-02"])
+def test_a_hemisphere_has_surfaces_and_maps_of_its_side_only(cohort, brain):
+    folder = cohort.results / "brains" / brain
+    assert (folder / "surface" / "left.pial.surf.gii").exists()
+    assert (folder / "metrics" / "left.shape.gii").exists()
+    assert not list(folder.rglob("right*"))
+    report = read_json(folder / "surface" / "surface.json")
+    assert report["side"] == "left"
+    assert read_surface(folder / "surface" / "pial.surf.gii").vertices[:, 0].max() < report["fissure_x_mm"]
+
+
+def test_a_hemisphere_folds_with_its_wall_in_its_plane(cohort):
+    run = cohort.results / "runs" / "reference" / "sub-01"
+    assert read_yaml(run / "params.yaml")["side"] == "left"
+    zones = read_json(run / "folding" / "zones.json")["zones"]
+    assert zones["medial wall"]["area_mm2"] > 5 * zones["left contact"]["area_mm2"] / 2
+    assert zones["right contact"]["facets"] == zones["between planes"]["facets"] == 0
+    start, end = (read_surface(run / "surfaces" / f"week-{week}" / "left.pial.surf.gii") for week in ("22.00", "23.00"))
+    wall = start.vertices[:, 0].max()
+    assert end.vertices[:, 0].max() < wall + 0.5
+    assert end.vertices[:, 0].min() < start.vertices[:, 0].min() - 0.05
+    assert not (run / "surfaces" / "week-23.00" / "right.pial.surf.gii").exists()
+
+
+def test_tables_and_figures_are_of_the_side_that_there_is(cohort):
+    study = cohort.results / "study"
+    for name in ("metrics", "similarity"):
+        assert set(pd.read_csv(study / f"{name}.csv")["hemisphere"]) == {"whole", "left"}
+    assert set(pd.read_csv(study / "spectra.csv")["hemisphere"]) == {"left"}
+    for name in ("zones", "shape_index"):
+        assert (cohort.results / "runs" / "reference" / "sub-01" / "figures" / f"{name}.png").exists()
+
+
+def test_a_finished_cohort_stays_finished(cohort):
+    # the second pass found all done; what is planned again is what failed, and what would need it
+    table = (cohort.results / "study" / "quality.csv").stat().st_mtime_ns
+    outcome = cohort.workflow.run("quality", "--cores", "2", "-k", "--configfile", cohort.config)
+    assert outcome.returncode == 2
+    assert (cohort.results / "study" / "quality.csv").stat().st_mtime_ns == table

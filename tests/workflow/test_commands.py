@@ -1,0 +1,73 @@
+"""The commands of gyriflow as a user types them."""
+
+import subprocess
+import sys
+
+import pytest
+
+from .conftest import SMALL_STUDY
+
+
+def gyriflow(workflow, *arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "gyriflow.cli", *arguments],
+        cwd=workflow.directory, env=workflow.environment, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+
+
+def test_help_names_every_command_and_how_a_study_goes(workflow):
+    said = gyriflow(workflow, "--help").stdout
+    assert said.startswith("Usage: gyriflow")
+    for command in ("init", "check", "run", "status", "view", "compare", "completion"):
+        assert f"\n  {command} " in said
+
+
+def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflow):
+    name = workflow.write("bad.yaml", SMALL_STUDY | {"folding": {"end_week": 20, "poisson_ratio": 0.5}})
+    outcome = gyriflow(workflow, "check", name)
+    assert outcome.returncode == 2
+    assert "the configuration has 2 problems" in outcome.stderr
+    assert "Traceback" not in outcome.stderr
+
+
+def test_an_input_of_another_scheme_is_found_by_check(workflow):
+    labels = workflow.checkout / "atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz"
+    brains = [{"id": "x", "week": 21, "labels": str(labels), "scheme": "dhcp-19"}]
+    name = workflow.write("study.yaml", SMALL_STUDY | {"brains": brains, "start": "x"})
+    outcome = gyriflow(workflow, "check", name)
+    assert outcome.returncode == 2
+    assert "  brain x: " in outcome.stdout
+    assert "scheme 'dhcp-19'" in outcome.stdout
+    assert not (workflow.directory / "results").exists()
+
+
+@pytest.mark.slow
+def test_check_says_what_will_run_and_what_it_takes(workflow):
+    workflow.write("gyriflow.yaml", SMALL_STUDY)
+    outcome = gyriflow(workflow, "check", "--cores", "2")
+    assert outcome.returncode == 0, outcome.stderr
+    said = outcome.stdout
+    assert said.startswith("gyriflow.yaml: 2 brains, 2 simulations (reference, thick)")
+    for stage in ("surface", "mesh", "folding", "metrics", "figures", "report"):
+        assert f"\n  {stage} " in said
+    assert "not made yet" in said
+    for need in ("\ntime    about ", "\nmemory  about ", "\ndisk    about "):
+        assert need in said
+    assert not (workflow.directory / "results").exists()
+
+
+def test_completion_scripts_are_printed(workflow):
+    for shell, words in (
+        ("bash", "complete -o nosort -F"),
+        ("zsh", "#compdef gyriflow"),
+        ("fish", "complete --no-files"),
+    ):
+        assert words in gyriflow(workflow, "completion", shell).stdout
+
+
+def test_view_and_status_say_what_is_missing(workflow):
+    for command in ("view", "status"):
+        outcome = gyriflow(workflow, command)
+        assert outcome.returncode == 2
+        assert outcome.stderr.startswith("gyriflow: ")
+        assert "Traceback" not in outcome.stderr

@@ -1,0 +1,71 @@
+"""The package as a wheel: what it carries, and that its command works in an empty folder without the checkout."""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from .conftest import CHECKOUT
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    built = subprocess.run(
+        [sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, CHECKOUT],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert built.returncode == 0, built.stdout + built.stderr
+    (found,) = folder.glob("gyriflow-*.whl")
+    return found
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    """A virtual environment with the wheel, and all other packages of this environment."""
+    folder = tmp_path_factory.mktemp("installed")
+    subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", folder], check=True, timeout=120)
+    python = folder / "bin" / "python"
+    found = "import sysconfig; print(sysconfig.get_path('purelib'))"
+    site = subprocess.run([python, "-c", found], capture_output=True, text=True, check=True).stdout.strip()
+    (Path(site) / "environment.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    plain = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    install = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", wheel]
+    subprocess.run(install, env=plain, check=True, timeout=120)
+    return folder / "bin" / "gyriflow", plain | {"PATH": "/usr/bin:/bin"}
+
+
+def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    tracked = subprocess.run(
+        ["git", "-C", CHECKOUT, "ls-files", "Snakefile", "workflow", "atlases", "norms", "config", "profiles", "envs"],
+        capture_output=True, text=True, check=True,
+    ).stdout.split()  # fmt: skip
+    assert {f"gyriflow/shipped/{name}" for name in tracked} <= names
+    assert "snakemake_logger_plugin_gyriflow/__init__.py" in names
+    assert not [name for name in names if "__pycache__" in name or name.startswith("tests")]
+
+
+def test_the_command_works_in_an_empty_folder(installed, tmp_path):
+    command, environment = installed
+
+    def gyriflow(*arguments):
+        return subprocess.run(
+            [command, *arguments],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False,
+        )  # fmt: skip
+
+    assert gyriflow("--version").stdout.startswith("gyriflow 0.")
+    target = "results/brains/spina-bifida-unoperated-21/surface/pial.surf.gii"
+    outcome = gyriflow("run", "--cores", "1", target)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    assert (tmp_path / target).is_file()
+    assert str(CHECKOUT) not in outcome.stdout + outcome.stderr
+    # nothing is missing further down
+    assert gyriflow("run", "--dry-run").returncode == 0
