@@ -20,8 +20,7 @@ with step(snakemake.log[0]):
             render_caption(read_text(entry["caption"]), entry["values"]),
             first=path == params.first,
         )
-        for entry in params.entries
-        for path in [entry["file"]]
+        for path, entry in ((entry["file"], entry) for entry in params.entries)
     ]
     results = Results(
         brains=params.brains,
