@@ -40,7 +40,7 @@ def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats)
     """
     regions = np.zeros(len(mesh.vertices), dtype=np.int64)
     valley = (depth_mm >= DEEP_MM) & (mean_curvature < 0)
-    deep: NDArray[np.bool_] = valley[mesh.faces].all(axis=1)
+    deep = np.asarray(valley[mesh.faces].all(axis=1))
     if not deep.any():
         return regions
     part, used = submesh(mesh, deep)
