@@ -71,7 +71,7 @@ rule influence_figure:
         dpi=CONFIG.report.dpi,
         runs=lambda wildcards: shown_members(wildcards.study),
         reached=lambda wildcards: reached_runs(wildcards.study),
-        values=lambda wildcards: [
+        members=lambda wildcards: [
             dict(member.values) for member in CONFIG.members[wildcards.study]
         ],
         sides=lambda wildcards: len(sides_of(study_start(wildcards.study))),

@@ -53,16 +53,19 @@ MADE = [
     *rules.study_resources.output,
     f"{STUDY}/figures/cost.png",
     *rules.quality.input,
+    *rules.influence_figures.input,
 ]
 PICTURE_BYTES = 9_000_000
 
 
-def caption_values(job, wildcards):
-    """Returns what a caption names: the wildcards of a file and the parameters of its rule."""
+def caption_values(job, caption, wildcards):
+    """Returns what a caption names: the wildcards of a file, and those parameters of its rule that it speaks of."""
     own = SimpleNamespace(**wildcards)
+    named = set(re.findall(r"snakemake\.params\.(\w+)", Path(caption).read_text()))
     values = {
         name: value(own) if callable(value) else value
         for name, value in job.params.items()
+        if name in named
     }
     return {"snakemake": {"wildcards": wildcards, "params": values}}
 
@@ -75,6 +78,9 @@ def marked_files():
             if not is_flagged(output, "report"):
                 continue
             mark = get_flag_value(output, "report")
+            caption = str(
+                job.basedir.join(mark.caption).get_path_or_uri(secret_free=False)
+            )
             for path in dict.fromkeys(map(str, MADE)):
                 found = output.regex().fullmatch(path)
                 if found:
@@ -89,12 +95,8 @@ def marked_files():
                             "file": path,
                             "section": mark.category,
                             "title": " · ".join([title[0].upper() + title[1:], *named]),
-                            "caption": str(
-                                job.basedir.join(mark.caption).get_path_or_uri(
-                                    secret_free=False
-                                )
-                            ),
-                            "values": caption_values(job, own),
+                            "caption": caption,
+                            "values": caption_values(job, caption, own),
                         }
                     )
     return entries
@@ -264,6 +266,7 @@ rule html_report:
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
+        notice=f"{PAGE}/three.LICENSE.txt",
         controls=f"{PAGE}/OrbitControls.js",
         viewer=f"{PAGE}/viewer.js",
     output:

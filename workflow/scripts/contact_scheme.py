@@ -2,7 +2,7 @@
 
 from gyriflow.folding.contact import BARRIER, DISTANCE_PER_EDGE
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.geometry.triangles import TriangleMesh, edges, mean_length
+from gyriflow.geometry.triangles import TriangleMesh, mean_edge_length
 from gyriflow.io.figures import write_figure
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
@@ -15,7 +15,7 @@ with step(snakemake.log[0]):
     mesh, run = read_tetrahedral_mesh(files.mesh), parameters_from(read_yaml(files.params))
     zones = zones_of_run(mesh, run)
     boundary, by_planes = TriangleMesh(mesh.vertices, zones.facets), run.contact.kind == "planes"
-    distance = run.contact.distance_mm or DISTANCE_PER_EDGE * mean_length(boundary.vertices, edges(boundary.faces))
+    distance = run.contact.distance_mm or DISTANCE_PER_EDGE * mean_edge_length(boundary)
     figure = contact_scheme(
         boundary,
         zones.facet_zone,

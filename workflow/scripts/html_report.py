@@ -7,6 +7,7 @@ from gyriflow.report.assembly import Results, assemble
 from gyriflow.report.page import Shown, picture, render_caption, report_page
 from gyriflow.step import step
 
+PARTS = ("style", "three", "notice", "controls", "viewer")
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     pictures = [entry["file"] for entry in params.entries if entry["file"].endswith(".png")]
@@ -19,8 +20,7 @@ with step(snakemake.log[0]):
             render_caption(read_text(entry["caption"]), entry["values"]),
             first=path == params.first,
         )
-        for entry in params.entries
-        for path in [entry["file"]]
+        for path, entry in ((entry["file"], entry) for entry in params.entries)
     ]
     results = Results(
         brains=params.brains,
@@ -36,5 +36,5 @@ with step(snakemake.log[0]):
         },
     )
     view = read_json(files.view)
-    parts = {name: read_text(path) for name, path in files.items() if name in ("style", "three", "controls", "viewer")}
+    parts = {name: read_text(path) for name, path in files.items() if name in PARTS}
     write_text(snakemake.output[0], report_page(read_text(files.page), parts, view, **assemble(results, shown, view)))

@@ -21,7 +21,7 @@ def brain(surfaces, maps):
 
 
 with step(snakemake.log[0]):
-    labels = dict(zip(params.runs, value_labels(params.values), strict=True))
+    labels = dict(zip(params.runs, value_labels(params.members), strict=True))
     pairs = zip(batched(files.surfaces, params.sides), batched(files.maps, params.sides), strict=True)
     known = [brain(*pair) for pair in pairs]
     reached = dict(zip(params.reached, known, strict=False))

@@ -10,9 +10,8 @@ with step(snakemake.log[0]):
     table, nearest = read_table(files.comparison), read_table(files.nearest)
     own = table[(table["subject"] == params.subject) & table["real"].isin(params.real)]
     flags = own["flag"].where(own["resolution"] == "ok", own["resolution"])
-    column = f"published_{params.varied}"
-    known = nearest.dropna(subset=[column]) if column in nearest else nearest.iloc[:0]
-    published = dict(zip(known["measure"], known[column], strict=True)) if len(known) else {}
+    known = nearest.dropna(subset=["paper"])
+    published = dict(zip(known["measure"], known["paper"], strict=True))
     shown = {"varied": params.varied, "parameter": parameter_label(params.varied), "published": published}
     figure = nearest_chart(own.assign(flag=flags), **shown, synthetic=params.synthetic)
     write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

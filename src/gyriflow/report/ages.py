@@ -90,7 +90,7 @@ def age_profile_chart(
     panels[0].set_ylabel("looks like (GW)")
     panels[0].set_title("simulated" + (" (stars: other measured brains)" if (brains["run"] == MEASURED).any() else ""))
     panels[1].set_title(_errors(left_out, measured))
-    between, below = figure.add_subplot(grid[1, :]), figure.add_subplot(grid[2, :])
+    below, between = figure.add_subplot(grid[2, :]), figure.add_subplot(grid[1, :])
     _similarity_panel(between, similarity[similarity["hemisphere"] == "whole"], colours, last)
     _metric_panel(below, rows, colours, last)
     add_letters([*panels, between, below])

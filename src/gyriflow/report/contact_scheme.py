@@ -41,7 +41,7 @@ def penalty_law(penalty_pa_per_m: float) -> Law:
     """Returns the pressure ε⟨g⟩ of a penalty over the penetration g of a wall beyond its plane, in mm."""
     at = np.linspace(-0.5, 1.0, 151)
     pressure = penalty_pa_per_m * 1e-3 * np.maximum(at, 0.0)
-    return Law("penetration beyond the plane (mm)", "contact pressure (Pa)", at, pressure)
+    return Law("penetration (mm)", "contact pressure (Pa)", at, pressure)
 
 
 def barrier_law(barrier: Callable[[float, float], float]) -> Law:

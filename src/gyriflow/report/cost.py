@@ -41,7 +41,7 @@ def cost_chart(stages: pd.DataFrame) -> Figure:
     times.invert_yaxis()
     times.set_xlabel("time, summed over jobs (min)")
     energy.set_xlabel("energy, estimated (Wh)")
-    times.legend(loc="lower right")
+    figure.legend(handles=times.get_legend_handles_labels()[0], loc="outside lower left", ncols=2)
     for axes in (times, energy):
         light_grid(axes, "x")
     add_letters([times, energy])

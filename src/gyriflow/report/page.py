@@ -23,6 +23,7 @@ SECTIONS = (
 )
 """The sections of figures and tables in their order; others follow."""
 VERDICTS = ("fine", "look", "refused")
+_WORD, _SENTENCE = 24, 60
 FILE, COMMAND = "(file)", "(command)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
 
@@ -64,6 +65,8 @@ def _cells(table: pd.DataFrame, row: Sequence[Any]) -> Markup:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         text = ("–" if pd.isna(value) else f"{value:.4g}") if number else "–" if value is None else str(value)
         kind = "number" if number else f"verdict {text}" if name == "verdict" and text in VERDICTS else ""
+        # columns of sentences are wide, single words and numbers stay on one line
+        kind = kind or ("wide" if len(text) > _SENTENCE else "whole" if len(text) <= _WORD else "")
         cells.append(Markup('<td class="{}">{}</td>').format(kind, text))
     return Markup("").join(cells)
 
@@ -125,8 +128,8 @@ def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any]
     ----------
     template
         Jinja template of the page, which escapes what is put in.
-    parts : style, three, controls, viewer
-        The style sheet and the scripts of the 3D view, put into the page as they are.
+    parts : style, three, notice, controls, viewer
+        The style sheet and the scripts of the 3D view with their licence, put into the page as they are.
     view
         What `view_data` returns.
     content

@@ -7,7 +7,7 @@ import matplotlib as mpl
 import numpy as np
 import pyvista as pv
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, to_rgb
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -60,6 +60,8 @@ VIEWS = {
 PIXELS_PER_INCH = 600
 """Resolution of pictures of surfaces: that of the PDF files, and twice that of PNG files at 300 dots per inch."""
 
+PARTS = {"YlGnBu": (0.0, 0.85), "YlOrRd": (0.08, 0.85), "RdBu_r": (0.06, 0.94)}
+"""Parts of colour maps that are used: their darkest ends could be taken for shade."""
 UNKNOWN_COLOUR = "#B8B8B8"
 SAME_PLACE_MM = 0.5
 """How near to a point what is seen first has to be, to be that point."""
@@ -134,7 +136,9 @@ def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
 
 def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -> ScalarMappable:
     """Returns a colour scale; `cut` marks its upper end as passed by some values."""
-    colours = mpl.colormaps[colormap]
+    start, end = PARTS.get(colormap, (0.0, 1.0))
+    shades = mpl.colormaps[colormap](np.linspace(start, end, 256))
+    colours = LinearSegmentedColormap.from_list(colormap, [tuple(shade) for shade in shades])
     colours.colorbar_extend = "max" if cut else "neither"  # type: ignore[assignment]
     return ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
 

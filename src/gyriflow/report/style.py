@@ -107,7 +107,18 @@ def add_letters(panels: Iterable[Axes]) -> None:
     panels = list(panels)
     if len(panels) > 1:
         for axes, letter in zip(panels, ascii_lowercase, strict=False):
-            axes.set_title(letter, loc="left", fontweight="bold", fontsize=9)
+            # beside the title, which may be as wide as the panel
+            axes.annotate(
+                letter,
+                (0.0, 1.0),
+                xytext=(-12, 4),
+                xycoords="axes fraction",
+                textcoords="offset points",
+                ha="right",
+                va="bottom",
+                fontweight="bold",
+                fontsize=9,
+            )
 
 
 def synthetic_note(measured: str = PHANTOM) -> str:

@@ -39,7 +39,7 @@ COLOURS = {
     BASE: "#999999",
     SIDE_X: "#56B4E9",
     SIDE_Y: "#E69F00",
-    MEDIAL_WALL: "#999999",
+    MEDIAL_WALL: "#8C6D31",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
 ZONES: Mapping[int, tuple[str, str]] = {code: (ZONE_NAMES[code], colour) for code, colour in COLOURS.items()}

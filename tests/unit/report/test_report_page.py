@@ -60,6 +60,7 @@ def page(shown: list[Shown], view: dict | None = None) -> str:
         validation=VALIDATION,
     )
     parts = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
+    parts["notice"] = "three.LICENSE.txt"
     texts = {name: (PAGE / file).read_text() for name, file in parts.items()}
     view = view or {"groups": [], "maps": []}
     return report_page((PAGE / "page.html").read_text(), texts, view, **assemble(results, shown, view))

@@ -121,7 +121,7 @@
   }
   const panes = real && simulated.length ? [new Pane(), new Pane()] : [new Pane()];
   const centre = new THREE.Vector3();
-  const half = data.size * 0.58;
+  const half = data.size * 0.52;
   const controls = new THREE.OrbitControls(camera, renderer.domElement);
   controls.enableDamping = false;
   controls.enablePan = false;
