@@ -5,13 +5,12 @@ from pathlib import Path
 from snakemake.utils import min_version
 
 min_version("9.0")
-# beside this file in a checkout; an installed package holds this file and is found without
+# beside this file in a checkout; an installed package holds this file
 CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
-SOURCE = str(
-    Path(workflow.basedir, "src") if CHECKED_OUT else Path(workflow.basedir).parents[1]
+SOURCE = (
+    f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 )
-if CHECKED_OUT:
-    sys.path.insert(0, SOURCE)
+sys.path.insert(0, SOURCE)
 from gyriflow.provenance import code_hash
 
 # a configuration given on the command line replaces the demo instead of being mixed with it
