@@ -121,7 +121,7 @@ def contact_scheme(
     curve.axhline(0, color=MUTED_COLOUR, linewidth=0.6)
     curve.set(xlabel=law.label, ylabel=law.pressure_label)
     if not planes_mm:
-        curve.set_ylim(-0.2, 8)
+        curve.set_ylim(-0.2, 5)
     light_grid(curve)
     add_letters([whole, zoom, curve])
     if handles:
