@@ -161,7 +161,7 @@ def test_source_files_are_short(path):
 
 
 def test_snakefile_is_short():
-    assert len((ROOT / "Snakefile").read_text().splitlines()) < 80
+    assert len((ROOT / "Snakefile").read_text().splitlines()) < 100
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=short)
