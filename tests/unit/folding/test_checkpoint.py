@@ -5,6 +5,9 @@ from itertools import pairwise
 import h5py
 import numpy as np
 import pytest
+from fuzzing import BOUNDED, damaged
+from hypothesis import given
+from hypothesis import strategies as st
 from shapes import box_mesh
 
 from gyriflow.errors import InputError
@@ -73,6 +76,21 @@ def test_a_torn_checkpoint_is_not_used(tmp_path, damage):
     read, message = read_checkpoint(path, "key")
     assert read is None
     assert "torn" in message
+
+
+@BOUNDED
+@given(data=st.data())
+def test_a_checkpoint_with_any_damage_is_whole_or_not_used(tmp_path, data):
+    path = tmp_path / "state.h5"
+    write_checkpoint(path, "key", some_state())
+    whole = read_checkpoint(path, "key")[0]
+    path.write_bytes(data.draw(damaged(path.read_bytes(), 200)))
+    read, message = read_checkpoint(path, "key")
+    assert message
+    if read is not None:
+        # the damage lies between what is kept
+        for name, value in vars(whole).items():
+            np.testing.assert_array_equal(getattr(read, name), value)
 
 
 def test_no_checkpoint_says_nothing(tmp_path):

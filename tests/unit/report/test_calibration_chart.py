@@ -29,7 +29,11 @@ PROFILES = pd.DataFrame(
 def test_each_parameter_has_a_panel_and_all_share_one_of_sensitivities():
     figure = calibration_chart(RUNS, OPTIMUM, SENSITIVITIES, PROFILES, score="size")
     first, second, last = figure.axes
-    assert [axes.get_xlabel() for axes in figure.axes] == ["thickness (mm)", "growth rate (1/s)", "part of the variance"]
+    assert [axes.get_xlabel() for axes in figure.axes] == [
+        "thickness (mm)",
+        "growth rate (1/s)",
+        "part of the variance",
+    ]
     lines = {line.get_label(): line for line in first.get_lines()}
     np.testing.assert_array_equal(lines["round 0"].get_xdata(), [1.0, 2.0])
     np.testing.assert_array_equal(lines["round 1"].get_ydata(), [0.1])
