@@ -90,7 +90,13 @@ def page_of(tests):
     section = None
     for number, (of, fault, gets) in known["fault"].items():
         if of != section:
-            lines += ["", f"## {of}", "", "| | fault | what the user gets | tests | |", "| --- | --- | --- | --- | --- |"]
+            lines += [
+                "",
+                f"## {of}",
+                "",
+                "| | fault | what the user gets | tests | |",
+                "| --- | --- | --- | --- | --- |",
+            ]
             section = of
         lines.append(_row(number, (fault, gets), tests.get(("fault", number), {})))
     lines += ["", "## Promises", "", "| | what holds | tests | |", "| --- | --- | --- | --- |"]

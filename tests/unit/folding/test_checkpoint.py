@@ -57,6 +57,7 @@ def test_a_long_table_of_steps_fits(tmp_path):
     assert len(read_checkpoint(tmp_path / "state.h5", "key")[0].rows) == 3000
 
 
+@pytest.mark.fault(34)
 def test_a_checkpoint_of_another_run_is_not_used(tmp_path):
     write_checkpoint(tmp_path / "state.h5", "key", some_state())
     read, message = read_checkpoint(tmp_path / "state.h5", "other")
@@ -64,6 +65,7 @@ def test_a_checkpoint_of_another_run_is_not_used(tmp_path):
     assert "another mesh or other parameters" in message
 
 
+@pytest.mark.fault(34)
 @pytest.mark.parametrize("damage", ["cut", "changed"])
 def test_a_torn_checkpoint_is_not_used(tmp_path, damage):
     path = tmp_path / "state.h5"
@@ -78,6 +80,7 @@ def test_a_torn_checkpoint_is_not_used(tmp_path, damage):
     assert "torn" in message
 
 
+@pytest.mark.fault(34, 62)
 @BOUNDED
 @given(data=st.data())
 def test_a_checkpoint_with_any_damage_is_whole_or_not_used(tmp_path, data):
@@ -116,6 +119,7 @@ def test_defaults_are_the_papers_reference_values():
     assert (p.stress_memory_gw, p.support, p.core_growth_rate_per_s) == (0, "ellipsoid", 0)
 
 
+@pytest.mark.fault(27)
 def test_unknown_parameters_are_all_named():
     with pytest.raises(InputError, match=r"thicknes: unknown key; did you mean thickness_mm.*twice: unknown key"):
         parameters_from(VALUES | {"thicknes": 1, "twice": 2})
@@ -123,6 +127,7 @@ def test_unknown_parameters_are_all_named():
         parameters_from(VALUES | {"contact": {"gap": 1}})
 
 
+@pytest.mark.fault(28)
 def test_parameters_out_of_bounds_are_all_named():
     with pytest.raises(InputError, match=r"thickness_mm.*poisson_ratio.*allow_negative_growth"):
         parameters_from(VALUES | {"thickness_mm": 0.0, "poisson_ratio": 0.5, "growth_rate_per_s": -1e-7})

@@ -24,7 +24,7 @@ from gyriflow.io.surfaces import declared, read_surface, read_vertex_maps, write
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_yaml
 
-pytestmark = [pytest.mark.fault(12), pytest.mark.fault(13)]
+pytestmark = pytest.mark.fault(12, 13, 62)
 
 LABELS = np.random.default_rng(3).integers(0, 9, (5, 6, 7)).astype(np.int16)
 BODY = trimesh.creation.icosphere(subdivisions=1)
