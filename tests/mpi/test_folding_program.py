@@ -116,6 +116,8 @@ def curved_brain(path):
     return path
 
 
+@pytest.mark.fault(33, 35)
+@pytest.mark.promise(11)
 def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp_path, monkeypatch):
     path = curved_brain(tmp_path / "curved.xdmf")
     settings = {
@@ -150,6 +152,7 @@ def test_every_output_week_is_hit_although_steps_do_not_divide_it(tight_run):
         assert np.abs(weeks - week).min() < 1e-12
 
 
+@pytest.mark.promise(11)
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_the_result_does_not_depend_on_the_number_of_ranks(mesh, tight_run, tmp_path, ranks):
     assert fold(mesh, tmp_path / "out", ranks, solver=TIGHT).returncode == 0
@@ -163,6 +166,7 @@ def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, 
     assert np.linalg.norm(other - one, axis=1).max() <= 1e-3
 
 
+@pytest.mark.fault(30, 38)
 def test_memory_and_a_shortened_step_are_said_before_the_solve(default_run):
     before, _, _ = default_run[1].partition("step    1")
     assert "3072 elements, 2187 unknowns, 2 ranks, about 516 MiB" in before
@@ -200,6 +204,8 @@ def killed_after(step, arguments):
     return "".join(printed)
 
 
+@pytest.mark.fault(33, 35)
+@pytest.mark.promise(3)
 @pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 3)])
 def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, long_run, tmp_path, first, then):
     out = tmp_path / "out"
@@ -215,6 +221,8 @@ def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, lon
     assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(long_run / "steps.csv"))
 
 
+@pytest.mark.fault(34)
+@pytest.mark.promise(4)
 def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run, tmp_path):
     out = tmp_path / "out"
     killed_after(2, command(mesh, out, step_s=MANY_STEPS))
@@ -230,6 +238,7 @@ def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run,
     assert np.linalg.norm(resumed - one, axis=1).max() <= 1e-3
 
 
+@pytest.mark.fault(29)
 def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
     done = fold(mesh, tmp_path / "out", 2, growth_rate_per_s=0.0)
     assert done.returncode == 0
@@ -237,6 +246,7 @@ def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
     assert (read_field(frames, 21.5, "displacement_mm") == 0).all()
 
 
+@pytest.mark.fault(32)
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_goes_on(mesh, tmp_path):
     done = fold(mesh, tmp_path / "out", step_s=302400.0, growth_rate_per_s=3e-6, solver={"max_newton": 1})
     assert done.returncode == 0, done.stdout + done.stderr
@@ -246,6 +256,7 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_goes_on(mesh, tmp_pat
     assert (steps["min_J"] > 0).all()
 
 
+@pytest.mark.fault(32)
 def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_halvings": 0, "max_newton": 1}}
     done = fold(mesh, tmp_path / "out", 2, **hard)
@@ -255,6 +266,8 @@ def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     assert not (tmp_path / "out" / "frames.h5").exists()
 
 
+@pytest.mark.fault(32)
+@pytest.mark.promise(5)
 def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_path, monkeypatch, capsys):
     brain = read_tetrahedral_mesh(mesh)
     weeks = WEEK | {"output_weeks": [21.0, 21.25, 21.5], "ranks": 1}
@@ -273,6 +286,7 @@ def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_pat
     assert pd.read_csv(tmp_path / "steps.csv")["week"].iloc[-1] == pytest.approx(21.25)
 
 
+@pytest.mark.fault(55)
 def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tmp_path, monkeypatch):
     brain = read_tetrahedral_mesh(mesh)
     parameters = parameters_from(WEEK)
@@ -291,6 +305,7 @@ def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tm
     assert (summary["steps"], summary["weeks"], summary["reached_week"]) == (0, [21.0], 21.0)
 
 
+@pytest.mark.fault(33)
 def test_stress_is_remembered_across_an_interruption(mesh, tmp_path, monkeypatch, capsys):
     brain = read_tetrahedral_mesh(mesh)
     parameters = parameters_from(WEEK | {"stress_memory_gw": 0.5, "solver": TIGHT})
@@ -334,6 +349,7 @@ def test_a_map_of_the_thickness_acts_where_it_says_on_any_ranks(mesh, tmp_path):
     assert done.stderr.count("the map thickness_mm does not fit the mesh") == 1
 
 
+@pytest.mark.fault(37)
 def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):
     out = tmp_path / "out"
     slow = command(mesh, out, end_week=30.0, output_weeks=[21.0, 30.0])
@@ -354,6 +370,8 @@ runpy.run_module("gyriflow.folding", run_name="__main__")
 """
 
 
+@pytest.mark.fault(36)
+@pytest.mark.promise(2)
 def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, default_run, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(default_run[0], out)
@@ -367,6 +385,7 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, defaul
     assert not [path for path in out.rglob("*") if path.is_file() and path.parent != out]
 
 
+@pytest.mark.fault(36)
 def test_a_folder_that_cannot_be_made_ends_in_code_five(mesh, tmp_path):
     (tmp_path / "file").touch()
     arguments = command(mesh, tmp_path / "out")
@@ -377,6 +396,7 @@ def test_a_folder_that_cannot_be_made_ends_in_code_five(mesh, tmp_path):
     assert "file/out: cannot be written" in done.stderr
 
 
+@pytest.mark.fault(36)
 def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
     brain, parameters = ellipsoid_mesh(4, (20.0, 26.0, 18.0)), parameters_from(WEEK)
     room = namedtuple("usage", "total used free")
@@ -387,6 +407,7 @@ def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
         require_space(tmp_path, brain, parameters)
 
 
+@pytest.mark.fault(28)
 def test_bad_parameters_end_in_code_two(mesh, tmp_path):
     done = fold(mesh, tmp_path / "out", 2, thicknes_mm=1.0)
     assert done.returncode == 2

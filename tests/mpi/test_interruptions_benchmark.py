@@ -16,6 +16,8 @@ pytestmark = pytest.mark.slow
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "interruptions.py"
 
 
+@pytest.mark.fault(33)
+@pytest.mark.promise(3)
 def test_a_killed_run_loses_one_step_at_most(tmp_path):
     write_tetrahedral_mesh(tmp_path / "brain.xdmf", ellipsoid_mesh(8, (20.0, 26.0, 18.0)))
     params = {"start_week": 21.0, "end_week": 21.25, "output_weeks": [21.0, 21.25], "fissure_x_mm": 0.0}

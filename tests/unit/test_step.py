@@ -63,6 +63,7 @@ def test_an_unknown_error_keeps_its_traceback(exit_file, tmp_path):
     assert "ZeroDivisionError" in log.read_text()
 
 
+@pytest.mark.fault(38)
 def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path):
     log = tmp_path / "log"
     log.write_text("before\n")

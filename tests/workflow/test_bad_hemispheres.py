@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from reliability import trying
 from scipy.spatial.transform import Rotation
 from shapes import hemisphere, save_gifti
 
@@ -53,6 +54,7 @@ BAD = {
     "nowhere": (without_place(LEFT), RIGHT, "{0}.left.gii", "has NaN or infinite coordinates; found 3 vertices"),
     "torn": (LEFT, RIGHT, "{0}.right.gii", "cannot be read as GIFTI"),
 }
+REFUSED = trying({"swapped": 9, "unequal": 14, "overlapping": 14, "microns": 4, "metres": 4, "nowhere": 13, "torn": 12})
 GUESSES = {"microns": "The file seems to be in micrometres", "metres": "The file seems to be in metres"}
 MATRIX = motion(0, 0, 90, shift=(7.0, 8.0, 9.0))
 LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -82,7 +84,7 @@ def test_the_run_ends_in_2_without_a_traceback(study):
     assert "Traceback" not in study.outcome.stderr
 
 
-@pytest.mark.parametrize("name", BAD)
+@pytest.mark.parametrize("name", REFUSED)
 def test_bad_hemispheres_are_refused_with_a_message_and_nothing_is_left(study, name):
     *_, files, said = BAD[name]
     expected = f"{files.format(study.directory / name)}: {said}"
@@ -93,7 +95,7 @@ def test_bad_hemispheres_are_refused_with_a_message_and_nothing_is_left(study, n
     assert not [path for path in (study.results / name / "surface").rglob("*") if path.is_file()]
 
 
-@pytest.mark.parametrize("name", ["placed", "lps"])
+@pytest.mark.parametrize("name", trying({"placed": 11, "lps": 10}))
 def test_coordinates_that_the_file_or_the_configuration_names_are_honoured(study, name):
     surface = read_surface(study.results / name / "surface" / "pial.surf.gii")
     np.testing.assert_allclose(surface.vertices.min(axis=0), [-23.5, -24.0, -16.0], atol=0.6)
@@ -111,6 +113,7 @@ def halves():
     return [isosurface(make_simple(smooth_mask(mask, 1.0))[0], affine) for mask in masks]
 
 
+@pytest.mark.fault(9, 10)
 def test_hemispheres_in_any_pose_are_posed_and_a_swapped_pair_alone_is_refused(workflow):
     motions = motion(100, 40, -70, shift=(30.0, 0.0, -50.0)), motion(-20, 130, 60, shift=(0.0, 9.0, 0.0))
     for side, half, turn in zip(("left", "right"), halves(), motions, strict=True):

@@ -55,6 +55,7 @@ def workflow(checkout_copy, tmp_path_factory):
     return workflow
 
 
+@pytest.mark.fault(23)
 def test_the_quality_of_the_mesh_is_told_and_drawn(workflow):
     quality = read_json(workflow.directory / "results/brains/apart/mesh/quality.json")
     assert quality["volume_mm3"] / 1e3 == pytest.approx(2 * VOLUME_ML, rel=0.05)
@@ -87,6 +88,7 @@ def gated(workflow):
     return remeshing(workflow, min_radius_ratio=0.9, max_volume_change=1e-6, max_surface_distance_mm=1e-3)
 
 
+@pytest.mark.fault(23)
 def test_a_mesh_below_the_gates_is_refused_with_all_that_it_fails(workflow, gated):
     refused(
         workflow,
@@ -99,6 +101,7 @@ def test_a_mesh_below_the_gates_is_refused_with_all_that_it_fails(workflow, gate
     )
 
 
+@pytest.mark.promise(9)
 @pytest.mark.usefixtures("gated")
 def test_what_was_refused_can_be_looked_at(workflow):
     quality = read_json(workflow.directory / REFUSED / "quality.json")
@@ -115,6 +118,7 @@ FAILURES = {
 }
 
 
+@pytest.mark.fault(24)
 @pytest.mark.usefixtures("gated")
 @pytest.mark.parametrize("failure", FAILURES)
 def test_a_mesher_that_fails_ends_in_3_with_its_last_words_and_all_of_them_in_the_log(workflow, tmp_path, failure):
@@ -131,6 +135,7 @@ def test_a_mesher_that_fails_ends_in_3_with_its_last_words_and_all_of_them_in_th
     assert log.count("pytetwild: so much is done\n") == 100
 
 
+@pytest.mark.fault(20)
 def test_a_surface_that_cuts_itself_is_refused_before_it_is_filled(workflow):
     outcome, log = remeshing(workflow, "tangled", mesher="tetgen", order=1, surface_edge_mm=2.0)
     refused(workflow, outcome, log, "the surface cuts itself and cannot be kept as it is; found ", brain="tangled")

@@ -150,6 +150,7 @@ def test_a_mended_brain_is_two_closed_outward_spheres_of_its_size(study, name):
         assert signed_volume(piece) / 1e3 == pytest.approx(VOLUME_ML, rel=0.05)
 
 
+@pytest.mark.fault(17)
 @pytest.mark.parametrize("name", BAD)
 def test_a_broken_surface_is_refused_with_a_message_and_nothing_is_left(study, name):
     expected = BAD[name][2]
@@ -159,6 +160,7 @@ def test_a_broken_surface_is_refused_with_a_message_and_nothing_is_left(study, n
     assert not files_in(study.results / name / "surface")
 
 
+@pytest.mark.fault(17, 18)
 def test_a_small_hole_and_a_non_manifold_edge_are_mended_and_reported(study):
     left, right, _ = repairs(study, "open")
     assert left.pop("largest_hole_mm") == pytest.approx(3.2, abs=0.1)
@@ -166,6 +168,7 @@ def test_a_small_hole_and_a_non_manifold_edge_are_mended_and_reported(study):
     assert right == {"pieces": 1, "non_manifold_edges_opened": 1}
 
 
+@pytest.mark.fault(19, 21, 22)
 def test_further_pieces_double_and_flat_faces_are_dropped_and_all_turned_outward(study):
     left, right, _ = repairs(study, "messy")
     # balls with radii of 1 and 5 mm
@@ -181,6 +184,7 @@ def test_further_pieces_double_and_flat_faces_are_dropped_and_all_turned_outward
     }
 
 
+@pytest.mark.fault(19, 20)
 def test_faces_that_disagree_or_cut_others_are_counted(study):
     left, right, _ = repairs(study, "tangled")
     assert left == {"pieces": 1, "faces_turned_to_agree": 200}
@@ -188,6 +192,7 @@ def test_faces_that_disagree_or_cut_others_are_counted(study):
     assert 6 < right["faces_that_cut_others"] < 20
 
 
+@pytest.mark.fault(21)
 def test_a_handle_of_each_hemisphere_is_closed_and_reported(study):
     *_, report = repairs(study, "pierced")
     assert report["euler_number"] == 4

@@ -61,6 +61,7 @@ def meshed(checkout_copy, tmp_path_factory):
     return workflow
 
 
+@pytest.mark.fault(26)
 def test_a_part_that_floats_is_refused_before_the_solve(meshed):
     target = "results/runs/floating/a/folding/summary.json"
     outcome = meshed.run(target, "--cores", "1", "--configfile", "study.yaml")
@@ -78,6 +79,7 @@ def folded(meshed):
     return meshed.run(*targets, LEFT, "--cores", "1", "--keep-going", "--configfile", "study.yaml")
 
 
+@pytest.mark.fault(26)
 def test_a_brain_that_nothing_clamps_is_refused_before_the_solve(meshed, folded):
     assert folded.returncode == 2, folded.stderr
     message = "no facet is clamped, so the brain would drift"
@@ -86,6 +88,7 @@ def test_a_brain_that_nothing_clamps_is_refused_before_the_solve(meshed, folded)
     assert not files_in(meshed.directory / "results/runs/drifting/a/folding")
 
 
+@pytest.mark.fault(25)
 @pytest.mark.usefixtures("folded")
 def test_a_cortex_thinner_than_an_element_is_warned_of_with_the_ratio(meshed):
     log = (meshed.directory / "results/runs/thin/a/logs/simulate.log").read_text()

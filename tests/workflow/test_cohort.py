@@ -69,11 +69,13 @@ def cohort(checkout_copy, tmp_path_factory):
     )
 
 
+@pytest.mark.fault(54)
 def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(cohort):
     assert cohort.refusal.returncode == 2
     assert "sub-04: age: found n/a" in cohort.refusal.stderr
 
 
+@pytest.mark.fault(54)
 def test_a_failed_subject_holds_up_no_other_and_the_call_ends_in_its_code(cohort):
     assert cohort.outcome.returncode == 2, cohort.outcome.stderr
     assert "Traceback" not in cohort.outcome.stderr
@@ -130,6 +132,7 @@ def test_tables_and_figures_are_of_the_side_that_there_is(cohort):
         assert (cohort.results / "runs" / "reference" / "sub-01" / "figures" / f"{name}.png").exists()
 
 
+@pytest.mark.promise(6)
 def test_a_finished_cohort_stays_finished(cohort):
     # the second pass found all done; what is planned again is what failed, and what would need it
     table = (cohort.results / "study" / "quality.csv").stat().st_mtime_ns

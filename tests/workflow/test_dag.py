@@ -205,6 +205,7 @@ def test_runs_that_write_contact_pressure_have_a_figure_of_it(workflow):
         assert jobs.get("contact_maps", 0) == expected
 
 
+@pytest.mark.promise(6)
 @pytest.mark.slow
 def test_nothing_is_to_be_done_after_all_was_made(finished):
     assert finished.jobs("--configfile", "study.yaml") == {}
@@ -237,6 +238,7 @@ FIGURES = {
 }  # fmt: skip
 
 
+@pytest.mark.fault(39)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "values", "expected"),

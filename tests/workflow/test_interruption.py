@@ -67,6 +67,8 @@ def ranks_of(process):
     return found
 
 
+@pytest.mark.fault(33)
+@pytest.mark.promise(3)
 def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
     process = started(meshed, until="step    3")
     below = psutil.Process(process.pid).children(recursive=True)
@@ -85,6 +87,7 @@ def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
     assert summary["steps"] == 252
 
 
+@pytest.mark.fault(38)
 def test_a_killed_rank_is_reported_as_memory_that_ran_out(meshed):
     process = started(meshed, until="step    2")
     ranks_of(process)[-1].kill()

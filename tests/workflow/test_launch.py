@@ -15,6 +15,7 @@ def message(outcome):
     return outcome.stderr
 
 
+@pytest.mark.fault(27, 28)
 def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
     study = SMALL_STUDY | {"folding": {"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}}
     outcome = workflow.run("-n", "--configfile", workflow.write("study.yaml", study))
@@ -26,6 +27,7 @@ def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
     assert "folding.end_week: found 20; it should be above 21, the week of the start brain a" in said
 
 
+@pytest.mark.fault(31)
 def test_two_runs_of_one_name_are_refused(workflow):
     (workflow.directory / "twice.yaml").write_text("runs:\n  x: {}\n  x: {}\n")
     outcome = workflow.run("-n", "--configfile", "twice.yaml")
@@ -72,6 +74,7 @@ def stale(directory):
     return lock
 
 
+@pytest.mark.fault(33)
 def test_a_stale_lock_is_cleared(tmp_path, capsys):
     lock = stale(tmp_path)
     clear_stale_lock(tmp_path)
@@ -79,6 +82,8 @@ def test_a_stale_lock_is_cleared(tmp_path, capsys):
     assert "cleared the lock" in capsys.readouterr().err
 
 
+@pytest.mark.fault(37)
+@pytest.mark.promise(10)
 def test_a_live_lock_is_not_cleared_but_refused(tmp_path):
     lock = stale(tmp_path)
     with hold_lock(tmp_path), pytest.raises(StorageError, match="another gyriflow run is live"):
@@ -86,6 +91,8 @@ def test_a_live_lock_is_not_cleared_but_refused(tmp_path):
     assert lock.exists()
 
 
+@pytest.mark.fault(37)
+@pytest.mark.promise(10)
 def test_a_run_beside_a_live_one_is_refused_with_5_but_may_look(workflow):
     holder = subprocess.Popen(
         [*workflow.command()[:1], "-c", "from gyriflow.launch import hold_lock; from pathlib import Path;"
@@ -102,6 +109,7 @@ def test_a_run_beside_a_live_one_is_refused_with_5_but_may_look(workflow):
         holder.communicate("\n")
 
 
+@pytest.mark.fault(36)
 def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
     (workflow.directory / "file").touch()
     outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")

@@ -45,6 +45,7 @@ OF_THE_SOLVER = {
 }
 
 
+@pytest.mark.fault(39)
 @pytest.mark.parametrize(
     ("names", "expected"),
     [
@@ -82,6 +83,7 @@ def with_later_end(study):
     study["folding"]["end_week"] = 22.5
 
 
+@pytest.mark.fault(39)
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
@@ -104,6 +106,7 @@ def test_a_change_of_brains_and_runs_makes_what_is_new_and_what_compares(finishe
     assert finished.jobs("--configfile", name) == expected | CONFIGURATION
 
 
+@pytest.mark.fault(39)
 def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(finished):
     labels = "results/brains/b/surface/labels.nii.gz"
     with changed_files(finished.directory, labels):

@@ -52,6 +52,7 @@ def files_in(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.promise(8)
 def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workflow, server):
     name = workflow.write("study.yaml", study(workflow.directory, server.url))
     folder = workflow.directory / "resources" / "atlases" / "far"
@@ -91,6 +92,7 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
     assert server.asked == []
 
 
+@pytest.mark.promise(7)
 def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
     raw = study(workflow.directory, server.url)
     raw["atlas"] = {"file": "atlas.yaml", "folder": "mine"}
@@ -115,6 +117,7 @@ def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
     assert own.read_bytes() == packed(1000)
 
 
+@pytest.mark.promise(7)
 def test_a_file_that_appears_meanwhile_is_checked_and_not_deleted(workflow, server):
     """What a user puts there between planning and fetching is found by the job, as Snakemake keeps it."""
     raw = study(workflow.directory, server.url)
@@ -139,6 +142,8 @@ def test_a_file_that_appears_meanwhile_is_checked_and_not_deleted(workflow, serv
     assert packed(1000) in left
 
 
+@pytest.mark.fault(40)
+@pytest.mark.promise(8)
 @pytest.mark.parametrize("fault", ["checksum", "half", "page", "lacking"])
 def test_what_is_not_the_file_is_refused_and_not_kept(workflow, server, fault):
     path = "w21/labels.nii.gz"
@@ -168,6 +173,7 @@ def test_what_is_not_the_file_is_refused_and_not_kept(workflow, server, fault):
     assert files_in(workflow.directory / "resources" / "atlases" / "far") == good
 
 
+@pytest.mark.fault(40)
 def test_no_network_ends_in_5_with_one_message_a_file_and_nothing_torn(workflow):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -31,6 +31,7 @@ STUDY = {
 }  # fmt: skip
 
 
+@pytest.mark.fault(55)
 @pytest.mark.slow
 def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
     name = workflow.write("study.yaml", STUDY)

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..io.files import read_tab_separated
+from ..parameters.files import beside
 from ..parameters.settings import Settings, setting
 from .brains import SOURCES, VOLUME_SUFFIXES, Brain, HemisphereFiles, OneHemisphere, SegmentationSettings, WhiteFiles
 
@@ -65,7 +66,7 @@ def participants_brains(
     Of the latter, `week` is the age if it is known, and `cause` what is missing. `folder` is that of the configuration.
     InputError where the table cannot be read or lacks what every row needs.
     """
-    places = [folder / Path(settings.file).expanduser(), Path(settings.file)]
+    places = [beside(folder, settings.file), Path(settings.file)]
     path = next((place for place in places if place.is_file()), places[0]).resolve()
     rows = read_tab_separated(path)
     columns = [*rows[0], *settings.columns] if rows else []
@@ -132,7 +133,7 @@ def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str
             continue
         value = values[column]
         if column in PATHS:
-            place = (folder / Path(value).expanduser()).resolve()
+            place = beside(folder, value).resolve()
             if not place.is_file():
                 return {}, f"{column}: no such file: {place}"
             value = str(place)

@@ -74,7 +74,7 @@ def read_json(path: AnyPath) -> Any:
     """Returns the content of a JSON file; InputError where it is missing or torn."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"cannot be read as JSON: {error}", path=path) from error
 
 
@@ -105,6 +105,15 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read as a tab-separated table: {error}", path=path) from error
     rows = [{str(name).strip(): value.strip() for name, value in row.items()} for row in table.to_dict("records")]
+    for number, row in enumerate(rows, start=2):
+        for name, value in row.items():
+            if not value.isprintable():
+                raise InputError(
+                    f"has a line break or another character that is not printed in row {number}, {name}",
+                    path=path,
+                    found=repr(value),
+                    expected="one line of text in each cell",
+                )
     if not rows:
         raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
     return rows

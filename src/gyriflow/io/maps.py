@@ -102,5 +102,5 @@ def read_maps(path: AnyPath) -> dict[str, Floats]:
     try:
         with h5py.File(path) as file:
             return {name: np.asarray(values[:], dtype=np.float64) for name, values in file.items()}
-    except OSError as error:
+    except Exception as error:  # HDF5 raises whatever a torn file leads it into
         raise InputError("cannot be read as maps", path=path, found=error, expected="an HDF5 file") from error

@@ -100,5 +100,5 @@ def read_regions(path: AnyPath) -> Regions:
                 for group in ("fields", "tets_tags", "facets_tags")
             ]
             return Regions(mesh, file["facets"][:], *groups)
-    except (OSError, KeyError) as error:
+    except Exception as error:  # HDF5 raises whatever a torn file leads it into
         raise InputError("cannot be read as regions", path=data, found=error, expected="regions.h5 of a run") from None

@@ -35,7 +35,7 @@ def read_deformation(path: AnyPath) -> tuple[Deformation, dict[str, Any]]:
         with h5py.File(path) as file:
             deformation = Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
             return deformation, json.loads(file.attrs["report"])
-    except (OSError, KeyError, ValueError) as error:
+    except Exception as error:  # HDF5 raises whatever a torn file leads it into
         raise InputError(
             "cannot be read as a deformation",
             path=path,
@@ -83,7 +83,7 @@ def read_carried_mesh(path: AnyPath) -> CarriedMesh:
                 for length, kinds in file.get("growth", {}).items()
             }
             return CarriedMesh(file["weeks"][:], file["positions"][:].astype(np.float64), growth)
-    except (OSError, KeyError, ValueError) as error:
+    except Exception as error:  # HDF5 raises whatever a torn file leads it into
         raise InputError(
             "cannot be read as a carried mesh",
             path=path,

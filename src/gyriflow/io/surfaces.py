@@ -1,16 +1,12 @@
 """Triangle surfaces (GIFTI, VTK, STL, PLY, OBJ, FreeSurfer) and per-vertex maps (GIFTI), in mm."""
 
-import binascii
-import zlib
 from pathlib import Path
 from typing import Any, Literal
-from xml.parsers.expat import ExpatError
 
 import nibabel as nib
 import numpy as np
 import pyvista as pv
 import trimesh
-from nibabel.filebasedimages import ImageFileError
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
 from numpy.typing import NDArray
 
@@ -49,18 +45,27 @@ def read_surface(path: AnyPath) -> TriangleMesh:
         vertices, faces = _read_gifti_surface(path)
     else:
         vertices, faces = read_freesurfer_surface(path)
+    if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
+        raise InputError(
+            "holds no surface",
+            path=path,
+            found=f"points of shape {vertices.shape}, faces of shape {faces.shape}",
+            expected="three coordinates for each point and three corners for each face",
+            remedy=AGAIN,
+        )
     bad = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
     if bad:
         raise InputError("has NaN or infinite coordinates", path=path, found=f"{bad} vertices", expected="none")
-    whole = np.rint(faces).astype(np.int64)
-    if np.abs(faces - whole).max() > 1e-3 or not 0 <= whole.min() <= whole.max() < len(vertices):
+    if not (np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)) or (
+        np.abs(faces - np.rint(faces)).max() > 1e-3
+    ):
         raise InputError(
             "has faces that name vertices which do not exist",
             path=path,
             found=f"indices {faces.min():.6g} to {faces.max():.6g}",
             expected=f"whole numbers from 0 to {len(vertices) - 1}",
         )
-    return TriangleMesh(vertices, whole)
+    return TriangleMesh(vertices, np.rint(faces).astype(np.int64))
 
 
 def declared(path: AnyPath) -> tuple[str | None, str | None]:
@@ -175,13 +180,13 @@ def load_gifti(path: AnyPath) -> GiftiImage:
         image = nib.load(path)
     except FileNotFoundError as error:
         raise InputError("no such file", path=path, expected="a GIFTI file") from error
-    except (ImageFileError, ExpatError, EOFError, OSError, ValueError, AttributeError, zlib.error, binascii.Error) as e:
+    except Exception as error:  # nibabel's reader raises whatever a torn file leads it into
         raise InputError(
-            f"cannot be read as GIFTI: {e}",
+            f"cannot be read as GIFTI: {error}",
             path=path,
             expected="a whole .gii file",
             remedy="The file may be truncated or of another kind: copy or download it again.",
-        ) from e
+        ) from error
     if not isinstance(image, GiftiImage):
         raise InputError("is not a GIFTI file", path=path, found=type(image).__name__, expected="a .gii file")
     return image

@@ -18,6 +18,8 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
     first: dict[str, int] = {}
     for key, _ in node.value:
         line = key.start_mark.line + 1
+        if not isinstance(key, yaml.ScalarNode):
+            raise yaml.constructor.ConstructorError(None, None, "a key is no single word", key.start_mark)
         if key.value in first and key.tag != "tag:yaml.org,2002:merge":
             raise yaml.constructor.ConstructorError(
                 None, None, f"the key {key.value!r} of line {first[key.value]} is there again", key.start_mark
@@ -36,11 +38,18 @@ def read_yaml(path: str | PathLike[str]) -> Any:
         return yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("cannot be read", path=path, found=error) from error
+    except RecursionError as error:
+        raise InputError("is nested too deeply", path=path, expected="a configuration") from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f", line {mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error)
         raise InputError(f"is not valid YAML{line}: {problem}", path=path) from error
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        # words that look like a date or a number and are none, such as 2001-99-99 or 0b
+        raise InputError(
+            f"has a value that YAML cannot read: {error}", path=path, remedy="Put texts in quotes."
+        ) from error
 
 
 def yaml_text(content: Any) -> str:

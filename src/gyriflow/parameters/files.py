@@ -9,6 +9,14 @@ from pydantic import AfterValidator, ValidationInfo
 from .settings import refused
 
 
+def beside(folder: Path, path: str) -> Path:
+    """Returns the place of a file that is named relative to a folder, or below a home folder (`~/scans/a.nii.gz`)."""
+    try:
+        return folder / Path(path).expanduser()
+    except RuntimeError:  # no home folder of that name: `~` is part of the file's
+        return folder / path
+
+
 def _absolute(path: str, info: ValidationInfo) -> str:
     """Returns the absolute path of a file, which must exist.
 
@@ -17,7 +25,7 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     """
     if not info.context:
         return path
-    places = [Path(info.context["folder"]) / Path(path).expanduser(), Path.cwd() / path]
+    places = [beside(Path(info.context["folder"]), path), Path.cwd() / path]
     present = [place for place in places if place.is_file()]
     if not present and path not in info.context.get("awaited", ()):
         raise refused(f"no such file: {places[0]}{_present_instead(places[0])}")

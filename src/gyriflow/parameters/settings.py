@@ -77,6 +77,15 @@ class Settings(BaseModel):
             raise ValueError("Input should be a number or text, not true or false")
         return value
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _refuse_texts_with_nul(cls, value: Any) -> Any:
+        # which ends a path or an argument for the system
+        inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+        if any(isinstance(text, str) and "\0" in text for text in inner):
+            raise ValueError("Text should have no NUL characters")
+        return value
+
     @model_validator(mode="wrap")
     @classmethod
     def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:

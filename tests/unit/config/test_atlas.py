@@ -214,6 +214,7 @@ def test_two_files_of_one_name_and_a_file_in_the_place_of_the_folder_are_refused
     assert found == [f"atlas.folder: {tmp_path}/file is a file; it should be a folder"]
 
 
+@pytest.mark.fault(16)
 def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
     put(tmp_path / "mine", *surfaces("21.5"))
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 21.5]}

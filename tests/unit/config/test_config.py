@@ -42,6 +42,7 @@ def test_defaults_are_the_reference_values():
     assert [brain.source for brain in config.brains] == ["phantom", "phantom"]
 
 
+@pytest.mark.fault(27)
 def test_all_mistakes_are_named_at_once():
     found = problems(study(folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}, metric={}))
     assert found == [
@@ -52,6 +53,7 @@ def test_all_mistakes_are_named_at_once():
     ]
 
 
+@pytest.mark.fault(28)
 @pytest.mark.parametrize(
     ("key", "value", "bound"),
     [
@@ -100,6 +102,7 @@ def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
     ]
 
 
+@pytest.mark.fault(56)
 @pytest.mark.parametrize("name", ["real", "a b", "../x", ""])
 def test_a_run_name_that_would_break_paths_or_tables_is_refused(name):
     (line,) = problems(study(runs={name: {}}))
@@ -148,17 +151,20 @@ def test_starts_that_cannot_be_are_all_named():
     assert problems(far) == ["folding.end_week: found 22; it should be above 22.5, the week of the start brain b"]
 
 
+@pytest.mark.fault(31)
 def test_brains_that_differ_in_case_only_would_share_a_folder():
     (line,) = problems(study(brains=[*study()["brains"], {"id": "A", "week": 23, "phantom": {}}]))
     assert line == "brains: the ids a and A are the same folder on some disks; rename one"
 
 
+@pytest.mark.fault(28)
 def test_a_run_that_ends_before_the_start_is_refused():
     assert problems(study(runs={"x": {"end_week": 21}, "y": {}})) == [
         "runs.x.end_week: found 21; it should be above 21, the week of the start brain a"
     ]
 
 
+@pytest.mark.fault(29)
 def test_negative_growth_only_where_it_is_allowed_by_name():
     folding = {"end_week": 24, "growth_rate_per_s": -1e-8}
     assert "allow_negative_growth" in problems(study(folding=folding))[0]
@@ -297,6 +303,7 @@ def test_truth_values_are_no_times():
     assert line.startswith("folding.stress_memory_gw: found 'forever'")
 
 
+@pytest.mark.fault(28)
 @pytest.mark.parametrize(
     ("settings", "key"),
     [

@@ -108,6 +108,7 @@ def test_a_mistake_around_a_segmentation_is_named(folder, brain, found):
     assert any(line.startswith(found) for line in problems(study(brain), folder))
 
 
+@pytest.mark.fault(15)
 def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
     for name in ("week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz"):
         (tmp_path / name).touch()

@@ -5,6 +5,9 @@ from itertools import pairwise
 import h5py
 import numpy as np
 import pytest
+from fuzzing import BOUNDED, damaged
+from hypothesis import given
+from hypothesis import strategies as st
 from shapes import box_mesh
 
 from gyriflow.errors import InputError
@@ -54,6 +57,7 @@ def test_a_long_table_of_steps_fits(tmp_path):
     assert len(read_checkpoint(tmp_path / "state.h5", "key")[0].rows) == 3000
 
 
+@pytest.mark.fault(34)
 def test_a_checkpoint_of_another_run_is_not_used(tmp_path):
     write_checkpoint(tmp_path / "state.h5", "key", some_state())
     read, message = read_checkpoint(tmp_path / "state.h5", "other")
@@ -61,6 +65,7 @@ def test_a_checkpoint_of_another_run_is_not_used(tmp_path):
     assert "another mesh or other parameters" in message
 
 
+@pytest.mark.fault(34)
 @pytest.mark.parametrize("damage", ["cut", "changed"])
 def test_a_torn_checkpoint_is_not_used(tmp_path, damage):
     path = tmp_path / "state.h5"
@@ -73,6 +78,22 @@ def test_a_torn_checkpoint_is_not_used(tmp_path, damage):
     read, message = read_checkpoint(path, "key")
     assert read is None
     assert "torn" in message
+
+
+@pytest.mark.fault(34, 62)
+@BOUNDED
+@given(data=st.data())
+def test_a_checkpoint_with_any_damage_is_whole_or_not_used(tmp_path, data):
+    path = tmp_path / "state.h5"
+    write_checkpoint(path, "key", some_state())
+    whole = read_checkpoint(path, "key")[0]
+    path.write_bytes(data.draw(damaged(path.read_bytes(), 200)))
+    read, message = read_checkpoint(path, "key")
+    assert message
+    if read is not None:
+        # the damage lies between what is kept
+        for name, value in vars(whole).items():
+            np.testing.assert_array_equal(getattr(read, name), value)
 
 
 def test_no_checkpoint_says_nothing(tmp_path):
@@ -98,6 +119,7 @@ def test_defaults_are_the_papers_reference_values():
     assert (p.stress_memory_gw, p.support, p.core_growth_rate_per_s) == (0, "ellipsoid", 0)
 
 
+@pytest.mark.fault(27)
 def test_unknown_parameters_are_all_named():
     with pytest.raises(InputError, match=r"thicknes: unknown key; did you mean thickness_mm.*twice: unknown key"):
         parameters_from(VALUES | {"thicknes": 1, "twice": 2})
@@ -105,6 +127,7 @@ def test_unknown_parameters_are_all_named():
         parameters_from(VALUES | {"contact": {"gap": 1}})
 
 
+@pytest.mark.fault(28)
 def test_parameters_out_of_bounds_are_all_named():
     with pytest.raises(InputError, match=r"thickness_mm.*poisson_ratio.*allow_negative_growth"):
         parameters_from(VALUES | {"thickness_mm": 0.0, "poisson_ratio": 0.5, "growth_rate_per_s": -1e-7})

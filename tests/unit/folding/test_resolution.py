@@ -40,6 +40,7 @@ def rows(*through):
     return [{"week": 21.0 + i, "elements_through_cortex": value} for i, value in enumerate(through)]
 
 
+@pytest.mark.fault(25)
 def test_a_cortex_that_outgrows_its_elements_is_told_once():
     assert resolution_warning(rows(2.3, 2.1), 1) == ""
     assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9), 1)
@@ -61,6 +62,7 @@ def test_a_step_above_its_tolerance_is_told():
     assert "step 7" in unconverged_warning(row | {"converged": False})
 
 
+@pytest.mark.fault(38)
 @pytest.mark.parametrize(
     ("tets", "ranks", "contact", "measured"),
     [
@@ -73,6 +75,7 @@ def test_predicted_memory_is_what_runs_have_taken(tets, ranks, contact, measured
     assert predicted_memory_mib(tets, ranks, contact) == pytest.approx(measured, rel=0.1)
 
 
+@pytest.mark.fault(38)
 @pytest.mark.parametrize(
     ("tets", "ranks", "contact", "measured"),
     [

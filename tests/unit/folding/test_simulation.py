@@ -17,6 +17,7 @@ from gyriflow.parameters.reading import parameters_from
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 
 
+@pytest.mark.fault(30)
 @pytest.mark.parametrize(
     ("step_s", "weeks", "shortened"),
     [
@@ -60,6 +61,7 @@ def steps_to(stepper, until_s):
     return [row["dt_s"] for row in state.rows]
 
 
+@pytest.mark.fault(32)
 def test_a_failing_step_is_halved_and_grows_back():
     # nothing longer than 11 000 s works before 60 000 s
     lengths = steps_to(Stepper(lambda time_s: 11_000.0 if time_s < 60_000 else 1e9), 604_800.0)
@@ -70,6 +72,7 @@ def test_a_failing_step_is_halved_and_grows_back():
     assert lengths[first + STEPS_BEFORE_GROWING] == 43_200
 
 
+@pytest.mark.fault(32)
 def test_where_the_smallest_step_fails_the_place_is_named():
     stepper = Stepper(lambda time_s: 1.0, solver={"max_halvings": 2})
     with pytest.raises(SolverError, match=r"fails even with 10800 s.*at \[1.0, 2.0, 3.0\] mm"):

@@ -131,12 +131,14 @@ def test_a_free_brain_needs_no_clamps(brain):
     refuse_impossible(brain, zones)
 
 
+@pytest.mark.fault(26)
 def test_a_brain_without_clamped_facets_is_refused(brain):
     zones = find_zones(brain, fissure_x_mm=0.0, **(DEFAULTS | {"semi_axes": (0.1, 0.1, 0.1)}))
     with pytest.raises(InputError, match="no facet is clamped"):
         refuse_impossible(brain, zones)
 
 
+@pytest.mark.fault(26)
 def test_a_floating_part_is_refused(brain):
     far = box_mesh((2, 2, 2), (2.0, 2.0, 2.0))
     both = TetrahedralMesh(

@@ -11,6 +11,7 @@ from gyriflow.errors import InputError, StorageError
 from gyriflow.io.files import read_json, read_table, replaced, write_json, write_table
 
 
+@pytest.mark.promise(1)
 def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
     path = tmp_path / "new" / "a.surf.gii"
     with replaced(path) as temporary:
@@ -23,6 +24,7 @@ def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
+@pytest.mark.promise(2)
 def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("earlier")
@@ -38,6 +40,7 @@ def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.fault(36)
 def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
     path = tmp_path / "a.csv"
     with pytest.raises(StorageError, match=r"a\.csv.*No space left") as caught, replaced(path):
@@ -45,6 +48,7 @@ def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
     assert caught.value.exit_code == 5
 
 
+@pytest.mark.fault(36)
 def test_folder_that_cannot_be_made_is_a_storage_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageError):

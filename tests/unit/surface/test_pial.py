@@ -107,6 +107,7 @@ def test_phantoms_of_all_ages_are_sound_and_fold():
     assert area(old) / area(young) > 1.1 * (signed_volume(old) / signed_volume(young)) ** (2 / 3)
 
 
+@pytest.mark.fault(1)
 @pytest.mark.parametrize("turn", [(0, 0, 45), (20, -30, 10)])
 def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom, turn):
     labels, affine = volume
@@ -120,6 +121,7 @@ def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom, turn):
     assert np.degrees(np.arccos(normal[0])) < 1.0
 
 
+@pytest.mark.fault(3)
 def test_storage_order_makes_no_difference(volume, phantom):
     labels, affine = volume
     reversed_ = affine @ np.diag([1.0, -1.0, 1.0, 1.0])
@@ -129,6 +131,7 @@ def test_storage_order_makes_no_difference(volume, phantom):
     assert same.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.1)
 
 
+@pytest.mark.fault(4)
 @pytest.mark.parametrize(("factor", "unit"), [(1e-3, "metres"), (1e3, "micrometres"), (0.1, "centimetres")])
 def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, unit):
     labels, affine = volume
@@ -174,11 +177,13 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
     assert any("moved apart" in warning for warning in surface.report["warnings"])
 
 
+@pytest.mark.fault(9)
 def test_swapped_hemispheres_are_refused(halves):
     with pytest.raises(InputError, match="swapped"):
         from_hemispheres(*reversed(halves), week=24.0)
 
 
+@pytest.mark.fault(14)
 def test_hemispheres_of_different_weeks_are_refused(halves):
     centre = halves[1].vertices.mean(axis=0)
     larger = TriangleMesh((halves[1].vertices - centre) * 1.06 + centre, halves[1].faces)

@@ -1,0 +1,73 @@
+"""Random damage to files, for tests that try what readers do with it; the same damage at each run."""
+
+from pathlib import Path
+
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+from gyriflow.errors import GyriflowError
+
+# drawn from a fixed seed; the machine's speed does not decide
+BOUNDED = settings(
+    max_examples=60,
+    derandomize=True,
+    deadline=None,
+    database=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+MANY = settings(BOUNDED, max_examples=200)
+
+# what numbers and words in headers are likely to be mistaken for
+ODD_BYTES = st.one_of(
+    st.binary(min_size=1, max_size=8),
+    st.sampled_from(
+        [b"\x00" * 4, b"\xff" * 4, b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\xc0\x7f", b"\x00\x00\x80\x7f"]
+    ),
+    st.sampled_from(
+        [b"-1", b"999999999999", b"nan", b"inf", b"1e400", b"\n", b"<", b">", b"&", b'"', b"\t", b": ", b"[", b"{"]
+    ),
+)
+
+
+@st.composite
+def damaged(draw: st.DrawFn, whole: bytes, header: int | None = None) -> bytes:
+    """Draws a damaged copy of a file's bytes: cut, overwritten, lengthened, or with a part missing or twice.
+
+    `header` is the length of what decides how the rest is read; half of the damage falls there.
+    """
+    data = bytearray(whole)
+    for _ in range(draw(st.integers(1, 3))):
+        ends = [len(data)] if header is None else [len(data), min(header, len(data))]
+        start = draw(st.integers(0, max(draw(st.sampled_from(ends)) - 1, 0)))
+        kind = draw(st.sampled_from(["cut", "overwrite", "overwrite", "insert", "drop", "repeat"]))
+        length = draw(st.integers(1, 64))
+        if kind == "cut":
+            del data[start:]
+        elif kind == "drop":
+            del data[start : start + length]
+        elif kind == "repeat":
+            data[start:start] = data[start : start + length]
+        else:
+            odd = draw(ODD_BYTES)
+            data[start : start + (len(odd) if kind == "overwrite" else 0)] = odd
+    return bytes(data)
+
+
+def outcome(read, *arguments):
+    """Returns what a reader gives, or None where it refuses with a message of gyriflow; any other error gets out.
+
+    A reader leaves the folder of its file as it was.
+    """
+    folder = Path(arguments[0]).parent
+    before = {path: path.stat().st_size for path in folder.iterdir()}
+    refusal = None
+    try:
+        return read(*arguments)
+    except GyriflowError as error:
+        refusal = error
+        return None
+    finally:
+        if refusal is not None:
+            assert refusal.exit_code == 2
+            assert str(folder) in str(refusal), f"the message names no file: {refusal}"
+        assert {path: path.stat().st_size for path in folder.iterdir()} == before

@@ -1,0 +1,202 @@
+"""Files with random damage: a reader gives something sound or refuses with a message that names the file.
+
+Nothing else is raised, and nothing is left beside the file.
+"""
+
+import gzip
+from functools import partial
+
+import nibabel as nib
+import numpy as np
+import pytest
+import pyvista as pv
+import trimesh
+from fuzzing import BOUNDED, MANY, damaged, outcome
+from hypothesis import example, given
+from hypothesis import strategies as st
+from nibabel.freesurfer.io import write_geometry
+
+from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.io.files import read_json, read_tab_separated, read_table, read_text
+from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
+from gyriflow.io.maps import read_maps, read_surface_map, read_volume_map, write_maps
+from gyriflow.io.surfaces import declared, read_surface, read_vertex_maps, write_surface, write_vertex_maps
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.yaml_files import read_yaml
+
+pytestmark = pytest.mark.fault(12, 13, 62)
+
+LABELS = np.random.default_rng(3).integers(0, 9, (5, 6, 7)).astype(np.int16)
+BODY = trimesh.creation.icosphere(subdivisions=1)
+BALL = TriangleMesh(np.array(BODY.vertices) * 20.0, np.array(BODY.faces))
+
+
+class Wholes(dict):
+    """Bytes of files by name."""
+
+    def __repr__(self):
+        return f"Wholes of {', '.join(self)}"
+
+
+@pytest.fixture(scope="module")
+def wholes(tmp_path_factory):
+    """Returns the bytes of a small whole file of each kind."""
+    folder = tmp_path_factory.mktemp("whole")
+    image = nib.Nifti1Image(LABELS, np.diag([2.0, 2.0, 2.0, 1.0]))
+    image.header.set_xyzt_units("mm")
+    nib.save(image, folder / "a.nii")
+    nib.save(nib.MGHImage(LABELS.astype(np.int32), np.diag([2.0, 2.0, 2.0, 1.0])), folder / "a.mgh")
+    for name in ("a.surf.gii", "a.stl", "a.ply", "a.obj"):
+        write_surface(folder / name, BALL)
+    info = {"head": [2, 0, 20], "valid": "1  # volume info valid", "filename": "a.mgz", "volume": [8, 8, 8]}
+    axes = {"xras": [-1.0, 0, 0], "yras": [0, 0, -1.0], "zras": [0, 1.0, 0], "cras": [1.0, 2.0, 3.0]}
+    write_geometry(folder / "lh.pial", BALL.vertices, BALL.faces, volume_info=info | {"voxelsize": [1.0] * 3} | axes)
+    body = pv.PolyData.from_regular_faces(BALL.vertices, BALL.faces)
+    body.save(folder / "a.vtk", binary=False)
+    body.save(folder / "a.vtp")
+    write_vertex_labels(folder / "a.label.gii", np.arange(len(BALL.vertices)) % 3, {1: "one", 2: "two"})
+    write_vertex_maps(folder / "a.shape.gii", {"depth": BALL.vertices[:, 0]})
+    write_maps(folder / "a.h5", {"thickness_mm": BALL.vertices[:, 0]})
+    return Wholes({path.name: path.read_bytes() for path in folder.iterdir()})
+
+
+def tried(tmp_path, name, data, read):
+    path = tmp_path / name
+    path.write_bytes(data)
+    return outcome(read, path)
+
+
+def is_sound(mesh):
+    return np.isfinite(mesh.vertices).all() and mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)
+
+
+@pytest.mark.parametrize(("name", "header"), [("a.nii", 352), ("a.mgh", 284)])
+@MANY
+@given(data=st.data())
+def test_volumes(tmp_path, wholes, name, header, data):
+    content = data.draw(damaged(wholes[name], header))
+    packed = {"a.nii": "a.nii.gz", "a.mgh": "a.mgz"}[name] if data.draw(st.booleans()) else name
+    found = tried(tmp_path, packed, gzip.compress(content, 1) if packed != name else content, read_label_volume)
+    if found is not None:
+        assert found.labels.ndim == 3
+        assert np.isfinite(found.affine).all()
+        assert abs(np.linalg.det(found.affine)) > 0
+
+
+@BOUNDED
+@given(data=st.data())
+def test_packed_volumes(tmp_path, wholes, data):
+    content = data.draw(damaged(gzip.compress(wholes["a.nii"]), 16))
+    found = tried(tmp_path, "a.nii.gz", content, read_volume_map)
+    assert found is None or found.values.ndim == 3
+
+
+@BOUNDED
+@given(code=st.sampled_from([2, 4, 8, 16, 64, 256, 512, 768]), value=st.floats(width=32), place=st.integers(0, 209))
+@example(code=16, value=1e30, place=0)
+@example(code=16, value=float("nan"), place=0)
+def test_labels_of_every_type_are_whole_numbers_or_refused(tmp_path, code, value, place):
+    kind = nib.nifti1.data_type_codes.dtype[code]
+    labels = LABELS.astype(kind)
+    with np.errstate(all="ignore"):
+        labels.flat[place] = np.float64(value).astype(kind)
+    nib.save(nib.Nifti1Image(labels, np.eye(4)), tmp_path / "a.nii")
+    found = outcome(read_label_volume, tmp_path / "a.nii")
+    if found is not None:
+        np.testing.assert_array_equal(found.labels.astype(np.float64), np.rint(labels.astype(np.float64)))
+
+
+@pytest.mark.parametrize(
+    ("name", "header"),
+    [("a.surf.gii", 1500), ("lh.pial", 80), ("a.stl", 84), ("a.ply", 250), ("a.obj", None), ("a.vtk", 200)],
+)
+@MANY
+@given(data=st.data())
+def test_surfaces(tmp_path, wholes, name, header, data):
+    content = data.draw(damaged(wholes[name], header))
+    found = tried(tmp_path, name, content, read_surface)
+    assert found is None or is_sound(found)
+    tried(tmp_path, name, content, declared)
+
+
+@BOUNDED
+@given(data=st.data())
+def test_surfaces_of_vtks_xml(tmp_path, wholes, data):
+    found = tried(tmp_path, "a.vtp", data.draw(damaged(wholes["a.vtp"], 1000)), read_surface)
+    assert found is None or is_sound(found)
+
+
+@BOUNDED
+@given(
+    vertex=st.tuples(st.integers(0, 41), st.floats(width=32)),
+    corner=st.tuples(st.integers(0, 79), st.integers(-(2**31), 2**31 - 1)),
+)
+@example(vertex=(0, 0.0), corner=(0, 42))
+def test_vertices_and_faces_with_wrong_numbers(tmp_path, vertex, corner):
+    vertices, faces = BALL.vertices.astype(np.float32), BALL.faces.astype(np.int32)
+    vertices[vertex[0], 1], faces[corner[0], 2] = vertex[1], corner[1]
+    points = nib.gifti.GiftiDataArray(vertices, intent="NIFTI_INTENT_POINTSET")
+    triangles = nib.gifti.GiftiDataArray(faces, intent="NIFTI_INTENT_TRIANGLE")
+    nib.save(nib.GiftiImage(darrays=[points, triangles]), tmp_path / "a.surf.gii")
+    write_geometry(tmp_path / "lh.pial", vertices, faces)
+    sound = np.isfinite(vertices).all() and 0 <= corner[1] < len(vertices)
+    for name in ("a.surf.gii", "lh.pial"):
+        assert (outcome(read_surface, tmp_path / name) is not None) == sound
+
+
+@pytest.mark.parametrize(("name", "read"), [("a.label.gii", read_vertex_labels), ("a.shape.gii", read_vertex_maps)])
+@BOUNDED
+@given(data=st.data())
+def test_values_at_vertices(tmp_path, wholes, name, read, data):
+    tried(tmp_path, name, data.draw(damaged(wholes[name], 800)), read)
+
+
+@BOUNDED
+@given(data=st.data())
+def test_maps_of_a_surface(tmp_path, wholes, data):
+    (tmp_path / "a.surf.gii").write_bytes(wholes["a.surf.gii"])
+    read = partial(read_surface_map, surface_path=tmp_path / "a.surf.gii")
+    found = tried(tmp_path, "a.shape.gii", data.draw(damaged(wholes["a.shape.gii"], 800)), read)
+    assert found is None or (np.isfinite(found[1]).all() and len(found[1]) == len(found[0].vertices))
+
+
+@BOUNDED
+@given(data=st.data())
+def test_maps_in_hdf5(tmp_path, wholes, data):
+    tried(tmp_path, "a.h5", data.draw(damaged(wholes["a.h5"], 200)), read_maps)
+
+
+TABLE = b"participant_id\tage\tfiles\nsub-01\t24.5\ta.nii.gz\nsub-02\tn/a\tb.nii.gz\n"
+
+
+@pytest.mark.parametrize("read", [read_tab_separated, partial(read_table, separator="\t"), read_text])
+@MANY
+@given(content=st.one_of(damaged(TABLE), st.binary(max_size=80)))
+def test_tables(tmp_path, read, content):
+    found = tried(tmp_path, "participants.tsv", content, read)
+    if found is not None and read is read_tab_separated:
+        assert all(isinstance(value, str) for row in found for value in row.values())
+
+
+@MANY
+@given(content=st.one_of(damaged(b'{"a": [1, 2.5, null], "b": {"c": "text"}}'), st.binary(max_size=80)))
+@example(content=b"[" * 100_000)
+def test_json(tmp_path, content):
+    tried(tmp_path, "a.json", content, read_json)
+
+
+YAML = b"brains:\n  - {id: a, week: 21.5, phantom: {}}\nstart: a\nfolding: &f {end_week: 23}\nruns: {b: *f}\n"
+
+
+@MANY
+@given(content=st.one_of(damaged(YAML), st.text("[]{}:-&*!?|>'\"# ab1\n\t%@`,.", max_size=40).map(str.encode)))
+@example(content=b"[" * 10_000)
+@example(content=b"? [a, b]\n: c\n")
+@example(content=b"a: 2001-99-99\n")
+@example(content=b"a: &x [*x]\n")
+@example(content=b"a: 0b\n")
+@example(content=b"a: 0x_\n")
+@example(content=b"<<: 3\n")
+@example(content=b"a: " + b"9" * 5000 + b"\n")
+def test_yaml(tmp_path, content):
+    tried(tmp_path, "study.yaml", content, read_yaml)
