@@ -45,27 +45,6 @@ include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
 
 
-localrules:
-    all,
-    atlas_file,
-    retrieve,
-    surface,
-    mesh,
-    growth,
-    folding,
-    validate,
-    metrics,
-    figures,
-    quality,
-    report,
-    studies,
-    influence_figures,
-    calibrate,
-    paper,
-    parameters,
-    html_report,
-
-
 rule all:
     default_target: True
     input:

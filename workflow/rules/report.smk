@@ -341,3 +341,25 @@ rule report:
         rules.html_report.output,
         rules.report_config.output,
         rules.provenance.output,
+
+
+# targets, and what only moves text: no jobs of their own on a cluster
+localrules:
+    all,
+    atlas_file,
+    retrieve,
+    surface,
+    mesh,
+    growth,
+    folding,
+    validate,
+    metrics,
+    figures,
+    quality,
+    report,
+    studies,
+    influence_figures,
+    calibrate,
+    paper,
+    parameters,
+    html_report,
