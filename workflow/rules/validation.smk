@@ -369,7 +369,7 @@ CEILING = (
 rule validation_figure:
     input:
         validation=rules.validation_table.output[0],
-        ceiling=CEILING,
+        ceiling=CEILING[0] if CEILING else [],
     output:
         **figure(
             f"{STUDY}/figures/validation",

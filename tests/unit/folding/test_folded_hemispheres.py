@@ -41,7 +41,13 @@ class Named(dict):
 def run(script, folder, inputs, outputs, **more):
     """Runs a script of the workflow on files of a folder, as Snakemake would."""
     inputs, outputs = (
-        Named({name: str(folder / file) if file else [] for name, file in files.items()}) for files in (inputs, outputs)
+        Named(
+            {
+                name: [str(folder / f) for f in file] if isinstance(file, list) else file and str(folder / file)
+                for name, file in files.items()
+            }
+        )
+        for files in (inputs, outputs)
     )
     job = SimpleNamespace(input=inputs, output=outputs, log=[str(folder / "log")], **more)
     runpy.run_path(str(SCRIPTS / script), init_globals={"snakemake": job})
@@ -65,7 +71,7 @@ def made(measured, tmp_path_factory):
     for side, surface in zip(("left", "right"), measured, strict=True):
         write_surface(folder / f"start.{side}.gii", surface)
     (folder / "params.yaml").write_text(yaml.safe_dump(RUN))
-    start = {"mesh": "brain.xdmf", "params": "params.yaml", "left": "start.left.gii", "right": "start.right.gii"}
+    start = {"mesh": "brain.xdmf", "params": "params.yaml", "sides": ["start.left.gii", "start.right.gii"]}
     run("regions.py", folder, start | {"maps": None}, {"mesh": "regions.xdmf"})
     for week, positions in ((21.0, brain.vertices), (22.0, folded(brain.vertices))):
         write_frame(folder / f"{week}.h5", week, {"positions": positions})

@@ -102,7 +102,7 @@ def mesh_in(folder, mesher, gates=GATES):
     """Runs the workflow's script on a ball; returns the exit code and the files that it wrote for good."""
     write_surface(folder / "pial.surf.gii", ball())
     outputs = {name: str(folder / file) for name, file in OUTPUTS.items()}
-    settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5}
+    settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5, "pial_faces": None}
     job = SimpleNamespace(
         input=[str(folder / "pial.surf.gii")],
         output=SimpleNamespace(**outputs),
