@@ -113,7 +113,7 @@ class Brain(Settings):
         "simulations from one are compared with the others first.",
         min_length=1,
     )  # fmt: skip
-    labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI).")
+    labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI or MGZ).")
     image: InputFile | None = setting(
         None, "", "T2-weighted volume (NIfTI): the input of `segmentation`; with `labels`, for a figure only."
     )
