@@ -21,7 +21,7 @@ from gyriflow.config.root import Config
 from gyriflow.cost import MEASURED
 from gyriflow.cost.prediction import Job, predict, rule_key, work_of
 from gyriflow.cost.sizes import Size, cubes
-from gyriflow.folding.__main__ import predicted_memory_mib
+from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.io.benchmarks import read_benchmarks
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.yaml_files import read_yaml

@@ -1,5 +1,6 @@
 # Figures of each run from each brain that it folds.
 from gyriflow.parameters.measures import SHAPE_MEASURES
+from gyriflow.parameters.terms import ELEMENTS_NEEDED
 
 
 def measured_beside(run, brain):
@@ -308,6 +309,8 @@ rule steps_figure:
         ENVIRONMENT
     params:
         **drawing(),
+        order=CONFIG.mesh.order,
+        elements_needed=ELEMENTS_NEEDED[CONFIG.mesh.order],
     script:
         "../scripts/steps_figure.py"
 

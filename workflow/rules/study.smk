@@ -202,6 +202,7 @@ rule study_runs:
         params=of_runs(rules.parameters.output),
         summaries=of_runs(rules.simulate.output.summary),
         zones=of_runs(rules.simulate.output.zones),
+        steps=of_runs(rules.simulate.output.steps),
     output:
         csv=f"{STUDY}/runs.csv",
         table=report(

@@ -6,5 +6,6 @@ from gyriflow.report.charts import steps_chart
 from gyriflow.step import step
 
 with step(snakemake.log[0]):
-    figure = steps_chart(read_table(snakemake.input[0]), synthetic=snakemake.params.synthetic)
-    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=snakemake.params.dpi)
+    params = snakemake.params
+    figure = steps_chart(read_table(snakemake.input[0]), order=params.order, synthetic=params.synthetic)
+    write_figure(snakemake.output.png, snakemake.output.pdf, figure, dpi=params.dpi)

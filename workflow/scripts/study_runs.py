@@ -3,8 +3,9 @@
 import pandas as pd
 
 from gyriflow.io.figures import write_html
-from gyriflow.io.files import read_json, write_table
+from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.report.resolution import resolution_over_steps
 from gyriflow.report.style import run_names
 from gyriflow.report.tables import html_table, runs_table
 from gyriflow.step import step
@@ -14,10 +15,12 @@ BEFORE_THE_SOLVE = ("clamped_share", "initial_penetration_mm", "elements_through
 files, folded = snakemake.input, snakemake.params.folded
 with step(snakemake.log[0]):
     rows = []
-    for (run, brain), params, summary, zones in zip(folded, files.params, files.summaries, files.zones, strict=True):
+    of_runs = zip(folded, files.params, files.summaries, files.zones, files.steps, strict=True)
+    for (run, brain), params, summary, zones, steps in of_runs:
         report = read_json(zones)
         before = {name: report[name] for name in BEFORE_THE_SOLVE}
-        rows.append({"run": run, "subject": brain, **read_yaml(params), **read_json(summary), **before})
+        resolved = resolution_over_steps(report["order"], read_table(steps))
+        rows.append({"run": run, "subject": brain, **read_yaml(params), **read_json(summary), **before, **resolved})
     write_table(snakemake.output.csv, pd.json_normalize(rows))
     runs = {
         name: {key: value for key, value in row.items() if key not in ("run", "subject")}

@@ -13,6 +13,7 @@ from ..config.root import Config
 from ..cost import MEASURED
 from ..cost.prediction import Prediction, predict
 from ..errors import GyriflowError
+from ..folding.predicted_memory import predicted_memory_mib
 from ..io.files import read_json
 from ..io.surfaces import read_surface
 from ..io.volumes import read_label_volume
@@ -92,9 +93,6 @@ def _work(path: Path, config: Config, directory: Path, cores: int) -> Iterator[t
     yield f"to run: {len(jobs)} steps", False
     for stage, planned in sorted(by_stage.items(), key=lambda item: ORDER.index(item[0])):
         yield f"  {stage:<12} {len(planned):4d}  {reasons(planned)}", False
-    # the solver's own rule for its memory is heavy to import
-    from ..folding.__main__ import predicted_memory_mib
-
     predicted = predict([job.job for job in jobs], config, read_json(MEASURED), cores, predicted_memory_mib)
     yield from _needs(predicted, directory, cores)
 

@@ -25,21 +25,11 @@ from ..parameters.varying import Maps
 from ..step import record_exit_code
 from .output import ZONES, say
 from .points import IntegrationPoints
+from .predicted_memory import predicted_memory_mib
 from .resolution import stiffness_warning
 from .run import run
 from .zone_checks import refuse_impossible, zone_report, zone_warnings
 from .zones import zones_of_run
-
-MIB_PER_RANK = 250.0
-KIB_PER_TET = {1: 0.9, 2: 21.9}
-KIB_PER_TET_AND_RANK = {1: 1.6, 2: 7.3}
-"""Peak memory of a solve by the order of its elements: a part of the mesh, and positions and searches on every rank.
-From runs of 60 k to 1 M linear elements, met within 10 %, and of 23 k to 55 k quadratic ones, met within 5 %, on one
-rank and on two (docs/benchmarks.md)."""
-GLOBAL_CONTACT = {1: 1.3, 2: 1.0}
-"""Factor on what the elements take, where folds press on each other up to 36 GW; not measured with quadratic ones."""
-MIB_PER_RANK_OF_CONTACT = {1: 0.0, 2: 180.0}
-"""What every rank takes for the search between the flat pieces of curved faces."""
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -106,13 +96,6 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
             expected=f"{needed / 2**20:.0f} MiB",
             remedy="Free space, choose another --directory, or write fewer weeks or fields.",
         )
-
-
-def predicted_memory_mib(tets: int, ranks: int, contact: str, order: int = 1) -> float:
-    """Returns the peak memory in MiB, over all ranks, that a run with elements of an order is likely to take."""
-    per_tet = KIB_PER_TET[order] + KIB_PER_TET_AND_RANK[order] * ranks
-    factor, per_rank = (GLOBAL_CONTACT[order], MIB_PER_RANK_OF_CONTACT[order]) if contact == "global" else (1.0, 0.0)
-    return (MIB_PER_RANK + per_rank) * ranks + per_tet * factor * tets / 1024
 
 
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:

@@ -10,7 +10,7 @@ from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
 from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ELEMENTS_NEEDED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
-NAMES_OF_NEEDED = {1: "two elements", 2: "one quadratic element"}
+NAMES_OF_NEEDED = {1: "two elements", 2: f"{ELEMENTS_NEEDED[2]:g} quadratic elements"}
 """What the elements that `ELEMENTS_NEEDED` asks for are called, by their order."""
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""

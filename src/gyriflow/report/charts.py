@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..parameters.terms import SIDES
+from ..parameters.terms import ELEMENTS_NEEDED, SIDES
 from .style import (
     FULL_WIDTH_IN,
     MEASURED,
@@ -31,8 +31,6 @@ from .style import (
     week_axis,
 )
 
-TWO_ELEMENTS = 2.0
-"""Elements through the cortex below which folds are the mesh's."""
 METRIC_TITLES = {
     "volume": "volume",
     "area": "pial area",
@@ -146,7 +144,7 @@ def metrics_chart(
 
 
 @styled
-def steps_chart(steps: pd.DataFrame, *, synthetic: bool = False) -> Figure:
+def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> Figure:
     """Returns what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
 
     Parameters
@@ -154,6 +152,8 @@ def steps_chart(steps: pd.DataFrame, *, synthetic: bool = False) -> Figure:
     steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, elements_through_cortex, radius_ratio_01, rung,
         seconds
         One row per accepted step. Steps on another rung than the most frequent one are marked.
+    order
+        Of the elements: it says how many through the cortex are enough.
     """
     figure = new_figure(SINGLE_COLUMN_IN, 8.4, synthetic=synthetic)
     panels = figure.subplots(7, 1, sharex=True)
@@ -180,7 +180,7 @@ def steps_chart(steps: pd.DataFrame, *, synthetic: bool = False) -> Figure:
         from_zero(axes)
         axes.yaxis.get_major_locator().set_params(integer=True, nbins=5)
     panels[2].axhline(0, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
-    panels[4].axhline(TWO_ELEMENTS, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
+    panels[4].axhline(ELEMENTS_NEEDED[order], color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
     for axes in panels[4:]:
         from_zero(axes)
     figure.align_ylabels(panels)

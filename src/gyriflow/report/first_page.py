@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .charts import TWO_ELEMENTS
+from .resolution import resolution_verdict
 from .style import run_names, week_label
 
 DEEP_MM = 0.5
@@ -61,7 +61,7 @@ def runs_table(
     Parameters
     ----------
     runs : columns run, subject, start_week, preset, end_week, weeks, min_J, elements_through_cortex,
-        initial_penetration_mm
+        order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm
     validation : the study's table of validation
     displacement : the study's table of the agreement of displacements
     """
@@ -81,9 +81,8 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     said = [f"reached {week_label(reached)}" if reached >= end - 1e-6 else f"ended at {week_label(reached)} of {end:g}"]
     if run["min_J"] <= 0:
         said.append("elements inverted")
-    if run["elements_through_cortex"] < TWO_ELEMENTS:
-        count = f"{run['elements_through_cortex']:.2g}"
-        said.append(f"cortex not resolved ({count} elements through it): folds are the mesh's")
+    if too_coarse := resolution_verdict(run):
+        said.append(too_coarse)
     if run.get("initial_penetration_mm", 0.0) > DEEP_MM:
         said.append(f"walls of the fissure begin {run['initial_penetration_mm']:.2g} mm beyond their planes")
     return "; ".join(said)

@@ -86,6 +86,15 @@ def test_walls_between_the_planes_and_a_coarse_cortex_are_warned_of(brain):
     assert any("fewer than two elements" in text for text in warnings(2.5, 1.0))
 
 
+def test_a_warning_of_a_coarse_mesh_goes_by_the_order(brain):
+    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    report = zone_report(brain, zones, 8.0)
+    assert not zone_warnings(report | {"order": 2, "elements_through_cortex": 0.81})
+    assert (
+        "fewer than 0.8 quadratic elements" in zone_warnings(report | {"order": 2, "elements_through_cortex": 0.7})[0]
+    )
+
+
 def test_elements_through_the_cortex_of_a_box():
     box = box_mesh((8, 8, 8), (8.0, 8.0, 8.0))
     zones = find_zones(box, fissure_x_mm=0.0, **DEFAULTS)

@@ -7,6 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from gyriflow.errors import InputError
+from gyriflow.parameters.terms import ELEMENTS_NEEDED
 from gyriflow.report.charts import metrics_chart, quality_histogram, steps_chart
 from gyriflow.report.growth import growth_chart
 from gyriflow.report.spectra import spectra_chart, spectra_weeks_chart
@@ -205,7 +206,7 @@ def test_steps_are_drawn_and_unusual_rungs_marked():
             "seconds": np.arange(1.0, count + 1),
         }
     )
-    figure = steps_chart(steps)
+    figure = steps_chart(steps, order=1)
     newton, krylov, jacobian, displacement, through, quality, seconds = figure.axes
     assert newton.lines[0].get_ydata().tolist() == [2, 1, 1, 3, 1, 1]
     assert newton.lines[1].get_xydata().tolist() == [[steps["week"][3], 3]]
@@ -215,6 +216,7 @@ def test_steps_are_drawn_and_unusual_rungs_marked():
     assert [line.get_label() for line in displacement.lines] == ["max", "mean"]
     assert through.lines[0].get_ydata()[[0, -1]].tolist() == [2.3, 1.7]
     assert through.lines[1].get_ydata()[0] == 2.0
+    assert steps_chart(steps, order=2).axes[4].lines[1].get_ydata()[0] == ELEMENTS_NEEDED[2]
     assert quality.lines[0].get_ydata()[-1] == 0.3
     assert seconds.lines[0].get_ydata().sum() == 21
     assert "(s)" in seconds.get_ylabel()

@@ -14,6 +14,7 @@ from gyriflow.io.pictures import picture_addresses, read_body
 from gyriflow.report.assembly import Results, assemble
 from gyriflow.report.first_page import brains_table, run_verdict, runs_table, what_was_done
 from gyriflow.report.page import Shown, hide_paths, picture, render_caption, report_page, sections, table_html
+from gyriflow.report.resolution import resolution_over_steps
 
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
 BRAINS = [
@@ -32,6 +33,7 @@ RUNS = pd.DataFrame(
     {
         "run": ["thin"], "subject": ["young"], "start_week": [21.0], "preset": ["measured"], "end_week": [23.0],
         "weeks": ["[21.0, 22.0]"], "min_J": [0.9], "elements_through_cortex": [1.2], "initial_penetration_mm": [0.0],
+        "order": [1], "least_elements_through_cortex": [1.1], "unresolved_from_week": [21.5],
     }
 )  # fmt: skip
 VALIDATION = pd.DataFrame(
@@ -145,9 +147,29 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
 
 
 def test_a_sound_run_has_nothing_said_against_it():
-    good = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": 2.4}
+    good = finished_run(1, 2.4, 2.2)
     assert run_verdict(good) == "reached 23 GW"
     assert "inverted" in run_verdict(good | {"min_J": -0.1})
+
+
+def finished_run(order, *through):
+    """Returns a run to its end with so many elements through the cortex, before and in its steps of half a week."""
+    steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
+    run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
+    return run | resolution_over_steps(order, steps)
+
+
+def test_a_run_is_judged_by_the_order_of_its_elements():
+    assert run_verdict(finished_run(2, 1.0, 1.0)) == "reached 23 GW"
+    assert "(1 elements through it, 2 needed)" in run_verdict(finished_run(1, 1.0, 1.0))
+    assert "not resolved (0.6 elements" in run_verdict(finished_run(2, 0.6, 0.5))
+
+
+@pytest.mark.parametrize(("order", "through"), [(1, (2.3, 2.1, 1.9, 1.7)), (2, (1.0, 0.9, 0.7, 0.6))])
+def test_a_cortex_that_outgrows_its_elements_is_told_with_its_week(order, through):
+    said = run_verdict(finished_run(order, *through))
+    assert f"cortex not resolved from 22.5 GW on (down to {through[-1]:g} elements" in said
+    assert "(down to 0 elements" in run_verdict(finished_run(order, *through[:2], np.nan))
 
 
 def test_what_was_done_names_brains_weeks_and_runs():
