@@ -102,10 +102,8 @@ rule parameter_maps:
         bounds=lambda wildcards: {
             name: CONFIG.bounds(name) for name in CONFIG.maps(wildcards.run)
         },
-        # files of maps are read like those of the brain
-        reading=lambda wildcards: CONFIG.brain(wildcards.brain).model_dump(
-            include={"coordinates", "affine_from"}
-        ),
+        # volumes of maps are read like those of the brain
+        affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
     script:
         "../scripts/parameter_maps.py"
 

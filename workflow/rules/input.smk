@@ -24,7 +24,10 @@ rule phantom:
         ENVIRONMENT
     params:
         week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
-        settings=lambda wildcards: CONFIG.brain(wildcards.brain).phantom.model_dump(),
+        settings=lambda wildcards: CONFIG.brain(wildcards.brain).phantom.model_dump(
+            exclude={"pathology"}
+        ),
+        pathology=lambda wildcards: CONFIG.brain(wildcards.brain).phantom.pathology,
     script:
         "../scripts/phantom.py"
 

@@ -9,24 +9,21 @@ from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
 from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.mesh.maps import move_nearest, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
+from gyriflow.mesh.maps import move_to_mesh, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
 from gyriflow.step import step
-from gyriflow.surface.from_surfaces import LPS_TO_RAS
 
-files, reading, maps = snakemake.input, snakemake.params.reading, {}
+files, maps = snakemake.input, {}
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
     facets, report = boundary_faces(mesh)[0], read_json(files.surface)
-    # surfaces of the input are rotated like the brain; those that gyriflow made already are
-    poses = [np.array(report["pose"]) @ (LPS_TO_RAS if reading["coordinates"] == "lps" else np.eye(4)), np.eye(4)]
     for name, source in snakemake.params.maps.items():
         path = ", ".join(source["map"])
         if source["surface"]:
             surface, values = read_surface_maps(source["map"], source["surface"])
-            surface = move_nearest(mesh.vertices[np.unique(facets)], surface, poses)
+            surface = move_to_mesh(mesh.vertices[np.unique(facets)], surface, report)
             maps[name] = vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
         else:
-            volume, motion = read_volume_map(path, reading["affine_from"]), volume_pose(report, path)
+            volume, motion = read_volume_map(path, snakemake.params.affine_from), volume_pose(report, path)
             maps[name] = volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
         require_within(maps[name], snakemake.params.bounds[name], path)
     if files.carried:

@@ -10,6 +10,7 @@ from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING, FoldingSettings, bounds_of, output_weeks
 from ..parameters.schemes import SCHEMES, LabelScheme, SchemeSettings
 from ..parameters.settings import Problem, Settings, check, refused, setting
+from ..parameters.synthetic import PhantomSettings
 from ..parameters.varying import Varying, files_of
 from . import checks
 from .atlas import AtlasSettings, UsedAtlas
@@ -28,8 +29,6 @@ from .surface import SurfaceSettings
 
 REAL_BRAIN = "real brain"
 """Name of a measured brain of unknown population."""
-PHANTOM_SCHEME = "spina-bifida-atlas"
-"""Phantoms have the labels of this atlas."""
 
 
 class Config(Settings):
@@ -186,7 +185,7 @@ class Config(Settings):
 
     def scheme(self, brain: Brain) -> dict[str, Any]:
         """Returns the scheme of a brain's labels, the fields of a `LabelScheme`; for a phantom too."""
-        name = brain.scheme or PHANTOM_SCHEME
+        name = brain.scheme or (brain.phantom or PhantomSettings()).scheme
         own = self.schemes.get(name)
         scheme = SCHEMES[name] if own is None else LabelScheme(name=name, **own.model_dump())
         return scheme.model_dump()

@@ -10,6 +10,9 @@ from .settings import Problem, Settings, check, setting
 PHANTOM_WEEKS = (21.0, 36.0)
 """First and last gestational week of phantoms."""
 
+Pathology = Literal[
+    "agenesis", "holoprosencephaly", "wide-ventricle", "hypoplasia", "midline-shift", "hemimegalencephaly"
+]
 ShapeKind = Literal["sphere", "ellipsoid", "half-ellipsoid", "slab"]
 SHAPE_SIZES: dict[ShapeKind, str] = {
     "sphere": "radius_mm",
@@ -32,6 +35,17 @@ class PhantomSettings(Settings):
     voxel_mm: float = setting(0.8, "mm", "Edge of the isotropic voxels.", ge=0.3, le=2.0)
     seed: int = setting(0, "", "Seed of the random pattern of the folds.", ge=0)
     cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
+    pathology: Pathology | None = setting(
+        None, "",
+        "What is wrong with the brain: `agenesis` of the corpus callosum, `holoprosencephaly`, `wide-ventricle` (right, "
+        "as in unilateral ventriculomegaly), `hypoplasia` of the right hemisphere, `midline-shift` to the right by 8 "
+        "mm, `hemimegalencephaly` (right).",
+    )  # fmt: skip
+
+    @property
+    def scheme(self) -> str:
+        """The scheme of its labels: that of the example atlas, or where a hemisphere is known by them alone, BOUNTI."""
+        return "dhcp-19" if self.pathology == "hypoplasia" else "spina-bifida-atlas"
 
 
 class ShapeSettings(Settings):

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..parameters.synthetic import Pathology
 from .brain import (
     BRAINSTEM,
     CALLOSUM,
@@ -178,3 +179,14 @@ def add_sides(labels: Labels, affine: Floats) -> Labels:
     for number, left in pairs.items():
         made = np.where(labels == number, np.where(x < 0, left, left + 1), made)
     return made.astype(np.int32)
+
+
+PATHOLOGIES: dict[Pathology, Callable[[Labels, Floats], Labels]] = {
+    "agenesis": without_callosum,
+    "holoprosencephaly": holoprosencephaly,
+    "wide-ventricle": lambda labels, affine: wide_hemisphere(labels, affine, ventricle=True),
+    "hypoplasia": lambda labels, affine: add_sides(small_hemisphere(labels, affine), affine),
+    "midline-shift": shifted_midline,
+    "hemimegalencephaly": wide_hemisphere,
+}
+"""By the names of the configuration; the labels of hypoplasia are those of `add_sides`."""

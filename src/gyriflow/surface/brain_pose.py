@@ -32,6 +32,8 @@ TO_BRAINSTEM = np.array([0.0, -0.30, -0.95])
 TO_RIGHT = np.array([1.0, 0.0, 0.0])
 # brains turned by less stand as their files say: this is how far atlases and scans differ
 LEAST_TURN_DEG = 60.0
+# brains turned by more, up to that, are kept and told: atlases and scans rarely differ as much
+DOUBTFUL_TURN_DEG = 25.0
 # two directions nearer to each other than this (in radians) say nothing of the turn about them
 LEAST_SPREAD = 0.06
 # the narrowest extent of a whole cerebrum is 0.61 of its longest and more, that of one hemisphere 0.46 and less
@@ -60,7 +62,7 @@ def narrowness(mesh: TriangleMesh) -> float:
 def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> BrainPose | None:
     """Returns the pose from cerebellum, brainstem and labelled sides; None where too few of them are labelled.
 
-    It is that of the file where the two differ by less than 60°. InputError where the labels of left and right are
+    It is that of the file where the two differ by less than 60°, with a warning from 25° on. InputError where the labels of left and right are
     mirrored: no rotation brings them to their sides.
     """
     centres = {
@@ -194,7 +196,8 @@ def _keep_or_turn(rotation: Floats, by: str) -> BrainPose:
     rotation = _turn_by_quarters(rotation)
     angle = angle_deg(rotation)
     if angle < LEAST_TURN_DEG:
-        return BrainPose(np.eye(3), "file")
+        doubt = f"{by} say that the brain is turned by about {angle:.0f}°, which was kept as the file has it: check the pose"
+        return BrainPose(np.eye(3), "file", (doubt,) if angle > DOUBTFUL_TURN_DEG else ())
     return BrainPose(rotation, by, (f"the brain was turned by {angle:.0f}°, as {by} say: its affine has other axes",))
 
 

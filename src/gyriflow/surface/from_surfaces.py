@@ -26,7 +26,6 @@ log = logging.getLogger(__name__)
 
 Coordinates = Literal["auto", "ras", "lps"]
 Side = Literal["left", "right"]
-LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
 def from_hemispheres(

@@ -16,6 +16,8 @@ DOUBTFUL_RATIO = 1.15
 FURTHEST_APART_MM = 10.0
 # a second closed piece of this part of the largest is a hemisphere
 COMPARABLE = 0.1
+# and has this part of its area, or more, on its own side of the fissure, as the largest has: a whole brain has half
+ON_ITS_SIDE = 0.75
 # of a cut surface, patches on the wrong side of the cut up to this share are bulges over the fissure
 MOST_GIVEN_BACK = 0.05
 
@@ -24,17 +26,21 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> NDArray[np.bool_]:
     """Returns the (m,) mask of the faces of the left hemisphere.
 
     `heights` (m,) are the distances of the faces from the fissure, negative on the left. Two comparable closed pieces
-    on different sides are the hemispheres, wherever the fissure is thought to be. Else patches that bulge over the
-    fissure are given back to the hemisphere that surrounds them, so that each is in one piece. InputError where such
-    patches are too large: a cut there would not part the hemispheres.
+    that lie mostly on different sides are the hemispheres, though they may reach over the fissure. Else patches that
+    bulge over the fissure are given back to the hemisphere that surrounds them, so that each is in one piece.
+    InputError where such patches are too large: a cut there would not part the hemispheres.
     """
     surface = face_components(mesh)
     areas = face_areas(mesh)
-    sizes = np.bincount(surface, weights=areas)
-    middles = np.bincount(surface, weights=areas * heights) / sizes
-    if len(sizes) > 1 and sizes[1] >= COMPARABLE * sizes[0] and middles[0] * middles[1] < 0:
-        return np.asarray(middles < 0)[surface]
     side = heights < 0
+    sizes = np.bincount(surface, weights=areas)
+    on_left = np.bincount(surface, weights=areas * side) / sizes
+    if len(sizes) > 1 and sizes[1] >= COMPARABLE * sizes[0]:
+        # a detached lump is no second hemisphere: the brain beside it lies on both sides
+        low, high = sorted(on_left[:2])
+        if low <= 1 - ON_ITS_SIDE and high >= ON_ITS_SIDE:
+            middles = np.bincount(surface, weights=areas * heights) / sizes
+            return np.asarray(middles < 0)[surface]
     a, b = _neighbours(mesh)
     given_back = np.zeros(len(side), dtype=bool)
     # what is given back may join pieces of the other side

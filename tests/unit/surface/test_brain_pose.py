@@ -1,5 +1,7 @@
 """Whole brains in any pose: told by their hindbrain, their labelled sides or their shape, or refused."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -41,12 +43,25 @@ def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
     assert "the brain was turned by" in pose.warnings[0]
 
 
-@pytest.mark.parametrize("degrees", [(0, 0, 0), (30, 0, 0), (-20, 25, 30)])
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (10, 0, 0), (15, 0, 0), (-12, 10, 14)])
 def test_small_tilts_are_the_files_own(brain, degrees):
     labels, affine = brain
     pose = pose_of_labels(labels, turned(degrees) @ affine, SCHEMES["spina-bifida-atlas"])
     assert (pose.by, pose.warnings) == ("file", ())
     assert np.array_equal(pose.rotation, np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "angle"), [((30, 0, 0), 30), ((45, 0, 0), 45), ((0, 45, 0), 45), ((-20, 25, 30), 46)]
+)
+def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
+    labels, affine = brain
+    pose = pose_of_labels(labels, turned(degrees) @ affine, SCHEMES["spina-bifida-atlas"])
+    assert np.array_equal(pose.rotation, np.eye(3))
+    (warning,) = pose.warnings
+    said = re.search(r"cerebellum and brainstem say that the brain is turned by about (\d+)°, which was kept", warning)
+    # the hindbrain of this brain is pitched by 7° against that of the atlas
+    assert abs(int(said[1]) - angle) < 8
 
 
 @pytest.mark.parametrize("turn", TURNS)

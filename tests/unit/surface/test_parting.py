@@ -39,6 +39,17 @@ def test_two_closed_pieces_are_the_hemispheres_though_they_reach_over_the_plane(
     assert left.tolist() == [True] * len(BALL.faces) + [False] * len(BALL.faces)
 
 
+def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    # whose middle is a little off the plane, on the other side than the lump
+    brain = TriangleMesh(ball.vertices * [24, 33, 22] + [0.5, 0, 0], ball.faces)
+    lump = TriangleMesh(BALL.vertices * 0.87 + [-38.0, 0.0, 0.0], BALL.faces)
+    assert 0.1 < area(lump) / area(brain) < 0.12
+    mesh = merged(brain, lump)
+    with pytest.raises(InputError, match=r"cannot be parted at the fissure.* 10 % of the area beside"):
+        left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
+
+
 @pytest.mark.parametrize("mm", [3.0, 6.0])
 def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
     labels, affine = brain

@@ -17,12 +17,14 @@ from gyriflow.geometry.triangles import (
     euler_number,
     flipped,
     is_closed,
+    merged,
     signed_volume,
     submesh,
     transformed,
 )
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.mesh.maps import move_to_mesh
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
@@ -175,6 +177,21 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
     assert 0.5 < surface.report["moved_apart_mm"] < 2.0
     assert least_gap(*pieces(surface.whole)) == pytest.approx(0.8, abs=0.15)
     assert any("moved apart" in warning for warning in surface.report["warnings"])
+
+
+def test_maps_on_surfaces_in_lps_lie_on_the_brain(halves):
+    whole = transformed(merged(*halves), LPS)
+    surfaces = {
+        "pial": from_pial(whole, week=24.0, coordinates="lps", **QUICK),
+        "hemispheres": from_hemispheres(
+            *(transformed(half, LPS) for half in halves), week=24.0, coordinates="lps", **QUICK
+        ),
+    }
+    for source, surface in surfaces.items():
+        points = surface.whole.vertices
+        moved = move_to_mesh(points, whole, surface.report)
+        assert np.abs(moved.vertices.mean(axis=0) - points.mean(axis=0)).max() < 0.5, source
+        assert np.abs(np.ptp(moved.vertices, axis=0) - np.ptp(points, axis=0)).max() < 1.5, source
 
 
 @pytest.mark.fault(9)
