@@ -15,6 +15,7 @@ import yaml
 from mpi4py import MPI
 from shapes import ellipsoid_mesh
 from trimesh.creation import icosphere
+from written_frames import element_field
 
 from gyriflow.errors import SolverError, StorageError
 from gyriflow.folding.__main__ import require_space
@@ -26,7 +27,7 @@ from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, is_closed
 from gyriflow.io.files import read_json
-from gyriflow.io.frames import read_cell_field, read_field, read_positions, read_tets, read_weeks
+from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.mesh.curving import curve_edges
@@ -139,9 +140,9 @@ def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp
     moved = np.abs(read_positions(one, 21.5) - mesh.vertices).max()
     assert np.abs(read_positions(one, 21.5) - read_positions(three, 21.5)).max() <= 1e-8 * moved
     for field in ("von_mises_pa", "elastic_strain"):
-        values = read_cell_field(one, 21.5, field)
+        values = element_field(one, 21.5, field)
         assert values.shape == (len(mesh.tets),)
-        np.testing.assert_allclose(values, read_cell_field(three, 21.5, field), rtol=1e-4, atol=1e-4 * values.max())
+        np.testing.assert_allclose(values, element_field(three, 21.5, field), rtol=1e-4, atol=1e-4 * values.max())
     surface, _ = boundary_surface(TetrahedralMesh(read_positions(one, 21.5), read_tets(one)))
     assert is_closed(surface)
 
