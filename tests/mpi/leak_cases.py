@@ -5,7 +5,7 @@ import re
 
 import pytest
 from boxes import COMM
-from contact_cases import closing_sulcus
+from contact_bodies import closing_sulcus
 from petsc4py import PETSc
 
 PETSc.Log.begin()
