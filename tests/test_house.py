@@ -49,6 +49,7 @@ OF_PROGRAMS = {"io", "step"}
 """What a room's program (`__main__.py`) may import beyond that."""
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
@@ -155,8 +156,8 @@ def test_only_io_and_folding_open_files(path):
     assert opened_files(path) == []
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=short)
-def test_source_files_are_short(path):
+@pytest.mark.parametrize("path", [*SOURCES, *TESTS, *RULE_FILES], ids=short)
+def test_files_are_short(path):
     assert len(path.read_text().splitlines()) <= 400
 
 

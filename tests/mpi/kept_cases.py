@@ -4,7 +4,7 @@ import ctypes
 
 import numpy as np
 import pytest
-from contact_cases import after_steps, closing_sulcus
+from contact_bodies import after_steps, closing_sulcus
 
 from gyriflow.folding import ladder
 from gyriflow.folding.krylov import _PETSC, _finest_smoother

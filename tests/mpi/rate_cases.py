@@ -8,7 +8,7 @@ import igl.predicates
 import numpy as np
 import pytest
 from boxes import COMM, distorted_box, zones_of
-from contact_cases import after_steps, closing_sulcus
+from contact_bodies import after_steps, closing_sulcus
 from shapes import ellipsoid_mesh
 
 from gyriflow.errors import InputError

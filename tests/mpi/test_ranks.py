@@ -10,14 +10,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
-@pytest.mark.parametrize(
-    "cases",
-    [
-        *("solver_cases.py", "growth_cases.py", "memory_cases.py", "ladder_cases.py", "consistency_cases.py"),
-        *("manufactured_cases.py", "symmetry_cases.py", "bilayer_cases.py", "contact_cases.py"),
-        *("leak_cases.py", "rate_cases.py", "quadratic_cases.py", "following_cases.py", "kept_cases.py"),
-    ],
-)
+@pytest.mark.parametrize("cases", sorted(path.name for path in Path(__file__).parent.glob("*_cases.py")))
 def test_cases_hold_on(ranks, cases):
     path = Path(__file__).with_name(cases)
     command = [

@@ -24,9 +24,11 @@ def test_the_first_failure_is_the_one_handed_on(exit_file):
     assert recorded_exit_code(exit_file) == 3
 
 
-def test_without_a_launcher_nothing_is_recorded(monkeypatch):
+def test_without_a_launcher_nothing_is_recorded(tmp_path, monkeypatch):
     monkeypatch.delenv(EXIT_FILE, raising=False)
+    monkeypatch.chdir(tmp_path)
     record_exit_code(3)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_known_error_is_one_message_and_its_code(exit_file, tmp_path, capsys):

@@ -51,8 +51,6 @@ if workflow.is_main_process:
 BRAINS = [brain.id for brain in CONFIG.brains]
 # every run with each of the brains that it folds
 FOLDED = CONFIG.folded
-# runs of studies and of the calibration, which may diverge: each with each of the brains that it folds
-STUDIED = [(run, brain) for run in CONFIG.study_runs for brain in CONFIG.starts(run)]
 CALIBRATED = CONFIG.calibrate.runs if CONFIG.calibrate else {}
 
 # held as long as this process lives: how `gyriflow.launch` tells a live run from one that was interrupted

@@ -125,22 +125,13 @@ def read_tets(path: str | PathLike[str]) -> NDArray[np.int64]:
 
 def read_field(path: str | PathLike[str], week: float, field: str) -> NDArray:
     """Returns a field at the vertices at a week; InputError, which names the weeks there are, where there is none."""
-    return _values(path, week, field, field)
-
-
-def read_cell_field(path: str | PathLike[str], week: float, field: str) -> NDArray:
-    """Returns a field of the elements, as `read_field` does one at the vertices."""
-    return _values(path, week, field, f"{CELL_FIELDS}/{field}")
+    with h5py.File(path) as file:
+        name = f"{group_name(week)}/{field}"
+        if name not in file:
+            raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {read_weeks(path)}")
+        return file[name][:]
 
 
 def read_positions(path: str | PathLike[str], week: float) -> NDArray[np.float64]:
     """Returns the (n, 3) positions in mm at a week."""
     return read_field(path, week, POSITIONS)
-
-
-def _values(path: str | PathLike[str], week: float, field: str, where: str) -> NDArray:
-    with h5py.File(path) as file:
-        name = f"{group_name(week)}/{where}"
-        if name not in file:
-            raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {read_weeks(path)}")
-        return file[name][:]

@@ -119,23 +119,6 @@ def volume_gain(realised: float, poisson_ratio: float) -> float:
     return realised + (1 - realised) * poisson_ratio / (1 - poisson_ratio)
 
 
-def radial_rate(
-    thickness: float,
-    next_thickness: float,
-    duration: float,
-    tangential: float,
-    realised: float,
-    *,
-    poisson_ratio: float,
-) -> float:
-    """Returns the growth rate across the cortex that takes its thickness to an aim one step later.
-
-    ln(H*/H)/Δt less the thickening 2 a_tan (1 − g) ν/(1 − ν) that tangential growth held back brings along.
-    """
-    held_back = 2 * tangential * (1 - realised) * poisson_ratio / (1 - poisson_ratio)
-    return math.log(next_thickness / thickness) / duration - held_back
-
-
 def realised_share(realised: float, tangential: float, area: float, area_after: float, duration: float) -> float:
     """Returns the realised part g of tangential growth after a step: 0.7 g + 0.3 ln(A'/A)/(2 a_tan Δt), in bounds.
 

@@ -99,20 +99,6 @@ def local_strain(
     return np.stack(rates)
 
 
-def with_amplitude(rates: Floats, sizes: Floats, amplitude: float) -> Floats:
-    """Returns local rates whose deviation from the whole's is multiplied: 0 uniform, 1 as measured.
-
-    Parameters
-    ----------
-    rates
-        (w − 1, n) local log growth per week.
-    sizes
-        (n,) weights of the vertices, their areas or volumes.
-    """
-    whole = np.average(rates, axis=1, weights=sizes)[:, None]
-    return np.asarray(whole + amplitude * (rates - whole))
-
-
 def weekly_displacements(positions: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
     """Returns the (w − 1, n, 3) displacements in mm per week of the vertices, without their common rigid motion.
 

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 import pyvista
 from shapes import box_mesh
+from written_frames import element_field
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.jacobians import lower_bounds
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, quadratic, signed_volumes
 from gyriflow.io.frames import (
     join_frames,
-    read_cell_field,
     read_field,
     read_positions,
     read_tets,
@@ -108,18 +108,18 @@ def test_frames_are_joined_into_one_time_series(frames):
     np.testing.assert_array_equal(read_positions(path, 21.5), mesh.vertices * 21.5)
     np.testing.assert_array_equal(read_tets(path), mesh.tets)
     np.testing.assert_array_equal(read_field(path, 22.0, "w"), np.full(8, 22.0))
-    np.testing.assert_array_equal(read_cell_field(path, 21.5, "stress"), 21.5 + np.arange(8))
+    np.testing.assert_array_equal(element_field(path, 21.5, "stress"), 21.5 + np.arange(8))
     with pytest.raises(InputError, match=r"has no w of week 23.*weeks \[21\.0, 21\.5, 22\.0\]"):
         read_field(path, 23.0, "w")
-    with pytest.raises(InputError, match="has no w of week 21"):
-        read_cell_field(path, 21.0, "w")
+    with pytest.raises(InputError, match="has no stress of week 21"):
+        read_field(path, 21.0, "stress")
 
 
 def test_positions_are_kept_as_they_are_and_fields_in_single_precision(frames):
     path, _ = frames
     assert read_positions(path, 21.5).dtype == np.float64
-    assert read_field(path, 21.5, "u").dtype == read_cell_field(path, 21.5, "stress").dtype == np.float32
-    assert read_cell_field(path, 21.5, "zone").dtype == np.int64
+    assert read_field(path, 21.5, "u").dtype == element_field(path, 21.5, "stress").dtype == np.float32
+    assert element_field(path, 21.5, "zone").dtype == np.int64
 
 
 def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):

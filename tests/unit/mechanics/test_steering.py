@@ -6,7 +6,6 @@ from gyriflow.mechanics.steering import (
     FIRST_SHARE,
     Aim,
     GrowthRates,
-    radial_rate,
     realised_share,
     steered_rates,
     volume_gain,
@@ -79,12 +78,6 @@ def test_ventricles_and_thickness_take_their_part():
     rates = steered_rates(aim, 0.3, 0.6, poisson_ratio=NU, radial=0.02, ventricle_share=0.1, ventricle=0.05)
     assert rates.tangential == 0
     assert 0.3 * 0.02 + 0.1 * 3 * 0.05 + 0.6 * 3 * rates.core == pytest.approx(math.log(51 / 50))
-
-
-def test_thickness_is_steered_beside_what_growth_held_back_brings():
-    assert radial_rate(1.8, 1.9, 1.0, 0.0, 0.5, poisson_ratio=NU) == pytest.approx(math.log(1.9 / 1.8))
-    held = radial_rate(1.8, 1.9, 1.0, 0.1, 0.5, poisson_ratio=1 / 3)
-    assert held == pytest.approx(math.log(1.9 / 1.8) - 0.05)
 
 
 def test_shrinking_bodies_are_followed():

@@ -9,7 +9,7 @@ from gyriflow.geometry.motion import without_rigid_motion
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.registration.carrying import carry_back_over_weeks, carry_map, carry_over_weeks, carry_regions
-from gyriflow.registration.growth import local_growth, weekly_displacements, with_amplitude
+from gyriflow.registration.growth import local_growth, weekly_displacements
 
 GRID = np.diag([4.0, 4.0, 4.0, 1.0])
 GRID[:3, 3] = -30.0
@@ -93,13 +93,6 @@ def test_inverted_vertices_are_told():
 def test_weeks_that_do_not_ascend_are_refused():
     with pytest.raises(InputError, match=r"\[22, 21\]"):
         local_growth(np.stack([BALL.vertices] * 2), BALL.tets, [22, 21], 3.0)
-
-
-def test_amplitude_multiplies_what_deviates_from_the_whole():
-    rates, sizes = np.array([[0.1, 0.2, 0.6]]), np.array([1.0, 2.0, 1.0])
-    assert with_amplitude(rates, sizes, 0.0) == pytest.approx(np.full((1, 3), 1.1 / 4))
-    assert with_amplitude(rates, sizes, 1.0) == pytest.approx(rates)
-    assert with_amplitude(rates, sizes, 2.0)[0, 2] == pytest.approx(1.1 / 4 + 2 * (0.6 - 1.1 / 4))
 
 
 def test_rigid_motion_is_no_displacement():

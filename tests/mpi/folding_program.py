@@ -1,0 +1,55 @@
+"""How tests start the folding program, and how they break it off."""
+
+import subprocess
+import sys
+from contextlib import suppress
+
+import psutil
+import yaml
+
+from gyriflow.folding.ladder import NotConvergedError
+from gyriflow.folding.simulation import Folding
+
+TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
+WEEK = {
+    "start_week": 21.0,
+    "end_week": 21.5,
+    "output_weeks": [21.0, 21.25, 21.5],
+    "fissure_x_mm": 0.0,
+    "thickness_mm": 3.0,
+}
+
+
+def command(mesh, out, ranks=1, **changes):
+    params = out.parent / f"{out.name}.yaml"
+    params.write_text(yaml.safe_dump(WEEK | changes))
+    program = [sys.executable, "-m", "gyriflow.folding", str(mesh), "--params", str(params), "--out", str(out)]
+    return ["mpiexec", "-n", str(ranks), *program]
+
+
+def fold(mesh, out, ranks=1, **changes):
+    return subprocess.run(
+        command(mesh, out, ranks, **changes), capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+def failing_after(steps):
+    """Returns a step of the folding that fails once a number of steps has been done."""
+    honest = Folding.step
+
+    def step(self, state, step_s):
+        if len(state.rows) == steps:
+            raise NotConvergedError("no way on")
+        return honest(self, state, step_s)
+
+    return step
+
+
+def kill(process):
+    """Kills a program with its ranks, which Open MPI's daemon puts into groups of their own."""
+    ranks = psutil.Process(process.pid).children(recursive=True)
+    process.kill()
+    for rank in ranks:
+        with suppress(psutil.NoSuchProcess):
+            rank.kill()
+    psutil.wait_procs(ranks, timeout=10)

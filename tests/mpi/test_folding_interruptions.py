@@ -1,0 +1,188 @@
+"""The folding program when it is broken off: it goes on from its checkpoint, or keeps what it has reached."""
+
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+from folding_program import TIGHT, WEEK, command, failing_after, fold, kill
+from mpi4py import MPI
+from shapes import ellipsoid_mesh
+from trimesh.creation import icosphere
+from written_frames import element_field
+
+from gyriflow.errors import SolverError
+from gyriflow.folding.checkpoint import read_checkpoint, run_key
+from gyriflow.folding.run import run
+from gyriflow.folding.simulation import Folding
+from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh, is_closed
+from gyriflow.io.files import read_json
+from gyriflow.io.frames import read_positions, read_tets, read_weeks
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
+from gyriflow.mesh.curving import curve_edges
+from gyriflow.parameters.reading import parameters_from
+
+pytestmark = pytest.mark.slow
+
+MANY_STEPS = 4000.0
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory):
+    path = tmp_path_factory.mktemp("mesh") / "brain.xdmf"
+    write_tetrahedral_mesh(path, ellipsoid_mesh(8, (20.0, 26.0, 18.0)))
+    return path
+
+
+def curved_brain(path):
+    """Writes an ellipsoid of quadratic elements that follow it."""
+    ball = icosphere(subdivisions=4)
+    surface = TriangleMesh(ball.vertices * [20.0, 26.0, 18.0], ball.faces)
+    write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, (20.0, 26.0, 18.0)), surface))
+    return path
+
+
+@pytest.mark.fault(33, 35)
+@pytest.mark.promise(11)
+def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp_path, monkeypatch):
+    path = curved_brain(tmp_path / "curved.xdmf")
+    settings = {
+        "solver": TIGHT,
+        "stress_memory_gw": 1.0,
+        "fields": ["displacement", "cortex_weight", "stress", "strain"],
+    }
+    assert fold(path, tmp_path / "three", 3, **settings).returncode == 0
+    mesh, p = read_tetrahedral_mesh(path), parameters_from(WEEK | settings)
+    zones = zones_of_run(mesh, p)
+    with monkeypatch.context() as patch:
+        patch.setattr(Folding, "step", failing_after(3))
+        with pytest.raises(SolverError):
+            run(MPI.COMM_SELF, mesh, zones, p, {}, tmp_path / "one")
+    run(MPI.COMM_SELF, mesh, zones, p, {}, tmp_path / "one")
+    assert read_json(tmp_path / "one" / "summary.json")["resumed_after_step"] == 3
+    one, three = (tmp_path / name / "frames.h5" for name in ("one", "three"))
+    assert read_tets(one).shape == (len(mesh.tets), 10)
+    moved = np.abs(read_positions(one, 21.5) - mesh.vertices).max()
+    assert np.abs(read_positions(one, 21.5) - read_positions(three, 21.5)).max() <= 1e-8 * moved
+    for field in ("von_mises_pa", "elastic_strain"):
+        values = element_field(one, 21.5, field)
+        assert values.shape == (len(mesh.tets),)
+        np.testing.assert_allclose(values, element_field(three, 21.5, field), rtol=1e-4, atol=1e-4 * values.max())
+    surface, _ = boundary_surface(TetrahedralMesh(read_positions(one, 21.5), read_tets(one)))
+    assert is_closed(surface)
+
+
+@pytest.fixture(scope="module")
+def long_run(mesh, tmp_path_factory):
+    """A run of so many steps that it does not end before it is killed, uninterrupted."""
+    out = tmp_path_factory.mktemp("long") / "out"
+    done = fold(mesh, out, solver=TIGHT, step_s=MANY_STEPS)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out
+
+
+def killed_after(step, arguments):
+    """Starts the program, kills it when it has printed a step, and returns what it printed."""
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        printed = []
+        for line in process.stdout:
+            printed.append(line)
+            if f"step {step:4d}" in line:
+                kill(process)
+                break
+    return "".join(printed)
+
+
+@pytest.mark.fault(33, 35)
+@pytest.mark.promise(3)
+@pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 3)])
+def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, long_run, tmp_path, first, then):
+    out = tmp_path / "out"
+    printed = killed_after(3, command(mesh, out, first, solver=TIGHT, step_s=MANY_STEPS))
+    assert not (out / "frames.h5").exists(), printed
+    again = fold(mesh, out, then, solver=TIGHT, step_s=MANY_STEPS)
+    assert again.returncode == 0, again.stderr
+    assert "going on from the checkpoint after step" in again.stdout
+    assert read_json(out / "summary.json")["resumed_after_step"] >= 3
+    one, more = (read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out))
+    largest = np.linalg.norm(one - read_positions(out / "frames.h5", 21.0), axis=1).max()
+    assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
+    assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(long_run / "steps.csv"))
+
+
+@pytest.mark.fault(34)
+@pytest.mark.promise(4)
+def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run, tmp_path):
+    out = tmp_path / "out"
+    killed_after(2, command(mesh, out, step_s=MANY_STEPS))
+    done = fold(mesh, out, thickness_mm=2.5)
+    assert done.returncode == 0
+    assert "another mesh or other parameters: not used, kept for a return" in done.stdout
+    assert "going on" not in done.stdout
+    again = fold(mesh, out, step_s=MANY_STEPS)
+    assert again.returncode == 0
+    assert "going on from the checkpoint after step" in again.stdout
+    assert not list(out.glob("checkpoint-*"))
+    one, resumed = (read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out))
+    assert np.linalg.norm(resumed - one, axis=1).max() <= 1e-3
+
+
+@pytest.mark.fault(32)
+@pytest.mark.promise(5)
+def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_path, monkeypatch, capsys):
+    brain = read_tetrahedral_mesh(mesh)
+    weeks = WEEK | {"output_weeks": [21.0, 21.25, 21.5], "ranks": 1}
+    parameters = parameters_from(weeks)
+    monkeypatch.setattr(Folding, "step", failing_after(5))
+    zones = zones_of_run(brain, parameters)
+    with pytest.raises(SolverError, match="The last good state is kept"):
+        run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path)
+    key = run_key(brain, parameters, {})
+    state, _ = read_checkpoint(tmp_path / f"checkpoint-{key}" / "state.h5", key)
+    assert len(state.rows) == 5
+    earlier = parameters_from(weeks | {"end_week": 21.25, "output_weeks": [21.0, 21.25]})
+    run(MPI.COMM_SELF, brain, zones, earlier, {}, tmp_path)
+    assert "going on from the checkpoint after step 5" in capsys.readouterr().out
+    assert read_weeks(tmp_path / "frames.h5") == [21.0, 21.25]
+    assert pd.read_csv(tmp_path / "steps.csv")["week"].iloc[-1] == pytest.approx(21.25)
+
+
+@pytest.mark.fault(55)
+def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tmp_path, monkeypatch):
+    brain = read_tetrahedral_mesh(mesh)
+    parameters = parameters_from(WEEK)
+    monkeypatch.setattr(Folding, "step", failing_after(5))
+    zones = zones_of_run(brain, parameters)
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path, may_diverge=True)
+    summary = read_json(tmp_path / "summary.json")
+    assert read_weeks(tmp_path / "frames.h5") == summary["weeks"] == [21.0, 21.25]
+    assert "no way on" in summary["diverged"]
+    assert summary["reached_week"] == pytest.approx(21.25 + 1 / 14)
+    assert not list(tmp_path.glob("checkpoint-*"))
+    # one that cannot take a single step has its start
+    monkeypatch.setattr(Folding, "step", failing_after(0))
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path, may_diverge=True)
+    summary = read_json(tmp_path / "summary.json")
+    assert (summary["steps"], summary["weeks"], summary["reached_week"]) == (0, [21.0], 21.0)
+
+
+@pytest.mark.fault(33)
+def test_stress_is_remembered_across_an_interruption(mesh, tmp_path, monkeypatch, capsys):
+    brain = read_tetrahedral_mesh(mesh)
+    parameters = parameters_from(WEEK | {"stress_memory_gw": 0.5, "solver": TIGHT})
+    zones = zones_of_run(brain, parameters)
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "whole")
+    monkeypatch.setattr(Folding, "step", failing_after(4))
+    with pytest.raises(SolverError):
+        run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "cut")
+    monkeypatch.undo()
+    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "cut")
+    assert "going on from the checkpoint after step 4" in capsys.readouterr().out
+    whole, cut = (read_positions(tmp_path / name / "frames.h5", 21.5) for name in ("whole", "cut"))
+    forgetful = parameters_from(WEEK | {"solver": TIGHT})
+    run(MPI.COMM_SELF, brain, zones, forgetful, {}, tmp_path / "forgetful")
+    other = read_positions(tmp_path / "forgetful" / "frames.h5", 21.5)
+    assert np.abs(cut - whole).max() <= 1e-8 * np.abs(whole - brain.vertices).max()
+    assert np.abs(other - whole).max() > 1e-3
