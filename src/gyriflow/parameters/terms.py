@@ -60,3 +60,6 @@ CORTEX, CORE = 1, 2
 ELEMENTS_NEEDED = {1: 2.0, 2: 0.9}
 """Elements through the cortex by their order, below which folds are the mesh's (docs/verification.md): two linear
 ones, or about one quadratic."""
+
+LONGEST_NAME = 100
+"""Characters that the name of a brain, run or study has at most: names of files have 255 bytes."""

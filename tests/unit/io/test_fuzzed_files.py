@@ -16,6 +16,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from nibabel.freesurfer.io import write_geometry
 
+from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_json, read_tab_separated, read_table, read_text
 from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
@@ -200,3 +201,18 @@ YAML = b"brains:\n  - {id: a, week: 21.5, phantom: {}}\nstart: a\nfolding: &f {e
 @example(content=b"a: " + b"9" * 5000 + b"\n")
 def test_yaml(tmp_path, content):
     tried(tmp_path, "study.yaml", content, read_yaml)
+
+
+@pytest.mark.fault(60)
+@pytest.mark.parametrize("suffix", ["nii", "nii.gz", "mgz"])
+def test_a_header_that_asks_for_more_than_its_file_has_takes_no_memory(tmp_path, suffix):
+    kind = nib.MGHImage if suffix == "mgz" else nib.Nifti1Image
+    data = bytearray(kind(LABELS.astype(np.int32), np.eye(4)).to_bytes())
+    # 30000 x 30000 x 30000 voxels
+    places = {4: ">i4", 8: ">i4", 12: ">i4"} if suffix == "mgz" else {42: "<i2", 44: "<i2", 46: "<i2"}
+    for place, number in places.items():
+        data[place : place + np.dtype(number).itemsize] = np.array(30000, number).tobytes()
+    path = tmp_path / f"a.{suffix}"
+    path.write_bytes(data if suffix == "nii" else gzip.compress(data))
+    with pytest.raises(InputError, match="is shorter than its header says"):
+        read_label_volume(path)
