@@ -88,7 +88,7 @@ def test_shell_commands_of_rules_quote_what_they_are_given():
     for path in RULES:
         text = path.read_text()
         for block in re.findall(
-            r"^SOLVE = \((.*?)^\)|^    shell:\n((?:        .*\n)*)", text, re.DOTALL | re.MULTILINE
+            r"^SOLVE = \((.*?)^\)|^    shell:\n((?:        [^\n]*\n)*)", text, re.DOTALL | re.MULTILINE
         ):
             texts = re.findall(r'"(.*)"', "".join(block))
             places += [place for text in texts for place in re.findall(r"(?<!\{)\{(?!\{)([^{}]+)\}", text)]

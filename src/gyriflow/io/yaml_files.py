@@ -9,7 +9,6 @@ import yaml
 from ..errors import InputError
 from .files import replaced
 
-
 MOST_VALUES = 1_000_000
 """How many values a file may have, so that a few lines of nested aliases don't fill the memory."""
 

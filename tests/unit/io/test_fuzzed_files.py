@@ -216,3 +216,15 @@ def test_a_header_that_asks_for_more_than_its_file_has_takes_no_memory(tmp_path,
     path.write_bytes(data if suffix == "nii" else gzip.compress(data))
     with pytest.raises(InputError, match="is shorter than its header says"):
         read_label_volume(path)
+
+
+@pytest.mark.parametrize(("name", "old", "new"), [("cells", b"\n3 ", b"\n3 7777"), ("sizes", b"\n3 ", b"\n9 ")])
+def test_vtk_cells_that_name_missing_points_do_not_end_the_process(tmp_path, name, old, new):
+    points = "0 0 0 1 0 0 0 1 0 0 0 1"
+    faces = "\n3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n"
+    text = f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n{points}\nPOLYGONS 4 16{faces}"
+    path = tmp_path / "a.vtk"
+    path.write_bytes(text.encode())
+    assert len(read_surface(path).faces) == 4
+    path.write_bytes(text.encode().replace(old, new))
+    assert outcome(read_surface, path) is None

@@ -119,7 +119,7 @@ def mesh_in(folder, mesher, gates=GATES):
     job = SimpleNamespace(
         input=[str(folder / "pial.surf.gii")],
         output=SimpleNamespace(**outputs),
-        params=SimpleNamespace(settings=settings, gates=gates, refused=str(folder / "refused")),
+        params=SimpleNamespace(settings=settings, gates=gates, refused=str(folder / "refused"), stretched=None),
         log=[str(folder / "log")],
     )
     code = 0
