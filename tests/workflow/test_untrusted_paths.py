@@ -17,7 +17,7 @@ FILE = "$(touch pwned) 'x' \"y\"; touch pwned & -é.nii.gz"
 def test_brains_in_a_folder_of_any_name_are_segmented_and_have_surfaces(checkout_copy, tmp_path):
     folder = tmp_path / FOLDER
     folder.mkdir()
-    labels, affine = phantom_labels(21.0, voxel_mm=2.5)
+    labels, affine = phantom_labels(21.0, voxel_mm=2.0)
     image = nib.Nifti1Image(labels.astype(np.int16), affine)
     image.header.set_xyzt_units("mm")
     nib.save(image, folder / "plain.nii.gz")
