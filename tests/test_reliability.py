@@ -60,7 +60,8 @@ def test_the_page_tells_the_worst_outcome_of_each_fault(tmp_path):
     collector.pytest_runtest_logreport(report(nodes[3], "skipped"))
     collector.pytest_sessionfinish()
     page = (tmp_path / "page.md").read_text()
-    ends = {row.split(" |")[0]: row.rsplit(" | ", 1)[1] for row in page.splitlines() if row.startswith("| ")}
+    rows = page.partition("## Promises")[0].splitlines()
+    ends = {row.split(" |")[0]: row.rsplit(" | ", 1)[1] for row in rows if row.startswith("| ")}
     assert [ends[f"| {number}"] for number in (1, 2, 3, 4, 5)] == [
         "passed |",
         "failed |",

@@ -1,6 +1,8 @@
 """The content of an `atlas.yaml`: populations by week, files and their source, licence and reference."""
 
+import re
 from pathlib import Path
+from string import Formatter
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -18,7 +20,20 @@ FileKey = Literal["labels", "image", "left", "right", "pial"]
 SOURCES_OF_SERIES = ({"labels"}, {"left", "right"}, {"pial"})
 """The keys of files that give a surface, of which a series has one set; `image` goes with labels."""
 
-NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
+"""How a week may be written in a file's name, as `05.2f`."""
+NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+
+
+def _names_weeks(pattern: str) -> bool:
+    """Returns whether the fields of a pattern are weeks, as plain numbers: what fills them out cannot be a path."""
+    try:
+        fields = [(name, kind, flag) for _, name, kind, flag in Formatter().parse(pattern) if name is not None]
+    except ValueError:
+        return False
+    return bool(fields) and all(
+        name == "week" and flag is None and re.fullmatch(WEEK_FORMAT, kind or "") for name, kind, flag in fields
+    )
 
 
 class AtlasLicence(Settings):
@@ -98,13 +113,9 @@ class AtlasSeries(Settings):
         if set(files) - {"image"} not in SOURCES_OF_SERIES or ("image" in files and "labels" not in files):
             raise ValueError("have labels (and perhaps image), or left and right, or pial")
         for pattern in files.values():
-            if Path(pattern).is_absolute() or ".." in Path(pattern).parts:
+            if Path(pattern).is_absolute() or ".." in Path(pattern).parts or "\\" in pattern:
                 raise ValueError("be paths below the folder of the atlas")
-            try:
-                several = pattern.format(week=21.0) != pattern.format(week=22.0)
-            except (ValueError, LookupError):
-                several = False
-            if not several:
+            if not _names_weeks(pattern):
                 raise ValueError("have {week} in each path, for the gestational week")
         return files
 

@@ -6,7 +6,7 @@ from ..parameters.files import InputFile
 from ..parameters.schemes import SCHEMES
 from ..parameters.settings import NotValidError, Problem, Settings, check, setting
 from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
-from ..parameters.terms import SIDES, AffineSource, Coordinates, Side
+from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
 from ..parameters.varying import Week
 
 SOURCES = ("labels", "segmentation", "hemispheres", "hemisphere", "pial", "phantom", "shape")
@@ -99,7 +99,11 @@ class Brain(Settings):
     """
 
     id: str = setting(
-        ..., "", "Name in result paths and tables: letters, digits, - _ .", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+        ...,
+        "",
+        "Name in result paths and tables: letters, digits, - _ .",
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$",
+        max_length=LONGEST_NAME,
     )
     week: Week = setting(..., "GW", "Gestational age.")
     population: str | None = setting(

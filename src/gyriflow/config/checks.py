@@ -7,6 +7,7 @@ from ..parameters.folding import GROWTH_RATES, VARYING, value_problems
 from ..parameters.messages import nearest
 from ..parameters.schemes import SCHEMES
 from ..parameters.settings import Problem
+from ..parameters.terms import LONGEST_NAME
 from ..parameters.varying import Varying
 from .brains import Brain
 from .growth import GrowthSettings, estimated_from, growth_series
@@ -39,6 +40,9 @@ def name_problems(brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[
             yield Problem("the name is reserved; choose another", ("runs", name))
         elif not name or not all(char.isalnum() or char in "-_." for char in name) or not name[0].isalnum():
             text = "a run's name has letters, digits, - _ . only and begins with a letter or digit"
+            yield Problem(text, ("runs", name))
+        elif len(name) > LONGEST_NAME:
+            text = f"a run's name has {LONGEST_NAME} characters at most"
             yield Problem(text, ("runs", name))
     for first, second in _equal_but_for_case(runs):
         yield Problem(f"is the same folder as that of the run {first} on some disks; rename one", ("runs", second))

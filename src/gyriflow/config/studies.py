@@ -10,6 +10,7 @@ from pydantic import Discriminator, Tag, ValidationError
 from ..parameters.folding import value_problems
 from ..parameters.messages import messages
 from ..parameters.settings import Problem, Settings, setting
+from ..parameters.terms import LONGEST_NAME
 from .brains import Brain
 from .runs import Run
 
@@ -153,8 +154,10 @@ def study_problems(studies: Mapping[str, Study], runs: Mapping[str, Run], brains
     names: dict[str, str] = {}
     for name, study in studies.items():
         here = ("studies", name)
-        if not name.replace("-", "").replace("_", "").isalnum():
-            yield Problem("a study's name has letters, digits, - _ only", here)
+        if not name.replace("-", "").replace("_", "").isalnum() or not name[0].isalnum() or len(name) > LONGEST_NAME:
+            text = "a study's name has letters, digits, - _ only and begins with a letter or digit"
+            text = f"{text}; {LONGEST_NAME} characters at most"
+            yield Problem(text, here)
         if name in RESERVED_STUDIES:
             yield Problem("the name is reserved; choose another", here)
         if study.has("base") and study.base not in runs:

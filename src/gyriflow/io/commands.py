@@ -2,6 +2,7 @@
 
 import logging
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -15,6 +16,9 @@ from .files import AnyPath
 log = logging.getLogger(__name__)
 
 LINES_SHOWN = 5
+QUOTES = ("'", '"', "`")
+SHELL_TOKEN = r"""'[^']*'|"(?:\\.|[^"\\])*"|`(?:\\.|[^`\\])*`|\\.|(?<!\S)\#[^\n]*|<<|."""
+"""A quoted part of a shell command, an escaped character, a comment, or any other character."""
 DOCKER_PREFIX = "docker://"
 APPTAINER = ("apptainer", "singularity")
 DOCKER = ("docker", "podman")
@@ -37,11 +41,11 @@ def run_command(command: str, files: Mapping[str, AnyPath], made: str, container
     Raises
     ------
     InputError
-        With the last lines of the output, where the command ends in another code than 0 or makes no file.
+        With the last lines of the output, where the command ends in another code than 0 or makes no file; where a
+        place stands in quotes, in which a path could not be quoted.
     """
     paths = {name: Path(path).absolute() for name, path in files.items()}
-    for name, path in paths.items():
-        command = command.replace(f"{{{name}}}", shlex.quote(str(path)))
+    command = _with_paths(command, paths)
     folders = sorted({str(path.parent) for path in paths.values()})
     arguments = ["sh", "-c", command] if container is None else _command_in_container(command, container, folders)
     log.info("running %s", shlex.join(arguments))
@@ -67,6 +71,22 @@ def run_command(command: str, files: Mapping[str, AnyPath], made: str, container
         )
 
 
+def _with_paths(command: str, paths: Mapping[str, Path]) -> str:
+    """Returns a shell command with each path, quoted, in its place, so that nothing that stands in a path is run."""
+    places = {f"{{{name}}}": shlex.quote(str(path)) for name, path in paths.items()}
+    tokens = re.findall("|".join([*map(re.escape, places), SHELL_TOKEN]), command, flags=re.DOTALL)
+    for token in tokens:
+        inside = [place for place in places if place in token and place != token and not token.startswith("#")]
+        if inside or token in QUOTES or token == "<<":
+            raise InputError(
+                f"the command has {inside[0]} in quotes" if inside else f"the command has {token} without its end",
+                found=command,
+                expected=f"{' and '.join(places)} by themselves: paths are quoted where that is needed",
+                remedy="Leave out the quotes around them, and here-documents (<<); put what is longer into a script.",
+            )
+    return "".join(places.get(token, token) for token in tokens)
+
+
 def _command_in_container(command: str, container: str, folders: list[str]) -> list[str]:
     """Returns the arguments that run a shell command in a container with the first program found that can do so."""
     is_file = container.endswith(".sif")
@@ -78,6 +98,13 @@ def _command_in_container(command: str, container: str, folders: list[str]) -> l
             path=container,
             expected=" or ".join(programs),
             remedy="Install one of them, or give a command that needs no container.",
+        )
+    unclear = [folder for folder in folders if ":" in folder or "," in folder]
+    if unclear:
+        raise InputError(
+            "has a colon or a comma in its path, which containers take for the end of it",
+            path=unclear[0],
+            remedy="Move the file, or run the study, in another folder.",
         )
     if program in APPTAINER:
         binds = [part for folder in folders for part in ("--bind", folder)]

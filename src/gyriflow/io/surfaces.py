@@ -213,11 +213,36 @@ def _read_with_pyvista(path: Path) -> tuple[NDArray[np.float64], NDArray]:
         data = pv.read(path)
     except Exception as error:  # VTK's readers raise whatever their parsing runs into
         raise InputError(f"cannot be read as VTK: {error}", path=path, remedy=AGAIN) from error
-    surface = data.extract_surface(algorithm=None) if isinstance(data, pv.UnstructuredGrid) else data
-    if not isinstance(surface, pv.PolyData) or not surface.n_points or not surface.n_cells:
+    if not isinstance(data, pv.UnstructuredGrid | pv.PolyData) or not data.n_points or not data.n_cells:
         raise InputError("holds no surface", path=path, found=type(data).__name__, expected="polygons (PolyData)")
+    _require_sound_cells(data, path)
+    surface = data.extract_surface(algorithm=None) if isinstance(data, pv.UnstructuredGrid) else data
     surface = surface.triangulate()
     return np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
+
+
+def _require_sound_cells(data: pv.UnstructuredGrid | pv.PolyData, path: Path) -> None:
+    """Raises InputError where cells name points that are not there, on which VTK's filters end the whole process."""
+    arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else []
+    if isinstance(data, pv.PolyData):
+        arrays = [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
+    for cells in arrays:
+        corners, starts = (pv.convert_array(array) for array in (cells.GetConnectivityArray(), cells.GetOffsetsArray()))
+        named = len(corners) == 0 or 0 <= corners.min() <= corners.max() < data.n_points
+        whole = len(starts) == 0 or (
+            starts[0] == 0 and starts[-1] == len(corners) and np.all(np.diff(starts.astype(np.int64)) >= 0)
+        )
+        if not (named and whole):
+            raise InputError(
+                "has cells that name points which do not exist",
+                path=path,
+                found=f"points {corners.min()} to {corners.max()}" if len(corners) else "cells without points",
+                expected=f"0 to {data.n_points - 1}",
+                remedy=AGAIN,
+            )
+    wrong = int(np.count_nonzero(~np.isfinite(np.asarray(data.points)).all(axis=1)))
+    if wrong:
+        raise InputError("has NaN or infinite coordinates", path=path, found=f"{wrong} vertices", expected="none")
 
 
 def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:

@@ -9,9 +9,20 @@ import yaml
 from ..errors import InputError
 from .files import replaced
 
+MOST_VALUES = 1_000_000
+"""How many values a file may have, so that a few lines of nested aliases don't fill the memory."""
+
 
 class _StrictLoader(yaml.SafeLoader):
     """Refuses two equal keys in one mapping, of which YAML would silently keep the last."""
+
+
+def _size(value: Any, known: dict[int, int]) -> int:
+    """Returns the number of values in nested lists and mappings, those that aliases share counted each time."""
+    if id(value) not in known:
+        inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+        known[id(value)] = 1 + sum(_size(item, known) for item in inner)
+    return known[id(value)]
 
 
 def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
@@ -35,7 +46,8 @@ _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _m
 def read_yaml(path: str | PathLike[str]) -> Any:
     """Returns the content of a YAML (or JSON) file; InputError where it is missing, malformed or names a key twice."""
     try:
-        return yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
+        content = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
+        size = _size(content, {})
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("cannot be read", path=path, found=error) from error
     except RecursionError as error:
@@ -50,6 +62,9 @@ def read_yaml(path: str | PathLike[str]) -> Any:
         raise InputError(
             f"has a value that YAML cannot read: {error}", path=path, remedy="Put texts in quotes."
         ) from error
+    if size > MOST_VALUES:
+        raise InputError("has too many values, aliases written out", path=path, found=size, expected=MOST_VALUES)
+    return content
 
 
 def yaml_text(content: Any) -> str:

@@ -16,6 +16,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from nibabel.freesurfer.io import write_geometry
 
+from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_json, read_tab_separated, read_table, read_text
 from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
@@ -200,3 +201,30 @@ YAML = b"brains:\n  - {id: a, week: 21.5, phantom: {}}\nstart: a\nfolding: &f {e
 @example(content=b"a: " + b"9" * 5000 + b"\n")
 def test_yaml(tmp_path, content):
     tried(tmp_path, "study.yaml", content, read_yaml)
+
+
+@pytest.mark.fault(60)
+@pytest.mark.parametrize("suffix", ["nii", "nii.gz", "mgz"])
+def test_a_header_that_asks_for_more_than_its_file_has_takes_no_memory(tmp_path, suffix):
+    kind = nib.MGHImage if suffix == "mgz" else nib.Nifti1Image
+    data = bytearray(kind(LABELS.astype(np.int32), np.eye(4)).to_bytes())
+    # 30000 x 30000 x 30000 voxels
+    places = {4: ">i4", 8: ">i4", 12: ">i4"} if suffix == "mgz" else {42: "<i2", 44: "<i2", 46: "<i2"}
+    for place, number in places.items():
+        data[place : place + np.dtype(number).itemsize] = np.array(30000, number).tobytes()
+    path = tmp_path / f"a.{suffix}"
+    path.write_bytes(data if suffix == "nii" else gzip.compress(data))
+    with pytest.raises(InputError, match="is shorter than its header says"):
+        read_label_volume(path)
+
+
+@pytest.mark.parametrize(("name", "old", "new"), [("cells", b"\n3 ", b"\n3 7777"), ("sizes", b"\n3 ", b"\n9 ")])
+def test_vtk_cells_that_name_missing_points_do_not_end_the_process(tmp_path, name, old, new):
+    points = "0 0 0 1 0 0 0 1 0 0 0 1"
+    faces = "\n3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n"
+    text = f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n{points}\nPOLYGONS 4 16{faces}"
+    path = tmp_path / "a.vtk"
+    path.write_bytes(text.encode())
+    assert len(read_surface(path).faces) == 4
+    path.write_bytes(text.encode().replace(old, new))
+    assert outcome(read_surface, path) is None

@@ -1,5 +1,6 @@
 """The meshers' own processes: what comes back, and what a user is told when they die, hang or are missing."""
 
+import os
 import runpy
 from pathlib import Path
 from types import SimpleNamespace
@@ -83,6 +84,18 @@ def test_a_mesher_that_dies_leaves_its_last_words(stand_in, mesher):
         tetrahedralise(ball(), mesher=mesher, **SIZES)
 
 
+@pytest.mark.promise(12)
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_the_folder_of_a_mesher_is_its_users_only(stand_in, mesher):
+    stand_in(mesher, "mode = os.stat('.').st_mode & 0o777", "os.write(1, f'mode {mode:o}'.encode())", DYING[1])
+    before = os.umask(0)
+    try:
+        with pytest.raises(MeshError, match="found mode 700"):
+            tetrahedralise(ball(), mesher=mesher, **SIZES)
+    finally:
+        os.umask(before)
+
+
 @pytest.mark.parametrize("mesher", MESHERS)
 def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesher):
     stand_in(mesher, *HANGING)
@@ -106,7 +119,7 @@ def mesh_in(folder, mesher, gates=GATES):
     job = SimpleNamespace(
         input=[str(folder / "pial.surf.gii")],
         output=SimpleNamespace(**outputs),
-        params=SimpleNamespace(settings=settings, gates=gates, stretched=None, refused=str(folder / "refused")),
+        params=SimpleNamespace(settings=settings, gates=gates, refused=str(folder / "refused"), stretched=None),
         log=[str(folder / "log")],
     )
     code = 0

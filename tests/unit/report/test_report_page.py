@@ -89,6 +89,20 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     assert "Made 2026-01-01 by gyriflow 0.1, commit abc." in text
 
 
+@pytest.mark.fault(61)
+def test_what_a_user_has_written_is_shown_as_text(monkeypatch):
+    script = "<script>alert(1)</script><img src=x onerror=alert(1)>"
+    monkeypatch.setitem(BRAINS[0], "population", script)
+    monkeypatch.setitem(SURFACES["young"], "warnings", [script])
+    shown = [Shown("Growth", script, table_html(pd.DataFrame({script: [script]})), script)]
+    text = page(shown, {"groups": [{"name": script}], "maps": [script]})
+    # the data of the 3D view are JSON, in which no element ends
+    shown_text = re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL)
+    assert shown_text.count("alert(1)") >= 5
+    assert "<img src=x" not in shown_text
+    assert "<script" not in shown_text
+
+
 def test_without_surfaces_there_is_no_3d_view():
     assert 'id="view3d"' not in page([])
 

@@ -1,0 +1,96 @@
+"""User files are untrusted: no code comes from them, in the sources of the package, the workflow and the launcher."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).parents[1]
+SOURCES = sorted([*(CHECKOUT / "src").rglob("*.py"), *(CHECKOUT / "workflow").rglob("*.py")])
+RULES = sorted([*(CHECKOUT / "workflow" / "rules").glob("*.smk"), CHECKOUT / "Snakefile"])
+
+UNPICKLING = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
+CALLS = {"eval", "exec", "compile", "__import__"}
+"""Built-in functions that make code of text."""
+METHODS = {
+    ("os", "system"), ("os", "popen"), ("tempfile", "mktemp"), ("pd", "read_pickle"), ("pandas", "read_pickle"),
+    ("yaml", "full_load"), ("yaml", "unsafe_load"), ("yaml", "load_all"), ("shutil", "unpack_archive"),
+    ("tarfile", "open"), ("zipfile", "ZipFile"), ("pv", "read_pickle"),
+}  # fmt: skip
+TRUE_IS_BAD = {"shell", "allow_pickle"}
+SAFE_LOADERS = {"SafeLoader", "CSafeLoader", "_StrictLoader"}
+
+
+def dangers(source):
+    """Returns what a source has that makes code of data, or files that others may read."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found += [name.name for name in node.names if name.name.split(".")[0] in UNPICKLING]
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in UNPICKLING:
+            found.append(node.module)
+        elif isinstance(node, ast.Call):
+            function = node.func
+            if isinstance(function, ast.Name) and function.id in CALLS:
+                found.append(function.id)
+            if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+                called = (function.value.id, function.attr)
+                if called in METHODS:
+                    found.append(".".join(called))
+                loader = {k.arg: getattr(k.value, "id", getattr(k.value, "attr", "")) for k in node.keywords}
+                if called == ("yaml", "load") and loader.get("Loader") not in SAFE_LOADERS:
+                    found.append("yaml.load")
+            found += [
+                keyword.arg
+                for keyword in node.keywords
+                if keyword.arg in TRUE_IS_BAD
+                and not (isinstance(keyword.value, ast.Constant) and not keyword.value.value)
+            ]
+    return found
+
+
+@pytest.mark.fault(58)
+@pytest.mark.promise(12)
+def test_no_source_makes_code_of_data():
+    assert len(SOURCES) > 150
+    assert {str(path.relative_to(CHECKOUT)): found for path in SOURCES if (found := dangers(path.read_text()))} == {}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import pickle",
+        "from pickle import loads",
+        "eval(text)",
+        "import yaml\nyaml.load(text, Loader=yaml.Loader)",
+        "yaml.load(text, yaml.SafeLoader)",
+        "subprocess.run(text, shell=True)",
+        "subprocess.run(text, shell=wanted)",
+        "np.load(path, allow_pickle=True)",
+        "os.system(text)",
+        "tempfile.mktemp()",
+    ],
+)
+def test_dangers_are_seen(source):
+    assert dangers(source)
+
+
+@pytest.mark.parametrize("source", ["model.eval()", "re.compile(x)", "np.load(p, allow_pickle=False)", "pickles = 1"])
+def test_what_only_looks_like_one_is_not(source):
+    assert not dangers(source)
+
+
+@pytest.mark.fault(57)
+def test_shell_commands_of_rules_quote_what_they_are_given():
+    """Values in the text of a shell command are quoted (`:q`), but for numbers and the MPI launcher of a profile."""
+    places = []
+    for path in RULES:
+        text = path.read_text()
+        for block in re.findall(
+            r"^SOLVE = \((.*?)^\)|^    shell:\n((?:        [^\n]*\n)*)", text, re.DOTALL | re.MULTILINE
+        ):
+            texts = re.findall(r'"(.*)"', "".join(block))
+            places += [place for text in texts for place in re.findall(r"(?<!\{)\{(?!\{)([^{}]+)\}", text)]
+    assert len(places) > 5
+    assert {place for place in places if not place.endswith(":q")} == {"resources.mpi", "resources.tasks"}

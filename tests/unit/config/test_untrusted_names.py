@@ -1,0 +1,143 @@
+"""Names and descriptions that come from others: they stay names, and lead nowhere but into their folder."""
+
+import os
+
+import pytest
+import yaml
+
+from gyriflow.config.loading import load
+from gyriflow.errors import InputError
+from gyriflow.io.yaml_files import read_yaml
+
+NAMES = [
+    "a b", "a'b", 'a"b', "a;b", "$(touch x)", "`x`", "a\nb", "a\n", "a\0b", "-rf", "--all", ".hidden", "..", "../x",
+    "a/b", "/etc/passwd", "a\\b", "a|b", "a&b", "a*", "a?", "~root", "{brain}", "a\u202eb", "", " ",
+    "a" * 5000,
+]  # fmt: skip
+
+
+def study(**changes):
+    brain = {"id": "a", "week": 21, "phantom": {}}
+    return {"brains": [brain], "start": "a", "folding": {"end_week": 22}} | changes
+
+
+def refusal(raw, folder="."):
+    with pytest.raises(InputError) as error:
+        load(raw, folder)
+    return str(error.value)
+
+
+@pytest.mark.fault(56)
+@pytest.mark.parametrize("name", NAMES)
+def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
+    brain = {"id": name, "week": 21, "phantom": {}}
+    assert "brains[0].id" in refusal(study(brains=[brain], start=name))
+    assert f"runs.{name}: " in refusal(study(runs={name: {}}))
+    vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
+    later = {"id": "b", "week": 22, "phantom": {}}
+    assert "studies" in refusal(study(studies={name: vary}, brains=[*study()["brains"], later]))
+
+
+def test_the_study_without_such_a_name_is_valid():
+    vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
+    later = {"id": "b", "week": 22, "phantom": {}}
+    assert load(study(studies={"a": vary}, runs={"größe": {}, "reference": {}}, brains=[*study()["brains"], later]))
+
+
+@pytest.mark.fault(56)
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "a\n"])
+def test_rows_of_a_table_have_such_names_neither(tmp_path, name):
+    (tmp_path / "a.gii").touch()
+    lines = [["participant_id", "age", "pial"], [name, "24", "a.gii"]]
+    table = "\n".join("\t".join(f'"{cell.replace(chr(34), chr(34) * 2)}"' for cell in row) for row in lines)
+    (tmp_path / "participants.tsv").write_text(table + "\n")
+    said = refusal({"participants": "participants.tsv", "folding": {"end_week": 25}, "start": "first"}, tmp_path)
+    assert "id" in said
+
+
+ATLAS = {
+    "name": "mine",
+    "title": "Mine",
+    "licence": {"name": "CC0", "terms": "None."},
+    "url": "https://example.org/atlas",
+    "series": {"all": {"population": "sheep", "scheme": "feta-7", "weeks": [21, 22], "files": {}}},
+}
+
+
+def with_atlas(folder, **changes):
+    (folder / "atlas.yaml").write_text(yaml.safe_dump(ATLAS | changes))
+    return {"atlas": "atlas.yaml", "start": "mine-21", "folding": {"end_week": 22}}
+
+
+def with_file(folder, pattern):
+    series = ATLAS["series"]["all"] | {"files": {"labels": pattern}}
+    return with_atlas(folder, series={"all": series})
+
+
+@pytest.mark.fault(59)
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "../../{week}.nii.gz",
+        "a/../../{week}.nii.gz",
+        "/etc/{week}.nii.gz",
+        "a\\..\\{week}.nii.gz",
+        # fill characters that make a path of a number
+        "{week:/>9}.nii.gz",
+        "{week:.>7}/{week:.>5}/x.nii.gz",
+        "{week:>999999999}.nii.gz",
+        "{week.__class__}.nii.gz",
+        "{week!r:/>9}.nii.gz",
+        "{week[0]}.nii.gz",
+    ],
+)
+def test_files_of_an_atlas_stay_in_its_folder(tmp_path, pattern):
+    said = refusal(with_file(tmp_path, pattern), tmp_path)
+    assert "be paths below the folder" in said or "have {week} in each path" in said
+
+
+@pytest.mark.fault(59)
+def test_an_atlas_with_plain_names_is_fetched_into_its_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    config = load(with_file(tmp_path, "sub folder/$(x) {week:05.2f}.nii.gz"), tmp_path)
+    folder = tmp_path / "resources" / "atlases" / "mine"
+    assert [brain.labels for brain in config.brains] == [
+        str(folder / "sub folder" / f"$(x) {week}.00.nii.gz") for week in (21, 22)
+    ]
+
+
+@pytest.mark.fault(59)
+@pytest.mark.parametrize("name", ["../x", "/tmp/x", ".", "a/b", "-x"])
+def test_an_atlas_has_a_plain_name(tmp_path, name):
+    assert "name: found" in refusal(with_atlas(tmp_path, name=name), tmp_path)
+
+
+@pytest.mark.fault(59)
+@pytest.mark.parametrize("url", ["file:///etc", "ftp://x", "javascript:x", "--output=x"])
+def test_an_atlas_is_on_the_web(tmp_path, url):
+    assert "url: found" in refusal(with_atlas(tmp_path, url=url), tmp_path)
+
+
+@pytest.mark.fault(58)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "!!python/object/apply:os.system ['touch pwned']",
+        "a: !!python/object/new:os.system ['touch pwned']",
+        "!!python/name:os.system ''",
+        "!!python/module:antigravity ''",
+        "a: !custom {b: 1}",
+        "a: &x [*x]",
+        "a: &x {b: *x}",
+        "[" * 5000,
+        "a: &a [x, x]\n"
+        + "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}' if n else '*a'] * 9)}]\n" for n in range(12)),
+    ],
+    ids=["apply", "new", "name", "module", "tag", "cycle", "cycle-of-keys", "deep", "laughs"],
+)
+def test_yaml_makes_no_objects_cycles_or_masses(tmp_path, monkeypatch, text):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text(text)
+    with pytest.raises(InputError, match=r"study.yaml"):
+        read_yaml(tmp_path / "study.yaml")
+    assert os.listdir(tmp_path) == ["study.yaml"]  # noqa: PTH208
