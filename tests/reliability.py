@@ -80,8 +80,8 @@ def page_of(tests):
     lines = [
         "# Reliability",
         "",
-        "What goes wrong, what a user then gets, and the test that tries it with real files and programs. Messages name the",
-        "file, what was found, what was expected and what to do; the exit codes are on [the command line's",
+        "What goes wrong, what a user then gets, and the test that tries it with real files and programs. Messages",
+        "name the file, what was found, what was expected and what to do; the exit codes are on [the command line's",
         "page](command-line.md). This page is written by a run of the tests, `./run pytest --reliability",
         "docs/reliability.md`, from `tests/faults.yaml`.",
         "",
