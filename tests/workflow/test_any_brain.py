@@ -224,7 +224,7 @@ def study(checkout_copy, tmp_path_factory):
         workflow.run(*targets[first::4], "--cores", "2", "--keep-going", "--configfile", name) for first in range(4)
     ]
     measured = [f"results/brains/{name}/metrics/metrics.csv" for name in ("plain", *NAMED)]
-    measuring = workflow.run(*measured, "--cores", "2", "--configfile", name)
+    measuring = workflow.run(*measured, "--cores", "2", "--configfile", name, timeout_s=600)
     said = "".join(call.stderr for call in calls)
     codes = [call.returncode for call in calls]
     return SimpleNamespace(
