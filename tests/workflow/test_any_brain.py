@@ -413,7 +413,9 @@ def test_pathologies_go_through_to_metrics(study, name):
     found, plain = (table.set_index(["hemisphere", "metric"])["value"] for table in tables)
     sides = {"whole", "left"} if name == "hemispherectomy" else {"whole", "left", "right"}
     assert set(found.index.get_level_values("hemisphere")) == sides
-    assert np.isfinite(found).all()
+    # so few modes complete no relative power, and no band beyond B2
+    measured = ~found.index.get_level_values("metric").str.startswith("spangy")
+    assert np.isfinite(found[measured]).all()
     assert found["whole", "volume"] == pytest.approx(report(study, name)["volume_mL"], rel=1e-6)
     assert found["whole", "area"] == pytest.approx(report(study, name)["area_cm2"]["whole"], rel=1e-6)
     assert found["whole", "crossing_faces"] == 0
