@@ -20,6 +20,7 @@ from types import SimpleNamespace
 
 import nibabel as nib
 import numpy as np
+import pandas as pd
 import pytest
 import pyvista as pv
 from nibabel.freesurfer.io import write_geometry
@@ -167,6 +168,7 @@ GOOD = {
         lambda labels, affine: pathologies.add_sides(pathologies.small_hemisphere(labels, affine), affine), "dhcp-19"
     ),
     "shifted": labelled(pathologies.shifted_midline),
+    "hemimegalencephaly": lambda folder, name: {"phantom": {"voxel_mm": 2.0, "pathology": name}},
     "cropped": labelled(pathologies.crop),
     "upside_down": labelled(turn=motion(180, 0, 0)),
     "backwards": labelled(pathologies.add_sides, "dhcp-19", motion(0, 0, 180)),
@@ -195,20 +197,25 @@ BAD = {
         "does not lie around what it calls the cerebrum",
     ),
 }
+NAMED = ("agenesis", "holoprosencephaly", "wide", "hypoplasia", "shifted", "hemimegalencephaly", "hemispherectomy")
+"""The pathologies that go on to metrics."""
 REFUSED = trying(
     dict.fromkeys(("half", "small_half", "whole_as_half", "pial_half"), 41) | {"mirrored": 42, "unit": 43, "scheme": 44}
 )
+HEMISPHERECTOMY = alone("left", pathologies.one_hemisphere)
 CROSSING = both_sides(LEFT, RIGHT, white_mm=-1.5)
 
 
 @pytest.fixture(scope="module")
 def study(checkout_copy, tmp_path_factory):
-    """One run of the surface stage over all of them."""
+    """One run of the surface stage over all of them, and of the metrics of pathologies."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("any"))
     makers = GOOD | {name: make for name, (make, _) in BAD.items()} | {"crossing": CROSSING}
+    makers["hemispherectomy"] = HEMISPHERECTOMY
     brains = [{"id": name, "week": 24} | make(workflow.directory, name) for name, make in makers.items()]
     surface = {"edge_length_mm": 2.5, "max_hemisphere_ratio": 1.4, "max_asymmetry": 0.05}
-    config = {"brains": brains, "start": "plain", "surface": surface, "folding": {"end_week": 25}}
+    metrics = {"curvature_radius_mm": 7.0, "spangy_modes": 50}
+    config = {"brains": brains, "start": "plain", "surface": surface, "metrics": metrics, "folding": {"end_week": 25}}
     name = workflow.write("study.yaml", config)
     targets = [f"results/brains/{brain['id']}/surface/pial.surf.gii" for brain in brains]
     targets += [f"results/brains/{name}/surface/thickness.shape.gii" for name in ("freesurfer", "crossing")]
@@ -216,9 +223,13 @@ def study(checkout_copy, tmp_path_factory):
     calls = [
         workflow.run(*targets[first::4], "--cores", "2", "--keep-going", "--configfile", name) for first in range(4)
     ]
+    measured = [f"results/brains/{name}/metrics/metrics.csv" for name in ("plain", *NAMED)]
+    measuring = workflow.run(*measured, "--cores", "2", "--configfile", name, timeout_s=600)
     said = "".join(call.stderr for call in calls)
     codes = [call.returncode for call in calls]
-    return SimpleNamespace(codes=codes, stderr=said, results=workflow.directory / "results" / "brains")
+    return SimpleNamespace(
+        codes=codes, stderr=said, measuring=measuring, results=workflow.directory / "results" / "brains"
+    )
 
 
 def report(study, name):
@@ -284,9 +295,39 @@ def test_missing_tissues_are_named_and_not_required(study):
     assert report(study, "agenesis")["pieces"] == 1
 
 
+def cerebrum_ml(labels):
+    return np.isin(labels, pathologies.CEREBRUM).sum() * 2.0**3 / 1e3
+
+
+@pytest.mark.fault(47)
+def test_a_brain_without_a_fissure_in_front_is_cut_in_halves(study):
+    found, plain = report(study, "holoprosencephaly"), report(study, "plain")
+    assert found["volume_mL"] == pytest.approx(cerebrum_ml(pathologies.holoprosencephaly(LABELS, AFFINE)), rel=0.01)
+    area = found["area_cm2"]
+    assert area["left"] == pytest.approx(area["right"], rel=0.03)
+    # the walls of the fissure in front are not there
+    assert area["whole"] / plain["area_cm2"]["whole"] == pytest.approx(0.94, abs=0.02)
+    assert found["label_volumes_mL"]["ventricles"] > 2.5 * plain["label_volumes_mL"]["ventricles"]
+
+
+@pytest.mark.fault(52)
+def test_a_wide_ventricle_counts_as_brain_and_its_side_is_doubted(study):
+    found = report(study, "wide")
+    labels = pathologies.wide_hemisphere(LABELS, AFFINE, ventricle=True)
+    assert found["volume_mL"] == pytest.approx(cerebrum_ml(labels), rel=0.01)
+    assert found["label_volumes_mL"]["ventricles"] == pytest.approx((labels == 2).sum() * 2.0**3 / 1e3)
+    assert found["area_cm2"]["right"] / found["area_cm2"]["left"] == pytest.approx(1.16, abs=0.02)
+    assert warned(study, "wide", "the hemispheres' areas differ by 1")
+
+
 @pytest.mark.fault(48)
 def test_a_field_of_view_that_cuts_the_brain_is_warned_of(study):
     assert warned(study, "cropped", "the cerebrum touches the border of the volume")
+    cropped, plain = report(study, "cropped"), report(study, "plain")
+    assert cropped["volume_mL"] == pytest.approx(cerebrum_ml(pathologies.crop(LABELS, AFFINE)[0]), rel=0.01)
+    assert cropped["volume_mL"] / plain["volume_mL"] == pytest.approx(0.81, abs=0.02)
+    # a third of the height is lost
+    assert cropped["extents_mm"][2] / plain["extents_mm"][2] == pytest.approx(0.68, abs=0.03)
     assert not any("border" in warning for warning in report(study, "plain")["warnings"])
 
 
@@ -363,3 +404,20 @@ def test_a_shifted_midline_is_followed(study):
     area = report(study, "shifted")["area_cm2"]
     assert area["left"] > 1.2 * area["right"]
     assert report(study, "shifted")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0] + 8.0, abs=2.5)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_pathologies_go_through_to_metrics(study, name):
+    assert study.measuring.returncode == 0, study.measuring.stderr
+    tables = [pd.read_csv(study.results / brain / "metrics" / "metrics.csv") for brain in (name, "plain")]
+    found, plain = (table.set_index(["hemisphere", "metric"])["value"] for table in tables)
+    sides = {"whole", "left"} if name == "hemispherectomy" else {"whole", "left", "right"}
+    assert set(found.index.get_level_values("hemisphere")) == sides
+    # so few modes complete no relative power, and no band beyond B2
+    measured = ~found.index.get_level_values("metric").str.startswith("spangy")
+    assert np.isfinite(found[measured]).all()
+    assert found["whole", "volume"] == pytest.approx(report(study, name)["volume_mL"], rel=1e-6)
+    assert found["whole", "area"] == pytest.approx(report(study, name)["area_cm2"]["whole"], rel=1e-6)
+    assert found["whole", "crossing_faces"] == 0
+    ratio = {"hypoplasia": 0.51, "hemispherectomy": 0.49, "wide": 1.16, "hemimegalencephaly": 1.16}.get(name, 1.0)
+    assert found["whole", "volume"] / plain["whole", "volume"] == pytest.approx(ratio, abs=0.04)

@@ -37,9 +37,9 @@ class PhantomSettings(Settings):
     cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
     pathology: Pathology | None = setting(
         None, "",
-        "What is wrong with the brain: `agenesis` of the corpus callosum, `holoprosencephaly`, `wide-ventricle` (right, "
-        "as in unilateral ventriculomegaly), `hypoplasia` of the right hemisphere, `midline-shift` to the right by 8 "
-        "mm, `hemimegalencephaly` (right).",
+        "What is wrong with the brain: `agenesis` of the corpus callosum, `holoprosencephaly`, `wide-ventricle` on the "
+        "right, `hypoplasia` of the right hemisphere, `midline-shift` to the right by 8 mm, `hemimegalencephaly` of "
+        "the right hemisphere.",
     )  # fmt: skip
 
     @property

@@ -62,8 +62,8 @@ def narrowness(mesh: TriangleMesh) -> float:
 def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> BrainPose | None:
     """Returns the pose from cerebellum, brainstem and labelled sides; None where too few of them are labelled.
 
-    It is that of the file where the two differ by less than 60°, with a warning from 25° on. InputError where the labels of left and right are
-    mirrored: no rotation brings them to their sides.
+    It is that of the file where the two differ by less than 60°, with a warning from 25° on. InputError
+    where the labels of left and right are mirrored: no rotation brings them to their sides.
     """
     centres = {
         name: affine[:3, :3] @ np.argwhere(np.isin(labels, numbers)).mean(axis=0)
@@ -196,7 +196,11 @@ def _keep_or_turn(rotation: Floats, by: str) -> BrainPose:
     rotation = _turn_by_quarters(rotation)
     angle = angle_deg(rotation)
     if angle < LEAST_TURN_DEG:
+<<<<<<< HEAD
         doubt = f"{by} say that the brain is turned by about {angle:.0f}°, which was kept: check the pose"
+=======
+        doubt = f"{by} say that the brain is turned by about {angle:.0f}°, which was kept: check the file's axes"
+>>>>>>> fix2
         return BrainPose(np.eye(3), "file", (doubt,) if angle > DOUBTFUL_TURN_DEG else ())
     return BrainPose(rotation, by, (f"the brain was turned by {angle:.0f}°, as {by} say: its affine has other axes",))
 
