@@ -125,7 +125,7 @@ def main() -> None:
         from gyriflow.report.renders import weekly_comparison
 
         for kind, surfaces in shown.items():
-            figure = weekly_comparison(surfaces, {}, title=f"contact: {kind}")
+            figure = weekly_comparison(surfaces, {})
             figure.savefig(arguments.figure.with_stem(f"{arguments.figure.stem}-{kind}"), dpi=150)
     print(json.dumps(found), flush=True)
 

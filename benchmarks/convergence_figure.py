@@ -27,7 +27,7 @@ def draw(runs: pd.DataFrame, weeks: pd.DataFrame, pairs: pd.DataFrame, finest: s
     for metric in SHOWN:
         against[metric] = against[metric].abs() / abs(at_end.loc[finest, metric])
     with style():
-        figure = new_figure(FULL_WIDTH_IN, 5.6, title="", synthetic=False)
+        figure = new_figure(FULL_WIDTH_IN, 5.6, synthetic=False)
         by_week, statistics, places, costs = figure.subplots(2, 2).ravel()
         _by_week(by_week, runs, weeks)
         _against(statistics, against, "nodes_to_cortex", SHOWN)

@@ -198,7 +198,7 @@ def draw(rows: list[dict], file: Path) -> None:
 
     by_ranks = {count: [row for row in rows if row["ranks"] == count] for count in {row["ranks"]: None for row in rows}}
     with style():
-        figure = new_figure(FULL_WIDTH_IN, 2.9, title="", synthetic=False)
+        figure = new_figure(FULL_WIDTH_IN, 2.9, synthetic=False)
         panels = {"seconds": "time per step (s)", "memory_MiB": "peak memory of all ranks (MiB)"}
         for axes, (name, label) in zip(figure.subplots(1, 2), panels.items(), strict=True):
             for i, (count, own) in enumerate(by_ranks.items()):

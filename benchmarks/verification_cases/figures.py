@@ -49,7 +49,7 @@ def slope(axes: Axes, x, at: float, order: float) -> None:
 
 def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
     """Returns Taylor's remainders, and the errors of manufactured solutions and of growing waves by mesh."""
-    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN, title="", synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN, synthetic=False)
     taylor, manufactured, waves = figure.subplots(1, 3)
     one = found["consistency"]
     for i, (key, name) in enumerate((("energy_remainders", "energy"), ("residual_remainders", "forces"))):
@@ -88,7 +88,7 @@ def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
 
 def rates(found: dict, slab_cells: tuple[int, ...]) -> Figure:
     """Returns the rates of growth by wavelength where stress is forgotten, a panel for each contrast."""
-    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN, title="", synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN, synthetic=False)
     all_axes = figure.subplots(1, len(found["rates"]))
     for axes, (contrast, own) in zip(all_axes, found["rates"].items(), strict=True):
         lengths = np.array(own["lengths"])
@@ -111,7 +111,7 @@ def rates(found: dict, slab_cells: tuple[int, ...]) -> Figure:
 
 def memory(found: dict, cells: tuple[int, ...]) -> Figure:
     """Returns amplifications where stress is kept, by wavelength and by growth."""
-    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN + 0.7, title="", synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN + 0.7, synthetic=False)
     by_wave, by_growth = figure.subplots(1, 2)
     contrast, step = found["contrast"], found["growth"]
     runs = found["memory"]

@@ -196,11 +196,7 @@ def _keep_or_turn(rotation: Floats, by: str) -> BrainPose:
     rotation = _turn_by_quarters(rotation)
     angle = angle_deg(rotation)
     if angle < LEAST_TURN_DEG:
-<<<<<<< HEAD
-        doubt = f"{by} say that the brain is turned by about {angle:.0f}°, which was kept: check the pose"
-=======
         doubt = f"{by} say that the brain is turned by about {angle:.0f}°, which was kept: check the file's axes"
->>>>>>> fix2
         return BrainPose(np.eye(3), "file", (doubt,) if angle > DOUBTFUL_TURN_DEG else ())
     return BrainPose(rotation, by, (f"the brain was turned by {angle:.0f}°, as {by} say: its affine has other axes",))
 
