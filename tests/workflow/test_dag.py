@@ -263,6 +263,7 @@ FIGURES = {
                 "measure": 6,
                 "growth_rates": 1,
                 "growth_figure": 1,
+                "inputs_figure": 1,
                 "quality_page": 2,
                 "quality_table": 1,
             },
