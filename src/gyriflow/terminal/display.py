@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, TextIO
 
-from .logs import FoldingStep, GrowingLog, cause, last_step, warnings_in
+from .logs import FoldingStep, GrowingLog, cause, last_step, size_in, warnings_in
 from .stages import subject
 from .time_left import LEAST_SHARE, Pace, as_duration, as_seconds
 
@@ -234,6 +234,8 @@ class RunDisplay:
             if ("warning", job.subject, warning) not in self.told:
                 self.told.add(("warning", job.subject, warning))
                 self.line(f"warning {job.what}: {warning}")
+        if size := size_in(text):
+            self.line(self._row(job.stage, f"{job.subject}: {size}"))
         before, job.step = job.step, last_step(text) or job.step
         if job.step is None or job.step == before:
             return

@@ -9,6 +9,8 @@ WARNING = re.compile(OWN.format(level="WARNING") + r"|^warning: (.+)$", re.MULTI
 """Warnings of gyriflow; those of libraries are for the log."""
 STEP = re.compile(r"^GW (?P<week>[\d.]+)/(?P<end>[\d.]+) .* left (?P<left>[\d:]+)\s*$", re.MULTILINE)
 """A line of the folding's log, one a step."""
+SIZE = re.compile(r"^\d+ elements, .* about \d+ MiB$", re.MULTILINE)
+"""The line of the folding's log with its size and predicted memory, before the solve."""
 ERROR = re.compile(OWN.format(level="ERROR"), re.MULTILINE)
 UNEXPECTED = "unexpected error"
 MESSAGE = re.compile(r"^gyriflow: (.+(?:\n {2,}.+)*)$", re.MULTILINE)
@@ -28,6 +30,12 @@ class FoldingStep:
 def warnings_in(text: str) -> list[str]:
     """Returns the warnings of gyriflow in a piece of a log, each once."""
     return list(dict.fromkeys((match[1] or match[2]).strip() for match in WARNING.finditer(text)))
+
+
+def size_in(text: str) -> str:
+    """Returns the size of a folding and the memory that it is to need, from a piece of its log; empty without."""
+    found = SIZE.search(text)
+    return found[0] if found else ""
 
 
 def last_step(text: str) -> FoldingStep | None:
