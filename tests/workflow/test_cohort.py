@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gyriflow.geometry.triangles import area
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.yaml_files import read_yaml
@@ -81,7 +82,8 @@ def test_a_failed_subject_holds_up_no_other_and_the_call_ends_in_its_code(cohort
     assert "Traceback" not in cohort.outcome.stderr
     assert "left out: " in cohort.outcome.stderr
     assert "refused: sub-03, sub-05; finishing the study without" in cohort.outcome.stderr
-    assert [call.returncode for call in cohort.later] == [2, 2]
+    # the folding of one brain needs none of those that fail, the table of metrics does
+    assert [call.returncode for call in cohort.later] == [0, 2]
     metrics = pd.read_csv(cohort.results / "study" / "metrics.csv")
     assert set(metrics["subject"]) == {"sub-01", "sub-02"}
 
@@ -114,7 +116,8 @@ def test_a_hemisphere_folds_with_its_wall_in_its_plane(cohort):
     run = cohort.results / "runs" / "reference" / "sub-01"
     assert read_yaml(run / "params.yaml")["side"] == "left"
     zones = read_json(run / "folding" / "zones.json")["zones"]
-    assert zones["medial wall"]["area_mm2"] > 5 * zones["left contact"]["area_mm2"] / 2
+    whole = area(read_surface(run / "surfaces" / "week-22.00" / "pial.surf.gii"))
+    assert 0.05 < zones["medial wall"]["area_mm2"] / whole < 0.4
     assert zones["right contact"]["facets"] == zones["between planes"]["facets"] == 0
     start, end = (read_surface(run / "surfaces" / f"week-{week}" / "left.pial.surf.gii") for week in ("22.00", "23.00"))
     wall = start.vertices[:, 0].max()
