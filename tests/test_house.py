@@ -158,7 +158,8 @@ def test_only_io_and_folding_open_files(path):
 
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS, *RULE_FILES], ids=short)
 def test_files_are_short(path):
-    assert len(path.read_text().splitlines()) <= 400
+    # cases of one subject may stand together in a test file
+    assert len(path.read_text().splitlines()) <= (450 if path in TESTS else 400)
 
 
 def test_snakefile_is_short():
