@@ -34,14 +34,14 @@ def changed_files(root, *names, content=OTHER):
 OF_THE_OTHER_BRAIN = SHAPE | {
     "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 5, "similarity": 2,
     "weekly_figure": 2, "shape_maps": 8, "runs_figure": 1, "pial_from_labels": 1, "label_volumes": 1,
-    "quality_page": 1, "quality_table": 1,
+    "quality_page": 1, "quality_table": 1, "inputs_figure": 1, "outlines_figure": 2,
 }  # fmt: skip
 # a table of the study is shown by the report
 NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "view_surfaces": 1}
 OF_THE_SOLVER = {
     rule: count
     for rule, count in BOTH_RUNS.items()
-    if rule not in ("parameters", "regions", "zones_figure", "growth_zone_figure", "layers_figure", "normals_figure")
+    if rule not in ("parameters", "regions", "zones_figure", "growth_zone_figure", "layers_figure", "mesh_figure")
 }
 
 
@@ -91,7 +91,8 @@ def with_later_end(study):
             with_brain,
             SHAPE
             | {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 4}
-            | {"growth_rates": 1, "growth_figure": 1, "label_volumes": 1, "quality_page": 1, "quality_table": 1},
+            | {"growth_rates": 1, "growth_figure": 1, "label_volumes": 1, "quality_page": 1, "quality_table": 1}
+            | {"inputs_figure": 1},
         ),
         (with_run, ONE_RUN),
         (with_other_phantom, OF_THE_OTHER_BRAIN | {"phantom": 1}),
