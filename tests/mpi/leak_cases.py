@@ -14,9 +14,11 @@ SPARE = 2
 """Objects that are there between two iterations or not."""
 
 
-def alive(path):
-    """Returns how many objects of each class PETSc has made and not destroyed."""
+def alive(problem, path):
+    """Returns how many objects of each class PETSc has made and not destroyed, right after a tangent's clean-up."""
+    # what the last solve let go of waits for the next clean-up, and how much that is differs from step to step
     gc.collect()
+    problem.tangent()
     viewer = PETSc.Viewer().createASCII(str(path), comm=COMM)
     PETSc.Log.view(viewer)
     viewer.destroy()
@@ -43,12 +45,16 @@ def test_objects_do_not_add_up(kind, changes, tmp_path_factory):
     folding, state = closing_sulcus(kind, **changes)
     path = COMM.bcast(tmp_path_factory.mktemp("log") / "log.txt")
     counts = []
-    for step in range(9):
+    for _ in range(12):
         state = folding.step(state, state.step_s)
-        if step in (5, 8):
-            counts.append(alive(path))
+        counts.append(alive(folding.problem, path))
     if "stress_memory_gw" in changes:
         assert sum("shifted" in row["rung"] for row in state.rows) >= 2
     assert sum(row["newton"] for row in state.rows[6:]) >= 6
-    for before, after in zip(*counts, strict=True):
-        assert after <= before + SPARE
+    # a solve may need a level of multigrid more than its neighbours; what leaks is there in all later steps
+    for early, late in zip(least(counts[2:6]), least(counts[-4:]), strict=True):
+        assert late <= early + SPARE
+
+
+def least(counts):
+    return [min(numbers) for numbers in zip(*counts, strict=True)]
