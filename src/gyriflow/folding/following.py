@@ -218,10 +218,22 @@ def following_step(
         joined(p.follow.volume_ml, start.volume_mm3 * ML_PER_MM3, p.start_week, week) / ML_PER_MM3,
         step_s,
     )
-    free = growth_of_brain(p, positions_mm, tissue, week)
+    return steered_step(p, before, aim, growth_of_brain(p, positions_mm, tissue, week), learnt, week, last)
+
+
+def steered_step(
+    p: FoldingParameters,
+    before: Size,
+    aim: Aim,
+    free: Response,
+    learnt: Sequence[float] | None,
+    week: float,
+    last: Mapping[str, Any],
+) -> SteeredStep:
+    """Returns the first try of a step that ends at a week, for what free growth makes; others as `following_step`."""
     response = free if learnt is None else free + Response.of(learnt)
     rates = steered_rates(aim, response, bounds(p))
-    parameters, at_start = with_rates(p, rates, week, step_s, last)
+    parameters, at_start = with_rates(p, rates, week, aim.duration, last)
     return SteeredStep(parameters, before, aim, rates, at_start, free, response, week, last)
 
 

@@ -31,7 +31,7 @@ from .newton import NewtonSettings, NewtonSolver, StepCount
 from .output import say
 from .problem import Problem
 from .rates import SMALL, RateProblem, rate_step, summed
-from .resolution import elements_through, resolution_warning, worst_quality
+from .resolution import elements_through, resolution_warning, unconverged_warning, worst_quality
 from .stress import (
     deformation_gradients,
     elastic_strain_fields,
@@ -397,13 +397,3 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
-
-
-def unconverged_warning(row: dict) -> str:
-    """Returns what to say of a step that ended above the tolerance; empty of others."""
-    if row["converged"]:
-        return ""
-    return (
-        f"step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
-        "folding.solver.newton_tolerance: nothing was left to gain but round-off"
-    )
