@@ -10,8 +10,10 @@ from shapes import ellipsoid_mesh
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.following import size_of
+from gyriflow.folding.free_growth import Tissue
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
+from gyriflow.parameters.folding import VENTRICLES
 from gyriflow.parameters.reading import parameters_from
 from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
 
@@ -26,7 +28,7 @@ def following(growth, **changes):
     known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
     settings = {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
     plain = parameters_from(known | settings)
-    start = size_of(mesh.vertices, zones_of_run(mesh, plain))
+    start = size_of(mesh.vertices, Tissue.of(mesh, zones_of_run(mesh, plain), {}))
     sizes = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
     curves = {
         name: {21.0: size, 23.0: size * math.exp(2 * rate)}
@@ -53,7 +55,7 @@ def test_area_and_volume_meet_their_curves_after_a_week(growth, scheme):
     for each in state.rows:
         assert each["area_cm2"] == pytest.approx(each["area_aim_cm2"], rel=1.5e-3)
         assert each["volume_ml"] == pytest.approx(each["volume_aim_ml"], rel=1.5e-3)
-    found = size_of(state.positions * MM_PER_M, folding.zones)
+    found = size_of(state.positions * MM_PER_M, Tissue.of(ellipsoid_mesh(8, AXES), folding.zones, {}))
     assert row["area_cm2"] == pytest.approx(found.area_mm2 * CM2_PER_MM2, rel=1e-12)
     # the aim is the curve itself
     weeks = 10 / 7
@@ -124,3 +126,23 @@ def test_growth_goes_in_measured_directions_and_still_meets_its_curves():
     # a strain that is the same everywhere is compatible, so that the body follows it without stress
     assert stretch[0] - stretch[1:].mean() == pytest.approx(0.09, abs=0.01)
     assert after.rows[-1]["volume_ml"] == pytest.approx(after.rows[-1]["volume_aim_ml"], rel=1e-3)
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "adams-bashforth"])
+def test_ventricles_follow_a_curve_of_their_own_beside_the_brain(scheme):
+    folding, state = following((0.10, 0.15), time_scheme=scheme)
+    mesh = ellipsoid_mesh(8, AXES)
+    maps = {VENTRICLES: (np.linalg.norm(mesh.vertices, axis=1) < 10).astype(float)}
+    tissue = Tissue.of(mesh, folding.zones, maps)
+    start = tissue.ventricles_mm3(mesh.vertices)
+    values = folding.parameters.model_dump(mode="json")
+    curve = {21.0: start * ML_PER_MM3, 23.0: start * ML_PER_MM3 * math.exp(0.04)}
+    values["follow"] |= {"ventricles_ml": curve}
+    after = grown(Folding(COMM, mesh, folding.zones, parameters_from(values), maps), state, 7)
+    row = after.rows[-1]
+    for name, unit in (("area", "cm2"), ("volume", "ml"), ("ventricles", "ml")):
+        assert row[f"{name}_{unit}"] == pytest.approx(row[f"{name}_aim_{unit}"], rel=1.5e-3)
+    assert row["ventricles_ml"] == pytest.approx(curve[21.0] * math.exp(0.02), rel=1.5e-3)
+    # like the core they would be much wider
+    alike = grown(folding, state, 7)
+    assert tissue.ventricles_mm3(alike.positions * MM_PER_M) > 1.05 * row["ventricles_ml"] / ML_PER_MM3

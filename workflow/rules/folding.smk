@@ -1,10 +1,17 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
 from gyriflow.io.files import read_json
 
+
+def with_ventricles(run):
+    """Returns whether the ventricles of a run grow by a rate of their own."""
+    follow = CONFIG.run(run).follow
+    return follow is not None and follow.ventricles_ml is not None
+
+
 RUNS_WITH_MAPS = [
     run
     for run in [*CONFIG.runs, *CONFIG.study_runs]
-    if CONFIG.maps(run) or regional(run)
+    if CONFIG.maps(run) or regional(run) or with_ventricles(run)
 ]
 
 
@@ -29,8 +36,14 @@ def curves_of_run(wildcards):
         follow.area_cm2,
         follow.volume_ml,
         follow.thickness_mm,
+        follow.ventricles_ml,
     )
     return rules.growth_curves.output.curves if measured else []
+
+
+def ventricle_labels(wildcards):
+    """Returns the labels of the start brain where the run's ventricles grow by a rate of their own."""
+    return label_volume_of(wildcards.brain) if with_ventricles(wildcards.run) else []
 
 
 def carried_of_run(wildcards):
@@ -79,6 +92,7 @@ rule parameter_maps:
         data=rules.tetrahedralise.output.data,
         surface=PIAL["report"],
         carried=carried_of_run,
+        labels=ventricle_labels,
     output:
         f"{RUN}/folding/maps.h5",
     log:
@@ -102,6 +116,11 @@ rule parameter_maps:
         bounds=lambda wildcards: {
             name: CONFIG.bounds(name) for name in CONFIG.maps(wildcards.run)
         },
+        ventricles=lambda wildcards: (
+            CONFIG.scheme(CONFIG.brain(wildcards.brain))["ventricles"]
+            if ventricle_labels(wildcards)
+            else []
+        ),
         # volumes of maps are read like those of the brain
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
     script:

@@ -105,6 +105,12 @@ def run_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[str
         for week, called in starts or ([(run.end_week - 1e-9, "the start")] if run.has("end_week") else []):
             for problem in value_problems(run, week, {}, called):
                 yield Problem(problem.text, _place(name, problem.key, runs))
+        follow = run.follow if run.has("follow") else None
+        if follow is not None and follow.has("ventricles_ml") and follow.ventricles_ml is not None:
+            bare = [brain.id for brain in brains if brain.has("id", "source") and not brain.has_labels]
+            if found := [brain for brain in bare if brain in ids]:
+                text = f"needs labels that say where the ventricles are, which {', '.join(found)} has not"
+                yield Problem(text, _place(name, ("follow", "ventricles_ml"), runs))
         for key in VARYING if len(ids) > 1 else ():
             value = getattr(run, key, None)
             if isinstance(value, Varying) and value.surface is not None:

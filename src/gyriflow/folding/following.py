@@ -14,7 +14,6 @@ from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Varying
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 from .free_growth import Tissue, growth_of_brain, map_at
-from .zones import Zones
 
 Floats = NDArray[np.float64]
 
@@ -42,10 +41,31 @@ class Size:
         Of the surface under which cortex lies.
     volume_mm3
         Of all that the surface encloses.
+    ventricles_mm3
+        Of the ventricles in it, 0 where they are not known.
     """
 
     area_mm2: float
     volume_mm3: float
+    ventricles_mm3: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ventricles:
+    """How the ventricles grow in a step, where they do so by a rate of their own.
+
+    Attributes
+    ----------
+    before_mm3, aim_mm3
+        Their volume at the step's start, and that to be reached at its end.
+    rate, at_start
+        Their rate in each direction in 1/s over the step, and at its start, as those of the cortex.
+    """
+
+    before_mm3: float
+    aim_mm3: float
+    rate: float
+    at_start: float | None
 
 
 @dataclass(frozen=True)
@@ -109,6 +129,7 @@ class SteeredStep(Step):
     last: Mapping[str, Any]
     tries: int = 1
     tried: tuple[GrowthRates, tuple[float, float]] | None = None
+    ventricles: Ventricles | None = None
 
     def again(self, after: Size) -> "SteeredStep | None":
         missed = after.area_mm2 / self.aim.next_area - 1, after.volume_mm3 / self.aim.next_volume - 1
@@ -131,7 +152,11 @@ class SteeredStep(Step):
         )
 
     def learnt(self, after: Size) -> tuple[float, ...]:
-        return (self._taught(after) - self.free).values
+        learnt = (self._taught(after) - self.free).values
+        if self.ventricles is None:
+            return learnt
+        grown = math.log(after.ventricles_mm3 / self.ventricles.before_mm3) / self.aim.duration
+        return (*learnt, grown - 3 * self.ventricles.rate)
 
     def row(self, after: Size) -> dict[str, Any]:
         row = super().row(after)
@@ -140,6 +165,14 @@ class SteeredStep(Step):
                 "growth_rate_at_start_per_s": self.at_start.tangential,
                 "core_growth_rate_at_start_per_s": self.at_start.core,
             }
+        if self.ventricles is not None:
+            row |= {
+                "ventricles_ml": after.ventricles_mm3 * ML_PER_MM3,
+                "ventricles_aim_ml": self.ventricles.aim_mm3 * ML_PER_MM3,
+                "ventricle_growth_rate_per_s": self.ventricles.rate,
+            }
+            if self.ventricles.at_start is not None:
+                row["ventricle_growth_rate_at_start_per_s"] = self.ventricles.at_start
         # what the cortex would grow in area if nothing held it
         free = sum(self.free.area) * self.rates.tangential + self.free.area_else
         return row | {
@@ -167,7 +200,7 @@ class SteeredStep(Step):
 def missed_curves(row: Mapping[str, Any]) -> str:
     """Returns what to say of a step that is more than `FOLLOWED` off a curve; empty where it is not."""
     parts = []
-    for name, unit in (("area", "cm2"), ("volume", "ml")):
+    for name, unit in (("area", "cm2"), ("volume", "ml"), ("ventricles", "ml")):
         if (aim := row.get(f"{name}_aim_{unit}")) is not None:
             error = row[f"{name}_{unit}"] / aim - 1
             if abs(error) > FOLLOWED:
@@ -175,10 +208,13 @@ def missed_curves(row: Mapping[str, Any]) -> str:
     return f"at GW {row['week']:g} the brain is {' and '.join(parts)}" if parts else ""
 
 
-def size_of(positions_mm: Floats, zones: Zones) -> Size:
+def size_of(positions_mm: Floats, tissue: Tissue) -> Size:
     """Returns the size of a brain from the (n, 3) positions of its mesh in mm."""
+    zones = tissue.zones
     return Size(
-        area(TriangleMesh(positions_mm, zones.measured_facets)), signed_volume(TriangleMesh(positions_mm, zones.facets))
+        area(TriangleMesh(positions_mm, zones.measured_facets)),
+        signed_volume(TriangleMesh(positions_mm, zones.facets)),
+        tissue.ventricles_mm3(positions_mm),
     )
 
 
@@ -207,7 +243,7 @@ def following_step(
     learnt
         What the steps before have taught, None where there was none.
     """
-    before = size_of(positions_mm, tissue.zones)
+    before = size_of(positions_mm, tissue)
     if p.follow is None:
         return Step(p, before)
     week = p.start_week + (time_s + step_s) / SECONDS_PER_GW
@@ -218,7 +254,20 @@ def following_step(
         joined(p.follow.volume_ml, start.volume_mm3 * ML_PER_MM3, p.start_week, week) / ML_PER_MM3,
         step_s,
     )
-    return steered_step(p, before, aim, growth_of_brain(p, positions_mm, tissue, week), learnt, week, last)
+    if p.follow.ventricles_ml is None:
+        return steered_step(p, before, aim, growth_of_brain(p, positions_mm, tissue, week), learnt, week, last)
+    known = 0.0 if learnt is None else learnt[-1]
+    at_end = joined(p.follow.ventricles_ml, start.ventricles_mm3 * ML_PER_MM3, p.start_week, week) / ML_PER_MM3
+    rate = (math.log(at_end / before.ventricles_mm3) / step_s - known) / 3
+    rate = min(max(rate, bounds(p)[0]), bounds(p)[1])
+    at_start = None
+    if p.time_scheme == "adams-bashforth":
+        at_start = rate_at_start(rate, step_s, last, "ventricle_growth_rate_at_start_per_s")
+    ventricles = Ventricles(before.ventricles_mm3, at_end, rate, at_start)
+    p = p.model_copy(update={"ventricle_growth_rate_per_s": rate if at_start is None else at_start})
+    free = growth_of_brain(p, positions_mm, tissue, week, rate)
+    step = steered_step(p, before, aim, free, None if learnt is None else learnt[:-1], week, last)
+    return replace(step, ventricles=ventricles)
 
 
 def steered_step(
@@ -273,17 +322,22 @@ def rates_at_start(rates: GrowthRates, step_s: float, last: Mapping[str, Any]) -
     last
         Row of the step table of the step before, empty where there was none.
     """
-    if not last:
-        return rates
-    part = step_s / last["dt_s"] / 2
-    tangential = (rates.tangential + part * last["growth_rate_at_start_per_s"]) / (1 + part)
-    core = (rates.core + part * last["core_growth_rate_at_start_per_s"]) / (1 + part)
+    tangential = rate_at_start(rates.tangential, step_s, last, "growth_rate_at_start_per_s")
+    core = rate_at_start(rates.core, step_s, last, "core_growth_rate_at_start_per_s")
     return GrowthRates(tangential, core, rates.limited)
+
+
+def rate_at_start(rate: float, step_s: float, last: Mapping[str, Any], column: str) -> float:
+    """Returns one such rate at a step's start; the row of the step before has its own in a column."""
+    if not last:
+        return rate
+    part = step_s / last["dt_s"] / 2
+    return float((rate + part * last[column]) / (1 + part))
 
 
 def growing_at_start(p: FoldingParameters, positions_mm: Floats, tissue: Tissue) -> FoldingParameters:
     """Returns the parameters of a run with the growth of its first step, for (n, 3) positions of its start mesh."""
-    start = size_of(positions_mm, tissue.zones)
+    start = size_of(positions_mm, tissue)
     return following_step(p, start, positions_mm, tissue, 0.0, p.step_s, {}, None).parameters
 
 

@@ -1,7 +1,7 @@
 """What growth would make of the area and the volume of a brain if nothing held it back, from its layers and maps."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces, volumes_betwee
 from ..geometry.triangles import TriangleMesh, area_vectors
 from ..mechanics.growth import growth_increments
 from ..mechanics.steering import Response, free_response
-from ..parameters.folding import STRAIN, FoldingParameters
+from ..parameters.folding import STRAIN, VENTRICLES, FoldingParameters
 from ..parameters.varying import Maps, value_at
 from ..units import SECONDS_PER_GW
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight
@@ -41,12 +41,20 @@ class Tissue:
         """Returns the tissue of a mesh."""
         return cls(linear_pieces(mesh), zones, maps)
 
+    def ventricles_mm3(self, positions_mm: Floats) -> float:
+        """Returns the volume of the ventricles in the brain, for (n, 3) positions of all vertices; 0 where unknown."""
+        if VENTRICLES not in self.maps:
+            return 0.0
+        return float(self.maps[VENTRICLES][self.pieces].mean(axis=1) @ volumes_between(positions_mm, self.pieces))
 
-def growth_of_brain(p: FoldingParameters, positions_mm: Floats, tissue: Tissue, week: float) -> Response:
+
+def growth_of_brain(
+    p: FoldingParameters, positions_mm: Floats, tissue: Tissue, week: float, ventricles_per_s: float = 0.0
+) -> Response:
     """Returns what free growth would make of the brain's sizes, in 1/s for unit rates of cortex and core.
 
-    Each place grows by its maps' multiples of the two rates, and with measured strain where there is one. Volume is
-    that of all tissue; area is as growth along the surface makes it.
+    Each place grows by its maps' multiples of the two rates, and with measured strain where there is one; ventricles
+    by a rate of their own. Volume is that of all tissue; area is as growth along the surface makes it.
 
     Parameters
     ----------
@@ -54,6 +62,8 @@ def growth_of_brain(p: FoldingParameters, positions_mm: Floats, tissue: Tissue, 
         Of all vertices.
     week
         Whose thickness and maps hold.
+    ventricles_per_s
+        Rate of the ventricles in each direction, where they have their own.
     """
     zones, maps = tissue.zones, tissue.maps
     thickness = p.thickness_at(week, maps)
@@ -67,6 +77,7 @@ def growth_of_brain(p: FoldingParameters, positions_mm: Floats, tissue: Tissue, 
             map_at(p.regional_growth, week),
         )
     )
+    ventricles = maps[VENTRICLES] if p.with_ventricles else 0.0
     volumes = volumes_between(positions_mm, tissue.pieces)
     whole = volumes.sum()
 
@@ -87,12 +98,21 @@ def growth_of_brain(p: FoldingParameters, positions_mm: Floats, tissue: Tissue, 
         tensors = unpacked((strain * zones.growth).T[faces].mean(axis=1))
         across = np.einsum("fi,fij,fj->f", normals, tensors, normals) / areas**2
         stretched = float((np.trace(tensors, axis1=1, axis2=2) - across) @ areas / areas.sum()) / SECONDS_PER_GW
-    return free_response(
+    response = free_response(
         surface,
         of_volume(of_cortex, 0.0, 0.0, of_cortex if p.regional_strain else 0.0),
-        of_volume(0.0, 0.0, of_core, 0.0),
+        of_volume(0.0, 0.0, of_core * (1.0 - ventricles), 0.0),
         area_else=stretched,
         volume_else=of_volume(0.0, value_at(p.radial_growth_rate_per_s, week, maps), 0.0, 0.0),
+    )
+    if not p.with_ventricles:
+        return response
+    # the surface gives way to ventricles as it does to the core around them
+    wider = ventricles_per_s * of_volume(0.0, 0.0, ventricles, 0.0)
+    return replace(
+        response,
+        area_else=response.area_else + wider * response.area[1] / response.volume[1],
+        volume_else=response.volume_else + wider,
     )
 
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, unit, vertex_normals
 from ..mechanics.growth import growth_increments
-from ..parameters.folding import FoldingParameters
+from ..parameters.folding import VENTRICLES, FoldingParameters
 from ..parameters.varying import Maps, value_at
 
 Floats = NDArray[np.float64]
@@ -68,6 +68,8 @@ def layers_at(
         value_at(rate, week, maps)
         for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
     )
+    if p.with_ventricles:
+        core = core + maps[VENTRICLES] * (p.ventricle_growth_rate_per_s - core)
     # where directions are measured, the rates are those of volume
     across = tangential if p.regional_strain else 0.0
     dg, dr = growth_increments(w, growth, tangential, radial, core, step_s, across=across)

@@ -102,8 +102,8 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
-        self._start_size = size_of(mesh.vertices, zones)
         self._tissue = Tissue.of(mesh, zones, self.maps)
+        self._start_size = size_of(mesh.vertices, self._tissue)
         # those of the last step, with its rates of growth
         self.present = growing_at_start(parameters, mesh.vertices, self._tissue)
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
@@ -265,7 +265,7 @@ class Folding:
             counts.append(count)
             guess = self.problem.displacement.copy()
             u = self.domain.gathered(guess[: self.domain.owned])
-            again = growth.again(size_of((state.positions + u) * MM_PER_M, self.zones))
+            again = growth.again(size_of((state.positions + u) * MM_PER_M, self._tissue))
             if again is None:
                 return growth, u, summed(counts), rate
             growth = again
@@ -329,7 +329,7 @@ class Folding:
         growth, u, count, rate = self._grow(state, step_s, growth)
         ratios = problem.volume_ratios()
         energy = self._energy()
-        size = size_of((state.positions + u) * MM_PER_M, self.zones)
+        size = size_of((state.positions + u) * MM_PER_M, self._tissue)
         length = np.linalg.norm(u, axis=1) * MM_PER_M
         left = None if kept is None else domain.gathered_cells(packed(left_stretch(problem.outcome("elastic"))))
         row = {

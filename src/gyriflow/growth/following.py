@@ -14,8 +14,10 @@ Floats = NDArray[np.float64]
 
 QUANTITIES = ("area_cm2", "volume_ml")
 """Sizes that growth follows, as columns of the table of areas."""
-THICKNESS = "thickness_mm"
-"""Column of that table with the mean cortical thickness, where it is known."""
+THICKNESS, VENTRICLES = "thickness_mm", "ventricles_ml"
+"""Columns of that table with the mean cortical thickness, and with the volume of the ventricles, where it is known."""
+MORE = (THICKNESS, VENTRICLES)
+"""What may be followed beside the sizes; both may shrink."""
 SPACING_GW = 0.25
 """Of the weeks that a run knows a curve at."""
 
@@ -28,8 +30,8 @@ def fits_of_series(
     Parameters
     ----------
     areas
-        Columns series, week, area_cm2, volume_ml, thickness_mm; series of two weeks or more. Where brains of less than
-        two weeks have a thickness, no curve of it is fitted; thickness may shrink.
+        Columns series, week, area_cm2, volume_ml, and of `MORE` what is known; series of two weeks or more. Where
+        brains of less than two weeks have a thickness or ventricles, no curve of these is fitted; they may shrink.
     until
         The last week whose brains count; series that then have less than two weeks are left out. None for all.
     """
@@ -39,10 +41,12 @@ def fits_of_series(
     fits: dict[str, dict[str, Fit]] = {}
     for name, brains in areas.groupby("series", sort=False):
         fits[str(name)] = {}
-        for quantity in (*QUANTITIES, THICKNESS):
+        for quantity in (*QUANTITIES, *(name for name in MORE if name in brains)):
             known = brains.dropna(subset=quantity)
+            if quantity == VENTRICLES:
+                known = known[known[quantity] > 0]
             if quantity in QUANTITIES or len(known["week"].unique()) > 1:
-                shrink = may_shrink or quantity == THICKNESS
+                shrink = may_shrink or quantity in MORE
                 curve = fitted(known["week"].tolist(), known[quantity].tolist(), name=quantity, may_shrink=shrink)
                 fits[str(name)][quantity] = curve
     return fits
@@ -51,7 +55,7 @@ def fits_of_series(
 def followed_sizes(
     follow: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float], shrink: bool
 ) -> dict[str, dict[float, float]]:
-    """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week; thickness if given.
+    """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week; `MORE` if given.
 
     Parameters
     ----------
@@ -74,15 +78,13 @@ def followed_sizes(
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in (*QUANTITIES, *([THICKNESS] if follow[THICKNESS] is not None else [])):
+    for quantity in (*QUANTITIES, *(name for name in MORE if follow.get(name) is not None)):
         given = follow[quantity]
         if given == "measured":
             curve = _measured(curves, series, quantity, follow["known_until_gw"])
         else:
             known = {float(week): number for week, number in given.items()}
-            curve = tabulated(
-                list(known), list(known.values()), name=quantity, may_shrink=shrink or quantity == THICKNESS
-            )
+            curve = tabulated(list(known), list(known.values()), name=quantity, may_shrink=shrink or quantity in MORE)
         sizes = value(curve, at)
         tables[quantity] = {round(float(week), 6): float(size) for week, size in zip(at, sizes, strict=True)}
     return tables
@@ -124,10 +126,14 @@ def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str, un
     known = table["known_until_gw"].isna() if until is None else table["known_until_gw"] == until
     rows = table[known & (table["series"] == series) & (table["quantity"] == quantity)]
     if not len(rows):
+        weeks_known = "two weeks or more" + ("" if until is None else f" up to {until:g} GW")
+        if quantity in MORE and (known & (table["series"] == series)).any():
+            found = f"its brains have no {quantity} in {weeks_known}"
+        else:
+            found = f"the start brain is in no series of brains of {weeks_known}"
         raise InputError(
             f"no measured curve of {quantity} can be followed",
-            found="the start brain is in no series of brains of two weeks or more"
-            + ("" if until is None else f" up to {until:g} GW"),
+            found=found,
             remedy="List brains of other weeks, or give follow a table such as {area_cm2: {21: 99, 30: 252}}",
         )
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))

@@ -134,6 +134,45 @@ def surface_pose(report: Mapping) -> Floats:
     return pose @ LPS_TO_RAS if _in_lps(report) and report["source"] == "hemispheres" else pose
 
 
+def ventricles_on_mesh(
+    mesh_vertices_mm: Floats,
+    labels: NDArray[np.integer],
+    affine: ArrayLike,
+    ventricles: Sequence[int],
+    report: Mapping,
+    path: str,
+) -> Floats:
+    """Returns the part of ventricles in the tissue around the (n,) vertices of a mesh, from 0 to 1.
+
+    Parameters
+    ----------
+    labels : (i, j, k) int
+        Of the voxels.
+    affine : (4, 4) float
+        Voxel index to RAS+ position of the volume.
+    ventricles
+        The labels that are ventricles.
+    report, path
+        Of the brain's surface, and the file of the labels, as of `volume_pose`.
+
+    Raises
+    ------
+    InputError
+        Where no vertex lies in a ventricle.
+    """
+    fluid, motion = np.isin(labels, ventricles).astype(float), volume_pose(report, path)
+    found = volume_map_on_mesh(mesh_vertices_mm, fluid, motion @ np.asarray(affine), path)
+    if found.max() < 0.5:
+        raise InputError(
+            "the labels know no ventricles in the brain, so that they cannot grow by a curve of their own",
+            path=path,
+            found=f"no vertex of the mesh in voxels of the ventricles' labels {list(ventricles)}",
+            expected="ventricles in the cerebrum, named by the labels' scheme",
+            remedy="Set follow.ventricles_ml to null, or name the ventricles in the scheme.",
+        )
+    return found
+
+
 def volume_pose(report: Mapping, path: str) -> Floats:
     """Returns the (4, 4) motion from a brain's volumes to its surface, from the report of the surface.
 

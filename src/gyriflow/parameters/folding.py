@@ -47,6 +47,8 @@ Memory = Annotated[
 Fraction = Annotated[float, Field(gt=0, le=2)]
 STRAIN = ("xx", "yy", "zz", "xy", "xz", "yz")
 """Parts of a symmetric tensor, which end the names of their maps."""
+VENTRICLES = "ventricles"
+"""The map of the part of ventricles in the tissue around a vertex."""
 
 
 class Contact(Settings):
@@ -126,6 +128,11 @@ class Follow(Settings):
         None, "mm",
         "Cortical thickness by gestational week, or `measured`, a curve through the mean thickness of these brains; "
         "`null`: the run's `thickness_mm`.",
+    )  # fmt: skip
+    ventricles_ml: SizeCurve | None = setting(
+        None, "mL",
+        "Volume of the ventricles by gestational week, or `measured`, a curve through that of these brains' labels: "
+        "they then grow by a rate of their own, and the core around them by what remains. `null`: like the core.",
     )  # fmt: skip
     regional: float = setting(
         0.0, "",
@@ -300,12 +307,23 @@ class FoldingParameters(FoldingSettings):
         {}, "GW", "With `follow.directional`: likewise what the names of the six maps of measured strain begin with."
     )
 
+    ventricle_growth_rate_per_s: float = setting(
+        0.0, "1/s", "With `follow.ventricles_ml`: growth of the ventricles in all directions, set before each step."
+    )
+
+    @property
+    def with_ventricles(self) -> bool:
+        """Whether ventricles grow by a rate of their own."""
+        return self.follow is not None and self.follow.ventricles_ml is not None
+
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
         own = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
         strain = {f"{name}_{part}" for name in self.regional_strain.values() for part in STRAIN}
-        return own | strain | set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
+        ventricles = {VENTRICLES} if self.with_ventricles else set()
+        local = set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
+        return own | strain | local | ventricles
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""

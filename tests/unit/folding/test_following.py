@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ from gyriflow.folding.output import layer_fields
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, area
 from gyriflow.mechanics.steering import Aim, GrowthRates, Response, free_response
-from gyriflow.parameters.folding import STRAIN
+from gyriflow.parameters.folding import STRAIN, VENTRICLES
 from gyriflow.parameters.reading import parameters_from
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 
@@ -65,7 +65,7 @@ def test_a_run_that_follows_begins_with_the_growth_that_leads_to_its_curves():
     plain = parameters_from(RUN | GROWING)
     zones = zones_of_run(mesh, plain)
     tissue = Tissue.of(mesh, zones, {})
-    start = size_of(mesh.vertices, zones)
+    start = size_of(mesh.vertices, tissue)
     area, volume = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
     curves = {"area_cm2": {21.0: area, 22.0: 1.13 * area}, "volume_ml": {21.0: volume, 22.0: 1.2 * volume}}
     p = parameters_from(RUN | GROWING | {"follow": curves})
@@ -91,10 +91,10 @@ def test_free_growth_of_a_body_is_known():
     }
     maps = {"uniform": np.ones(len(x)), "double": np.full(len(x), 2.0), "left": np.where(x < 0, 2.0, 1.0)} | strain
 
+    tissue = Tissue.of(mesh, zones, maps)
+
     def free(**changes):
-        return growth_of_brain(
-            parameters_from(RUN | GROWING | changes), mesh.vertices, Tissue.of(mesh, zones, maps), 21
-        )
+        return growth_of_brain(parameters_from(RUN | GROWING | changes), mesh.vertices, tissue, 21)
 
     plain, doubled = free(), free(regional_growth={21.0: "double"})
     # all of it grows by one rate: three directions of the core, two of the cortex
@@ -112,6 +112,16 @@ def test_free_growth_of_a_body_is_known():
     stretched = TriangleMesh(mesh.vertices * np.exp(1e-3 * np.array([0.06, -0.03, -0.03])), zones.measured_facets)
     wider = math.log(area(stretched) / area(TriangleMesh(mesh.vertices, zones.measured_facets)))
     assert directed.area_else * SECONDS_PER_GW == pytest.approx(1e3 * wider, rel=1e-3)
+    # ventricles leave the core's rate without them, and widen brain and surface by their own
+    inside = np.linalg.norm(mesh.vertices, axis=1) < 8
+    maps[VENTRICLES] = inside.astype(float)
+    curves = {"area_cm2": {21: 1.0}, "volume_ml": {21: 1.0}, "ventricles_ml": {21: 1.0}}
+    own = growth_of_brain(parameters_from(RUN | GROWING | {"follow": curves}), mesh.vertices, tissue, 21, 1e-7)
+    part = tissue.ventricles_mm3(mesh.vertices) / size_of(mesh.vertices, tissue).volume_mm3
+    assert part == pytest.approx(8**3 / np.prod(SEMI_AXES), rel=0.15)
+    assert own.volume[1] == pytest.approx(plain.volume[1] - 3 * part, rel=1e-6)
+    assert own.volume_else == pytest.approx(3 * part * 1e-7, rel=1e-6)
+    assert own.area_else == pytest.approx(own.volume_else * own.area[1] / own.volume[1])
     assert free(radial_growth_rate_per_s=1e-7).volume_else == pytest.approx((1 - layer) * 1e-7)
 
 
@@ -142,7 +152,9 @@ def followed_body(gain, days, *, curve=bent, directions=changing, kept=0.7, week
     for number in range(round(weeks * 7 / days)):
         week = 21 + (number + 1) * days / 7
         before = size
-        aim = Aim(*astuple(before), 1e4 * math.exp(curve(week)[0]), 5e4 * math.exp(curve(week)[1]), step)
+        aim = Aim(
+            before.area_mm2, before.volume_mm3, 1e4 * math.exp(curve(week)[0]), 5e4 * math.exp(curve(week)[1]), step
+        )
         added = directions(week) / SECONDS_PER_GW
         body = Response((2.1 * share, 2.1 * (1 - share)), (1.25, 1.75), kept * added, 0.0)
         last = rows[-1] if rows else {}

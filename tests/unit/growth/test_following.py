@@ -87,3 +87,17 @@ def test_a_prediction_knows_no_brain_after_its_week():
     assert sizes["area_cm2"][25.0] == pytest.approx(90 * 1.1**4, rel=0.01)
     with pytest.raises(InputError, match="up to 22 GW"):
         followed_sizes(follow | {"known_until_gw": 22.0}, pd.concat(tables), "volume", [23.0, 24.0], False)
+
+
+def test_ventricles_have_a_curve_where_labels_know_them_and_may_shrink():
+    (fits,) = fits_of_series(AREAS.assign(ventricles_ml=8.0 - 0.5 * (WEEKS - 21))).values()
+    table = curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=np.nan)
+    follow = {"area_cm2": "measured", "volume_ml": "measured", "ventricles_ml": "measured", "known_until_gw": None}
+    assert followed_sizes(follow, table, "volume", [21.0, 23.0], False)["ventricles_ml"][23.0] == pytest.approx(
+        7.0, 0.01
+    )
+    # labels that know none have volumes of zero, or none at all
+    (without,) = fits_of_series(AREAS.assign(ventricles_ml=0.0)).values()
+    assert set(without) == {"area_cm2", "volume_ml"}
+    with pytest.raises(InputError, match="no ventricles_ml in two weeks or more"):
+        followed_sizes(follow, curves(), "volume", [21.0, 23.0], False)

@@ -13,6 +13,7 @@ from gyriflow.mesh.maps import (
     move_nearest,
     require_within,
     surface_pose,
+    ventricles_on_mesh,
     vertex_map_on_mesh,
     volume_map_on_mesh,
     volume_pose,
@@ -225,3 +226,21 @@ def test_a_volume_cannot_follow_hemispheres_that_were_posed_separately():
     report = {"pose": np.eye(4).tolist(), "posing": {"together": False}}
     with pytest.raises(InputError, match=r"a\.nii: a volume cannot be the map.*posed separately.*per vertex \(GIFTI\)"):
         volume_pose(report, "a.nii")
+
+
+def test_ventricles_are_where_the_labels_have_them(ball):
+    points = ball.vertices
+    low = points.min(axis=0) - 2
+    affine = np.diag([0.5, 0.5, 0.5, 1.0])
+    affine[:3, 3] = low
+    shape = np.ceil((np.ptp(points, axis=0) + 4) / 0.5).astype(int) + 1
+    places = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) * 0.5 + low
+    inside = np.linalg.norm(places, axis=-1) < 0.5 * RADIUS
+    labels = np.where(inside, 7, 1)
+    report = {"pose": np.eye(4).tolist(), "source": "labels"}
+    found = ventricles_on_mesh(points, labels, affine, (7, 8), report, "labels.nii.gz")
+    depth = np.linalg.norm(points, axis=1)
+    assert (found[depth < 0.5 * RADIUS - 1] == 1).all()
+    assert (found[depth > 0.5 * RADIUS + 1] == 0).all()
+    with pytest.raises(InputError, match="know no ventricles"):
+        ventricles_on_mesh(points, labels, affine, (2,), report, "labels.nii.gz")
