@@ -182,15 +182,16 @@ def _draw_row(
         axes.set_label(f"{row.label}, column {index}")
         axes.set_axis_off()
         if index < len(letters):
-            # beside the row's label, or above the letters of the picture's ends
+            # beside the row's label, or above the letters of the ends, of this picture and the one before
+            beside = row.label and not index
             axes.annotate(
                 letters[index],
                 (0.0, 1.0),
                 xytext=(-2, 2),
                 textcoords="offset points",
                 xycoords="axes fraction",
-                ha="right" if row.label else "left",
-                va="bottom" if not row.label else "top",
+                ha="right" if beside else "left",
+                va="top" if beside else "bottom",
                 fontsize=9,
                 fontweight="bold",
             )
