@@ -127,6 +127,8 @@ def quality_page(
         _draw_views(figure, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS, top - VIEWS_IN)
         bar = figure.add_axes((0.93, (FOOT_IN + 0.2) / height, 0.012, (VIEWS_IN - 0.4) / height))
         figure.colorbar(scale, cax=bar).set_label("thickness (mm)", fontsize=6.5)
+        if not np.isfinite(brain.thickness_mm).all():
+            figure.text(0.985, (FOOT_IN + 0.06) / height, "grey: not measured", fontsize=6, ha="right", va="top")
         bar.tick_params(labelsize=6)
     for letter, below in zip("abc", (HEAD_IN, HEAD_IN + PLANES_IN, HEAD_IN + PLANES_IN + VIEWS_IN), strict=True):
         place = 1 - (below + 0.02) / height

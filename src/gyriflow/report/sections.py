@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..parameters.terms import BRIDGE, LEFT, RIGHT
+from .renders import ROUNDING, SIGNED, goes_below_zero
 from .style import (
     FULL_WIDTH_IN,
     MAGNITUDES,
@@ -120,8 +121,13 @@ def cross_sections(
                 scale = ListedColormap(colours)
             else:
                 values = section.point_data[name][triangles].mean(axis=1)
-                limits = float(np.min(fields[name])), float(np.max(fields[name]))
+                limits, scale = (
+                    _limits(fields[name]),
+                    mpl.colormaps[SIGNED if goes_below_zero(fields[name]) else MAGNITUDES],
+                )
             drawn = _draw(axes, points, triangles, values, scale, limits)
+            if panels.shape[1] > 3:
+                axes.xaxis.set_major_locator(MaxNLocator(2))
             if ellipsoid:
                 _outline(axes, ellipsoid, plane, _middle(mesh)[PLANES[plane][0]])
         if name in fields:
@@ -241,7 +247,6 @@ def _rows(
         axes.set_ylim(middle[up] - tall[row], middle[up] + tall[row])
         last = row == len(planes) - 1 or PLANES[planes[row + 1]][1] != right
         axes.tick_params(labelbottom=last, labelleft=not column)
-        axes.xaxis.set_major_locator(MaxNLocator(nbins=4 if columns < 4 else 2))
         if last:
             axes.set_xlabel(AXIS_NAMES[right] if columns < 3 else f"{'xyz'[right]} (mm)")
         if not column:
@@ -249,6 +254,14 @@ def _rows(
     for axes in panels[-1]:
         axes.set_axis_off()
     return figure, panels[:-1], panels[-1]
+
+
+def _limits(values: Floats) -> tuple[float, float]:
+    """Returns the ends of the colour scale of a field: from zero where it is the same everywhere but for rounding."""
+    low, high = float(np.min(values)), float(np.max(values))
+    if goes_below_zero(values):
+        return min(low, -high), max(high, -low)
+    return (low, high) if high - low > ROUNDING * high else (0.0, high)
 
 
 def _middle(mesh: TetrahedralMesh) -> Floats:

@@ -8,6 +8,7 @@ from string import ascii_lowercase
 
 import matplotlib as mpl
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -32,7 +33,8 @@ def figures_can_be_printed(monkeypatch):
     monkeypatch.setattr(Figure, "__init__", noted)
     yield
     for figure, kind in drawn:
-        panels = [axes for axes in figure.axes if axes.get_label() != "scale bar" and not hasattr(axes, "_colorbar")]
+        drawn_on = [axes for axes in figure.axes if axes.axison or axes.has_data()]
+        panels = [axes for axes in drawn_on if axes.get_label() != "scale bar" and not hasattr(axes, "_colorbar")]
         bold = [text for text in figure.findobj(Text) if text.get_fontweight() == "bold"]
         letters = sorted(text.get_text() for text in bold if len(text.get_text()) == 1)
         assert letters == list(ascii_lowercase[: len(letters)])
@@ -68,7 +70,7 @@ def require_legible(figure: Figure) -> None:
 def shown_texts(figure: Figure) -> set[Text]:
     """Returns the texts that are seen: not those of ticks beyond an axis, nor of an axis that is off."""
     hidden = set()
-    for axes in figure.axes:
+    for axes in figure.findobj(Axes):
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
             for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
