@@ -29,7 +29,7 @@ STUDY = {
     # so many steps that both runs are under way together
     "folding": {
         "end_week": 21.5,
-        "output_weeks": [21, 21.5],
+        "output_every_gw": 0.5,
         "thickness_mm": 4.0,
         "support": "base",
         "no_growth": {"kind": "none"},
@@ -76,7 +76,7 @@ class Submitted:
 
     def end(self):
         """Waits for its end; returns its exit code and what it printed."""
-        printed, _ = self.process.communicate(timeout=300)
+        printed, _ = self.process.communicate(timeout=900)
         return self.process.returncode, printed
 
     def jobs(self):
@@ -88,7 +88,7 @@ class Submitted:
             found[run] = (number, state, int(processors), " ".join(reason))
         return found
 
-    def wait(self, until, timeout_s=180):
+    def wait(self, until, timeout_s=600):
         """Waits until a function of the jobs and of the logs holds, and returns the jobs of that moment."""
         deadline = time.monotonic() + timeout_s
         while True:
@@ -96,8 +96,8 @@ class Submitted:
             logs = {run: self.log(run) for run in RUNS}
             if until(jobs, logs):
                 return jobs
-            ended = self.process.poll() is not None and self.process.communicate()[0]
-            assert time.monotonic() < deadline and not ended, f"{jobs}\n{logs}\n{ended}\n{self.slurm.logs()}"
+            assert self.process.poll() is None, f"{self.process.communicate()[0]}\n{self.slurm.logs()}"
+            assert time.monotonic() < deadline, f"{jobs}\n{logs}\n{self.slurm.logs()}"
             time.sleep(0.3)
 
     def log(self, run):
