@@ -8,10 +8,14 @@ from importlib.util import find_spec
 import numpy as np
 import pandas as pd
 import pytest
+from shapes import ellipsoid_mesh, hemisphere
 
-from gyriflow.io.files import read_json
+from gyriflow.io.files import read_json, write_json
 from gyriflow.io.frames import read_positions
+from gyriflow.io.surfaces import write_surface
+from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
+from .conftest import SMALL_STUDY
 from .slurm_cluster import cluster, missing
 
 PLUGIN = "snakemake_executor_plugin_slurm"
@@ -21,21 +25,16 @@ pytestmark = [
     pytest.mark.skipif(bool(LACKING), reason=f"not installed here: {', '.join(LACKING)} (docs/how-to/cluster.md)"),
 ]
 
-STUDY = {
-    "brains": [{"id": "dome", "week": 21, "shape": {"kind": "half-ellipsoid", "noise_mm": 0.1}}],
-    "start": "dome",
-    "surface": {"edge_length_mm": 3.0},
-    "mesh": {"surface_edge_mm": 3.0, "core_edge_mm": 6.0, "envelope_mm": 0.1, "order": 1},
+STUDY = SMALL_STUDY | {
+    "brains": SMALL_STUDY["brains"][:1],
     # so many steps that both runs are under way together
     "folding": {
         "end_week": 21.5,
         "output_every_gw": 0.5,
-        "thickness_mm": 4.0,
-        "support": "base",
-        "no_growth": {"kind": "none"},
-        "contact": {"kind": "none"},
+        "thickness_mm": 3.0,
         "growth_rate_per_s": 1e-6,
-        "step_s": 900.0,
+        "step_s": 1000.0,
+        "contact": {"kind": "none"},
         "solver": {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10},
     },
     "runs": {
@@ -47,7 +46,7 @@ STUDY = {
 }
 RUNS = tuple(STUDY["runs"])
 PARALLEL = ("soft", "stiff")
-FOLDER = "results/runs/{run}/dome/folding"
+FOLDER = "results/runs/{run}/a/folding"
 SUMMARIES = [f"{FOLDER.format(run=run)}/summary.json" for run in RUNS]
 BEFORE = [f"{FOLDER.format(run=run)}/regions.xdmf" for run in RUNS]
 OPTIONS = (
@@ -102,25 +101,35 @@ class Submitted:
 
     def log(self, run):
         """Returns the log of a run."""
-        path = self.folder / f"results/runs/{run}/dome/logs/simulate.log"
+        path = self.folder / f"results/runs/{run}/a/logs/simulate.log"
         return path.read_text() if path.exists() else ""
 
 
 @pytest.fixture
-def slurm(tmp_path):
-    with cluster(tmp_path / "slurm") as running:
+def slurm(tmp_path_factory):
+    with cluster(tmp_path_factory.mktemp("slurm")) as running:
         yield running
 
 
 @pytest.fixture
 def meshed(workflow):
-    """The study up to its folding, in two folders; in the first one it is finished on this machine, undisturbed."""
+    """A study up to its folding, in two folders; in the first one it is finished on this machine, undisturbed.
+
+    Its surface and mesh, an ellipsoid, count as made.
+    """
     workflow.write("study.yaml", STUDY)
-    made = workflow.run(*BEFORE, "--cores", "2", "--configfile", "study.yaml")
+    workflow.lay_out("mesh", "--configfile", "study.yaml")
+    results = workflow.directory / "results" / "brains" / "a"
+    write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
+    for side, sign in (("left", -1), ("right", 1)):
+        write_surface(results / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
+    write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", ellipsoid_mesh(8, (20.0, 26.0, 18.0)))
+    workflow.count_as_made("mesh", "--configfile", "study.yaml")
+    made = workflow.run(*BEFORE, "--cores", "2", "--configfile", "study.yaml", timeout_s=900)
     assert made.returncode == 0, made.stdout + made.stderr
-    disturbed = workflow.directory.parent / f"{workflow.directory.name}-disturbed"
-    shutil.copytree(workflow.directory, disturbed, ignore=shutil.ignore_patterns("slurm"))
-    finished = workflow.run(*SUMMARIES, "--cores", "2", "--configfile", "study.yaml")
+    disturbed = workflow.directory.with_name("disturbed")
+    shutil.copytree(workflow.directory, disturbed)
+    finished = workflow.run(*SUMMARIES, "--cores", "2", "--configfile", "study.yaml", timeout_s=900)
     assert finished.returncode == 0, finished.stdout + finished.stderr
     return workflow, disturbed
 
@@ -132,7 +141,7 @@ def test_cancelled_jobs_and_lost_nodes_change_nothing_in_the_result(meshed, slur
     study.start()
 
     # two runs side by side, each of two ranks on a processor of their own
-    jobs = study.wait(lambda jobs, logs: all("step   20" in logs[run] for run in PARALLEL))
+    jobs = study.wait(lambda jobs, logs: all("step    5" in logs[run] for run in PARALLEL))
     assert [jobs[run][1:3] for run in PARALLEL] == [("RUNNING", 2)] * 2
     assert all(" 2 ranks," in study.log(run) for run in PARALLEL)
 
@@ -159,7 +168,7 @@ def test_cancelled_jobs_and_lost_nodes_change_nothing_in_the_result(meshed, slur
         one, other = (root / FOLDER.format(run=run) for root in (workflow.directory, folder))
         if run in PARALLEL:
             assert "going on from the checkpoint after step" in study.log(run)
-            assert read_json(other / "summary.json")["resumed_after_step"] >= 20
+            assert read_json(other / "summary.json")["resumed_after_step"] >= 5
         before, after = (read_positions(root / "frames.h5", week) for root, week in ((one, 21.0), (one, 21.5)))
         largest = np.linalg.norm(after - before, axis=1).max()
         assert largest > 0.1
