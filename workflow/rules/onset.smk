@@ -20,7 +20,7 @@ rule onset:
         reports=lambda wildcards: expand(
             PIAL["report"], brain=later_brains(wildcards.brain)
         ),
-        registrations=lambda wildcards: registrations(later_brains(wildcards.brain)),
+        correspondences=lambda wildcards: correspondences(later_brains(wildcards.brain)),
     output:
         f"{RUN}/metrics/onset.csv",
     log:

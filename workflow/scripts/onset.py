@@ -4,12 +4,13 @@ import numpy as np
 import pandas as pd
 
 from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.triangles import transformed
 from gyriflow.io.files import read_json, write_table
-from gyriflow.io.registrations import read_deformation
+from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.depth import convex_hull, sulcal_depth
-from gyriflow.registration.carrying import carry_over_weeks
+from gyriflow.registration.carrying import carry_surface
 from gyriflow.step import step
 from gyriflow.validation.onset import numbered, onset_on_surfaces, regions_on, sulcal_regions
 
@@ -18,12 +19,12 @@ files, params, tables = snakemake.input, snakemake.params, []
 
 def carried(mesh, index):
     """Returns the vertices of a surface in the pose of the brain of an index, carried to the last brain's."""
-    points = carry_over_weeks(transform_points(mesh.vertices, np.linalg.inv(poses[index])), deformations[index:])[-1]
+    points = carry_surface(transformed(mesh, np.linalg.inv(poses[index])), between[index:])
     return transform_points(points, poses[-1])
 
 
 with step(snakemake.log[0]):
-    deformations = [read_deformation(path)[0] for path in files.registrations]
+    between = [read_correspondence(path) for path in files.correspondences]
     poses = [np.array(read_json(path)["pose"]) for path in files.reports]
     for side in params.sides:
         real, run = ([read_surface(path) for path in files[f"{who}_{side}"]] for who in ("real", "run"))
