@@ -54,6 +54,20 @@ def test_uniform_scaling_stands_beside_it():
     assert alike["displacement_slope_scaling"].iloc[0] == pytest.approx(1.0)
 
 
+def test_bodies_that_nothing_joins_may_move_apart():
+    faces = np.concatenate([FACES, FACES + len(POINTS)])
+    measured = np.stack(
+        [np.concatenate([stretched(week) - [22, 0, 0], stretched(week) + [22, 0, 0]]) for week in (21, 22)]
+    )
+    apart = np.stack([measured[0], measured[1] + np.repeat([[-3.0, 0, 1], [2, 0, 0]], len(POINTS), axis=0)])
+    table = displacement_table([21, 22], apart, measured, faces)
+    assert table["displacement_r"].iloc[0] == pytest.approx(1.0)
+    assert table["rms_mm"].iloc[0] == pytest.approx(table["measured_rms_mm"].iloc[0])
+    one = displacement_table([21, 22], measured[:, : len(POINTS)], measured[:, : len(POINTS)], FACES)
+    for name in ("displacement_r_scaling", "displacement_slope_scaling", "measured_rms_mm"):
+        assert table[name].iloc[0] == pytest.approx(one[name].iloc[0])
+
+
 def test_other_vertices_are_refused():
     with pytest.raises(InputError, match="same vertices in the same weeks"):
         displacement_table([21, 22], np.stack([POINTS] * 2), np.stack([POINTS[:9]] * 2), FACES)
