@@ -35,7 +35,9 @@ def curves_of_run(wildcards):
 
 def carried_of_run(wildcards):
     """Returns the mesh carried through real brains where the run's growth differs between regions."""
-    return rules.carried_mesh.output[0] if regional(wildcards.run) else []
+    # where no brains tell of local growth, the run's parameters say why
+    known = regional(wildcards.run) and wildcards.brain in WITH_CHAIN
+    return rules.carried_mesh.output[0] if known else []
 
 
 rule parameters:
@@ -63,6 +65,9 @@ rule parameters:
         ),
         regional_weeks=lambda wildcards: (
             weeks_of_chain(wildcards.brain) if regional(wildcards.run) else []
+        ),
+        unmatched=lambda wildcards: UNMATCHED.get(
+            CONFIG.estimated_from(wildcards.brain)
         ),
     script:
         "../scripts/parameters.py"
