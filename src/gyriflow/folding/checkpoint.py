@@ -6,6 +6,7 @@ a checksum of its own content; one that does not fit or is torn is not used.
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -45,6 +46,8 @@ class State:
         remembered (see `memory`).
     rate, before_rate : (n, 3) float or None
         Velocities in m/s at the start of the two last steps, without contact, where steps are made of velocities.
+    learnt : sequence of float or None
+        What growth that follows has learnt of the brain's response.
     rows : tuple of dict
         The step table so far.
     """
@@ -60,6 +63,7 @@ class State:
     stretch: Floats | None = None
     rate: Floats | None = None
     before_rate: Floats | None = None
+    learnt: Sequence[float] | None = None
     rows: tuple[dict, ...] = field(default=())
 
     @classmethod
@@ -92,10 +96,11 @@ class State:
         row: dict,
         stretch: Floats | None = None,
         rate: Floats | None = None,
+        learnt: Sequence[float] | None = None,
     ) -> "State":
         """Returns the state after an accepted step with its (n, 3) displacement in m and the stretch it left.
 
-        `rate` is the velocity at its start, where it was made of velocities.
+        `rate` is the velocity at its start, where it was made of velocities, and `learnt` what it taught.
         """
         return replace(
             self,
@@ -109,6 +114,7 @@ class State:
             stretch=stretch,
             rate=rate,
             before_rate=self.rate,
+            learnt=learnt,
             rows=(*self.rows, row),
         )
 

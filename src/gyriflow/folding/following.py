@@ -1,19 +1,19 @@
 """Growth that follows a brain: the rates of a step, set so that the pial area and the volume meet their curves."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.triangles import TriangleMesh, area, signed_volume
-from ..mechanics.steering import FIRST_SHARE, Aim, GrowthRates, realised_share, steered_rates
-from ..parameters.folding import STRAIN, FoldingParameters
-from ..parameters.varying import Maps, Varying
+from ..mechanics.steering import Aim, GrowthRates, Response, steered_rates
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import Varying
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
-from .memory import unpacked
+from .free_growth import Tissue, growth_of_brain, map_at
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -24,8 +24,12 @@ FASTEST_PER_S = 1e-5
 """Largest rate that is set, the bound of the prescribed ones."""
 FOLLOWED = 0.005
 """Part of a curve's value within which it counts as followed."""
-MOST_CORTEX = 0.8
-"""Part of the volume that at most counts as cortex, so that the core has something to grow."""
+MET = 0.001
+"""Part of a curve's value within which a step has to end, or else is done again with other rates."""
+MOST_TRIES = 4
+"""How often a step is done at most."""
+SAME = 1e-3
+"""Part of the rates by which they must change for a step to be done again."""
 
 
 @dataclass(frozen=True)
@@ -46,48 +50,118 @@ class Size:
 
 @dataclass(frozen=True)
 class Step:
-    """What growth that follows does in a step.
+    """A step whose growth is prescribed.
 
     Attributes
     ----------
     parameters
-        Those of the run with the rates of this step.
-    before, aim
-        The size at the step's start and that to be reached at its end, None where growth is prescribed.
-    rates
-        The rates that were set, as they are over the whole step.
-    at_start
-        What they are at its start; None where the step takes them as constant.
-    realised
-        Part of tangential growth that turns into area, as taken for this step.
+        Those of the run, with the rates of this step.
+    before
+        The size at the step's start.
     """
 
     parameters: FoldingParameters
     before: Size
-    aim: Size | None = None
-    rates: GrowthRates | None = None
-    at_start: GrowthRates | None = None
-    realised: float = FIRST_SHARE
 
-    def row(self, after: Size, step_s: float) -> dict[str, Any]:
+    def again(self, after: Size) -> "Step | None":
+        """Returns how a step that has led to a size is to be done again, None where it need not or cannot be."""
+        return None
+
+    def learnt(self, after: Size) -> tuple[float, ...] | None:
+        """Returns what a step that has led to a size teaches the next ones, None where that is nothing."""
+        return None
+
+    def row(self, after: Size) -> dict[str, Any]:
         """Returns what the step table says of growth after the step has led to a size."""
-        sizes = {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
-        if self.aim is None or self.rates is None:
-            return sizes
-        share = realised_share(self.realised, self.rates.tangential, self.before.area_mm2, after.area_mm2, step_s)
+        return {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
+
+
+@dataclass(frozen=True)
+class SteeredStep(Step):
+    """A step whose growth is set so that it leads to a size.
+
+    Attributes
+    ----------
+    aim
+        The size to be reached.
+    rates
+        The rates that are set, as they are over the whole step.
+    at_start
+        What they are at its start; None where the step takes them as constant.
+    free, response
+        What unit rates would make of the brain's size if nothing held growth back, and what is expected of them.
+    end_week
+        When the step ends.
+    last
+        Row of the step table of the step before, empty where there was none.
+    tries
+        How often the step has been done, this time included.
+    tried
+        The rates of the try before, and the rates in 1/s of the logarithms of area and volume that came of it.
+    """
+
+    aim: Aim
+    rates: GrowthRates
+    at_start: GrowthRates | None
+    free: Response
+    response: Response
+    end_week: float
+    last: Mapping[str, Any]
+    tries: int = 1
+    tried: tuple[GrowthRates, tuple[float, float]] | None = None
+
+    def again(self, after: Size) -> "SteeredStep | None":
+        missed = after.area_mm2 / self.aim.next_area - 1, after.volume_mm3 / self.aim.next_volume - 1
+        if self.tries >= MOST_TRIES or max(map(abs, missed)) <= MET:
+            return None
+        response = self._taught(after)
+        rates = steered_rates(self.aim, response, bounds(self.parameters))
+        change = abs(rates.tangential - self.rates.tangential) + abs(rates.core - self.rates.core)
+        if change <= SAME * (abs(rates.tangential) + abs(rates.core)):
+            return None
+        parameters, at_start = with_rates(self.parameters, rates, self.end_week, self.aim.duration, self.last)
+        return replace(
+            self,
+            parameters=parameters,
+            rates=rates,
+            at_start=at_start,
+            response=response,
+            tries=self.tries + 1,
+            tried=(self.rates, self._found(after)),
+        )
+
+    def learnt(self, after: Size) -> tuple[float, ...]:
+        return (self._taught(after) - self.free).values
+
+    def row(self, after: Size) -> dict[str, Any]:
+        row = super().row(after)
         if self.at_start is not None:
-            sizes |= {
+            row |= {
                 "growth_rate_at_start_per_s": self.at_start.tangential,
                 "core_growth_rate_at_start_per_s": self.at_start.core,
             }
-        return sizes | {
-            "area_aim_cm2": self.aim.area_mm2 * CM2_PER_MM2,
-            "volume_aim_ml": self.aim.volume_mm3 * ML_PER_MM3,
+        # what the cortex would grow in area if nothing held it
+        free = sum(self.free.area) * self.rates.tangential + self.free.area_else
+        return row | {
+            "area_aim_cm2": self.aim.next_area * CM2_PER_MM2,
+            "volume_aim_ml": self.aim.next_volume * ML_PER_MM3,
             "growth_rate_per_s": self.rates.tangential,
             "core_growth_rate_per_s": self.rates.core,
-            "realised_share": share,
+            "realised_share": self._found(after)[0] / free if free else math.nan,
             "growth_limited": int(self.rates.limited),
+            "growth_tries": self.tries,
         }
+
+    def _found(self, after: Size) -> tuple[float, float]:
+        """Returns the rates in 1/s of the logarithms of area and volume, after the step has led to a size."""
+        return replace(self.aim, next_area=after.area_mm2, next_volume=after.volume_mm3).rates()
+
+    def _taught(self, after: Size) -> Response:
+        """Returns the response of the brain as it is known after the step has led to a size."""
+        found, response = self._found(after), self.response
+        if self.tried is not None:
+            response = response.corrected(*self.tried, self.rates, found)
+        return response.agreeing(self.rates, found)
 
 
 def missed_curves(row: Mapping[str, Any]) -> str:
@@ -109,38 +183,67 @@ def size_of(positions_mm: Floats, zones: Zones) -> Size:
 
 
 def following_step(
-    p: FoldingParameters, start: Size, before: Size, time_s: float, step_s: float, last: Mapping[str, Any], maps: Maps
+    p: FoldingParameters,
+    start: Size,
+    positions_mm: Floats,
+    tissue: Tissue,
+    time_s: float,
+    step_s: float,
+    last: Mapping[str, Any],
+    learnt: Sequence[float] | None,
 ) -> Step:
     """Returns the growth of a step: the run's own where it is prescribed, else what leads to the curves.
 
     Parameters
     ----------
-    start, before
-        The size at the start of the run, and now.
+    start
+        The size at the start of the run.
+    positions_mm : (n, 3) float
+        Of all vertices at the step's start.
     time_s, step_s
         Time since the start, and the length of the step.
     last
         Row of the step table of the step before, empty where there was none.
-    maps
-        The maps of the run, at all vertices.
+    learnt
+        What the steps before have taught, None where there was none.
     """
+    before = size_of(positions_mm, tissue.zones)
     if p.follow is None:
         return Step(p, before)
-    end_week = p.start_week + (time_s + step_s) / SECONDS_PER_GW
-    aim = Size(
-        joined(p.follow.area_cm2, start.area_mm2 * CM2_PER_MM2, p.start_week, end_week) / CM2_PER_MM2,
-        joined(p.follow.volume_ml, start.volume_mm3 * ML_PER_MM3, p.start_week, end_week) / ML_PER_MM3,
+    week = p.start_week + (time_s + step_s) / SECONDS_PER_GW
+    aim = Aim(
+        before.area_mm2,
+        before.volume_mm3,
+        joined(p.follow.area_cm2, start.area_mm2 * CM2_PER_MM2, p.start_week, week) / CM2_PER_MM2,
+        joined(p.follow.volume_ml, start.volume_mm3 * ML_PER_MM3, p.start_week, week) / ML_PER_MM3,
+        step_s,
     )
-    thickness = float(np.mean(p.thickness_at(end_week, maps)))
-    realised = float(last.get("realised_share", FIRST_SHARE))
-    rates = steered_rates(
-        Aim(before.area_mm2, before.volume_mm3, aim.area_mm2, aim.volume_mm3, step_s),
-        min(before.area_mm2 * thickness / before.volume_mm3, MOST_CORTEX),
-        realised,
-        poisson_ratio=p.poisson_ratio,
-        isotropic=bool(p.regional_strain),
-        bounds=(-FASTEST_PER_S if p.allow_negative_growth else 0.0, FASTEST_PER_S),
-    )
+    return steered_step(p, before, aim, growth_of_brain(p, positions_mm, tissue, week), learnt, week, last)
+
+
+def steered_step(
+    p: FoldingParameters,
+    before: Size,
+    aim: Aim,
+    free: Response,
+    learnt: Sequence[float] | None,
+    week: float,
+    last: Mapping[str, Any],
+) -> SteeredStep:
+    """Returns the first try of a step that ends at a week, for what free growth makes; others as `following_step`."""
+    response = free if learnt is None else free + Response.of(learnt)
+    rates = steered_rates(aim, response, bounds(p))
+    parameters, at_start = with_rates(p, rates, week, aim.duration, last)
+    return SteeredStep(parameters, before, aim, rates, at_start, free, response, week, last)
+
+
+def with_rates(
+    p: FoldingParameters, rates: GrowthRates, week: float, step_s: float, last: Mapping[str, Any]
+) -> tuple[FoldingParameters, GrowthRates | None]:
+    """Returns the parameters of a step that ends at a week with rates of growth, and these at its start.
+
+    The latter are None where the step takes the rates as constant; other parameters are as of `following_step`.
+    """
     at_start = rates_at_start(rates, step_s, last) if p.time_scheme == "adams-bashforth" else None
     given = at_start or rates
     values: dict[str, Any] = {}
@@ -148,9 +251,14 @@ def following_step(
         ("growth_rate_per_s", given.tangential, p.regional_growth_of_cortex or p.regional_growth),
         ("core_growth_rate_per_s", given.core, p.regional_growth),
     ):
-        regional = map_at(maps_by_week, end_week)
-        values[name] = rate if regional is None else Varying(weeks={end_week: rate}, map=regional)
-    return Step(p.model_copy(update=values), before, aim, rates, at_start, realised)
+        regional = map_at(maps_by_week, week)
+        values[name] = rate if regional is None else Varying(weeks={week: rate}, map=regional)
+    return p.model_copy(update=values), at_start
+
+
+def bounds(p: FoldingParameters) -> tuple[float, float]:
+    """Returns the least and the largest rate in 1/s that growth may be set to."""
+    return -FASTEST_PER_S if p.allow_negative_growth else 0.0, FASTEST_PER_S
 
 
 def rates_at_start(rates: GrowthRates, step_s: float, last: Mapping[str, Any]) -> GrowthRates:
@@ -173,10 +281,10 @@ def rates_at_start(rates: GrowthRates, step_s: float, last: Mapping[str, Any]) -
     return GrowthRates(tangential, core, rates.limited)
 
 
-def growing_at_start(p: FoldingParameters, positions_mm: Floats, zones: Zones, maps: Maps) -> FoldingParameters:
+def growing_at_start(p: FoldingParameters, positions_mm: Floats, tissue: Tissue) -> FoldingParameters:
     """Returns the parameters of a run with the growth of its first step, for (n, 3) positions of its start mesh."""
-    start = size_of(positions_mm, zones)
-    return following_step(p, start, start, 0.0, p.step_s, {}, maps).parameters
+    start = size_of(positions_mm, tissue.zones)
+    return following_step(p, start, positions_mm, tissue, 0.0, p.step_s, {}, None).parameters
 
 
 def joined(curve: Any, at_start: float, start_week: float, week: float) -> float:
@@ -196,21 +304,3 @@ def value_on(curve: Any, week: float) -> float:
         return float(np.exp(np.interp(week, weeks, logs)))
     i, j = (0, 1) if week < weeks[0] else (-1, -2)
     return float(np.exp(logs[i] + (logs[i] - logs[j]) / (weeks[i] - weeks[j]) * (week - weeks[i])))
-
-
-def strain_at(p: FoldingParameters, maps: Maps, week: float) -> Floats | None:
-    """Returns the (6, n) measured strain per week that holds at a week, None where growth has no directions."""
-    name = map_at(p.regional_strain, week)
-    return None if name is None else np.stack([maps[f"{name}_{part}"] for part in STRAIN])
-
-
-def undone(strain: Floats) -> Floats:
-    """Returns the (..., 3, 3) inverse of growth by small (..., 6) strains, which leaves volumes as they are."""
-    inverse = np.linalg.inv(np.eye(3) + unpacked(strain))
-    return np.asarray(inverse / np.cbrt(np.linalg.det(inverse))[..., None, None])
-
-
-def map_at(maps: Mapping[float, str], week: float) -> str | None:
-    """Returns the name of the map that holds at a week: that of the last week before it, or else the first."""
-    before = [start for start in maps if start < week]
-    return maps[max(before)] if before else next(iter(maps.values()), None)

@@ -158,7 +158,7 @@ def rate_step(
     counts.append(_met(problem, solver, wanted))
     strained = grown + problem.displacement - wanted
     rate: Floats = domain.gathered(at_start[: domain.owned]) * (1 / step_s)
-    return RateStep(rate, strained, _summed(counts))
+    return RateStep(rate, strained, summed(counts))
 
 
 def _grown(problem: RateProblem, solver: NewtonSolver, guess: Floats) -> tuple[Floats, StepCount]:
@@ -180,7 +180,7 @@ def _met(problem: RateProblem, solver: NewtonSolver, wanted: Floats) -> StepCoun
     return StepCount(residual=0.0, converged=True)
 
 
-def _summed(counts: Sequence[StepCount]) -> StepCount:
+def summed(counts: Sequence[StepCount]) -> StepCount:
     """Returns what several solves took together."""
     return StepCount(
         sum(count.newton for count in counts),

@@ -62,3 +62,13 @@ def resolution_warning(rows: Sequence[dict], order: int) -> str:
         "since it grows: folds may be mesh noise; "
         "a smaller mesh.surface_edge_mm, or mesh.sized_for: end, resolves it to a later week"
     )
+
+
+def unconverged_warning(row: dict) -> str:
+    """Returns what to say of a step that ended above the tolerance; empty of others."""
+    if row["converged"]:
+        return ""
+    return (
+        f"step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
+        "folding.solver.newton_tolerance: nothing was left to gain but round-off"
+    )

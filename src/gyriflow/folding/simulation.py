@@ -22,15 +22,16 @@ from .checkpoint import State
 from .contact import SelfContact, contact_settings
 from .domain import Domain
 from .element_layers import Layered, linear_layers, quadratic_layers
-from .following import following_step, growing_at_start, size_of, strain_at, undone
+from .following import Step, following_step, growing_at_start, size_of
+from .free_growth import Tissue, strain_at, undone
 from .ladder import RUNGS, NotConvergedError
 from .layers import WEIGHT_REACH, PialSearch
 from .memory import left_stretch, packed, relaxed, unpacked, unstretched
 from .newton import NewtonSettings, NewtonSolver, StepCount
 from .output import say
 from .problem import Problem
-from .rates import SMALL, RateProblem, rate_step
-from .resolution import elements_through, resolution_warning, worst_quality
+from .rates import SMALL, RateProblem, rate_step, summed
+from .resolution import elements_through, resolution_warning, unconverged_warning, worst_quality
 from .stress import (
     deformation_gradients,
     elastic_strain_fields,
@@ -101,10 +102,10 @@ class Folding:
         floor = 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
         solver = parameters.solver
         self._start = self.domain.positions
-        self._through = math.nan  # elements through the cortex in the last step
         self._start_size = size_of(mesh.vertices, zones)
+        self._tissue = Tissue.of(mesh, zones, self.maps)
         # those of the last step, with its rates of growth
-        self.present = growing_at_start(parameters, mesh.vertices, zones, self.maps)
+        self.present = growing_at_start(parameters, mesh.vertices, self._tissue)
         self._strained = np.zeros_like(self.problem.displacement)  # what the last step's stress belongs to
         self._step_s = parameters.step_s  # of the last step
         self._through, self._part = math.nan, self.domain.part  # of its layers
@@ -252,12 +253,29 @@ class Folding:
             f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(place, 1).tolist()} mm"
         )
 
-    def _solve(self, state: State, step_s: float) -> tuple[StepCount, Floats | None]:
+    def _grow(self, state: State, step_s: float, growth: Step) -> tuple[Step, Floats, StepCount, Floats | None]:
+        """Solves a step, again while growth that follows asks for it.
+
+        Returns the growth that it had, its (n, 3) displacement in m, what it took, and the velocity it began with.
+        """
+        guess, counts = self.domain.local(state.predicted(step_s)), []
+        while True:
+            self.present = growth.parameters
+            count, rate = self._solve(state, step_s, guess)
+            counts.append(count)
+            guess = self.problem.displacement.copy()
+            u = self.domain.gathered(guess[: self.domain.owned])
+            again = growth.again(size_of((state.positions + u) * MM_PER_M, self.zones))
+            if again is None:
+                return growth, u, summed(counts), rate
+            growth = again
+
+    def _solve(self, state: State, step_s: float, guess: Floats) -> tuple[StepCount, Floats | None]:
         """Leaves the displacement of a step in the problem; returns what it took, and the velocity it began with."""
         problem = self.problem
         if not isinstance(problem, RateProblem):
             self.set_layers(state.time_s, step_s)
-            count = self.solver.solve(self.domain.local(state.predicted(step_s)))
+            count = self.solver.solve(guess)
             self._strained = problem.displacement.copy()
             return count, None
 
@@ -301,18 +319,17 @@ class Folding:
         if self.contact is not None:
             self.contact.adapt(state.rows)
         last = state.rows[-1] if state.rows else {}
-        before = size_of(state.positions * MM_PER_M, self.zones)
-        growth = following_step(self.parameters, self._start_size, before, state.time_s, step_s, last, self.maps)
-        self.present = growth.parameters
+        at_start = self.parameters, self._start_size, state.positions * MM_PER_M, self._tissue
+        growth = following_step(*at_start, state.time_s, step_s, last, state.learnt)
         kept = self._kept_stretch(state, step_s)
         directions = self._directions(state, step_s)
         stretches = [part for part in (kept, directions) if part is not None]
         if stretches:
             problem.set_stretch(stretches[0] if len(stretches) == 1 else stretches[0] @ stretches[1])
-        count, rate = self._solve(state, step_s)
+        growth, u, count, rate = self._grow(state, step_s, growth)
         ratios = problem.volume_ratios()
         energy = self._energy()
-        u = domain.gathered(problem.displacement[: domain.owned])
+        size = size_of((state.positions + u) * MM_PER_M, self.zones)
         length = np.linalg.norm(u, axis=1) * MM_PER_M
         left = None if kept is None else domain.gathered_cells(packed(left_stretch(problem.outcome("elastic"))))
         row = {
@@ -331,11 +348,11 @@ class Folding:
             "max_u_pial_mm": float(length[self._pial].max()),
             "mean_u_pial_mm": float(length[self._pial].mean()),
             **self._contact_row(domain.positions + u),
-            **growth.row(size_of((domain.positions + u) * MM_PER_M, self.zones), step_s),
+            **growth.row(size),
             "elements_through_cortex": self._through,
             "rung": RUNGS[count.rung],
         }
-        after = state.after(u, step_s, row, left, rate)
+        after = state.after(u, step_s, row, left, rate, growth.learnt(size))
         domain.place(after.positions)
         row["radius_ratio_01"] = worst_quality(domain)
         row["seconds"] = time.monotonic() - began
@@ -380,13 +397,3 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
         if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
-
-
-def unconverged_warning(row: dict) -> str:
-    """Returns what to say of a step that ended above the tolerance; empty of others."""
-    if row["converged"]:
-        return ""
-    return (
-        f"step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
-        "folding.solver.newton_tolerance: nothing was left to gain but round-off"
-    )

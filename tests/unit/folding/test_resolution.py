@@ -7,8 +7,13 @@ from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.predicted_memory import predicted_memory_mib
-from gyriflow.folding.resolution import elements_through, resolution_warning, stiffness_warning, worst_quality
-from gyriflow.folding.simulation import unconverged_warning
+from gyriflow.folding.resolution import (
+    elements_through,
+    resolution_warning,
+    stiffness_warning,
+    unconverged_warning,
+    worst_quality,
+)
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
 
 

@@ -1,106 +1,105 @@
 import math
+from dataclasses import replace
 
 import pytest
 
 from gyriflow.mechanics.steering import (
-    FIRST_SHARE,
+    FIRST_GAIN,
     Aim,
     GrowthRates,
-    realised_share,
+    Response,
+    free_response,
     steered_rates,
-    volume_gain,
 )
 
-NU = 0.45
+BRAIN = Response((1.09, 1.12), (1.25, 1.75), area_else=-0.02, volume_else=0.001)
 
 
-def area_aim(week: float) -> float:
-    return 99.0 * math.exp(0.10 * (week - 21) - 0.002 * (week - 21) ** 2)
+def made_by(response: Response, aim: Aim, rates: GrowthRates) -> tuple[float, float]:
+    """Returns area and volume after a step of a body with a response."""
+    area, volume = response.rates(rates)
+    return aim.area * math.exp(area * aim.duration), aim.volume * math.exp(volume * aim.duration)
 
 
-def volume_aim(week: float) -> float:
-    return 51.0 * math.exp(0.16 * (week - 21) - 0.004 * (week - 21) ** 2)
-
-
-def follow(realised: float, thickness: float = 0.15, days: float = 1.0) -> list[tuple[float, float, float]]:
-    """Returns week by step, and errors of area and volume, of a body with a known realised part of its growth.
-
-    The body is a thin elastic layer on a core: the area takes the realised part of what the layer grows, what is held
-    back thickens the layer by Poisson's effect, and the core's volume grows freely.
-    """
-    area, volume, share = area_aim(21), volume_aim(21), FIRST_SHARE
-    cortex, step, rows = area * thickness, days / 7, []
-    core = volume - cortex
-    for number in range(round(5 / step)):
-        week = 21 + (number + 1) * step
-        aim = Aim(area, volume, area_aim(week), volume_aim(week), step)
-        rates = steered_rates(aim, cortex / volume, share, poisson_ratio=NU)
-        grown = area * math.exp(2 * realised * rates.tangential * step)
-        cortex *= math.exp(2 * rates.tangential * (realised + (1 - realised) * NU / (1 - NU)) * step)
-        core *= math.exp(3 * rates.core * step)
-        share = realised_share(share, rates.tangential, area, grown, step)
-        area, volume = grown, cortex + core
-        rows.append((week, area / area_aim(week) - 1, volume / volume_aim(week) - 1))
-    return rows
-
-
-@pytest.mark.parametrize("realised", [0.35, 0.6, 0.9])
-def test_both_curves_are_met_whatever_is_realised(realised):
-    rows = follow(realised)
-    assert max(abs(area) for week, area, _ in rows if week > 22) < 1e-3
-    assert max(abs(volume) for week, _, volume in rows if week > 22) < 2e-3
-    # even while the realised part is being learned, a step's error is made good by the next
-    assert max(abs(area) for _, area, _ in rows) < 0.02
-
-
-def test_without_steering_the_curve_is_missed():
-    area = area_aim(21)
-    for day in range(35):
-        wanted = math.log(area_aim(21 + (day + 1) / 7) / area_aim(21 + day / 7))
-        area *= math.exp(0.35 * wanted)
-    assert area / area_aim(26) - 1 < -0.2
-
-
-def test_rates_of_a_known_step():
-    aim = Aim(100.0, 50.0, 101.0, 51.0, 0.5)
-    rates = steered_rates(aim, 0.3, 0.5, poisson_ratio=1 / 3)
-    # c = 0.5 + 0.5·0.5
-    assert rates.tangential == pytest.approx(math.log(1.01) / 0.5)
-    assert rates.core == pytest.approx((math.log(1.02) / 0.5 - 2 * rates.tangential * 0.75 * 0.3) / 2.1)
+@pytest.mark.parametrize("growth", [(0.02, 0.015), (-0.01, -0.02), (0.03, 0.0), (0.0, 0.02)])
+def test_a_body_whose_response_is_known_meets_its_aim(growth):
+    sizes = made_by(BRAIN, Aim(100.0, 50.0, 1.0, 1.0, 0.5), GrowthRates(*growth, limited=False))
+    rates = steered_rates(Aim(100.0, 50.0, *sizes, 0.5), BRAIN)
+    assert (rates.tangential, rates.core) == pytest.approx(growth)
     assert not rates.limited
-    assert volume_gain(1.0, NU) == 1.0
-    assert volume_gain(0.0, 0.5) == 1.0
-    assert volume_gain(0.25, 0.0) == 0.25
 
 
-def test_ventricles_and_thickness_take_their_part():
-    aim = Aim(100.0, 50.0, 100.0, 51.0, 1.0)
-    rates = steered_rates(aim, 0.3, 0.6, poisson_ratio=NU, radial=0.02, ventricle_share=0.1, ventricle=0.05)
-    assert rates.tangential == 0
-    assert 0.3 * 0.02 + 0.1 * 3 * 0.05 + 0.6 * 3 * rates.core == pytest.approx(math.log(51 / 50))
+def test_uniform_growth_is_asked_for_where_a_body_is_to_keep_its_shape():
+    response = free_response(2.0, 1.2, 1.8)
+    rates = steered_rates(Aim(100.0, 50.0, 100 * math.exp(0.02), 50 * math.exp(0.03), 1.0), response)
+    assert (rates.tangential, rates.core) == pytest.approx((0.01, 0.01))
+    # both add up to free growth, and the cortex has more of the area than of the volume
+    assert sum(response.area) == pytest.approx(2.0)
+    assert response.area[0] / 2.0 == pytest.approx(1.2 / 3.0 + FIRST_GAIN)
 
 
-def test_shrinking_bodies_are_followed():
-    rates = steered_rates(Aim(100.0, 50.0, 99.0, 49.0, 1.0), 0.3, 0.6, poisson_ratio=NU)
-    assert rates.tangential < 0
-    assert rates.core < 0
-    assert realised_share(0.6, -0.1, 100.0, 100 * math.exp(-0.2 * 0.9), 1.0) == pytest.approx(0.7 * 0.6 + 0.3 * 0.9)
+def test_bounds_leave_the_volume_on_its_curve():
+    # more area than the core, which may not shrink, leaves room for
+    aim = Aim(100.0, 50.0, 106.0, 53.0, 1.0)
+    assert steered_rates(aim, BRAIN, (-1.0, 1.0)).core < 0
+    cut = steered_rates(aim, BRAIN, (0.0, 1.0))
+    assert (cut.core, cut.limited) == (0.0, True)
+    area, volume = made_by(BRAIN, aim, cut)
+    assert volume == pytest.approx(53.0)
+    assert 100.0 < area < 106.0
+    # less area than the volume makes: the core grows by itself
+    cut = steered_rates(Aim(100.0, 50.0, 98.0, 52.0, 1.0), BRAIN, (0.0, 1.0))
+    assert (cut.tangential, cut.limited) == (0.0, True)
+    assert made_by(BRAIN, aim, cut)[1] == pytest.approx(52.0)
+    # neither can be followed down
+    assert steered_rates(Aim(100.0, 50.0, 99.0, 49.0, 1.0), BRAIN, (0.0, 1.0)) == GrowthRates(0.0, 0.0, True)
 
 
-def test_what_cannot_be_followed_is_told_and_the_core_makes_up_for_it():
-    aim = Aim(100.0, 50.0, 120.0, 51.0, 1.0)
-    free, cut = (steered_rates(aim, 0.3, 0.6, poisson_ratio=NU, bounds=bounds) for bounds in ((-1, 1), (0.0, 0.05)))
-    assert cut == GrowthRates(0.05, cut.core, limited=True)
-    assert not free.limited
-    assert cut.core > free.core
+def test_a_ball_whose_area_follows_its_volume_is_not_torn():
+    ball = Response((0.8, 1.2), (1.2, 1.8))
+    rates = steered_rates(Aim(100.0, 50.0, 101.0, 50.5, 1.0), ball)
+    assert made_by(ball, Aim(100.0, 50.0, 101.0, 50.5, 1.0), rates)[1] == pytest.approx(50.5)
+    assert abs(rates.tangential - rates.core) < 0.1
 
 
-def test_realised_share_is_learned_within_bounds_and_not_from_nothing():
-    assert realised_share(0.6, 1e-6, 100.0, 105.0, 1.0) == 0.6
-    assert realised_share(0.6, 0.1, 100.0, 200.0, 1.0) == 1.2
-    assert realised_share(0.2, 0.1, 100.0, 90.0, 1.0) == 0.2
+def test_two_tries_of_a_step_tell_how_a_body_answers():
+    aim = Aim(100.0, 50.0, 103.0, 52.0, 1.0)
+    believed = free_response(2.2, 1.25, 1.75)
+    first = steered_rates(aim, believed)
+    found = BRAIN.rates(first)
+    # the first try says how far it is off, the second by which slope
+    known = believed.agreeing(first, found)
+    assert known.rates(first) == pytest.approx(found)
+    second = steered_rates(aim, known)
+    taught = known.corrected(first, found, second, BRAIN.rates(second)).agreeing(second, BRAIN.rates(second))
+    assert taught.rates(first) == pytest.approx(found)
+    assert taught.rates(second) == pytest.approx(BRAIN.rates(second))
+    errors = [abs(made_by(BRAIN, aim, rates)[0] / 103.0 - 1) for rates in (first, second, steered_rates(aim, taught))]
+    assert errors[0] > 0.01
+    assert errors[1] < errors[0] / 2
+    assert errors[2] < 1e-5
+
+
+def test_tries_that_hardly_differ_or_contradict_growth_teach_nothing():
+    rates = GrowthRates(0.01, 0.01, limited=False)
+    near = GrowthRates(0.01 + 1e-6, 0.01, limited=False)
+    found = BRAIN.rates(rates)
+    assert BRAIN.corrected(rates, found, near, (1.0, 1.0)) == BRAIN
+    # a volume that falls with growth
+    far = GrowthRates(0.02, 0.01, limited=False)
+    assert BRAIN.corrected(rates, found, far, (found[0], found[1] - 0.1)) == BRAIN
+
+
+def test_what_was_learnt_is_kept_as_numbers():
+    free = free_response(2.0, 1.2, 1.8, area_else=0.01)
+    kept = list((BRAIN - free).values)
+    assert (free + Response.of(kept)).values == pytest.approx(BRAIN.values)
 
 
 def test_sizes_that_are_none_are_refused():
-    with pytest.raises(ValueError, match="must be positive"):
-        steered_rates(Aim(100.0, 50.0, 101.0, 51.0, 1.0), 1.0, 0.6, poisson_ratio=NU)
+    aim = Aim(100.0, 50.0, 101.0, 51.0, 1.0)
+    for wrong in (replace(aim, area=0.0), replace(aim, duration=0.0), replace(aim, next_volume=-1.0)):
+        with pytest.raises(ValueError, match="must be positive"):
+            steered_rates(wrong, BRAIN)
+    with pytest.raises(ValueError, match="must grow with both rates"):
+        steered_rates(aim, replace(BRAIN, volume=(0.0, 3.0)))
