@@ -92,8 +92,10 @@ def norms_chart(
                     axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
                 continue
             known = own["subject"].isin(reference)
-            axes.plot(own.loc[known, "week"], own.loc[known, "value"], "*", color=REAL_COLOUR, markersize=6)
-            axes.plot(own.loc[~known, "week"], own.loc[~known, "value"], "*", color=RUN_COLOURS[-1], markersize=7)
+            axes.plot(own.loc[known, "week"], own.loc[known, "value"], "*", color=REAL_COLOUR, markersize=6, zorder=3)
+            axes.plot(
+                own.loc[~known, "week"], own.loc[~known, "value"], "*", color=RUN_COLOURS[-1], markersize=7, zorder=3
+            )
             others |= bool((~known).any())
         unit = shown_unit(rows["unit"].iloc[0])
         axes.set_title(TITLES[name] + (f" ({unit})" if unit else ""))

@@ -42,6 +42,7 @@ TITLES = {
     "mean_thickness": "mean cortical thickness",
 }
 """The metrics of the chart and their titles."""
+NOT_FROM_ZERO = ("mean_curvature", "mean_local_gyrification_index")
 MOST_RUNS = 3
 TINTS = (0.0, 0.4, 0.7)
 """How far towards white the colours of further regions are."""
@@ -130,7 +131,7 @@ def regions_chart(
         _panel(axes, values, colours, runs)
         unit = shown_unit(rows["unit"].iloc[0])
         axes.set_title(TITLES[name] + (f" ({unit})" if unit else ""))
-        if name != "mean_curvature":
+        if name not in NOT_FROM_ZERO:
             from_zero(axes)
     axes = panels[len(shown)]
     rows = asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)]
