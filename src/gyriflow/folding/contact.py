@@ -48,7 +48,8 @@ MARGIN_MM = 0.05
 """How far the surface may move before pairs that can come near are looked for anew."""
 ROOM_MM = 1.0
 """How far it may move before each rank takes its part of the surface anew."""
-SWEEP = ipctk.AdditiveCCD(conservative_rescaling=0.9)
+CLOSED = 0.9
+SWEEP = ipctk.AdditiveCCD(conservative_rescaling=CLOSED)
 """Search for the first touch on a way (Li et al. 2021); it leaves a tenth of each pair's distance. Where surfaces meet
 flat on, interval bisection, the other choice, takes minutes."""
 N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
@@ -357,17 +358,26 @@ class SelfContact:
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements that can be added without any touch on the way."""
-        whole = self._start + self._on_surface(self._displacement) * MM_PER_M
-        end = whole + self._on_surface(direction) * MM_PER_M
+        way = self._on_surface(direction) * MM_PER_M
+        return self.domain.comm.allreduce(self._free_part(self._state(), way), op=MPI.MIN)
+
+    def _free_part(self, state: Near, way: Floats) -> float:
+        """Returns the part of a way (s, 3) in mm on which nothing touches that this rank looks for."""
+        # what is no pair is farther apart than the distance
+        gap = self.distance_mm
+        if len(state.pairs):
+            gap = min(gap, float(np.sqrt(state.pairs.compute_minimum_distance(state.surface, state.positions))))
+        if 2 * float(np.linalg.norm(way, axis=1).max()) <= CLOSED * gap:
+            return 1.0
+        whole = self._start + state.displacement * MM_PER_M
+        end = whole + way
         surface, part = self._surface_at(whole, end)
-        way = part.at(whole), part.at(end)
+        ends = part.at(whole), part.at(end)
         if self._candidates_held is not None and self._candidates_held.at(self.distance_mm, whole, end):
-            free = self._candidates.compute_collision_free_stepsize(surface, *way, narrow_phase_ccd=SWEEP)
-        else:
-            free = ipctk.compute_collision_free_stepsize(
-                surface, *way, broad_phase=self._search, narrow_phase_ccd=SWEEP
-            )
-        return self.domain.comm.allreduce(float(free), op=MPI.MIN)
+            return float(self._candidates.compute_collision_free_stepsize(surface, *ends, narrow_phase_ccd=SWEEP))
+        return float(
+            ipctk.compute_collision_free_stepsize(surface, *ends, broad_phase=self._search, narrow_phase_ccd=SWEEP)
+        )
 
     def smallest_distance_mm(self) -> float:
         """Returns the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""
