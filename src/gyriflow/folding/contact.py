@@ -24,7 +24,7 @@ from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
-from .surface_parts import SurfacePart, part_of_surface, shared_out
+from .surface_parts import Held, SurfacePart, part_of_surface, shared_out
 
 Floats = NDArray[np.float64]
 DISTANCE_PER_EDGE = 0.2
@@ -49,6 +49,7 @@ MARGIN_MM = 0.05
 ROOM_MM = 1.0
 """How far it may move before each rank takes its part of the surface anew."""
 CLOSED = 0.9
+"""Part of a gap that a step may close."""
 SWEEP = ipctk.AdditiveCCD(conservative_rescaling=CLOSED)
 """Search for the first touch on a way (Li et al. 2021); it leaves a tenth of each pair's distance. Where surfaces meet
 flat on, interval bisection, the other choice, takes minutes."""
@@ -82,19 +83,6 @@ def new_pairs() -> ipctk.NormalCollisions:
     pairs = ipctk.NormalCollisions()
     pairs.use_area_weighting = True
     return pairs
-
-
-@dataclass(frozen=True, eq=False)
-class Held:
-    """Where the surface was, (s, 3) in mm, when all was looked for that is within two times a reach of each other."""
-
-    centre: Floats
-    reach: float
-
-    def at(self, distance_mm: float, *places: Floats) -> bool:
-        """Returns whether all that is within a distance at some other positions was found."""
-        margin = self.reach - distance_mm / 2
-        return all(bool(np.abs(place - self.centre).max() <= margin) for place in places)
 
 
 @dataclass(frozen=True, eq=False)
