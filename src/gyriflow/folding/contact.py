@@ -234,6 +234,9 @@ class SelfContact:
             owned = self._owner == self.domain.comm.rank
             self._part = part_of_surface(places[0], self._faces, owned, 2 * self._part_held.reach)
             self._follow = self._weights[self._part.vertices]
+            # column by column as the stiffness is, from both sides: nothing has to be turned round for their product
+            follow = sparse.kron(self._follow, np.eye(3), format="csr")
+            self._nodes_to_part, self._part_to_nodes = follow.tocsc(), follow.T
             # what is known goes by the numbers of the part before
             self._surface, self._known, self._candidates_held = None, None, None
         if self._surface is None:
@@ -318,8 +321,7 @@ class SelfContact:
         if len(state.pairs):
             kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
             hessian = self._barrier.hessian(state.pairs, state.surface, state.positions, kind) * N_PER_M_PER_PA_MM
-            follow = sparse.kron(self._follow, np.eye(3), format="csr")
-            own = sparse.csr_matrix(follow.T @ hessian @ follow)
+            own = sparse.csr_matrix(self._part_to_nodes @ hessian @ self._nodes_to_part)
         return self._distributed(own)
 
     def _distributed(self, own: sparse.csr_matrix | None) -> PETSc.Mat:
