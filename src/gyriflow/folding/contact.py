@@ -24,7 +24,7 @@ from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
-from .surface_parts import SurfacePart, part_of_surface, shared_out
+from .surface_parts import Held, SurfacePart, part_of_surface, shared_out
 
 Floats = NDArray[np.float64]
 DISTANCE_PER_EDGE = 0.2
@@ -48,7 +48,9 @@ MARGIN_MM = 0.05
 """How far the surface may move before pairs that can come near are looked for anew."""
 ROOM_MM = 1.0
 """How far it may move before each rank takes its part of the surface anew."""
-SWEEP = ipctk.AdditiveCCD(conservative_rescaling=0.9)
+CLOSED = 0.9
+"""Part of a gap that a step may close."""
+SWEEP = ipctk.AdditiveCCD(conservative_rescaling=CLOSED)
 """Search for the first touch on a way (Li et al. 2021); it leaves a tenth of each pair's distance. Where surfaces meet
 flat on, interval bisection, the other choice, takes minutes."""
 N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
@@ -81,19 +83,6 @@ def new_pairs() -> ipctk.NormalCollisions:
     pairs = ipctk.NormalCollisions()
     pairs.use_area_weighting = True
     return pairs
-
-
-@dataclass(frozen=True, eq=False)
-class Held:
-    """Where the surface was, (s, 3) in mm, when all was looked for that is within two times a reach of each other."""
-
-    centre: Floats
-    reach: float
-
-    def at(self, distance_mm: float, *places: Floats) -> bool:
-        """Returns whether all that is within a distance at some other positions was found."""
-        margin = self.reach - distance_mm / 2
-        return all(bool(np.abs(place - self.centre).max() <= margin) for place in places)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,6 +234,9 @@ class SelfContact:
             owned = self._owner == self.domain.comm.rank
             self._part = part_of_surface(places[0], self._faces, owned, 2 * self._part_held.reach)
             self._follow = self._weights[self._part.vertices]
+            # column by column as the stiffness is, from both sides: nothing has to be turned round for their product
+            follow = sparse.kron(self._follow, np.eye(3), format="csr")
+            self._nodes_to_part, self._part_to_nodes = follow.tocsc(), follow.T
             # what is known goes by the numbers of the part before
             self._surface, self._known, self._candidates_held = None, None, None
         if self._surface is None:
@@ -329,8 +321,7 @@ class SelfContact:
         if len(state.pairs):
             kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
             hessian = self._barrier.hessian(state.pairs, state.surface, state.positions, kind) * N_PER_M_PER_PA_MM
-            follow = sparse.kron(self._follow, np.eye(3), format="csr")
-            own = sparse.csr_matrix(follow.T @ hessian @ follow)
+            own = sparse.csr_matrix(self._part_to_nodes @ hessian @ self._nodes_to_part)
         return self._distributed(own)
 
     def _distributed(self, own: sparse.csr_matrix | None) -> PETSc.Mat:
@@ -357,17 +348,26 @@ class SelfContact:
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements that can be added without any touch on the way."""
-        whole = self._start + self._on_surface(self._displacement) * MM_PER_M
-        end = whole + self._on_surface(direction) * MM_PER_M
+        way = self._on_surface(direction) * MM_PER_M
+        return self.domain.comm.allreduce(self._free_part(self._state(), way), op=MPI.MIN)
+
+    def _free_part(self, state: Near, way: Floats) -> float:
+        """Returns the part of a way (s, 3) in mm on which nothing touches that this rank looks for."""
+        # what is no pair is farther apart than the distance
+        gap = self.distance_mm
+        if len(state.pairs):
+            gap = min(gap, float(np.sqrt(state.pairs.compute_minimum_distance(state.surface, state.positions))))
+        if 2 * float(np.linalg.norm(way, axis=1).max()) <= CLOSED * gap:
+            return 1.0
+        whole = self._start + state.displacement * MM_PER_M
+        end = whole + way
         surface, part = self._surface_at(whole, end)
-        way = part.at(whole), part.at(end)
+        ends = part.at(whole), part.at(end)
         if self._candidates_held is not None and self._candidates_held.at(self.distance_mm, whole, end):
-            free = self._candidates.compute_collision_free_stepsize(surface, *way, narrow_phase_ccd=SWEEP)
-        else:
-            free = ipctk.compute_collision_free_stepsize(
-                surface, *way, broad_phase=self._search, narrow_phase_ccd=SWEEP
-            )
-        return self.domain.comm.allreduce(float(free), op=MPI.MIN)
+            return float(self._candidates.compute_collision_free_stepsize(surface, *ends, narrow_phase_ccd=SWEEP))
+        return float(
+            ipctk.compute_collision_free_stepsize(surface, *ends, broad_phase=self._search, narrow_phase_ccd=SWEEP)
+        )
 
     def smallest_distance_mm(self) -> float:
         """Returns the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""

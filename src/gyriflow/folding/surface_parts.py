@@ -61,6 +61,19 @@ class SurfacePart:
         return kept
 
 
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Where the surface was, (s, 3) in mm, when all was looked for that is within two times a reach of each other."""
+
+    centre: Floats
+    reach: float
+
+    def at(self, distance_mm: float, *places: Floats) -> bool:
+        """Returns whether all that is within a distance at some other positions was found."""
+        margin = self.reach - distance_mm / 2
+        return all(bool(np.abs(place - self.centre).max() <= margin) for place in places)
+
+
 def shared_out(positions: Floats, ranks: int) -> NDArray[np.int64]:
     """Returns the rank (n,) that owns each vertex at (n, 3) positions: of nearly equal numbers, in a box each.
 
