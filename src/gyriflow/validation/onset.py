@@ -118,11 +118,6 @@ def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["region", "there_at_start", "onset_week", "first_relief_mm", "last_relief_mm"])
 
 
-def numbered(regions: NDArray[np.integer], side: str) -> dict[int, str]:
-    """Returns the names of numbered regions of a side, such as "left 1"."""
-    return {number: f"{side} {number}" for number in range(1, int(regions.max()) + 1)}
-
-
 def named(
     mesh: TriangleMesh,
     sulci: NDArray[np.integer],
@@ -141,7 +136,7 @@ def named(
     sulci
         (n,) numbers of `sulcal_regions`.
     regions, names
-        (n,) labels of the vertices, and the names of those that are regions.
+        (n,) labels of the vertices, and the names of those that are regions; without any, sulci are "left 1" and so on.
     """
     areas, parts = vertex_areas(mesh), []
     labels = np.where(np.isin(regions, list(names)), regions, 0)
