@@ -127,9 +127,10 @@ def named(
 ) -> tuple[Ints, dict[int, str]]:
     """Returns the sulci of a hemisphere by the regions of the cortex that they lie in, and their names.
 
-    A connected valley that reaches through several regions is parted between those that have `LEAST_REGION_MM2` or more
-    of it; what is left of it goes to the largest part. Names are as "left central", with a number from the second one
-    of a region on, by size; parts outside of all regions are called by the number of their valley, as "left 4".
+    A connected valley that reaches through several regions is parted between those that have `LEAST_REGION_MM2` or
+    more of it; what is left of it goes to the largest part, and so does what is in no region, unless that is more
+    than half. Names are as "left central", with a number from the second one of a region on, by size; parts outside
+    of all regions are called by the number of their valley, as "left 4".
 
     Parameters
     ----------
@@ -143,8 +144,12 @@ def named(
     for number in range(1, int(sulci.max()) + 1):
         inside = sulci == number
         sizes = np.bincount(labels[inside], areas[inside], minlength=int(labels.max()) + 1)
-        largest = int(np.argmax(sizes))
-        own = [int(label) for label in np.flatnonzero(sizes >= LEAST_REGION_MM2)] or [largest]
+        own = [int(label) for label in np.flatnonzero(sizes >= LEAST_REGION_MM2)]
+        # the rim of a sulcus is often in no region
+        if sizes[0] <= sizes.sum() / 2:
+            own = [label for label in own if label > 0]
+        own = own or [int(np.argmax(sizes))]
+        largest = max(own, key=lambda label: sizes[label])
         of_part = np.where(np.isin(labels, own), labels, largest)
         parts += [(number, label, inside & (of_part == label)) for label in own]
     parts.sort(key=lambda part: -areas[part[2]].sum())
@@ -153,7 +158,9 @@ def named(
         found[vertices] = place
         count[label] += 1
         again = f" {count[label]}" if count[label] > 1 else ""
-        called[place] = f"{side} {names[label]}{again}" if label in names else f"{side} {number}"
+        name = f"{side} {names[label]}{again}" if label in names else f"{side} {number}"
+        # a region may be called by a number too
+        called[place] = f"{name} ({place})" if name in called.values() else name
     return found, called
 
 
