@@ -153,7 +153,8 @@ def named(
         of_part = np.where(np.isin(labels, own), labels, largest)
         parts += [(number, label, inside & (of_part == label)) for label in own]
     parts.sort(key=lambda part: -areas[part[2]].sum())
-    found, called, count = np.zeros(len(sulci), dtype=np.int64), {}, Counter[int]()
+    found, count = np.zeros(len(sulci), dtype=np.int64), Counter[int]()
+    called: dict[int, str] = {}
     for place, (number, label, vertices) in enumerate(parts, start=1):
         found[vertices] = place
         count[label] += 1
