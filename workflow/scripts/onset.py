@@ -13,13 +13,13 @@ from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.depth import convex_hull, sulcal_depth
 from gyriflow.registration.carrying import carry_surface
 from gyriflow.step import step
-from gyriflow.validation.onset import named, numbered, onset_on_surfaces, regions_on, sulcal_regions
+from gyriflow.validation.onset import named, onset_on_surfaces, regions_on, sulcal_regions
 
 files, params, tables = snakemake.input, snakemake.params, []
 
 
 def places(mesh, index):
-    """Returns the last brain's sulci at the vertices of a surface in the pose of the brain of an index."""
+    """Returns the last brain's sulci on a surface in the pose of the brain of an index."""
     points = carry_surface(transformed(mesh, np.linalg.inv(poses[index])), between[index:])
     return regions_on(mesh, transform_points(points, poses[-1]), real[-1], last)
 
@@ -31,14 +31,10 @@ with step(snakemake.log[0]):
         real, run = ([read_surface(path) for path in files[f"{who}_{side}"]] for who in ("real", "run"))
         deep = [[sulcal_depth(mesh, convex_hull(mesh)) for mesh in meshes] for meshes in (real, run)]
         last = sulcal_regions(real[-1], deep[0][-1], curvature(real[-1], radius_mm=params.radius_mm).mean)
-        names = numbered(last, side)
-        if given := files.get(f"{side}_regions"):
-            last, names = named(real[-1], last, *read_vertex_labels(given), side)
-        measured = [places(mesh, index) for index, mesh in enumerate(real)]
-        start = places(run[0], 0)  # the same vertices in all weeks
-        brains = {"real": (params.real_weeks, real, deep[0], measured)}
-        brains[params.run] = params.run_weeks, run, deep[1], [start] * len(run)
-        for who, brain in brains.items():
-            table = onset_on_surfaces(*brain, names)
-            tables.append(table.assign(run=who, subject=params.subject, hemisphere=side))
+        regions = read_vertex_labels(given) if (given := files.get(f"{side}_regions")) else (0 * last, {})
+        last, names = named(real[-1], last, *regions, side)
+        brains = {"real": (params.real_weeks, real, deep[0], [places(mesh, index) for index, mesh in enumerate(real)])}
+        brains[params.run] = params.run_weeks, run, deep[1], [places(run[0], 0)] * len(run)
+        found = [onset_on_surfaces(*brain, names).assign(run=who) for who, brain in brains.items()]
+        tables += [table.assign(subject=params.subject, hemisphere=side) for table in found]
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

@@ -130,7 +130,7 @@ class Follow(Settings):
     regional: float = setting(
         0.0, "",
         "How much of the measured differences between regions growth has: 0 none, 1 all; they come from registering "
-        "the brains of successive weeks.",
+        "the brains of successive weeks, or from their surfaces' vertices if these are matched.",
         ge=0, le=2,
     )  # fmt: skip
     smoothing_mm: float = setting(

@@ -33,8 +33,8 @@ def displacement_table(weeks: Sequence[float], simulated: Floats, measured: Floa
 
     The rigid part of each interval is removed from both, and the simulated vectors are turned as the simulated brain
     lies to the measured one. Beside it stands uniform scaling: all vertices of the measured surface moved away from its
-    centroid so that the volume grows as measured. All this is done piece by piece where the surface has several: nothing
-    joins hemispheres that are bodies of their own, so that neither growth nor a pose says how they lie to each other.
+    centroid so that the volume grows as measured. All this is done piece by piece where the surface has several:
+    nothing joins hemispheres that are bodies of their own, so that growth does not say how they lie to each other.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ import trimesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.validation.displacement import displacement_table, vector_agreement
-from gyriflow.validation.onset import named, numbered, onset, regions_on, relief, sulcal_regions
+from gyriflow.validation.onset import named, onset, regions_on, relief, sulcal_regions
 
 BALL = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
 POINTS, FACES = np.asarray(BALL.vertices), np.asarray(BALL.faces)
@@ -144,9 +144,14 @@ def test_sulci_are_named_by_the_regions_that_they_lie_in():
     assert np.array_equal(of["left calcarine 2"], sulci == 2)
     assert np.array_equal(of["left 3"], sulci == 3)
     assert np.array_equal(found > 0, sulci > 0)
+    # a rim in no region is the sulcus's too
+    rim = np.where(np.abs(POINTS[:, 2]) > 2, 0, regions)
+    within, same_names = named(mesh, sulci, rim, {4: "central", 7: "calcarine", 9: "cingulate"}, "left")
+    assert sorted(same_names.values()) == sorted(names.values())
+    assert np.array_equal(within > 0, sulci > 0)
     # without names all is as it was
     same, numbers = named(mesh, sulci, regions, {}, "left")
-    assert sorted(numbers.values()) == sorted(numbered(sulci, "left").values())
+    assert sorted(numbers.values()) == ["left 1", "left 2", "left 3"]
     assert {numbers[int(number)] for number in np.unique(same[sulci == 2])} == {"left 2"}
 
 
