@@ -8,15 +8,21 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 from click.shell_completion import get_completion_class
 
 from ..errors import GyriflowError
 
-STAGES = ("surface", "mesh", "growth", "folding", "metrics", "figures", "report", "paper", "retrieve", "validate")
+STAGES = (
+    *("retrieve", "surface", "mesh", "growth", "folding", "metrics", "figures", "report"),
+    *("studies", "calibrate", "paper", "validate"),
+)
 """Targets of the workflow that a user asks for by name."""
 CONFIG = "gyriflow.yaml"
 """The configuration that is taken where none is named."""
 CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
+ELSEWHERE = ("--profile", "--executor", "-e")
+"""Options of Snakemake's by which jobs run on other machines."""
 SHELLS = ("bash", "zsh", "fish")
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -31,6 +37,14 @@ cores_option = click.option(
     default=os.cpu_count() or 1,
     show_default="all",
     help="How many cores to use.",
+)
+stages_option = click.option(
+    "-s",
+    "--stage",
+    "stages",
+    multiple=True,
+    type=click.Choice(STAGES),
+    help="Up to this stage only; of studies: theirs.",
 )
 config_argument = click.argument("config", type=FILE, required=False)
 
@@ -99,9 +113,13 @@ def init(folder: Path, output: Path | None, force: bool) -> None:
 @config_argument
 @directory_option
 @cores_option
+@stages_option
 @click.option("--no-files", is_flag=True, help="Check the configuration only, not what is in the input files.")
+@click.option("--price", type=click.FloatRange(0), metavar="PRICE", help="Price of a core hour, for the study's cost.")
 @told
-def check(config: Path | None, directory: Path, cores: int, no_files: bool) -> None:
+def check(
+    config: Path | None, directory: Path, cores: int, stages: Sequence[str], no_files: bool, price: float | None
+) -> None:
     """Check a configuration and its files; say what will run and what it will take.
 
     Nothing is run or written. CONFIG is gyriflow.yaml where none is named, or else the demo.
@@ -109,7 +127,7 @@ def check(config: Path | None, directory: Path, cores: int, no_files: bool) -> N
     from .checking import check_study
 
     problems = 0
-    for line, bad in check_study(_chosen(config, directory), directory, cores, read_files=not no_files):
+    for line, bad in check_study(_chosen(config, directory), directory, cores, not no_files, stages, price):
         click.echo(line)
         problems += bad
     if problems:
@@ -120,7 +138,7 @@ def check(config: Path | None, directory: Path, cores: int, no_files: bool) -> N
 @main.command(context_settings={"ignore_unknown_options": True})
 @directory_option
 @cores_option
-@click.option("-s", "--stage", "stages", multiple=True, type=click.Choice(STAGES), help="Up to this stage only.")
+@stages_option
 @click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
 @click.option("-v", "--verbose", is_flag=True, help="All that Snakemake says, on the terminal.")
 @click.argument("further", nargs=-1, type=click.UNPROCESSED, metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]")
@@ -140,8 +158,12 @@ def run(
     arguments = ["--configfile", str(chosen.resolve())] if chosen else []
     arguments += ["--dry-run"] if dry_run else []
     arguments += ["--verbose"] if verbose else []
+    # the cores of this machine are no limit to a cluster, whose profile says how many jobs it may have
+    default = click.get_current_context().get_parameter_source("cores") == ParameterSource.DEFAULT
+    if not (default and any(argument.partition("=")[0] in ELSEWHERE for argument in further)):
+        arguments += ["--cores", str(cores)]
     # an option of one value stands before the targets
-    arguments += ["--cores", str(cores), "--directory", str(directory), *stages, *further[int(named) :]]
+    arguments += ["--directory", str(directory), *stages, *further[int(named) :]]
     sys.exit(launch(arguments))
 
 

@@ -77,6 +77,26 @@ def test_the_memory_of_a_folding_is_that_of_its_solver():
     assert asked == [(3, "global", 1)]
 
 
+def test_runs_of_studies_and_calibrations_cost_what_runs_do():
+    study = STUDY | {
+        "runs": {"reference": {}},
+        "studies": {"thick": {"base": "reference", "vary": {"thickness_mm": [2.0, 3.0]}, "compare_week": 22}},
+        "calibrate": {
+            "base": "reference", "compare_week": 22, "parameters": {"thickness_mm": [1.0, 3.0]},
+            "score": {"size": 1.0}, "first_runs": 3,
+        },
+    }  # fmt: skip
+    config = load(study)
+    assert config.calibrate is not None
+    calibrated = next(iter(config.calibrate.runs))
+    usual = predict([Job("simulate", "reference", "a", 2)], config, COEFFICIENTS, 2)
+    assert usual.core_seconds == usual.folding_core_seconds > 0.5
+    for run in (*config.study_runs, calibrated):
+        member = predict([Job("simulate_member", run, "a", 2)], config, COEFFICIENTS, 2)
+        assert member.core_seconds == pytest.approx(usual.core_seconds), run
+        assert member.disk_mib == pytest.approx(usual.disk_mib), run
+
+
 def test_what_was_measured_has_all_that_predictions_need():
     measured = read_json(MEASURED)
     predicted = predict([Job("simulate", "reference", "a", 1), Job("measure", None, "a")], load(STUDY), measured, 1)
