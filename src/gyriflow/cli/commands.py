@@ -1,6 +1,8 @@
 """The commands of `gyriflow`, thin: each reads its arguments, calls one function and prints what it returns."""
 
 import os
+import shlex
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -12,6 +14,7 @@ from click.core import ParameterSource
 from click.shell_completion import get_completion_class
 
 from ..errors import GyriflowError
+from ..shipped import SHIPPED
 
 STAGES = (
     *("retrieve", "surface", "mesh", "growth", "folding", "metrics", "figures", "report"),
@@ -63,6 +66,11 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
     return wrapped
 
 
+def command_name() -> str:
+    """Returns what a user types to get this command: in a checkout that is not installed, `./run gyriflow`."""
+    return "gyriflow" if shutil.which("gyriflow") or not (SHIPPED / "run").is_file() else "./run gyriflow"
+
+
 def version(context: click.Context, parameter: click.Parameter, value: bool) -> None:
     """Prints the version, with the commit where there is one, and ends."""
     if value and not context.resilient_parsing:
@@ -106,7 +114,7 @@ def init(folder: Path, output: Path | None, force: bool) -> None:
     path = output or folder / CONFIG
     for line in write_configuration(folder, path, force):
         click.echo(line)
-    click.echo(f"wrote {path}; next: gyriflow check {path}")
+    click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
 
 
 @main.command()
