@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 from ..config.root import Config
@@ -12,6 +13,8 @@ from .sizes import Size, size_of
 
 MIB = 2**20
 LEAST_S = 0.5
+LEAST_MIB, LEAST_MINUTES = 2000, 60
+"""What the job of any folding needs: Python, dolfinx, compiled forms, and processors slower than those measured on."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,25 @@ def predict(
         time_error=measured["error"]["time"],
         memory_error=measured["error"]["memory"],
         disk_error=measured["error"]["disk"],
+    )
+
+
+def folding_needs(
+    run: str,
+    brain: str,
+    config: Config,
+    measured: Mapping[str, Any],
+    memory_of_run: Callable[[int, int, str, int], float],
+) -> tuple[int, int]:
+    """Returns the memory in MiB and the minutes that a folding may take, for the limits of its job on a cluster.
+
+    Both are the prediction times its error, with a least value for what jobs need whatever their brain is.
+    """
+    ranks = run_of(run, config).ranks
+    predicted = predict([Job("simulate", run, brain, ranks)], config, measured, ranks, memory_of_run)
+    return (
+        max(ceil(predicted.memory_mib * predicted.memory_error), LEAST_MIB),
+        max(ceil(predicted.wall_seconds * predicted.time_error / 60), LEAST_MINUTES),
     )
 
 
