@@ -1,4 +1,7 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
+from gyriflow.cost import MEASURED as MEASURED_COSTS
+from gyriflow.cost.prediction import folding_needs
+from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.io.files import read_json
 
 RUNS_WITH_MAPS = [
@@ -170,6 +173,17 @@ def ranks(wildcards):
     return CONFIG.run(run).ranks
 
 
+def folding_limits(wildcards):
+    """Returns the memory in MiB and the minutes of a run's job on a cluster, predicted from measured runs."""
+    return folding_needs(
+        wildcards.run,
+        wildcards.brain,
+        CONFIG,
+        read_json(MEASURED_COSTS),
+        predicted_memory_mib,
+    )
+
+
 def solve_options(*more):
     """Returns the options of the folding program: the maps of a run where it has some, and `more`."""
     return lambda wildcards, input: [
@@ -195,8 +209,8 @@ rule simulate:
     resources:
         mpi="mpiexec",
         tasks=ranks,
-        mem_mb=8000,
-        runtime=1440,
+        mem_mb=lambda wildcards: folding_limits(wildcards)[0],
+        runtime=lambda wildcards: folding_limits(wildcards)[1],
     params:
         folder=subpath(output.steps, parent=True),
         options=solve_options(),
@@ -224,8 +238,8 @@ checkpoint simulate_member:
     resources:
         mpi="mpiexec",
         tasks=ranks,
-        mem_mb=8000,
-        runtime=1440,
+        mem_mb=lambda wildcards: folding_limits(wildcards)[0],
+        runtime=lambda wildcards: folding_limits(wildcards)[1],
     params:
         folder=subpath(output.steps, parent=True),
         options=solve_options("--may-diverge"),
