@@ -35,7 +35,9 @@ def curves_of_run(wildcards):
 
 def carried_of_run(wildcards):
     """Returns the mesh carried through real brains where the run's growth differs between regions."""
-    return rules.carried_mesh.output[0] if regional(wildcards.run) else []
+    # where no brains tell of local growth, the run's parameters say why
+    known = regional(wildcards.run) and wildcards.brain in WITH_CHAIN
+    return rules.carried_mesh.output[0] if known else []
 
 
 rule parameters:
@@ -63,6 +65,9 @@ rule parameters:
         ),
         regional_weeks=lambda wildcards: (
             weeks_of_chain(wildcards.brain) if regional(wildcards.run) else []
+        ),
+        unmatched=lambda wildcards: UNMATCHED.get(
+            CONFIG.estimated_from(wildcards.brain)
         ),
     script:
         "../scripts/parameters.py"
@@ -150,7 +155,9 @@ FOLDING = {
 SOLVE = (
     # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
     "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
-    "{resources.mpi} -n {resources.tasks} python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
+    # a cluster's profile sets no launcher for a single rank
+    "launch='{resources.mpi}'; ${{launch:+$launch -n {resources.tasks}}}"
+    " python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
     " {params.options:q} --out {params.folder:q} 2>&1"
     " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
 )
@@ -158,7 +165,7 @@ FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
 
 
 def ranks(wildcards):
-    """Returns the MPI ranks of a run: on one machine its threads; a cluster's profile sets threads to 1 and counts tasks."""
+    """Returns the MPI ranks of a run: on one machine its threads; a cluster's profile gives each task one CPU."""
     run = CONFIG.calibrate.base if wildcards.run in CALIBRATED else wildcards.run
     return CONFIG.run(run).ranks
 

@@ -98,7 +98,11 @@ rule validate:
         rules.smoothing_figure.output if len(set(SMOOTHING.values())) > 2 else [],
         CEILING,
         (
-            [rules.displacement_agreement_table.output, rules.onset_table.output]
+            [
+                rules.displacement_agreement_table.output,
+                rules.onset_table.output,
+                rules.onset_figure.output,
+            ]
             if any(brain in CARRIED for _, brain in VALIDATED)
             else []
         ),

@@ -9,8 +9,9 @@ from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
 from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.mesh.maps import move_to_mesh, require_within, vertex_map_on_mesh, volume_map_on_mesh, volume_pose
+from gyriflow.mesh.maps import move_to_mesh, require_within, vertex_map_on_mesh, volume_map_on_mesh
 from gyriflow.step import step
+from gyriflow.surface.file_poses import surface_pose, volume_pose
 
 files, maps = snakemake.input, {}
 with step(snakemake.log[0]):
@@ -20,7 +21,7 @@ with step(snakemake.log[0]):
         path = ", ".join(source["map"])
         if source["surface"]:
             surface, values = read_surface_maps(source["map"], source["surface"])
-            surface = move_to_mesh(mesh.vertices[np.unique(facets)], surface, report)
+            surface = move_to_mesh(mesh.vertices[np.unique(facets)], surface, surface_pose(report))
             maps[name] = vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
         else:
             volume, motion = read_volume_map(path, snakemake.params.affine_from), volume_pose(report, path)

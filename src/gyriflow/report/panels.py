@@ -146,7 +146,7 @@ def panel_grid(
         top -= block_head_in
         for row in part:
             bottom = top - heights[id(row)]
-            marks = len(row.panels) if len(rows) == 1 else 1
+            marks = 1 if len(rows) > 1 else len(row.panels) if len(columns) > 1 else 0
             _draw_row(figure, row, layout, list(islice(letters, marks)), bottom=bottom, height=heights[id(row)])
             top = bottom - captions[id(row)]
     _draw_scale_bar(figure, layout, {end for panel in shown for end in panel.view.ends})

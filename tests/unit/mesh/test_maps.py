@@ -12,10 +12,8 @@ from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 from gyriflow.mesh.maps import (
     move_nearest,
     require_within,
-    surface_pose,
     vertex_map_on_mesh,
     volume_map_on_mesh,
-    volume_pose,
 )
 
 RADIUS = 20.0
@@ -201,27 +199,3 @@ def test_values_that_a_parameter_cannot_have_are_refused_with_their_count():
     ) as caught:
         require_within(np.array([0.0, 1.5, 1500.0]), bounds, "thickness.shape.gii")
     assert all(words in str(caught.value) for words in ("thickness.shape.gii", "medial wall"))
-
-
-def test_a_volume_follows_the_one_motion_of_a_brain():
-    motion = pose(10, 20, 30)
-    for posing in ({}, {"posing": {"together": True}}):
-        assert volume_pose({"pose": motion.tolist()} | posing, "a.nii") == pytest.approx(motion)
-
-
-@pytest.mark.parametrize("source", ["pial", "hemisphere", "hemispheres"])
-@pytest.mark.parametrize("coordinates", ["lps", "ras"])
-def test_surfaces_in_lps_are_flipped_once_and_volumes_never(source, coordinates):
-    lps, turn = np.diag([-1.0, -1.0, 1.0, 1.0]), pose(0, 10, 0)
-    flip = lps if coordinates == "lps" else np.eye(4)
-    # the surface stage flips hemispheres before it poses them, other surfaces as part of their pose
-    reported = turn if source == "hemispheres" else turn @ flip
-    report = {"source": source, "coordinates": coordinates, "pose": reported.tolist()}
-    assert surface_pose(report) == pytest.approx(turn @ flip)
-    assert volume_pose(report, "a.nii") == pytest.approx(turn)
-
-
-def test_a_volume_cannot_follow_hemispheres_that_were_posed_separately():
-    report = {"pose": np.eye(4).tolist(), "posing": {"together": False}}
-    with pytest.raises(InputError, match=r"a\.nii: a volume cannot be the map.*posed separately.*per vertex \(GIFTI\)"):
-        volume_pose(report, "a.nii")
