@@ -98,6 +98,8 @@ def main() -> None:
     from gyriflow.io.files import read_json
 
     arguments, found = parse(), {}
+    if arguments.figure:
+        arguments.figure.parent.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work
     shown = {}
     for kind in arguments.kinds:
         out = fold(arguments, kind)

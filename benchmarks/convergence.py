@@ -244,6 +244,8 @@ def main(arguments: argparse.Namespace) -> None:
     from gyriflow.io.files import write_table
 
     result: dict[str, Any] = {}
+    if arguments.figure:
+        arguments.figure.parent.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work
     if "steps" in arguments.parts:
         steps = time_steps(arguments)
         write_table(arguments.folder / "time_steps.csv", steps)

@@ -222,6 +222,8 @@ def draw(rows: list[dict], file: Path) -> None:
 
 
 def main(arguments: argparse.Namespace) -> None:
+    if arguments.figure:
+        arguments.figure.parent.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work
     print("  ".join(heading for heading, _, _ in COLUMNS), flush=True)
     rows: list[dict] = []
     for tets in sorted(arguments.sizes):

@@ -5,8 +5,9 @@
 STUDY_FOLDER is where the study ran (with `results/study/` in it), its `results`, or `results/study` itself. The tables
 `validation.csv` and `displacement_agreement.csv` there are read. The last line is one JSON object: for each run by its
 name `worst_area_error`, `worst_volume_error`, `skill_shape_index`, `skill_mean_curvature`, `curvature_rms_ratio`,
-`displacement_r`, `displacement_slope` and the skill by horizon; where the metrics are there too, `largest_difference`
-of either hemisphere from the real one in the last week, by metric.
+`displacement_r`, `displacement_slope` and the skill by horizon, explained and predicted weeks apart under `horizon`;
+where the metrics are there too, `largest_difference` of either hemisphere from the real one in the last week, by
+metric.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import pandas as pd
 
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_table
+from gyriflow.validation.horizon import over_starts
 from gyriflow.validation.tables import summary
 
 
@@ -45,6 +47,12 @@ def main() -> None:
     shown += ["skill_shape_index", "skill_mean_curvature", "curvature_rms_ratio"]
     print(validation[[name for name in shown if name in validation]].to_string(index=False, float_format="%.3f"))
     found = summary(validation, displacement)
+    horizons = folder / "horizon.csv"
+    if horizons.exists():
+        shown = ["model", "kind", "known_gw", "horizon", "starts", "gain_shape_index", "gain_mean_curvature"]
+        shown += ["skill_shape_index", "skill_mean_curvature", "displacement_r", "displacement_r_scaling"]
+        print("\nby horizon, over the starts:")
+        print(over_starts(read_table(horizons))[shown].to_string(index=False, float_format="%.3f"))
     agreement = folder / "folding_agreement.csv"
     if agreement.exists():
         table = read_table(agreement)

@@ -254,6 +254,8 @@ def main(arguments: argparse.Namespace) -> None:
 
     from gyriflow.config.mesh import MeshSettings
 
+    if arguments.figures:
+        arguments.figures.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work
     found: dict = {}
     for part in arguments.only or PARTS:
         found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part in ALONE else 2)

@@ -254,7 +254,7 @@ def main(arguments: Sequence[str]) -> int:
     # the name under which usage and mistakes in it are told
     sys.argv[0] = "snakemake"
     complete = add_snakefile(arguments)
-    details = directory.absolute() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
+    details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
     quiet = runs_quietly(arguments)
     if quiet:
         complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]

@@ -29,7 +29,7 @@ PACKAGES = (
         "scipy",
     ),
     *("snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk", "lapy", "pandas"),
-    *("picsl-greedy", "SimpleITK", "pyvista", "h5py", "pydantic"),
+    *("picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
 )
 """Packages whose versions are recorded: those that results depend on."""
 

@@ -31,10 +31,10 @@ def commit() -> str | None:
 
 
 def _git(*arguments: str) -> str | None:
+    # a checkout may belong to another user, as in a container
+    command = ["git", "-c", "safe.directory=*", "-C", str(SHIPPED), *arguments]
     try:
-        done = subprocess.run(
-            ["git", "-C", str(SHIPPED), *arguments], capture_output=True, text=True, check=True, timeout=10
-        )
+        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
     except (OSError, subprocess.SubprocessError):
         return None
     return done.stdout.strip() or None

@@ -1,7 +1,7 @@
 """Bodies that come into contact with each other or with themselves."""
 
 import numpy as np
-from boxes import COMM, MATERIAL
+from boxes import COMM, MATERIAL, smooth_displacement
 from shapes import box_mesh
 
 from gyriflow.folding.checkpoint import State
@@ -47,6 +47,22 @@ def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z
     contact = SelfContact(domain, problem.displacement, zones.facets, ContactSettings(stiffness, distance))
     problem.contributions.append(contact)
     return problem, contact
+
+
+def approach(domain):
+    """Returns displacements of the local nodes in m by which two blocks close half of their gap, not evenly."""
+    x = domain.local(domain.positions)
+    u = smooth_displacement(domain, 1e-5)
+    u[:, 2] -= np.sign(x[:, 2]) * GAP_MM / 4 * M_PER_MM
+    return u
+
+
+def stress_at(stretch, growth):
+    """Returns the first Piola-Kirchhoff stress in Pa along z of uniaxial strain after growth along z."""
+    K = 2 * MU * (1 + NU) / (3 * (1 - 2 * NU))
+    Fe = stretch / (1 + growth)
+    by_Fe = MU / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3)) + K * (Fe - 1)
+    return by_Fe / (1 + growth)
 
 
 def slab_with_a_sulcus():

@@ -8,11 +8,12 @@ from contact_bodies import (
     GAP_MM,
     HEIGHT_MM,
     MU,
-    NU,
     SIDE_MM,
+    approach,
     in_a_tube,
     problem_with_contact,
     slab_with_a_sulcus,
+    stress_at,
     two_blocks,
 )
 from scipy.optimize import brentq
@@ -24,14 +25,6 @@ from gyriflow.folding.domain import Domain
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.units import M_PER_MM, MM_PER_M
-
-
-def approach(domain):
-    """Returns displacements of the local nodes in m by which two blocks close half of their gap, not evenly."""
-    x = domain.local(domain.positions)
-    u = smooth_displacement(domain, 1e-5)
-    u[:, 2] -= np.sign(x[:, 2]) * GAP_MM / 4 * M_PER_MM
-    return u
 
 
 def test_forces_fit_the_energy_and_stiffness_the_forces():
@@ -87,14 +80,6 @@ def test_the_preconditioner_sees_contact_and_the_forms_of_the_tangent_agree():
         assert other.norm() <= 1e-12 * one.norm()
         assert contact.pair_count() > 0
         assert bound.dot(x) >= one.dot(x)
-
-
-def stress_at(stretch, growth):
-    """Returns the first Piola-Kirchhoff stress in Pa along z of uniaxial strain after growth along z."""
-    K = 2 * MU * (1 + NU) / (3 * (1 - 2 * NU))
-    Fe = stretch / (1 + growth)
-    by_Fe = MU / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3)) + K * (Fe - 1)
-    return by_Fe / (1 + growth)
 
 
 @pytest.mark.parametrize("other", [(5, 5, 3), (4, 3, 3)])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from boxes import COMM, MATERIAL, distorted_box, everywhere_known, smooth_displacement, zones_of
+from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stress_at, two_blocks
 from mpi4py import MPI
 from shapes import box_mesh
 
@@ -19,11 +20,9 @@ from gyriflow.folding.multigrid import linear_in_quadratic
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import Zones
 from gyriflow.geometry.jacobians import lower_bounds
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
 from gyriflow.parameters.reading import parameters_from
-from gyriflow.parameters.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
@@ -222,26 +221,12 @@ def test_a_free_body_grows_without_drifting():
         assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(x).max() * size * len(x)
 
 
-HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2
-
-
 def pressed_blocks(comm, growth, distance):
     """Returns the problem of two blocks in a tube that grow towards each other, their contact, and the mesh."""
-    low, high = (quadratic(box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM))) for n in ((2, 2, 1), (3, 2, 2)))
-    shift = np.array([0.0, 0.0, (HEIGHT_MM + GAP_MM) / 2])
-    mesh = TetrahedralMesh(
-        np.concatenate([low.vertices - shift, high.vertices + shift]),
-        np.concatenate([low.tets, high.tets + len(low.vertices)]),
-    )
-    facets, _ = boundary_faces(mesh)
-    centre = mesh.vertices[facets].mean(axis=1)
-    zone = np.full(len(facets), FREE)
-    zone[np.abs(centre[:, 0]) > SIDE_MM / 2 - 1e-6] = SIDE_X
-    zone[np.abs(centre[:, 1]) > SIDE_MM / 2 - 1e-6] = SIDE_Y
-    zone[np.abs(centre[:, 2]) > np.abs(mesh.vertices[:, 2]).max() - 1e-6] = CLAMPED
-    zones = Zones(facets, zone, np.ones(len(mesh.vertices)), 0.0, (-0.5, 0.5))
+    mesh = quadratic(two_blocks((2, 2, 1), (3, 2, 2)))
+    zones = in_a_tube(mesh)
     problem = problem_on(mesh, zones, dr=growth, comm=comm)
-    contact = SelfContact(problem.domain, problem.displacement, facets, ContactSettings(2000.0, distance))
+    contact = SelfContact(problem.domain, problem.displacement, zones.facets, ContactSettings(2000.0, distance))
     problem.contributions.append(contact)
     return problem, contact, mesh
 
@@ -261,22 +246,15 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_on_any_number_of_
     forces = np.zeros_like(place)
     forces[np.unique(boundary_faces(mesh)[0])] = contact.forces()
     pressure = forces[on_top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
-    # uniaxial strain: the first Piola-Kirchhoff stress along z
-    nu, mu = MATERIAL.poisson_ratio, 1000.0
-    Fe = (1 + (GAP_MM - gap) / 2 / HEIGHT_MM) / 1.1
-    by_Fe = mu / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3))
-    by_Fe += 2 * mu * (1 + nu) / (3 * (1 - 2 * nu)) * (Fe - 1)
     assert 0 < gap < 0.1
-    assert pressure == pytest.approx(-by_Fe / 1.1, rel=0.01)
+    assert pressure == pytest.approx(-stress_at(1 + (GAP_MM - gap) / 2 / HEIGHT_MM, 0.1), rel=0.01)
     # an even pressure leaves faces even, although the meshes do not match: elements are 2 and 3 mm long
     assert place[below, 2].std() < 0.01
 
 
 def test_the_preconditioner_sees_contact():
     problem, contact, _ = pressed_blocks(COMM, growth=0.0, distance=0.15)
-    u = smooth_displacement(problem.domain, 1e-5)
-    u[:, 2] -= np.sign(problem.domain.local(problem.domain.positions)[:, 2]) * GAP_MM / 4 * M_PER_MM
-    problem.set_displacement(u)
+    problem.set_displacement(approach(problem.domain))
     tangent = problem.tangent()
     x, whole, bound = (problem.new_vector() for _ in range(3))
     rng = np.random.default_rng(1)
@@ -295,8 +273,7 @@ def test_forces_fit_the_energy_and_stiffness_the_forces():
     domain = problem.domain
     # shaken along the surfaces: where edges are parallel, which parts are nearest changes at once
     shaken = np.random.default_rng(4).uniform(-1e-4, 1e-4, (len(domain.positions), 3)) * [1.0, 1.0, 0.0]
-    u = smooth_displacement(domain, 1e-5) + domain.local(shaken)
-    u[:, 2] -= np.sign(domain.local(domain.positions)[:, 2]) * GAP_MM / 4 * M_PER_MM
+    u = approach(domain) + domain.local(shaken)
     v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
     v[domain.local(problem_fixed(problem))] = 0.0
     problem.set_displacement(u)

@@ -1,5 +1,6 @@
 """The commands of gyriflow as a user types them."""
 
+import re
 import subprocess
 import sys
 
@@ -55,6 +56,32 @@ def test_check_says_what_will_run_and_what_it_takes(workflow):
     for need in ("\ntime    about ", "\nmemory  about ", "\ndisk    about "):
         assert need in said
     assert not (workflow.directory / "results").exists()
+
+
+@pytest.mark.slow
+def test_a_study_of_fifty_runs_is_planned_with_its_core_hours_and_cost(workflow):
+    brains = [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 22, "phantom": {}}]
+    vary = {"thickness_mm": [1 + 0.2 * i for i in range(10)], "shear_modulus_cortex_pa": [300, 600, 900, 1500, 3000]}
+    fifty = {"fifty": {"base": "reference", "vary": vary, "compare_week": 22}}
+    study = {"brains": brains, "start": "a", "folding": {"end_week": 22}, "runs": {"reference": {}}, "studies": fifty}
+    name = workflow.write("study.yaml", study)
+    outcome = gyriflow(workflow, "check", name, "--stage", "studies", "--cores", "1000", "--price", "0.5")
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    said = outcome.stdout
+    assert said.startswith("study.yaml: 2 brains, 1 simulation (reference), 50 of study fifty\n")
+    # parameters, regions and solve of each run
+    assert re.search(r"\n  folding +15\d ", said)
+    number = r"([\d.e+]+)"
+    hours, least, most, share = map(
+        float,
+        re.search(rf"\nwork +about {number} \({number} to {number}\) core hours, {number}% of them", said).groups(),
+    )
+    cost = float(re.search(rf"\ncost +about {number} \(.* at 0\.5 a core hour", said)[1])
+    assert least < hours < most
+    assert share > 50
+    assert cost == pytest.approx(hours / 2, rel=0.1)
+    # the memory of a cluster is not that of this machine
+    assert "are free" not in re.search(r"\nmemory .*", said)[0]
 
 
 def test_completion_scripts_are_printed(workflow):

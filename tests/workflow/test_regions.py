@@ -3,14 +3,16 @@
 import numpy as np
 import pandas as pd
 import pytest
+from shapes import hemisphere, save_gifti
 
-from gyriflow.geometry.triangles import transformed
+from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.io.files import read_json
 from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
 from gyriflow.phantom.brain import CORTEX, phantom_labels
+from gyriflow.surface.file_poses import LPS_TO_RAS
 
 VOXEL_MM = 2.0
 STUDY = {
@@ -160,3 +162,29 @@ def test_labels_of_surfaces_are_given_as_well(workflow):
         assert names == {1: "front", 2: "back"}
         vertices = read_surface(folder / f"{side}.pial.surf.gii").vertices
         np.testing.assert_array_equal(found, np.where(vertices[:, 1] > middle(vertices), 1, 2))
+
+
+@pytest.mark.slow
+def test_a_volume_of_regions_fits_a_pial_surface_in_lps(workflow):
+    """The volume is in RAS+ whatever the axes of the surface; taken as they are, front and back would change places."""
+    halves, world = [hemisphere(side) for side in (-1, 1)], np.array([0.0, 6.0, 3.0])
+    points = np.concatenate([half.vertices for half in halves]) + world
+    brain = TriangleMesh(points, np.concatenate([halves[0].faces, halves[1].faces + len(halves[0].vertices)]))
+    save_gifti(workflow.directory / "lps.surf.gii", transformed(brain, LPS_TO_RAS))
+    affine = np.eye(4)
+    affine[:3, 3] = np.floor(points.min(axis=0)) - 2
+    index = np.ceil(points.max(axis=0) - affine[:3, 3]).astype(int) + 2
+    y = affine[1, 3] + np.arange(index[1])
+    regions = np.broadcast_to(np.where(y > middle(points), 1, 3)[None, :, None], index).copy()
+    write_label_volume(workflow.directory / "regions.nii.gz", LabelVolume(regions, affine))
+    given = {"id": "given", "week": 21, "pial": "lps.surf.gii", "coordinates": "lps"}
+    metrics = {"regions": {"given": STUDY["metrics"]["regions"]["p22"]}}
+    study = STUDY | {"brains": [given], "start": "given", "metrics": metrics}
+    made = "results/brains/given/metrics/left.regions.label.gii"
+    outcome = workflow.run(made, "--cores", "2", "--configfile", workflow.write("study.yaml", study))
+    assert outcome.returncode == 0, outcome.stderr[-2000:]
+    for side in SIDES:
+        found, _ = read_vertex_labels(workflow.directory / f"results/brains/given/metrics/{side}.regions.label.gii")
+        y = read_surface(workflow.directory / f"results/brains/given/surface/{side}.pial.surf.gii").vertices[:, 1]
+        clear = np.abs(y - world[1]) > 2.0
+        np.testing.assert_array_equal(found[clear], np.where(y[clear] > world[1], 1, 2))

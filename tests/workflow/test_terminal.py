@@ -31,6 +31,9 @@ def test_a_run_names_its_stage_and_brain_and_all_else_is_in_the_log(workflow):
     assert "\r" not in said
     lines = said.splitlines()
     assert len(lines) < 10
+    # nothing of Snakemake's stands before the first line
+    assert re.match(r"gyriflow: \d+ steps to do", lines[0])
+    assert re.search(r"^Using workflow specific profile .*arguments\.$", log_of(said), re.MULTILINE)
     assert sum("surface      brain a" in line for line in lines) == 1
     assert re.fullmatch(r"gyriflow: done in .*", lines[-1])
     details = log_of(said)
@@ -45,6 +48,7 @@ def test_a_run_names_its_stage_and_brain_and_all_else_is_in_the_log(workflow):
     # Snakemake's own messages are a word away
     as_before = workflow.run("--cores", "1", "surface", "--verbose", "--configfile", name)
     assert "Nothing to be done" in as_before.stdout + as_before.stderr
+    assert "Using workflow specific profile" in as_before.stderr
 
 
 @pytest.mark.slow
@@ -89,3 +93,4 @@ def test_a_terminal_gets_a_line_that_is_written_over(workflow):
     assert process.wait(timeout=300) == 0, said
     assert "\r\x1b[K" in said
     assert "gyriflow: done in" in said
+    assert "Using workflow specific profile" not in said

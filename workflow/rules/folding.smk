@@ -1,4 +1,7 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
+from gyriflow.cost import MEASURED as MEASURED_COSTS
+from gyriflow.cost.prediction import folding_needs
+from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.io.files import read_json
 
 
@@ -48,7 +51,9 @@ def ventricle_labels(wildcards):
 
 def carried_of_run(wildcards):
     """Returns the mesh carried through real brains where the run's growth differs between regions."""
-    return rules.carried_mesh.output[0] if regional(wildcards.run) else []
+    # where no brains tell of local growth, the run's parameters say why
+    known = regional(wildcards.run) and wildcards.brain in WITH_CHAIN
+    return rules.carried_mesh.output[0] if known else []
 
 
 rule parameters:
@@ -76,6 +81,9 @@ rule parameters:
         ),
         regional_weeks=lambda wildcards: (
             weeks_of_chain(wildcards.brain) if regional(wildcards.run) else []
+        ),
+        unmatched=lambda wildcards: UNMATCHED.get(
+            CONFIG.estimated_from(wildcards.brain)
         ),
     script:
         "../scripts/parameters.py"
@@ -169,7 +177,9 @@ FOLDING = {
 SOLVE = (
     # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
     "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
-    "{resources.mpi} -n {resources.tasks} python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
+    # a cluster's profile sets no launcher for a single rank
+    "launch='{resources.mpi}'; ${{launch:+$launch -n {resources.tasks}}}"
+    " python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
     " {params.options:q} --out {params.folder:q} 2>&1"
     " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
 )
@@ -177,9 +187,20 @@ FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
 
 
 def ranks(wildcards):
-    """Returns the MPI ranks of a run: on one machine its threads; a cluster's profile sets threads to 1 and counts tasks."""
+    """Returns the MPI ranks of a run: on one machine its threads; a cluster's profile gives each task one CPU."""
     run = CONFIG.calibrate.base if wildcards.run in CALIBRATED else wildcards.run
     return CONFIG.run(run).ranks
+
+
+def folding_limits(wildcards):
+    """Returns the memory in MiB and the minutes of a run's job on a cluster, predicted from measured runs."""
+    return folding_needs(
+        wildcards.run,
+        wildcards.brain,
+        CONFIG,
+        read_json(MEASURED_COSTS),
+        predicted_memory_mib,
+    )
 
 
 def solve_options(*more):
@@ -207,8 +228,8 @@ rule simulate:
     resources:
         mpi="mpiexec",
         tasks=ranks,
-        mem_mb=8000,
-        runtime=1440,
+        mem_mb=lambda wildcards: folding_limits(wildcards)[0],
+        runtime=lambda wildcards: folding_limits(wildcards)[1],
     params:
         folder=subpath(output.steps, parent=True),
         options=solve_options(),
@@ -236,8 +257,8 @@ checkpoint simulate_member:
     resources:
         mpi="mpiexec",
         tasks=ranks,
-        mem_mb=8000,
-        runtime=1440,
+        mem_mb=lambda wildcards: folding_limits(wildcards)[0],
+        runtime=lambda wildcards: folding_limits(wildcards)[1],
     params:
         folder=subpath(output.steps, parent=True),
         options=solve_options("--may-diverge"),

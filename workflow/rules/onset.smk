@@ -1,4 +1,15 @@
 # The weeks in which sulci begin, in simulated brains and in the real ones that follow their start.
+def regions_of_last(side):
+    """Returns an input function: the regions of the last brain that a start brain is carried to, where it has some."""
+
+    def files(wildcards):
+        last = later_brains(wildcards.brain)[-1]
+        names = region_files(f"results/brains/{last}/metrics")
+        return names[f"{side}_regions"] if last in REGIONED else []
+
+    return files
+
+
 rule onset:
     input:
         **{
@@ -17,10 +28,11 @@ rule onset:
             )
             for side in SIDES
         },
+        **{f"{side}_regions": regions_of_last(side) for side in SIDES},
         reports=lambda wildcards: expand(
             PIAL["report"], brain=later_brains(wildcards.brain)
         ),
-        registrations=lambda wildcards: registrations(later_brains(wildcards.brain)),
+        correspondences=lambda wildcards: correspondences(later_brains(wildcards.brain)),
     output:
         f"{RUN}/metrics/onset.csv",
     log:
@@ -42,6 +54,33 @@ rule onset:
         ],
     script:
         "../scripts/onset.py"
+
+
+rule onset_figure:
+    input:
+        "results/study/onset.csv",
+    output:
+        **figure(
+            f"{STUDY}/figures/onset",
+            "weeks in which sulci begin",
+            "figure.rst",
+            "Validation",
+        ),
+    log:
+        f"{STUDY}/logs/onset_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/onset_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        runs=list(CONFIG.runs),
+        dpi=CONFIG.report.dpi,
+        caption=(
+            "Weeks in which sulci of the last real brain that are not there at the start come to be 2 mm deep below "
+            "their neighbouring crowns. Marks at the right edge: never in the weeks that were folded or measured."
+        ),
+    script:
+        "../scripts/onset_figure.py"
 
 
 rule onset_table:

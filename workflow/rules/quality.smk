@@ -58,9 +58,9 @@ rule quality_page:
     params:
         **drawing(),
         caption=(
-            "Quality of *{brain}* before the solve: the pial surface and the inner border of the cortex over the "
-            "image or the labels, the surface from several sides, cortical thickness where it is known, and what "
-            "the steps have warned of."
+            "Quality of *{brain}* before the solve: (a) the pial surface and the inner border of the cortex over the "
+            "image or the labels, (b) the surface from several sides, (c) cortical thickness where it is known, else "
+            "further sides, and what the steps have warned of."
         ),
         title=lambda wildcards: (
             f"{wildcards.brain}, {CONFIG.brain(wildcards.brain).week:g} GW"

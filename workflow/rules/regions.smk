@@ -73,8 +73,8 @@ rule carried_regions:
         left=PIAL["left"],
         right=PIAL["right"],
         report=PIAL["report"],
-        registration=lambda wildcards: (
-            f"{STUDY}/registration/{CONFIG.regions_from(wildcards.brain)}/{wildcards.brain}.h5"
+        correspondence=lambda wildcards: correspondence(
+            CONFIG.regions_from(wildcards.brain), wildcards.brain
         ),
     output:
         **region_files(f"{BRAIN}/metrics"),
@@ -90,6 +90,7 @@ rule carried_regions:
         # masks of surfaces are in the surfaces' own pose
         posed=lambda wildcards: [
             not CONFIG.brain(brain).has_labels
+            and not matched(CONFIG.regions_from(wildcards.brain), wildcards.brain)
             for brain in (CONFIG.regions_from(wildcards.brain), wildcards.brain)
         ],
     script:

@@ -1,11 +1,28 @@
 # Correspondence between brains of successive weeks: where each point of a start brain goes in the real ones.
 from gyriflow.parameters.schemes import SCHEMES
 
+# growth series of surfaces: those with the same vertices, and why the others are not matched
+MATCHED = CONFIG.matched_surfaces
+UNMATCHED = CONFIG.unmatched_surfaces
+if workflow.is_main_process:
+    for series, cause in UNMATCHED.items():
+        if set(CONFIG.growth_series[series]) & set(CONFIG.start_brains):
+            print(
+                f"gyriflow: no local growth from the surfaces of {series}: {cause}",
+                file=sys.stderr,
+            )
+
+
+def correspond(brain, other):
+    """Returns whether local growth is known between a start brain and another one of its growth series."""
+    volumes = CONFIG.brain(brain).has_labels and CONFIG.brain(other).has_labels
+    return volumes or {brain, other} <= MATCHED.get(CONFIG.estimated_from(brain), set())
+
 
 def later_brains(brain):
     """Returns a start brain and the brains of its growth series up to where its runs end, one a week.
 
-    All have label volumes.
+    All have label volumes, or surfaces with the same vertices.
     """
     series = CONFIG.growth_series.get(CONFIG.estimated_from(brain), [])
     start = CONFIG.brain(brain)
@@ -19,10 +36,8 @@ def later_brains(brain):
     last = within[0] if within else end
     chosen = {start.week: brain}
     for other in map(CONFIG.brain, series):
-        if start.week < other.week <= last and other.has_labels:
+        if start.week < other.week <= last and correspond(brain, other.id):
             chosen.setdefault(other.week, other.id)
-    if not start.has_labels:
-        return [brain]
     return [chosen[week] for week in sorted(chosen)]
 
 
@@ -30,13 +45,11 @@ def earlier_brains(brain):
     """Returns the brains of a start brain's growth series up to it, one a week, where some run is to predict from them."""
     start = CONFIG.brain(brain)
     chosen = {start.week: brain}
-    if start.has_labels and any(
-        predicts(run) for run, folded in FOLDED if folded == brain
-    ):
+    if any(predicts(run) for run, folded in FOLDED if folded == brain):
         for other in map(
             CONFIG.brain, CONFIG.growth_series.get(CONFIG.estimated_from(brain), [])
         ):
-            if other.week < start.week and other.has_labels:
+            if other.week < start.week and correspond(brain, other.id):
                 chosen.setdefault(other.week, other.id)
     return [chosen[week] for week in sorted(chosen)]
 
@@ -56,12 +69,20 @@ def weeks_of_chain(brain):
     return [CONFIG.brain(name).week for name in chain_of(brain)]
 
 
-def registrations(chain):
-    """Returns the files of the registrations from each brain of a chain to the next."""
-    return [
-        f"{STUDY}/registration/{earlier}/{later}.h5"
-        for earlier, later in zip(chain, chain[1:])
-    ]
+def matched(*brains):
+    """Returns whether brains have surfaces with the same vertices."""
+    return any(set(brains) <= known for known in MATCHED.values())
+
+
+def correspondence(earlier, later):
+    """Returns the file that says where one brain's points are in another: by matched vertices, or registration."""
+    folder = "matched" if matched(earlier, later) else "registration"
+    return f"{STUDY}/{folder}/{earlier}/{later}.h5"
+
+
+def correspondences(chain):
+    """Returns these files from each brain of a chain to the next."""
+    return [correspondence(*pair) for pair in zip(chain, chain[1:])]
 
 
 # start brains that real ones of later weeks follow, and those that real ones of any week are registered with
@@ -133,13 +154,60 @@ rule register:
         "../scripts/register.py"
 
 
+# the surfaces as they are given, with all their vertices, in the pose of the mesh
+rule matched_surface:
+    input:
+        lambda wildcards: CONFIG.brain(wildcards.brain).files,
+        report=f"{BRAIN}/surface/surface.json",
+    output:
+        f"{BRAIN}/surface/matched.surf.gii",
+    log:
+        f"{BRAIN}/logs/matched_surface.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/matched_surface.tsv"
+    wildcard_constraints:
+        brain=one_of(sorted(set().union(*MATCHED.values()))),
+    conda:
+        ENVIRONMENT
+    params:
+        # exchanged files are the same inputs to Snakemake
+        files=lambda wildcards: CONFIG.brain(wildcards.brain).files,
+    script:
+        "../scripts/matched_surface.py"
+
+
+rule match_surfaces:
+    input:
+        **{
+            f"{which}{suffix}": f"results/brains/{{{which}}}/surface/{file}"
+            for which in ("earlier", "later")
+            for suffix, file in (
+                ("", "matched.surf.gii"),
+                ("_report", "surface.json"),
+            )
+        },
+    output:
+        f"{STUDY}/matched/{{earlier}}/{{later}}.h5",
+    log:
+        f"{STUDY}/matched/logs/{{earlier}}.{{later}}.log",
+    benchmark:
+        f"{STUDY}/matched/benchmarks/{{earlier}}.{{later}}.tsv"
+    wildcard_constraints:
+        earlier=one_of(BRAINS),
+        later=one_of(BRAINS),
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/match_surfaces.py"
+
+
 rule carried_mesh:
     input:
         mesh=rules.tetrahedralise.output.mesh,
         data=rules.tetrahedralise.output.data,
         report=PIAL["report"],
-        earlier=lambda wildcards: registrations(earlier_brains(wildcards.brain)),
-        later=lambda wildcards: registrations(later_brains(wildcards.brain)),
+        earlier=lambda wildcards: correspondences(earlier_brains(wildcards.brain)),
+        later=lambda wildcards: correspondences(later_brains(wildcards.brain)),
     output:
         f"{BRAIN}/mesh/carried.h5",
     log:

@@ -226,7 +226,6 @@ rule report_provenance:
     params:
         files=input_files(),
         paths=CONFIG.report.paths,
-        source=workflow.basedir,
     script:
         "../scripts/report_provenance.py"
 

@@ -187,6 +187,7 @@ rule norms_figure:
         ENVIRONMENT
     params:
         **drawing(*CONFIG.start_brains),
+        folded=FOLDED,
         reference=CONFIG.norm_reference,
         measured=CONFIG.measured_name(CONFIG.norm_reference or BRAINS),
     script:

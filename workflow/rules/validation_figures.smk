@@ -88,17 +88,99 @@ use rule validation_figure as smoothing_figure with:
         ),
 
 
+def models():
+    """Returns for each run the first one that differs from it only in its start, seed, end, or in what is known."""
+    known, found = {}, {}
+    for run in CONFIG.runs:
+        settings = CONFIG.run(run).model_dump(
+            exclude={"preset", "start", "end_week", "ranks"}
+        )
+        follow = settings["follow"]
+        if follow is not None:
+            follow.update(seed=None, known_until_gw=None)
+        found[run] = known.setdefault(repr(settings), run)
+    return found
+
+
+rule horizon:
+    input:
+        validation=rules.validation_table.output[0],
+        displacement=(
+            rules.displacement_agreement_table.output[0]
+            if any(brain in CARRIED for _, brain in VALIDATED)
+            else []
+        ),
+    output:
+        f"{STUDY}/horizon.csv",
+    log:
+        f"{STUDY}/logs/horizon.log",
+    benchmark:
+        f"{STUDY}/benchmarks/horizon.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        models=models(),
+        known_until_gw={
+            run: (
+                CONFIG.run(run).follow.known_until_gw
+                if CONFIG.run(run).follow
+                else None
+            )
+            for run in CONFIG.runs
+        },
+    script:
+        "../scripts/horizon.py"
+
+
+rule horizon_figure:
+    input:
+        horizon=rules.horizon.output[0],
+        ceiling=CEILING[0] if CEILING else [],
+    output:
+        **figure(
+            f"{STUDY}/figures/horizon",
+            "gain by weeks after the start",
+            "figure.rst",
+            "Validation",
+        ),
+    log:
+        f"{STUDY}/logs/horizon_figure.log",
+    benchmark:
+        f"{STUDY}/benchmarks/horizon_figure.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        runs=list(CONFIG.runs),
+        dpi=CONFIG.report.dpi,
+        caption=(
+            "Prediction horizon: correlation of curvature with that of the real brain, less that of the scaled start, "
+            "by weeks after the start. Each line begins at the week that stands at its end; weeks whose growth was "
+            "known and weeks whose growth was not stand in panels of their own."
+        ),
+    script:
+        "../scripts/horizon_figure.py"
+
+
 rule validate:
     input:
         (
-            [rules.validation_table.output, rules.validation_figure.output]
+            [
+                rules.validation_table.output,
+                rules.validation_figure.output,
+                rules.horizon.output,
+                rules.horizon_figure.output,
+            ]
             if VALIDATED
             else []
         ),
         rules.smoothing_figure.output if len(set(SMOOTHING.values())) > 2 else [],
         CEILING,
         (
-            [rules.displacement_agreement_table.output, rules.onset_table.output]
+            [
+                rules.displacement_agreement_table.output,
+                rules.onset_table.output,
+                rules.onset_figure.output,
+            ]
             if any(brain in CARRIED for _, brain in VALIDATED)
             else []
         ),

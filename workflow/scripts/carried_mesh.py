@@ -3,11 +3,11 @@
 import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.tetrahedra import boundary_faces, linear_pieces
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, linear_pieces
 from gyriflow.io.files import read_json
-from gyriflow.io.registrations import CarriedMesh, read_deformation, write_carried_mesh
+from gyriflow.io.registrations import CarriedMesh, read_correspondence, write_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.registration.carrying import carry_both_ways
+from gyriflow.registration.carrying import carry_mesh
 from gyriflow.registration.growth import local_growth, local_strain
 from gyriflow.step import step
 
@@ -15,10 +15,10 @@ files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
     pose = np.array(read_json(files.report)["pose"])
-    # the labels' world, in which brains were registered, is not the pose of the mesh
-    start = transform_points(mesh.vertices, np.linalg.inv(pose))
-    maps = [[read_deformation(path)[0] for path in paths] for paths in (files.earlier, files.later)]
-    positions = carry_both_ways(start, *maps)
+    # the files' world, in which brains correspond, is not the pose of the mesh
+    start = TetrahedralMesh(transform_points(mesh.vertices, np.linalg.inv(pose)), mesh.tets)
+    maps = [[read_correspondence(path) for path in paths] for paths in (files.earlier, files.later)]
+    positions = carry_mesh(start, *maps)
     cells = {"volume": linear_pieces(mesh), "area": boundary_faces(mesh)[0]}
     growth = {
         length: {

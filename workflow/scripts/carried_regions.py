@@ -5,7 +5,7 @@ import numpy as np
 from gyriflow.geometry.triangles import transformed
 from gyriflow.io.files import read_json
 from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
-from gyriflow.io.registrations import read_deformation
+from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_surface
 from gyriflow.parameters.terms import SIDES, STRUCTURES
 from gyriflow.registration.carrying import carry_regions
@@ -13,16 +13,14 @@ from gyriflow.step import step
 
 files, reports = snakemake.input, (snakemake.input.given_report, snakemake.input.report)
 with step(snakemake.log[0]):
-    # brains are registered in the world of their volumes
+    # brains correspond in the world of their files
     back = [
         np.eye(4) if posed else np.linalg.inv(read_json(report)["pose"])
         for report, posed in zip(reports, snakemake.params.posed, strict=True)
     ]
-    deformation, _ = read_deformation(files.registration)
+    between = read_correspondence(files.correspondence)
     for side in SIDES:
         regions, names = read_vertex_labels(files[f"{side}_regions"])
         pairs = zip((files[f"given_{side}"], files[side]), back, strict=True)
-        found = carry_regions(
-            regions, *(transformed(read_surface(path), matrix) for path, matrix in pairs), deformation
-        )
+        found = carry_regions(regions, *(transformed(read_surface(path), matrix) for path, matrix in pairs), between)
         write_vertex_labels(snakemake.output[f"{side}_regions"], found, names, STRUCTURES[side])

@@ -11,6 +11,7 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.terms import SIDES, STRUCTURES
 from gyriflow.registration.regions import number_regions, regions_from_surface, regions_from_volume, renumber
 from gyriflow.step import step
+from gyriflow.surface.file_poses import volume_pose
 
 files, params = snakemake.input, snakemake.params
 given = [file for name in ("volume", "left_labels", "right_labels") if (file := files.get(name))]
@@ -20,7 +21,8 @@ with step(snakemake.log[0], *given):
     if files.get("volume"):
         volume = read_label_volume(files.volume, affine_from=params.affine_from)
         numbers = number_regions(params.names)
-        regions, back = renumber(volume.labels, params.names, numbers), np.linalg.inv(report["pose"])
+        regions = renumber(volume.labels, params.names, numbers)
+        back = np.linalg.inv(volume_pose(report, files.volume))
         found = {
             side: regions_from_volume(transform_points(mesh.vertices, back), regions, volume.affine)
             for side, mesh in meshes.items()

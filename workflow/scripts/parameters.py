@@ -24,7 +24,8 @@ with step(snakemake.log[0]):
         if THICKNESS in sizes:
             settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}
         if snakemake.params.regional_weeks:
-            known = known_weeks(snakemake.params.regional_weeks, settings["follow"]["known_until_gw"])
+            until = settings["follow"]["known_until_gw"]
+            known = known_weeks(snakemake.params.regional_weeks, until, snakemake.params.unmatched)
             settings["regional_growth"] = {week: regional_map(week) for week in known}
             if settings["follow"]["directional"] > 0:
                 settings["regional_strain"] = {week: regional_map(week, STRAIN) for week in known}

@@ -1,8 +1,9 @@
 """Checks a study before it is run: its configuration, its files, what will run, and what that will take."""
 
+import os
 import shutil
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import psutil
@@ -21,29 +22,33 @@ from ..io.yaml_files import read_yaml
 from ..parameters.schemes import LabelScheme
 from ..shipped import SHIPPED
 from ..surface.labels import cerebrum_mask, require_cortex_outside
-from ..terminal.stages import ORDER, stages
+from ..terminal.stages import ORDER
+from ..terminal.stages import stages as stages_of_rules
 from ..terminal.time_left import as_duration
-from .plan import plan, reasons
+from .plan import PlannedJob, plan, reasons
 
 DEMO = SHIPPED / "config" / "config.yaml"
 MIB_PER_GIB = 1024
+NAMED_RUNS = 6
 
 
 def check_study(
-    config: Path | None, directory: Path, cores: int, read_files: bool = True
+    config: Path | None,
+    directory: Path,
+    cores: int,
+    read_files: bool = True,
+    stages: Sequence[str] = (),
+    price: float | None = None,
 ) -> Iterator[tuple[str, bool]]:
-    """Yields lines on a study, each with whether it is a problem.
+    """Yields lines on a study up to some stages, each with whether it is a problem.
+
+    With a price of a core hour they say what the study costs, too.
 
     InputError for a configuration that is not valid, with all its problems.
     """
     path = config or DEMO
     settings = load(read_yaml(path), path.resolve().parent)
-    folded = len(settings.folded)
-    yield (
-        f"{path}: {len(settings.brains)} brain{'s' if len(settings.brains) > 1 else ''}, "
-        f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(settings.runs)})",
-        False,
-    )
+    yield f"{path}: {_contents(settings)}", False
     bad = False
     if read_files:
         for line in input_problems(settings):
@@ -55,7 +60,27 @@ def check_study(
     if missing:
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
     if not bad:
-        yield from _work(path, settings, directory, cores)
+        arguments = ["--configfile", str(path.resolve()), "--directory", str(directory.resolve()), *stages]
+        yield from _work(plan(arguments), settings, directory, cores, price)
+
+
+def _contents(config: Config) -> str:
+    """Returns how many brains and simulations a configuration has, and the names of its runs or of the first ones."""
+
+    def counted(number: int, name: str) -> str:
+        return f"{number} {name}{'s' if number > 1 else ''}"
+
+    names = [*list(config.runs)[:NAMED_RUNS], *(["…"] if len(config.runs) > NAMED_RUNS else [])]
+    of_studies = [f"{len(members)} of study {name}" for name, members in config.members.items()]
+    if config.calibrate is not None:
+        of_studies.append(f"{len(config.calibrate.runs)} of the calibration")
+    return ", ".join(
+        [
+            counted(len(config.brains), "brain"),
+            f"{counted(len(config.folded), 'simulation')} ({', '.join(names)})",
+            *of_studies,
+        ]
+    )
 
 
 def input_problems(config: Config) -> Iterator[str]:
@@ -80,13 +105,14 @@ def _check_files(brain: Brain, config: Config) -> None:
             read_surface(file)
 
 
-def _work(path: Path, config: Config, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
+def _work(
+    jobs: Sequence[PlannedJob], config: Config, directory: Path, cores: int, price: float | None
+) -> Iterator[tuple[str, bool]]:
     """Yields what will run, by stage, and what it will take of time, memory and disk."""
-    jobs = plan(["--configfile", str(path.resolve()), "--directory", str(directory.resolve())])
     if not jobs:
         yield "nothing to run: all results are up to date", False
         return
-    of_rule = stages(SHIPPED / "workflow" / "rules")
+    of_rule = stages_of_rules(SHIPPED / "workflow" / "rules")
     by_stage = defaultdict(list)
     for job in jobs:
         by_stage[of_rule[job.rule]].append(job)
@@ -94,26 +120,31 @@ def _work(path: Path, config: Config, directory: Path, cores: int) -> Iterator[t
     for stage, planned in sorted(by_stage.items(), key=lambda item: ORDER.index(item[0])):
         yield f"  {stage:<12} {len(planned):4d}  {reasons(planned)}", False
     predicted = predict([job.job for job in jobs], config, read_json(MEASURED), cores, predicted_memory_mib)
-    yield from _needs(predicted, directory, cores)
+    yield from _needs(predicted, directory, cores, price)
 
 
-def _needs(predicted: Prediction, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
+def _needs(predicted: Prediction, directory: Path, cores: int, price: float | None) -> Iterator[tuple[str, bool]]:
     def between(value: float, error: float) -> str:
         return f"{as_duration(value / error)} to {as_duration(value * error)}"
 
     yield (
         f"time    about {as_duration(predicted.wall_seconds)} on {cores} core{'s' if cores > 1 else ''} without other "
-        f"load ({between(predicted.wall_seconds, predicted.time_error)}, by the errors of studies left out; "
-        f"{predicted.core_seconds / 3600:.2g} core hours)",
+        f"load ({between(predicted.wall_seconds, predicted.time_error)}, by the errors of studies left out)",
         False,
     )
-    available = psutil.virtual_memory().available / 2**20
-    too_much = predicted.memory_mib > available
-    yield (
-        f"memory  about {_gib(predicted.memory_mib)}, at most {_gib(predicted.memory_mib * predicted.memory_error)}; "
-        f"{_gib(available)} are free" + (": too little; use fewer cores, or larger edges" if too_much else ""),
-        too_much,
-    )
+    hours, folding = predicted.core_seconds / 3600, predicted.folding_core_seconds / predicted.core_seconds
+    yield f"work    about {_range(hours, predicted.time_error)} core hours, {folding:.0%} of them folding", False
+    if price is not None:
+        yield f"cost    about {_range(hours * price, predicted.time_error)} at {price:g} a core hour", False
+    memory = f"about {_gib(predicted.memory_mib)}, at most {_gib(predicted.memory_mib * predicted.memory_error)}"
+    if cores > (os.cpu_count() or 1):
+        # the plan of another machine, or of a cluster
+        yield f"memory  {memory}, of the largest jobs that run side by side", False
+    else:
+        available = psutil.virtual_memory().available / 2**20
+        too_much = predicted.memory_mib > available
+        advice = ": too little; use fewer cores, or larger edges" if too_much else ""
+        yield f"memory  {memory}; {_gib(available)} are free{advice}", too_much
     free = shutil.disk_usage(_there(directory)).free / 2**20
     full = predicted.disk_mib > free
     yield (
@@ -121,6 +152,10 @@ def _needs(predicted: Prediction, directory: Path, cores: int) -> Iterator[tuple
         f"{_gib(free)} are free" + (": too little" if full else ""),
         full,
     )
+
+
+def _range(value: float, error: float) -> str:
+    return f"{value:.2g} ({value / error:.2g} to {value * error:.2g})"
 
 
 def _gib(mib: float) -> str:

@@ -1,6 +1,8 @@
 """The commands of `gyriflow`, thin: each reads its arguments, calls one function and prints what it returns."""
 
 import os
+import shlex
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -8,15 +10,22 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 from click.shell_completion import get_completion_class
 
 from ..errors import GyriflowError
+from ..shipped import SHIPPED
 
-STAGES = ("surface", "mesh", "growth", "folding", "metrics", "figures", "report", "paper", "retrieve", "validate")
+STAGES = (
+    *("retrieve", "surface", "mesh", "growth", "folding", "metrics", "figures", "report"),
+    *("studies", "calibrate", "paper", "validate"),
+)
 """Targets of the workflow that a user asks for by name."""
 CONFIG = "gyriflow.yaml"
 """The configuration that is taken where none is named."""
 CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
+ELSEWHERE = ("--profile", "--executor", "-e")
+"""Options of Snakemake's by which jobs run on other machines."""
 SHELLS = ("bash", "zsh", "fish")
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -31,6 +40,14 @@ cores_option = click.option(
     default=os.cpu_count() or 1,
     show_default="all",
     help="How many cores to use.",
+)
+stages_option = click.option(
+    "-s",
+    "--stage",
+    "stages",
+    multiple=True,
+    type=click.Choice(STAGES),
+    help="Up to this stage only; of studies: theirs.",
 )
 config_argument = click.argument("config", type=FILE, required=False)
 
@@ -47,6 +64,11 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
             sys.exit(error.exit_code)
 
     return wrapped
+
+
+def command_name() -> str:
+    """Returns what a user types to get this command: in a checkout that is not installed, `./run gyriflow`."""
+    return "gyriflow" if shutil.which("gyriflow") or not (SHIPPED / "run").is_file() else "./run gyriflow"
 
 
 def version(context: click.Context, parameter: click.Parameter, value: bool) -> None:
@@ -92,16 +114,20 @@ def init(folder: Path, output: Path | None, force: bool) -> None:
     path = output or folder / CONFIG
     for line in write_configuration(folder, path, force):
         click.echo(line)
-    click.echo(f"wrote {path}; next: gyriflow check {path}")
+    click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
 
 
 @main.command()
 @config_argument
 @directory_option
 @cores_option
+@stages_option
 @click.option("--no-files", is_flag=True, help="Check the configuration only, not what is in the input files.")
+@click.option("--price", type=click.FloatRange(0), metavar="PRICE", help="Price of a core hour, for the study's cost.")
 @told
-def check(config: Path | None, directory: Path, cores: int, no_files: bool) -> None:
+def check(
+    config: Path | None, directory: Path, cores: int, stages: Sequence[str], no_files: bool, price: float | None
+) -> None:
     """Check a configuration and its files; say what will run and what it will take.
 
     Nothing is run or written. CONFIG is gyriflow.yaml where none is named, or else the demo.
@@ -109,7 +135,7 @@ def check(config: Path | None, directory: Path, cores: int, no_files: bool) -> N
     from .checking import check_study
 
     problems = 0
-    for line, bad in check_study(_chosen(config, directory), directory, cores, read_files=not no_files):
+    for line, bad in check_study(_chosen(config, directory), directory, cores, not no_files, stages, price):
         click.echo(line)
         problems += bad
     if problems:
@@ -120,7 +146,7 @@ def check(config: Path | None, directory: Path, cores: int, no_files: bool) -> N
 @main.command(context_settings={"ignore_unknown_options": True})
 @directory_option
 @cores_option
-@click.option("-s", "--stage", "stages", multiple=True, type=click.Choice(STAGES), help="Up to this stage only.")
+@stages_option
 @click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
 @click.option("-v", "--verbose", is_flag=True, help="All that Snakemake says, on the terminal.")
 @click.argument("further", nargs=-1, type=click.UNPROCESSED, metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]")
@@ -140,8 +166,12 @@ def run(
     arguments = ["--configfile", str(chosen.resolve())] if chosen else []
     arguments += ["--dry-run"] if dry_run else []
     arguments += ["--verbose"] if verbose else []
+    # the cores of this machine are no limit to a cluster, whose profile says how many jobs it may have
+    default = click.get_current_context().get_parameter_source("cores") == ParameterSource.DEFAULT
+    if not (default and any(argument.partition("=")[0] in ELSEWHERE for argument in further)):
+        arguments += ["--cores", str(cores)]
     # an option of one value stands before the targets
-    arguments += ["--cores", str(cores), "--directory", str(directory), *stages, *further[int(named) :]]
+    arguments += ["--directory", str(directory), *stages, *further[int(named) :]]
     sys.exit(launch(arguments))
 
 

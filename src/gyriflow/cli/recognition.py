@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..config.participants import AGES, IDS
 from ..errors import InputError
-from ..io.files import read_table
+from ..io.files import read_tab_separated
 from ..io.volumes import read_label_volume
 from ..parameters.schemes import SCHEMES, LabelScheme
 from ..surface.labels import cerebrum_mask, require_cortex_outside
@@ -36,17 +37,16 @@ WEEK = re.compile(
 WEEKS = (18.0, 45.0)
 """Numbers in names that may be gestational ages."""
 AGE_COLUMNS = (
-    "gestational_age",
+    *(name for name in AGES if name != "age"),  # which is that after birth in many tables
     "ga",
     "ga_weeks",
     "gestational_weeks",
     "gestational_age_weeks",
     "scan_age",
-    "week",
     "weeks",
     "age_at_scan",
 )
-ID_COLUMNS = ("participant_id", "subject_id", "subject", "id")
+ID_COLUMNS = (*IDS, "subject_id", "subject")
 HIDDEN = ("results", "resources", "derivatives-gyriflow")
 UNSET = "CHOOSE"
 """Stands where the files do not tell: `gyriflow check` then asks for it."""
@@ -91,13 +91,13 @@ def participants(folder: Path) -> dict[str, float]:
     """Returns the gestational ages of a folder's participants.tsv, by id; nothing where there is none."""
     for path in (folder / "participants.tsv", *sorted(folder.glob("*/participants.tsv"))):
         if path.is_file():
-            table = read_table(path, "\t")
-            columns = {name.lower(): name for name in table.columns}
+            rows = read_tab_separated(path)
+            columns = {name.lower(): name for name in rows[0]}
             of_id = next((columns[name] for name in ID_COLUMNS if name in columns), None)
             of_age = next((columns[name] for name in AGE_COLUMNS if name in columns), None)
             if of_id and of_age:
-                ages = pd.to_numeric(table[of_age], errors="coerce")
-                return {str(name): float(age) for name, age in zip(table[of_id], ages, strict=True) if age == age}
+                ages = pd.to_numeric([row[of_age] for row in rows], errors="coerce")
+                return {row[of_id]: float(age) for row, age in zip(rows, ages, strict=True) if age == age}
     return {}
 
 

@@ -80,6 +80,10 @@ class AtlasSeries(Settings):
     scheme: str | None = setting(None, "", "Meaning of the labels, as for `brains`; required with `labels`.")
     affine_from: AffineSource = setting("auto", "", "As for `brains`, with `labels`.")
     coordinates: Coordinates = setting("auto", "", "As for `brains`, with surfaces.")
+    matched: bool = setting(
+        False, "",
+        "Whether the surfaces have the same vertices in all weeks: believed as long as the files are not there.",
+    )  # fmt: skip
     files: dict[FileKey, str] = setting(
         ..., "",
         "Path of each file below the folder and the URL, with `{week}` for the week (`{week:05.2f}`: as 21.00): "
@@ -125,6 +129,12 @@ class AtlasSeries(Settings):
             raise ValueError("have a `scheme`, which says what the labels mean")
         if "labels" not in self.files and self.scheme is not None:
             raise ValueError("have no `scheme` where it has no labels")
+        return self
+
+    @model_validator(mode="after")
+    def _matched_with_surfaces(self) -> "AtlasSeries":
+        if self.matched and "labels" in self.files:
+            raise ValueError("have no `matched` with labels, which have no vertices")
         return self
 
     @property

@@ -183,6 +183,11 @@ class Brain(Settings):
         return self.label_volume is not None or self.source in ("segmentation", "phantom")
 
     @property
+    def has_vertices(self) -> bool:
+        """Whether the surface is made from surface files, whose vertices may be those of other brains too."""
+        return not self.has_labels and self.source in ("hemispheres", "hemisphere", "pial")
+
+    @property
     def files(self) -> list[str]:
         """The files that the surface is made from, the left hemisphere's first."""
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]

@@ -27,6 +27,11 @@ class GrowthSettings(Settings):
     estimated_from: str | None = setting(
         None, "", "Series that gives the `estimated` rates of the folding; `null`: that of the start brain."
     )
+    matched_surfaces: bool = setting(
+        True, "",
+        "Whether a series of surfaces with the same vertices and triangles in all weeks tells where each vertex goes: "
+        "local growth then comes from these vertices, without registration. `false`: they are not the same places.",
+    )  # fmt: skip
 
 
 def growth_series(

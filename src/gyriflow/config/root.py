@@ -18,6 +18,7 @@ from .atlas_description import Atlas
 from .brains import Brain
 from .calibration import Calibration, calibration_problems
 from .growth import GrowthSettings, estimated_from, growth_series
+from .matching import believed_files, why_unmatched
 from .mesh import MeshSettings
 from .metrics import MetricsSettings, age_reference, reference_brains
 from .participants import ParticipantsSettings
@@ -256,6 +257,32 @@ class Config(Settings):
         populations = {brain.id: brain.population for brain in self.brains}
         weeks = {brain.id: brain.week for brain in self.brains}
         return growth_series(kinds, weeks, self.growth.brains, populations)
+
+    @cached_property
+    def unmatched_surfaces(self) -> dict[str, str]:
+        """Why the vertices of the brains in a growth series of surfaces are not matched, by the series' name."""
+        if not self.growth.matched_surfaces:
+            return dict.fromkeys(self._surface_series, "growth.matched_surfaces is false")
+        believed = believed_files(self.atlases)
+        causes = {name: why_unmatched(brains, believed) for name, brains in self._surface_series.items()}
+        return {name: cause for name, cause in causes.items() if cause is not None}
+
+    @property
+    def matched_surfaces(self) -> dict[str, set[str]]:
+        """The ids of the brains of each growth series of surfaces that have the same vertices, by its name."""
+        return {
+            name: {brain.id for brain in brains}
+            for name, brains in self._surface_series.items()
+            if name not in self.unmatched_surfaces
+        }
+
+    @property
+    def _surface_series(self) -> dict[str, list[Brain]]:
+        """The brains of each growth series that are all from surface files, by week."""
+        series = {
+            name: sorted(map(self.brain, ids), key=lambda brain: brain.week) for name, ids in self.growth_series.items()
+        }
+        return {name: brains for name, brains in series.items() if all(brain.has_vertices for brain in brains)}
 
     def estimated_from(self, brain: str) -> str | None:
         """Returns the series that `estimated` rates are taken from where a brain is the start; None without one."""

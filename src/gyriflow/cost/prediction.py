@@ -2,15 +2,19 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 from ..config.root import Config
+from ..config.runs import Run
 from ..parameters.terms import ELEMENT_FIELDS
 from ..units import SECONDS_PER_GW
 from .sizes import Size, size_of
 
 MIB = 2**20
 LEAST_S = 0.5
+LEAST_MIB, LEAST_MINUTES = 2000, 60
+"""What the job of any folding needs: Python, dolfinx, compiled forms, and processors slower than those measured on."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,8 @@ class Prediction:
     ----------
     core_seconds
         Time of one core, over all jobs.
+    folding_core_seconds
+        That of the foldings alone.
     wall_seconds
         Time on the given number of cores without other load.
     memory_mib
@@ -43,6 +49,7 @@ class Prediction:
     """
 
     core_seconds: float
+    folding_core_seconds: float
     wall_seconds: float
     memory_mib: float
     disk_mib: float
@@ -58,11 +65,13 @@ def simulation_work(nodes: float, steps: float) -> float:
 
 def work_of(job: Job, size: Size, steps: float) -> float:
     """Returns what a job's time grows with: nodes times steps of a folding, nodes of a mesh, else faces."""
-    if job.rule == "simulate":
+    if job.rule in FOLDINGS:
         return simulation_work(size.nodes, steps)
     return size.nodes if job.rule in OF_NODES else size.faces if job.run is None else size.pial_faces
 
 
+FOLDINGS = ("simulate", "simulate_member")
+"""Rules that solve a folding; those of studies and calibrations may diverge."""
 OF_NODES = ("tetrahedralise", "carried_mesh", "parameter_maps", "regions")
 
 
@@ -70,7 +79,7 @@ def rule_key(rule: str, config: Config) -> str:
     """Returns the name under which a rule was measured; meshers and orders of elements are told apart."""
     if rule == "tetrahedralise":
         return f"tetrahedralise {config.mesh.mesher}"
-    return f"simulate order {config.mesh.order}" if rule == "simulate" else rule
+    return f"simulate order {config.mesh.order}" if rule in FOLDINGS else rule
 
 
 def predict(
@@ -103,17 +112,18 @@ def predict(
     seconds: list[float] = []
     spans: dict[str, float] = {}
     memories: list[tuple[float, int]] = []
-    disk = 0.0
+    disk = folding = 0.0
     for job in jobs:
         size = sizes.get(job.brain or "", usual)
         row = rules.get(rule_key(job.rule, config)) or rules.get(job.rule) or measured["other"]
         steps = _steps(config, job)
         time = max(row["s"] + row["s_per_work"] * work_of(job, size, steps), LEAST_S)
         memory = row["MiB"] + row["MiB_per_work"] * work_of(job, size, 1.0)
-        if job.rule == "simulate" and memory_of_run is not None and job.run is not None:
-            run = config.run(job.run)
+        if job.rule in FOLDINGS and memory_of_run is not None and job.run is not None:
+            run = run_of(job.run, config)
             memory = memory_of_run(round(size.tets), run.ranks, run.contact.kind, config.mesh.order)
         seconds.append(time)
+        folding += time if job.rule in FOLDINGS else 0.0
         # what each stage takes at least, one after the other
         alone = time / min(job.threads, cores)
         spans[job.rule] = max(spans.get(job.rule, 0.0), alone)
@@ -122,6 +132,7 @@ def predict(
     longest = sum(spans.get(rule, 0.0) for rule in CHAIN)
     return Prediction(
         core_seconds=sum(seconds),
+        folding_core_seconds=folding,
         wall_seconds=max(sum(seconds) / cores, longest),
         memory_mib=_side_by_side(memories, cores),
         disk_mib=disk,
@@ -131,28 +142,57 @@ def predict(
     )
 
 
+def folding_needs(
+    run: str,
+    brain: str,
+    config: Config,
+    measured: Mapping[str, Any],
+    memory_of_run: Callable[[int, int, str, int], float],
+) -> tuple[int, int]:
+    """Returns the memory in MiB and the minutes that a folding may take, for the limits of its job on a cluster.
+
+    Both are the prediction times its error, with a least value for what jobs need whatever their brain is.
+    """
+    ranks = run_of(run, config).ranks
+    predicted = predict([Job("simulate", run, brain, ranks)], config, measured, ranks, memory_of_run)
+    return (
+        max(ceil(predicted.memory_mib * predicted.memory_error), LEAST_MIB),
+        max(ceil(predicted.wall_seconds * predicted.time_error / 60), LEAST_MINUTES),
+    )
+
+
 CHAIN = (
     *("pial_from_labels", "pial_from_hemispheres", "pial_from_surface", "tetrahedralise", "parameters", "regions"),
-    *("simulate", "folded_surface", "measure", "shape_maps", "study_resources", "html_report"),
+    *(*FOLDINGS, "folded_surface", "measure", "shape_maps", "study_resources", "html_report"),
 )
 """Jobs that wait for each other, whatever the number of cores."""
+
+
+def run_of(name: str, config: Config) -> Run:
+    """Returns the settings of a run; one of a calibration is its base up to the week of comparison."""
+    calibrate = config.calibrate
+    if calibrate is not None and name in calibrate.runs:
+        return config.run(calibrate.base).model_copy(update={"end_week": calibrate.compare_week})
+    return config.run(name)
 
 
 def _steps(config: Config, job: Job) -> float:
     if job.run is None or job.brain is None:
         return 1.0
-    run = config.run(job.run)
+    run = run_of(job.run, config)
     return max((run.end_week - config.brain(job.brain).week) * SECONDS_PER_GW / run.step_s, 1.0)
 
 
 def _disk_mib(job: Job, size: Size, config: Config, disk: Mapping[str, float]) -> float:
     """Returns what a job leaves on the disk: a folding its frames as they are laid out, other jobs as measured."""
-    if job.rule == "simulate" and job.run is not None and job.brain is not None:
-        fields = config.run(job.run).fields
+    if job.rule in FOLDINGS and job.run is not None and job.brain is not None:
+        fields = run_of(job.run, config).fields
         of_elements = len(set(ELEMENT_FIELDS) & set(fields))
         # positions in double precision, fields in single
         frame = size.nodes * (24 + 12 * (len(fields) - of_elements)) + 16 * of_elements * size.tets
-        return len(config.weeks(job.run, job.brain)) * frame / MIB
+        calibrated = config.calibrate is not None and job.run in config.calibrate.runs
+        weeks = 2 if calibrated else len(config.weeks(job.run, job.brain))
+        return weeks * frame / MIB
     if job.rule in ("folded_surface", "measure") or job.rule.startswith("pial_from"):
         return disk["MiB_per_face"] * (size.faces if job.run is None else size.pial_faces)
     if job.rule == "tetrahedralise":

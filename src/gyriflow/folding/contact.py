@@ -1,8 +1,9 @@
 """Contact of the pial surface with itself: Incremental Potential Contact (Li et al. 2020), with the IPC Toolkit.
 
 Pairs of surface parts nearer than a distance d̂ repel each other with a barrier that grows without bound as they close
-in, and no displacement may cross a pair on its way. Every rank has the whole surface and does the same work, so that
-nothing but owned rows has to be agreed on.
+in, and no displacement may cross a pair on its way. Every rank knows where the whole surface is, and looks for the
+pairs of its own part (`surface_parts`). Energies, forces and stiffness are sums over the ranks, the smallest gap and
+the first touch on a way are the least of any: all decide alike.
 """
 
 from collections.abc import Sequence
@@ -23,6 +24,7 @@ from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
+from .surface_parts import Held, SurfacePart, part_of_surface, shared_out
 
 Floats = NDArray[np.float64]
 DISTANCE_PER_EDGE = 0.2
@@ -44,7 +46,11 @@ BESIDE = 0.999
 BARRIER = ipctk.TwoStageBarrier()
 MARGIN_MM = 0.05
 """How far the surface may move before pairs that can come near are looked for anew."""
-SWEEP = ipctk.AdditiveCCD(conservative_rescaling=0.9)
+ROOM_MM = 1.0
+"""How far it may move before each rank takes its part of the surface anew."""
+CLOSED = 0.9
+"""Part of a gap that a step may close."""
+SWEEP = ipctk.AdditiveCCD(conservative_rescaling=CLOSED)
 """Search for the first touch on a way (Li et al. 2021); it leaves a tenth of each pair's distance. Where surfaces meet
 flat on, interval bisection, the other choice, takes minutes."""
 N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
@@ -79,6 +85,21 @@ def new_pairs() -> ipctk.NormalCollisions:
     return pairs
 
 
+@dataclass(frozen=True, eq=False)
+class Near:
+    """What is near at a displacement (s, 3) in m of the whole surface.
+
+    That is this rank's part as the IPC Toolkit wants it, its (p, 3) positions in mm, and the pairs of it that are the
+    rank's own.
+    """
+
+    displacement: Floats
+    surface: ipctk.CollisionMesh
+    part: SurfacePart
+    positions: Floats
+    pairs: ipctk.NormalCollisions
+
+
 class SelfContact:
     """The barrier between all parts of the pial surface: a contribution to the problem of a step.
 
@@ -110,8 +131,7 @@ class SelfContact:
     def __init__(
         self, domain: Domain, displacement: Floats, facets: NDArray[np.int64], settings: ContactSettings
     ) -> None:
-        # the ranks do the same, one thread each: sums in the same order, and no thread in the way of another rank
-        ipctk.set_num_threads(1)
+        ipctk.set_num_threads(1)  # else threads would be in the way of another rank's
         self.domain = domain
         self.settings = settings
         self._displacement = displacement
@@ -120,25 +140,30 @@ class SelfContact:
         self._finer: sparse.csr_array | None = None  # weights of the nodes at the vertices of the surface of contact
         if domain.order == 2:
             self._finer, faces = finer_surface(faces)
-            self._followed = sparse.kron(self._finer, np.eye(3), format="csr")
-        self._faces = np.asfortranarray(faces, dtype=np.int32)
-        surface = TriangleMesh(self._at_vertices(domain.positions[self._vertices]), faces)
-        self._edges = np.asfortranarray(edges(surface)[0], dtype=np.int32)
+        self._faces = faces
+        # of the nodes at the vertices of the surface of contact
+        self._weights = (sparse.eye_array(len(self._vertices)) if self._finer is None else self._finer).tocsr()
         owned = domain.vertex_of_node[: domain.owned]
         place = np.searchsorted(self._vertices, owned).clip(max=len(self._vertices) - 1)
         self._owned_nodes = np.flatnonzero(self._vertices[place] == owned)
-        self._owned_rows = place[self._owned_nodes]
-        self._gathered_rows = np.concatenate(domain.comm.allgather(self._owned_rows))
+        self._rows_by_rank = domain.comm.allgather(place[self._owned_nodes])
+        self._owned_rows = self._rows_by_rank[domain.comm.rank]
+        self._gathered_rows = np.concatenate(self._rows_by_rank)
         self._counts = [3 * count for count in domain.comm.allgather(len(self._owned_rows))]
         self._columns = domain.node_of_vertex[self._vertices]
+        start = self._at_vertices(domain.positions[self._vertices]) * MM_PER_M
+        self._edges = edges(TriangleMesh(start, faces))[0]
+        # ranks on different processors may round differently, but each vertex has one owner
+        self._owner = domain.comm.bcast(shared_out(start, domain.comm.size), root=0)
         self._search = ipctk.LBVH()
         self._candidates = ipctk.Candidates()
-        self._centre: Floats | None = None  # where the candidates hold
-        self._reach = 0.0
+        self._part_held: Held | None = None
+        self._candidates_held: Held | None = None
         self._widest_mm = np.inf
         self.stiffness_pa = settings.stiffness_pa
         self.mesh_moved()
-        if ipctk.has_intersections(self._surface, self._start):
+        surface, part = self._surface_at(self._start)
+        if domain.comm.allreduce(ipctk.has_intersections(surface, part.at(self._start)), op=MPI.LOR):
             raise MeshError(
                 "the pial surface of the mesh crosses itself",
                 expected="a surface without self-intersections, which contact could not undo",
@@ -151,11 +176,11 @@ class SelfContact:
 
     def mesh_moved(self) -> None:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
-        self._start = np.asfortranarray(self._at_vertices(self.domain.positions[self._vertices]) * MM_PER_M)
-        self._surface = ipctk.CollisionMesh(self._start, self._edges, self._faces)
+        self._start = self._at_vertices(self.domain.positions[self._vertices]) * MM_PER_M
         self.distance_mm = self.settings.distance_mm or min(self._distance_of_edges(), self._widest_mm)
         self._barrier = ipctk.BarrierPotential(BARRIER, self.distance_mm, self.stiffness_pa, use_physical_barrier=True)
-        self._known: Floats | None = None
+        self._surface: ipctk.CollisionMesh | None = None
+        self._known: Near | None = None
 
     def _distance_of_edges(self) -> float:
         """Returns the distance in mm that belongs to the present edges, the same whatever a rank's processor rounds."""
@@ -177,12 +202,15 @@ class SelfContact:
 
     def _smallest_gap(self) -> float:
         """Returns the smallest distance in mm at the step's start, infinite where no pair is within the present d̂."""
+        surface, part = self._surface_at(self._start)
         pairs = self._pairs_near(self._start, self.distance_mm)
-        gap = np.inf
-        if len(pairs):
-            # rounding must not make a pair of what is just at the limit
-            gap = BESIDE * float(np.sqrt(pairs.compute_minimum_distance(self._surface, self._start)))
-        return self.domain.comm.bcast(gap, root=0)
+        # rounding must not make a pair of what is just at the limit
+        return BESIDE * self._nearest(pairs, surface, part.at(self._start))
+
+    def _nearest(self, pairs: ipctk.NormalCollisions, surface: ipctk.CollisionMesh, positions: Floats) -> float:
+        """Returns the smallest distance in mm between the pairs of all ranks, infinite without any."""
+        nearest = np.sqrt(pairs.compute_minimum_distance(surface, positions)) if len(pairs) else np.inf
+        return self.domain.comm.allreduce(float(nearest), op=MPI.MIN)
 
     def _on_surface(self, local: Floats) -> Floats:
         """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""
@@ -196,66 +224,89 @@ class SelfContact:
         """Returns the (s, 3) values at the vertices of the surface of contact from those at the surface's nodes."""
         return at_nodes if self._finer is None else np.asarray(self._finer @ at_nodes)
 
-    def _to_nodes(self, forces: Floats) -> Floats:
-        """Returns what (s, 3) forces at the vertices of the surface of contact are at the surface's nodes."""
-        return forces if self._finer is None else np.asarray(self._finer.T @ forces)
+    def _surface_at(self, *places: Floats) -> tuple[ipctk.CollisionMesh, SurfacePart]:
+        """Returns this rank's part of the surface, good for all that can be near at some (s, 3) positions in mm."""
+        if self._part_held is None or not self._part_held.at(self.distance_mm, *places):
+            way = max(float(np.abs(place - places[0]).max()) for place in places)
+            # a single rank's part is all there is, wherever it goes
+            room = max(ROOM_MM, way) if self.domain.comm.size > 1 else np.inf
+            self._part_held = Held(places[0], self.distance_mm / 2 + room)
+            owned = self._owner == self.domain.comm.rank
+            self._part = part_of_surface(places[0], self._faces, owned, 2 * self._part_held.reach)
+            self._follow = self._weights[self._part.vertices]
+            # column by column as the stiffness is, from both sides: nothing has to be turned round for their product
+            follow = sparse.kron(self._follow, np.eye(3), format="csr")
+            self._nodes_to_part, self._part_to_nodes = follow.tocsc(), follow.T
+            # what is known goes by the numbers of the part before
+            self._surface, self._known, self._candidates_held = None, None, None
+        if self._surface is None:
+            self._surface = ipctk.CollisionMesh(self._part.at(self._start), self._part.edges, self._part.faces)
+        return self._surface, self._part
 
-    def _within_reach(self, positions: Floats) -> bool:
-        """Returns whether the known candidates hold all pairs that can be near at (s, 3) positions in mm."""
-        margin = self._reach - self.distance_mm / 2
-        return self._centre is not None and bool(np.abs(positions - self._centre).max() <= margin)
-
-    def _state(self) -> tuple[Floats, ipctk.NormalCollisions]:
-        """Returns the (s, 3) positions in mm at the present displacement, and the pairs within the distance."""
+    def _state(self) -> Near:
+        """Returns where this rank's part is at the present displacement, and its pairs within the distance."""
         u = self._on_surface(self._displacement)
-        if self._known is None or not np.array_equal(u, self._known):
-            self._known = u
-            self._positions = np.asfortranarray(self._start + u * MM_PER_M)
-            if not self._within_reach(self._positions):
-                self._centre, self._reach = self._positions, self.distance_mm / 2 + MARGIN_MM
-                self._candidates.build(self._surface, self._positions, self._reach, self._search)
-            self._pairs = new_pairs()
-            self._pairs.build(self._candidates, self._surface, self._positions, self.distance_mm)
-        return self._positions, self._pairs
+        if self._known is None or not np.array_equal(u, self._known.displacement):
+            whole = self._start + u * MM_PER_M
+            surface, part = self._surface_at(whole)
+            positions = part.at(whole)
+            if self._candidates_held is None or not self._candidates_held.at(self.distance_mm, whole):
+                self._candidates_held = Held(whole, self.distance_mm / 2 + MARGIN_MM)
+                self._candidates.build(surface, positions, self._candidates_held.reach, self._search)
+            pairs = new_pairs()
+            pairs.build(self._candidates, surface, positions, self.distance_mm)
+            self._known = Near(u, surface, part, positions, part.of_own(pairs))
+        return self._known
 
     def _pairs_near(self, positions: Floats, distance_mm: float) -> ipctk.NormalCollisions:
-        """Returns the pairs within a distance at (s, 3) positions in mm, found anew."""
+        """Returns this rank's own pairs within a distance at (s, 3) positions in mm, found anew."""
+        surface, part = self._surface_at(positions)
         pairs = new_pairs()
-        pairs.build(self._surface, positions, distance_mm, broad_phase=self._search)
-        return pairs
+        pairs.build(surface, part.at(positions), distance_mm, broad_phase=self._search)
+        return part.of_own(pairs)
 
     def joined(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
         """Returns the numbers (n,) of parts of the mesh, those of parts that touch at the step's start made one."""
         if part.max() == 0:
             return part
+        _, seen = self._surface_at(self._start)
         pairs = self._pairs_near(self._start, self.distance_mm)
-        near = [pairs[i].vertex_ids(self._edges, self._faces) for i in range(len(pairs))]
+        near = [pairs[i].vertex_ids(seen.edges, seen.faces) for i in range(len(pairs))]
         of_vertex = part[self._vertices]
         if self._finer is not None:
             of_vertex = of_vertex[np.asarray(self._finer.argmax(axis=1)).ravel()]
+        of_vertex = of_vertex[seen.vertices]
         # the numbers below 0 stand for no vertex
         ends = [of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in near]
-        links = np.array([[two.min(), two.max()] for two in ends]).reshape(-1, 2)
+        own = {(int(two.min()), int(two.max())) for two in ends}
+        links = np.array(sorted(set().union(*self.domain.comm.allgather(own)))).reshape(-1, 2)
         count = int(part.max()) + 1
         graph = sparse.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
         return connected_components(graph, directed=False)[1][part].astype(np.int64)
 
     def energy(self) -> float:
         """Returns the barrier's energy in J."""
-        positions, pairs = self._state()
-        own = float(self._barrier(pairs, self._surface, positions)) * J_PER_PA_MM3
-        # ranks on different processors may round differently, but all have to decide alike
-        return self.domain.comm.bcast(own, root=0)
+        state = self._state()
+        own = float(self._barrier(state.pairs, state.surface, state.positions)) * J_PER_PA_MM3
+        return self.domain.comm.allreduce(own)
 
     def forces(self) -> Floats:
         """Returns the (n, 3) derivative of the energy in N at the surface's nodes."""
-        return self._to_nodes(self._forces_at_vertices())
+        state = self._state()
+        return self._summed(self._follow.T @ self._own_forces(state))
 
-    def _forces_at_vertices(self) -> Floats:
-        positions, pairs = self._state()
-        if not len(pairs):
-            return np.zeros_like(positions)
-        return self._barrier.gradient(pairs, self._surface, positions).reshape(-1, 3) * N_PER_PA_MM2
+    def _own_forces(self, state: Near) -> Floats:
+        """Returns the (p, 3) derivative of the energy of this rank's pairs in N at its part's vertices."""
+        if not len(state.pairs):
+            return np.zeros_like(state.positions)
+        gradient = self._barrier.gradient(state.pairs, state.surface, state.positions)
+        return gradient.reshape(-1, 3) * N_PER_PA_MM2
+
+    def _summed(self, own: Floats) -> Floats:
+        """Returns the sum of an array over the ranks."""
+        total = np.empty_like(own, order="C")
+        self.domain.comm.Allreduce(np.ascontiguousarray(own), total)
+        return total
 
     def add_residual(self, out: PETSc.Vec) -> None:
         """Adds the forces in N to the owned components of a vector."""
@@ -263,19 +314,27 @@ class SelfContact:
 
     def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
         """Returns the second derivative in N/m, None without any pair; `convex` drops the negative part of each."""
-        positions, pairs = self._state()
-        if not len(pairs):
+        state, comm = self._state(), self.domain.comm
+        if not comm.allreduce(len(state.pairs)):
             return None
-        kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
-        hessian = self._barrier.hessian(pairs, self._surface, positions, kind) * N_PER_M_PER_PA_MM
-        if self._finer is not None:
-            hessian = self._followed.T @ hessian @ self._followed
-        return self._distributed(sparse.csr_matrix(hessian))
+        own: sparse.csr_matrix | None = None
+        if len(state.pairs):
+            kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
+            hessian = self._barrier.hessian(state.pairs, state.surface, state.positions, kind) * N_PER_M_PER_PA_MM
+            own = sparse.csr_matrix(self._part_to_nodes @ hessian @ self._nodes_to_part)
+        return self._distributed(own)
 
-    def _distributed(self, matrix: sparse.csr_matrix) -> PETSc.Mat:
-        """Returns the PETSc matrix of all unknowns from one of the surface's, of which each rank takes its rows."""
-        components = np.arange(3)
-        rows = matrix[(3 * self._owned_rows[:, None] + components).ravel()]
+    def _distributed(self, own: sparse.csr_matrix | None) -> PETSc.Mat:
+        """Returns the PETSc matrix of all unknowns, the sum of each rank's of the surface's, None for none."""
+        comm, components = self.domain.comm, np.arange(3)
+        # each rank gets what all have of the rows that it owns
+        of_rank = [
+            None if own is None else own[(3 * rows[:, None] + components).ravel()] for rows in self._rows_by_rank
+        ]
+        kept, of_rank[comm.rank] = of_rank[comm.rank], None
+        received = [kept, *comm.alltoall(of_rank)]
+        rows = sparse.csr_matrix((3 * len(self._owned_rows), 3 * len(self._vertices)))
+        rows = sum((part for part in received if part is not None), rows)
         counts = np.zeros((self.domain.owned, 3), dtype=PETSc.IntType)
         counts[self._owned_nodes] = np.diff(rows.indptr).reshape(-1, 3)
         # owned rows are in the order of the nodes
@@ -289,34 +348,46 @@ class SelfContact:
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements that can be added without any touch on the way."""
-        positions, _ = self._state()
-        target = np.asfortranarray(positions + self._on_surface(direction) * MM_PER_M)
-        if self._within_reach(positions) and self._within_reach(target):
-            free = self._candidates.compute_collision_free_stepsize(
-                self._surface, positions, target, narrow_phase_ccd=SWEEP
-            )
-        else:
-            free = ipctk.compute_collision_free_stepsize(
-                self._surface, positions, target, broad_phase=self._search, narrow_phase_ccd=SWEEP
-            )
-        return self.domain.comm.allreduce(float(free), op=MPI.MIN)
+        way = self._on_surface(direction) * MM_PER_M
+        return self.domain.comm.allreduce(self._free_part(self._state(), way), op=MPI.MIN)
+
+    def _free_part(self, state: Near, way: Floats) -> float:
+        """Returns the part of a way (s, 3) in mm on which nothing touches that this rank looks for."""
+        # what is no pair is farther apart than the distance
+        gap = self.distance_mm
+        if len(state.pairs):
+            gap = min(gap, float(np.sqrt(state.pairs.compute_minimum_distance(state.surface, state.positions))))
+        if 2 * float(np.linalg.norm(way, axis=1).max()) <= CLOSED * gap:
+            return 1.0
+        whole = self._start + state.displacement * MM_PER_M
+        end = whole + way
+        surface, part = self._surface_at(whole, end)
+        ends = part.at(whole), part.at(end)
+        if self._candidates_held is not None and self._candidates_held.at(self.distance_mm, whole, end):
+            return float(self._candidates.compute_collision_free_stepsize(surface, *ends, narrow_phase_ccd=SWEEP))
+        return float(
+            ipctk.compute_collision_free_stepsize(surface, *ends, broad_phase=self._search, narrow_phase_ccd=SWEEP)
+        )
 
     def smallest_distance_mm(self) -> float:
         """Returns the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""
-        positions, pairs = self._state()
-        nearest = float(np.sqrt(pairs.compute_minimum_distance(self._surface, positions))) if len(pairs) else np.inf
-        # the stiffness of the next step is decided by it, on every rank alike
-        return self.domain.comm.bcast(nearest, root=0)
+        state = self._state()
+        return self._nearest(state.pairs, state.surface, state.positions)
 
     def pair_count(self) -> int:
         """Returns the number of pairs within the distance."""
-        return len(self._state()[1])
+        return self.domain.comm.allreduce(len(self._state().pairs))
 
     def pressure(self) -> Floats:
         """Returns the (n,) contact pressure in Pa at all vertices of the file, 0 off the surface: force per area."""
-        areas = np.array(self._surface.vertex_areas) * M_PER_MM**2
+        state = self._state()
+        forces, areas = np.zeros_like(self._start), np.zeros(len(self._start))
+        forces[state.part.vertices] = self._own_forces(state)
+        # all faces at a vertex are in its owner's part alone
+        own = state.part.owned
+        areas[state.part.vertices[own]] = np.array(state.surface.vertex_areas)[own] * M_PER_MM**2
         values = np.zeros(len(self.domain.positions))
         # nodes are the first vertices of the surface of contact
-        pressure = np.linalg.norm(self._forces_at_vertices(), axis=1) / areas
+        pressure = np.linalg.norm(self._summed(forces), axis=1) / self._summed(areas)
         values[self._vertices] = pressure[: len(self._vertices)]
         return values

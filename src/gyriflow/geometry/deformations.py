@@ -1,4 +1,4 @@
-"""A smooth map of space: a displacement field on a grid followed by an affine map."""
+"""How one brain's points come to lie in another: a smooth map of space, or surfaces with the same vertices."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from .triangles import Floats, frozen
+from .triangles import Floats, TriangleMesh, frozen
 
 INVERSION_ROUNDS = 100
 INVERTED_MM = 1e-3
@@ -35,6 +35,31 @@ class Deformation:
         object.__setattr__(self, "affine", frozen(self.affine, np.float64, 4))
         if self.displacement.ndim != 4 or self.displacement.shape[3] != 3:
             raise ValueError(f"expected an (i, j, k, 3) displacement, found shape {self.displacement.shape}")
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedSurfaces:
+    """Surfaces of two brains with the same triangles, whose vertices are the same places of the cortex.
+
+    Attributes
+    ----------
+    first
+        The first brain's surface, in mm.
+    second : (n, 3) float
+        Positions of its vertices in the second brain, in mm.
+    """
+
+    first: TriangleMesh
+    second: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "second", frozen(self.second, np.float64, 3))
+        if self.second.shape != self.first.vertices.shape:
+            raise ValueError(f"expected {len(self.first.vertices)} matched vertices, found {len(self.second)}")
+
+
+Correspondence = Deformation | MatchedSurfaces
+"""What a registration, or the vertices of matched surfaces, say of two brains."""
 
 
 def transform_points(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:

@@ -24,17 +24,24 @@ def regional_map(week: float, part: str = "") -> str:
     return "_".join(filter(None, ("regional_growth", part, f"{week:05.2f}")))
 
 
-def known_weeks(weeks: Sequence[float], until: float | None) -> list[float]:
+def known_weeks(weeks: Sequence[float], until: float | None, unmatched: str | None = None) -> list[float]:
     """Returns the first weeks of the intervals between successive weeks that end by the week `until`, if given.
 
-    InputError where there is none.
+    InputError where there is none; `unmatched` is then why surfaces did not tell of growth.
     """
     known = [first for first, second in pairwise(weeks) if until is None or second <= until]
+    if not known and unmatched is not None:
+        raise InputError(
+            "the brains' surfaces do not tell of regional growth",
+            found=unmatched,
+            expected="the same vertices and triangles in all brains of the growth series, or label volumes",
+            remedy="Name the brains that have them under growth.brains, or set follow.regional and directional to 0.",
+        )
     if not known:
         raise InputError(
             "no two brains tell of regional growth",
             found=f"brains of {', '.join(f'{week:g}' for week in weeks)} GW, known until {until} GW",
-            expected="two or more with label volumes up to that week",
+            expected="two or more with label volumes, or with matched surfaces, up to that week",
             remedy="Raise follow.known_until_gw, add brains of earlier weeks, or set follow.regional to 0.",
         )
     return known

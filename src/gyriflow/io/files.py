@@ -119,9 +119,9 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     return rows
 
 
-def read_table(path: AnyPath, separator: str = ",") -> pd.DataFrame:
-    """Returns a CSV table, or one with another separator; InputError where it is missing or torn."""
+def read_table(path: AnyPath) -> pd.DataFrame:
+    """Returns a CSV table; InputError where it is missing or torn."""
     try:
-        return pd.read_csv(path, sep=separator)
+        return pd.read_csv(path)
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read as a CSV table: {error}", path=path) from error

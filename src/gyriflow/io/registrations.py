@@ -1,4 +1,4 @@
-"""Deformations between brains' spaces, and meshes carried along them, in HDF5 files of the project's own, RAS+ mm."""
+"""Correspondences between brains, and meshes carried along them, in HDF5 files of the project's own, RAS+ mm."""
 
 import json
 from collections.abc import Mapping
@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 
 from ..errors import InputError
-from ..geometry.deformations import Deformation
-from ..geometry.triangles import Floats
+from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
+from ..geometry.triangles import Floats, TriangleMesh
 from .files import AnyPath
 from .hdf5 import new_hdf5
 
@@ -43,6 +43,32 @@ def read_deformation(path: AnyPath) -> tuple[Deformation, dict[str, Any]]:
             expected="an HDF5 file with matrix, displacement and affine",
             remedy="Run the registration again.",
         ) from error
+
+
+def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapping[str, Any]) -> None:
+    """Writes the data sets first (n, 3) and second (n, 3) in mm, and faces (m, 3); the `report` as a deformation's."""
+    with new_hdf5(path) as file:
+        for name, points in (("first", matched.first.vertices), ("second", matched.second)):
+            file.create_dataset(name, data=points, compression="gzip", shuffle=True)
+        file.create_dataset("faces", data=matched.first.faces, compression="gzip", shuffle=True)
+        file.attrs["report"] = json.dumps(dict(report))
+
+
+def read_correspondence(path: AnyPath) -> Correspondence:
+    """Returns what `write_deformation` or `write_matched_surfaces` has written; InputError for other files."""
+    try:
+        with h5py.File(path) as file:
+            if "faces" in file:
+                return MatchedSurfaces(TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:])
+    except Exception as error:  # HDF5 raises whatever a torn file leads it into
+        raise InputError(
+            "cannot be read as a correspondence of brains",
+            path=path,
+            found=error,
+            expected="an HDF5 file of a registration, or with first, second and faces",
+            remedy="Register the brains, or match their surfaces, again.",
+        ) from error
+    return read_deformation(path)[0]
 
 
 @dataclass(frozen=True, eq=False)

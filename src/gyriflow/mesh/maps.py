@@ -11,13 +11,13 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.triangles import TriangleMesh, corners, face_areas, transformed
+from ..parameters.folding import VENTRICLES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 log = logging.getLogger(__name__)
 
-LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 FARTHEST_MM = 5.0
 QUANTILE = 0.95
 """The surface of a map may be this far from this part of the mesh's surface: pial, white and midthickness surfaces of
@@ -124,79 +124,41 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     return values
 
 
-def surface_pose(report: Mapping) -> Floats:
-    """Returns the (4, 4) motion from a brain's surface files to its surface, from the report of the surface.
-
-    The reported pose begins at the coordinates of the file, but for hemispheres that are given in LPS: theirs begins at
-    RAS+.
-    """
-    pose = np.array(report["pose"])
-    return pose @ LPS_TO_RAS if _in_lps(report) and report["source"] == "hemispheres" else pose
-
-
-def ventricles_on_mesh(
-    mesh_vertices_mm: Floats,
-    labels: NDArray[np.integer],
-    affine: ArrayLike,
-    ventricles: Sequence[int],
-    report: Mapping,
-    path: str,
-) -> Floats:
-    """Returns the part of ventricles in the tissue around the (n,) vertices of a mesh, from 0 to 1.
+def ventricle_map(
+    mesh_vertices_mm: Floats, labels: NDArray[np.integer], affine: ArrayLike, ventricles: Sequence[int], path: str
+) -> dict[str, Floats]:
+    """Returns, by its name, the map of the part of ventricles in the tissue around the n vertices of a mesh, 0 to 1.
 
     Parameters
     ----------
     labels : (i, j, k) int
         Of the voxels.
     affine : (4, 4) float
-        Voxel index to RAS+ position of the volume.
+        Voxel index to position on the mesh, in mm.
     ventricles
         The labels that are ventricles.
-    report, path
-        Of the brain's surface, and the file of the labels, as of `volume_pose`.
+    path
+        The file of the labels, for messages.
 
     Raises
     ------
     InputError
         Where no vertex lies in a ventricle.
     """
-    fluid, motion = np.isin(labels, ventricles).astype(float), volume_pose(report, path)
-    found = volume_map_on_mesh(mesh_vertices_mm, fluid, motion @ np.asarray(affine), path)
+    fluid = np.isin(labels, ventricles).astype(float)
+    found = volume_map_on_mesh(mesh_vertices_mm, fluid, affine, path)
     if found.max() < 0.5:
+        named = (
+            f"voxels labelled {', '.join(map(str, ventricles))}" if len(ventricles) else "a scheme without ventricles"
+        )
         raise InputError(
-            "the labels know no ventricles in the brain, so that they cannot grow by a curve of their own",
+            "the labels know no ventricles in the brain, so that these cannot grow by a curve of their own",
             path=path,
-            found=f"no vertex of the mesh in voxels of the ventricles' labels {list(ventricles)}",
+            found=f"no vertex of the mesh in {named}" if len(ventricles) else named,
             expected="ventricles in the cerebrum, named by the labels' scheme",
             remedy="Set follow.ventricles_ml to null, or name the ventricles in the scheme.",
         )
-    return found
-
-
-def volume_pose(report: Mapping, path: str) -> Floats:
-    """Returns the (4, 4) motion from a brain's volumes to its surface, from the report of the surface.
-
-    Volumes are in RAS+, whatever the coordinates that the configuration names for the surface files.
-
-    Raises
-    ------
-    InputError
-        Where its hemispheres were posed separately: a volume cannot follow two motions.
-    """
-    if "posing" in report and not report["posing"]["together"]:
-        raise InputError(
-            "a volume cannot be the map of a brain whose hemispheres were posed separately",
-            path=path,
-            found="one motion for the left and another for the right hemisphere (posing in surface.json)",
-            expected="hemispheres that lie in the coordinates of one brain",
-            remedy="Give the map per vertex (GIFTI), on the surfaces in results/, or hemispheres posed as one brain.",
-        )
-    pose = np.array(report["pose"])
-    return pose @ LPS_TO_RAS if _in_lps(report) and report["source"] != "hemispheres" else pose
-
-
-def _in_lps(report: Mapping) -> bool:
-    return report.get("coordinates") == "lps"
+    return {VENTRICLES: found}
 
 
 def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:
@@ -218,12 +180,12 @@ def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> No
         )
 
 
-def move_to_mesh(points: Floats, surface: TriangleMesh, report: Mapping) -> TriangleMesh:
-    """Returns the surface of a map in the pose of (k, 3) points on the mesh, by the report of the brain's surface.
+def move_to_mesh(points: Floats, surface: TriangleMesh, pose: ArrayLike) -> TriangleMesh:
+    """Returns the surface of a map in the pose of (k, 3) points on the mesh.
 
-    Surfaces of the input are moved like the brain; those that gyriflow made have been already.
+    Surfaces of the input are moved like the brain, by its (4, 4) pose; those that gyriflow made have been already.
     """
-    return move_nearest(points, surface, [surface_pose(report), np.eye(4)])
+    return move_nearest(points, surface, [pose, np.eye(4)])
 
 
 def move_nearest(points: Floats, surface: TriangleMesh, matrices: Sequence[ArrayLike]) -> TriangleMesh:

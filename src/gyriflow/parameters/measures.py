@@ -43,7 +43,6 @@ SHAPE_MEASURES = {
         "cortical thickness (mm)",
         "Cortical thickness, of simulated brains to the border that the cortex had at the start, carried with the "
         "tissue, of measured brains where labels or white surfaces give it (else grey),",
-        colours="magma",
     ),
 }
 """The arrays per vertex of a brain's metrics that are drawn as maps, by name."""

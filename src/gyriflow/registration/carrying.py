@@ -1,4 +1,8 @@
-"""What is carried along a registration: points over the weeks, maps and regions to another brain's surface."""
+"""What is carried from brain to brain: points over the weeks, maps and regions to another brain's surface.
+
+Brains correspond by registration, which carries any point, or by surfaces with matched vertices, which carry surfaces
+and meshes.
+"""
 
 from collections.abc import Sequence
 
@@ -6,9 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.deformations import Deformation, carry, carry_back, transform_points
+from ..geometry.deformations import (
+    Correspondence,
+    Deformation,
+    MatchedSurfaces,
+    carry,
+    carry_back,
+    transform_points,
+)
 from ..geometry.matching import labels_at, match_points, values_at
+from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
+from .matched_surfaces import follow_inside, follow_surfaces
 
 OUTSIDE = 0.001
 """Largest share of points that may lie beyond the grid that a displacement is known on."""
@@ -39,27 +52,50 @@ def carry_both_ways(points: Floats, earlier: Sequence[Deformation], later: Seque
     return np.concatenate([carry_back_over_weeks(points, earlier), carry_over_weeks(points, later)[1:]])
 
 
-def carry_map(values: Floats, source: TriangleMesh, target: TriangleMesh, deformation: Deformation) -> Floats:
+def carry_mesh(mesh: TetrahedralMesh, earlier: Sequence[Correspondence], later: Sequence[Correspondence]) -> Floats:
+    """Returns the (w, n, 3) positions of a mesh's vertices in all weeks: carried back, as given, and carried on.
+
+    Along matched surfaces its boundary follows them, and the inside harmonically.
+    """
+    matched = [pair for pair in (*earlier, *later) if isinstance(pair, MatchedSurfaces)]
+    if matched:
+        return follow_inside(mesh, matched, own=len(earlier))
+    maps = [[pair for pair in pairs if isinstance(pair, Deformation)] for pairs in (earlier, later)]
+    return carry_both_ways(mesh.vertices, *maps)
+
+
+def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floats:
+    """Returns the (n, 3) positions of a surface's vertices in the last brain, those given where there is no other."""
+    if not between:
+        return mesh.vertices
+    matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
+    if matched:
+        return np.asarray(follow_surfaces(mesh, matched)[-1])
+    return np.asarray(carry_over_weeks(mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)])[-1])
+
+
+def carry_map(values: Floats, source: TriangleMesh, target: TriangleMesh, between: Correspondence) -> Floats:
     """Returns (n,) or (n, k) values of the vertices of `source` at those of `target`.
 
     The source is carried into the target's space; each vertex of the target takes the value of the nearest point whose
     normal agrees.
     """
-    shape = _carry_surface(source, deformation)
+    shape = _carried(source, between)
     return values_at(match_points(target.vertices, vertex_normals(target), shape), values)
 
 
 def carry_regions(
-    labels: NDArray[np.integer], source: TriangleMesh, target: TriangleMesh, deformation: Deformation
+    labels: NDArray[np.integer], source: TriangleMesh, target: TriangleMesh, between: Correspondence
 ) -> Ints:
     """Returns the region labels of the vertices of `source` at those of `target`, as by `carry_map`."""
-    shape = _carry_surface(source, deformation)
+    shape = _carried(source, between)
     return labels_at(match_points(target.vertices, vertex_normals(target), shape), labels)
 
 
-def _carry_surface(source: TriangleMesh, deformation: Deformation) -> TriangleMesh:
-    _require_on_grid(deformation, source.vertices, "the surface")
-    return TriangleMesh(carry(deformation, source.vertices), source.faces)
+def _carried(source: TriangleMesh, between: Correspondence) -> TriangleMesh:
+    if isinstance(between, Deformation):
+        _require_on_grid(between, source.vertices, "the surface")
+    return TriangleMesh(carry_surface(source, [between]), source.faces)
 
 
 def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> None:

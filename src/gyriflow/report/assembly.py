@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 import pandas as pd
@@ -19,7 +20,7 @@ class Results:
     ----------
     brains, surfaces, quality : as for `brains_table`
     runs, validation, displacement : as for `runs_table`
-    provenance : commit, versions, files (brain, what, sha256, and path where it may be shown) and made, the time
+    provenance : what `software` returns, and files (brain, what, sha256, and path where it may be shown)
     metrics : {setting: {"value", "unit", "description"}}
     warnings : columns subject, run, step, level, message
     configuration : text, without paths unless they may be shown
@@ -43,7 +44,6 @@ def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) 
     weeks = {"content": Markup(first.content), "caption": caption_html(first.caption)} if first else None
     starts = ", ".join(dict.fromkeys(results.runs["subject"]))
     provenance = results.provenance
-    versions = pd.DataFrame(provenance["versions"].items(), columns=["package", "version"])
     return {
         "title": f"Simulated cortical folding of {starts}",
         "done": what_was_done(results.brains, results.runs),
@@ -56,7 +56,7 @@ def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) 
         "made": made(provenance),
         "metrics": table_html(metrics_settings(results.metrics)),
         "files": table_html(input_files(provenance["files"])),
-        "versions": table_html(versions),
+        "versions": table_html(versions(provenance)),
         "configuration": results.configuration,
     }
 
@@ -64,8 +64,17 @@ def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) 
 def made(provenance: Mapping[str, Any]) -> str:
     """Returns when and by which code the results were made."""
     commit = provenance["commit"]
-    of = f"commit {commit}" if commit else "not from a checkout of the source, so without a commit"
-    return f"Made {provenance['made']} by gyriflow {provenance['versions']['gyriflow']}, {of}."
+    of = "not from a checkout of the source, so without a commit"
+    if commit:
+        of = f"commit {commit.removesuffix('-dirty')}{', changed' if commit.endswith('-dirty') else ''}"
+    time = datetime.fromisoformat(provenance["recorded"]).strftime("%Y-%m-%d %H:%M UTC")
+    return f"Made {time} by gyriflow {provenance['gyriflow']}, {of}."
+
+
+def versions(provenance: Mapping[str, Any]) -> pd.DataFrame:
+    """Returns a row for each package that was there, gyriflow and Python first."""
+    found = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"]} | provenance["packages"]
+    return pd.DataFrame([(name, number) for name, number in found.items() if number], columns=["package", "version"])
 
 
 def metrics_settings(settings: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:

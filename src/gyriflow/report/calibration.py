@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, light_grid, new_figure, styled
+from .style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, add_letters, light_grid, new_figure, styled
 
 LINE_COLOUR = RUN_COLOURS[0]
 OPTIMUM_COLOUR = RUN_COLOURS[1]
@@ -39,11 +39,10 @@ def calibration_chart(
     rows = optimum.set_index("parameter")
     for number, (axes, name) in enumerate(zip(panels, names, strict=False)):
         _parameter_panel(axes, name, runs, rows.loc[name], profiles[profiles["parameter"] == name])
-        axes.set_title(f"({'abc'[number]})", loc="left")
         if number == 0:
             axes.set_ylabel(f"score: {score.replace('_', ' ')}")
     _sensitivity_panel(panels[-1], sensitivities)
-    panels[-1].set_title(f"({'abcd'[len(names)]})", loc="left")
+    add_letters(panels)
     entries = [panel.get_legend_handles_labels() for panel in (panels[0], panels[-1])]
     handles, labels = ([item for entry in entries for item in entry[part]] for part in (0, 1))
     figure.legend(handles, labels, loc="outside lower center", ncols=5)

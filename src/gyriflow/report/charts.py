@@ -26,6 +26,7 @@ from .style import (
     light_grid,
     new_figure,
     run_legend,
+    shown_number,
     shown_unit,
     styled,
     week_axis,
@@ -232,13 +233,13 @@ def quality_histogram(
             # a least volume far below all others would stretch their axis: it is only told
             if column != "volume_mm3" or limit >= edges[0]:
                 axes.axvline(limit, color=RUN_COLOURS[1], linestyle="--")
-            said += f", gate {limit:g}"
+            said += f", limit {shown_number(limit)}"
         axes.set_title(said, fontsize=7)
         light_grid(axes)
     panels[-1].set_xscale("log")
     add_letters(panels)
     count = f"{int(counts.sum()):,}".replace(",", "\u2009")
-    panels[0].set_ylabel(f"of {count} elements")
+    panels[0].set_ylabel(f"elements (of {count})")
     if surface:
         figure.supxlabel(surface, fontsize=7)
     return figure

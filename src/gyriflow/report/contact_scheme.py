@@ -16,7 +16,7 @@ from .overlay import section_lines
 from .style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, add_letters, light_grid, new_figure, styled
 from .zones import ZONES
 
-_WALLS = {LEFT_CONTACT: RUN_COLOURS[0], RIGHT_CONTACT: RUN_COLOURS[4], BETWEEN_PLANES: RUN_COLOURS[3]}
+_WALLS = {code: ZONES[code][1] for code in (LEFT_CONTACT, RIGHT_CONTACT, BETWEEN_PLANES)}
 _ZOOM_MM = 9.0
 
 

@@ -64,7 +64,7 @@ def growth_chart(
     drawn: list[Axes] = []
     for name, colour in colours.items():
         axes = next(panels)
-        heading = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 32)
+        heading = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 28)
         _rates_panel(axes, rates[rates["series"] == name], colour, heading, folding_rate_per_s)
         drawn.append(axes)
     limits = np.array([axes.get_ylim() for axes in drawn])
@@ -104,10 +104,10 @@ def _rates_panel(
     bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
     # in front of the folding's line, where they meet
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-    size = 6.5 if len(rates) <= 10 else 5
-    texts = axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=size, padding=2)
+    crowded = len(rates) > 8
+    texts = axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5, padding=2)
     for text in texts:
-        text.set(bbox=box, zorder=3)
+        text.set(bbox=box, zorder=3, rotation=90 if crowded else 0)
     axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
         _folding_line(axes, rates, folding_rate_per_s)
@@ -115,7 +115,7 @@ def _rates_panel(
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
-    axes.margins(y=0.12)
+    axes.margins(y=0.25 if crowded else 0.12)
     _interval_axis(axes, labels)
 
 

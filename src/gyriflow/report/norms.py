@@ -13,14 +13,15 @@ from .style import (
     FULL_WIDTH_IN,
     MEASURED,
     MUTED_COLOUR,
+    NEUTRAL_COLOUR,
     REAL_BRAIN,
     REAL_COLOUR,
     RUN_COLOURS,
+    add_letters,
+    chosen_colours,
     light_grid,
     new_figure,
-    run_colours,
     shown_unit,
-    simulated_runs,
     styled,
     week_axis,
 )
@@ -43,6 +44,7 @@ def norms_chart(
     norms: pd.DataFrame,
     reference: Sequence[str],
     *,
+    runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
@@ -58,6 +60,8 @@ def norms_chart(
     norms : columns hemisphere, metric, week, brains, q05, q50, q95
     reference
         Subjects that the curves go through.
+    runs
+        All runs of the study, which settle the colours.
 
     InputError where none of the metrics is there.
     """
@@ -65,8 +69,7 @@ def norms_chart(
     shown = [name for name in TITLES if (whole["metric"] == name).any()]
     if not shown:
         raise InputError("no metric of whole brains to show", expected=list(TITLES))
-    runs = simulated_runs(whole["run"])
-    colours = run_colours(runs)
+    colours = chosen_colours(whole["run"], runs)
     rows_of_panels = -(-len(shown) // 3)
     figure = new_figure(FULL_WIDTH_IN, 0.6 + 2.0 * rows_of_panels, synthetic=synthetic, measured=measured)
     panels = figure.subplots(rows_of_panels, 3, squeeze=False).ravel()
@@ -76,7 +79,7 @@ def norms_chart(
         band = curves[(curves["hemisphere"] == "whole") & (curves["metric"] == name)]
         # a table without rows has no numbers to draw
         if len(band):
-            axes.fill_between(band["week"], band["low"], band["high"], color="#D9D9D9", linewidth=0)
+            axes.fill_between(band["week"], band["low"], band["high"], color=NEUTRAL_COLOUR, linewidth=0)
             axes.plot(band["week"], band["expected"], color=MUTED_COLOUR)
         bars = norms[(norms["hemisphere"] == "whole") & (norms["metric"] == name)].dropna(subset=["q50"])
         for low, middle, high, week in bars[["q05", "q50", "q95", "week"]].to_numpy():
@@ -89,22 +92,25 @@ def norms_chart(
                     axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
                 continue
             known = own["subject"].isin(reference)
-            axes.plot(own.loc[known, "week"], own.loc[known, "value"], "*", color=REAL_COLOUR, markersize=6)
-            axes.plot(own.loc[~known, "week"], own.loc[~known, "value"], "*", color=RUN_COLOURS[-1], markersize=7)
+            axes.plot(own.loc[known, "week"], own.loc[known, "value"], "*", color=REAL_COLOUR, markersize=6, zorder=3)
+            axes.plot(
+                own.loc[~known, "week"], own.loc[~known, "value"], "*", color=RUN_COLOURS[-1], markersize=7, zorder=3
+            )
             others |= bool((~known).any())
         unit = shown_unit(rows["unit"].iloc[0])
         axes.set_title(TITLES[name] + (f" ({unit})" if unit else ""))
         week_axis(axes, rows["week"])
         light_grid(axes)
     for axes in panels[len(shown) :]:
-        axes.set_axis_off()
+        axes.remove()
+    add_letters(panels[: len(shown)])
     star = {"marker": "*", "linestyle": "none", "markersize": 7}
-    handles: list = [Line2D([], [], color=colours[run], marker="o", label=run) for run in runs]
+    handles: list = [Line2D([], [], color=colours[run], marker="o", label=run) for run in colours]
     handles.append(Line2D([], [], color=REAL_COLOUR, label=measured, **star))  # type: ignore[arg-type]
     if others:
         handles.append(Line2D([], [], color=RUN_COLOURS[-1], label="other measured brains", **star))  # type: ignore[arg-type]
     if len(curves):
-        handles.append(Patch(color="#D9D9D9", label="90 % of further brains"))
+        handles.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)))
     return figure
 

@@ -75,7 +75,7 @@ def outlines_chart(
     start = foot.get_xlim()[0] + 2
     foot.plot([start, start + length], [low[PLANES[planes[-1]][2]]] * 2, color="black", linewidth=2, clip_on=False)
     foot.text(start, low[PLANES[planes[-1]][2]] - 1, f"{length:g} mm", va="top", fontsize=7)
-    add_letters(panels[:, 0] if len(weeks) > 1 else panels.flat)
+    add_letters(panels[:, 0] if len(planes) > 1 and len(weeks) > 1 else panels.flat)
     handles = [
         Line2D([], [], color=RUN_COLOURS[0], label="simulated"),
         Line2D([], [], color=REAL_COLOUR, label=measured),

@@ -17,7 +17,7 @@ from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note, wra
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
 _DOTS_PER_INCH = 300
-_MARGIN = 1.04
+_MARGIN, _RINGED_MARGIN = 1.04, 1.12
 _MAX_COLUMNS = 8
 _EDGE_IN = 0.1
 _LABEL_LETTERS = 26
@@ -59,13 +59,17 @@ class Row:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Sizes in inches, and the half width in mm that every panel shows; `left` is where the first panel begins."""
+    """Sizes in inches, and the half width in mm that every panel shows; `left` is where the first panel begins.
+
+    `margin` is how much larger than the surfaces pictures are.
+    """
 
     width: float
     left: float
     panel: float
     foot: float
     half_width_mm: float
+    margin: float
 
     @property
     def inches_per_mm(self) -> float:
@@ -110,7 +114,8 @@ def panel_grid(
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     shown = [panel for row in rows for panel in row.panels if panel is not None]
-    half_width = _MARGIN * max(half_extents(panel.mesh, panel.view)[0] for panel in shown)
+    margin = _MARGIN if all(panel.mark is None for panel in shown) else _RINGED_MARGIN
+    half_width = margin * max(half_extents(panel.mesh, panel.view)[0] for panel in shown)
     blocks = _blocks(columns, rows)
     most = max(len(heads) for heads, _ in blocks)
     lines = max(row.label.count("\n") for row in rows)
@@ -119,7 +124,7 @@ def panel_grid(
     width = _dots(max(SINGLE_COLUMN_IN, label_in + most * panel_in))
     left_in = _dots(label_in + (width - label_in - most * panel_in) / 2)
     foot_in = max(0.66 if colour_bars or legend else 0.46, 0.15 * -(-len(legend) // _legend_columns(width)) + 0.16)
-    layout = _Layout(width, left_in, panel_in, _dots(foot_in), half_width)
+    layout = _Layout(width, left_in, panel_in, _dots(foot_in), half_width, margin)
 
     # a letter of a column's heading is about 0.055 in wide
     columns = [wrap(column, int(panel_in / 0.055)) for column in columns]
@@ -146,7 +151,7 @@ def panel_grid(
         top -= block_head_in
         for row in part:
             bottom = top - heights[id(row)]
-            marks = len(row.panels) if len(rows) == 1 else 1
+            marks = 1 if len(rows) > 1 else len(row.panels) if len(columns) > 1 else 0
             _draw_row(figure, row, layout, list(islice(letters, marks)), bottom=bottom, height=heights[id(row)])
             top = bottom - captions[id(row)]
     _draw_scale_bar(figure, layout, {end for panel in shown for end in panel.view.ends})
@@ -158,7 +163,7 @@ def _row_height_in(row: Row, layout: _Layout) -> float:
     halves = [half_extents(panel.mesh, panel.view)[1] for panel in row.panels if panel is not None]
     # the label is written along the height
     least = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
-    return max(2 * _MARGIN * max(halves, default=0.0) * layout.inches_per_mm, least)
+    return max(2 * layout.margin * max(halves, default=0.0) * layout.inches_per_mm, least)
 
 
 def _dots(inches: float) -> float:
@@ -182,15 +187,16 @@ def _draw_row(
         axes.set_label(f"{row.label}, column {index}")
         axes.set_axis_off()
         if index < len(letters):
-            # beside the row's label, or above the letters of the picture's ends
+            # beside the row's label, or above the letters of the ends, of this picture and the one before
+            beside = row.label and not index
             axes.annotate(
                 letters[index],
                 (0.0, 1.0),
                 xytext=(-2, 2),
                 textcoords="offset points",
                 xycoords="axes fraction",
-                ha="right" if row.label else "left",
-                va="bottom" if not row.label else "top",
+                ha="right" if beside else "left",
+                va="top" if beside else "bottom",
                 fontsize=9,
                 fontweight="bold",
             )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from ..geometry.triangles import Floats, TriangleMesh
+from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.schemes import LabelScheme
 from .overlay import BRIGHTEST, draw_outline, plane_grid
 from .scene import VIEWS, View, colour_scale, half_extents, hemisphere_faces, paint, render, restricted, uniform_colours
@@ -122,11 +123,16 @@ def quality_page(
     if brain.thickness_mm is None:
         _draw_views(figure, brain, uniform, OTHER_VIEWS, top - VIEWS_IN)
     else:
-        scale = colour_scale("viridis", *THICKNESS_LIMITS_MM, cut=True)
+        scale = colour_scale(SHAPE_MEASURES["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True)
         _draw_views(figure, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS, top - VIEWS_IN)
         bar = figure.add_axes((0.93, (FOOT_IN + 0.2) / height, 0.012, (VIEWS_IN - 0.4) / height))
         figure.colorbar(scale, cax=bar).set_label("thickness (mm)", fontsize=6.5)
+        if not np.isfinite(brain.thickness_mm).all():
+            figure.text(0.985, (FOOT_IN + 0.06) / height, "grey: not measured", fontsize=6, ha="right", va="top")
         bar.tick_params(labelsize=6)
+    for letter, below in zip("abc", (HEAD_IN, HEAD_IN + PLANES_IN, HEAD_IN + PLANES_IN + VIEWS_IN), strict=True):
+        place = 1 - (below + 0.02) / height
+        figure.text(0.015, place, letter, ha="left", va="top", fontsize=9, fontweight="bold")
     _draw_warnings(figure, verdict, warnings)
     return figure
 

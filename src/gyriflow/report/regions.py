@@ -1,6 +1,6 @@
 """Regions of the cortex: a picture of where they are, and a chart of their metrics over the weeks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -19,19 +19,20 @@ from .style import (
     FULL_WIDTH_IN,
     MEASURED,
     MUTED_COLOUR,
+    NEUTRAL_COLOUR,
     PHANTOM,
     REAL_BRAIN,
+    RUN_COLOURS,
+    add_letters,
     from_zero,
     light_grid,
     new_figure,
-    run_colours,
     shown_unit,
     simulated_runs,
     styled,
     week_axis,
 )
 
-NO_REGION_COLOUR = "#D9D9D9"
 VIEWS = ("left", "right", "top", "bottom")
 TITLES = {
     "area": "area, both sides",
@@ -41,11 +42,28 @@ TITLES = {
     "mean_thickness": "mean cortical thickness",
 }
 """The metrics of the chart and their titles."""
+NOT_FROM_ZERO = ("mean_curvature", "mean_local_gyrification_index")
 MOST_RUNS = 3
+TINTS = (0.0, 0.4, 0.7)
+"""How far towards white the colours of further regions are."""
 STYLES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
 
 RegionMap = tuple[TriangleMesh, Ints]
 """A surface and the number of the region of each vertex, 0 for none."""
+
+
+def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:
+    """Returns a colour for each region in the order given: those of runs, then their tints.
+
+    No scale from dark to pale, which would make neighbours alike, and dark ones like shade. From the 22nd region on the
+    colours come again.
+    """
+    colours = {}
+    for number, name in enumerate(dict.fromkeys(names)):
+        tint = TINTS[number // len(RUN_COLOURS) % len(TINTS)]
+        red, green, blue = (part + tint * (1.0 - part) for part in to_rgb(RUN_COLOURS[number % len(RUN_COLOURS)]))
+        colours[name] = red, green, blue
+    return colours
 
 
 @styled
@@ -69,8 +87,8 @@ def regions_picture(
     """
     if not brains:
         raise InputError("no brain with regions")
-    colours = run_colours(names.values())
-    palette = {number: to_rgb(colours[name]) for number, name in names.items()} | {0: to_rgb(NO_REGION_COLOUR)}
+    colours = region_colours(names.values())
+    palette = {number: colours[name] for number, name in names.items()} | {0: to_rgb(NEUTRAL_COLOUR)}
     painted = {
         head: (mesh, np.array([palette[int(number)] for number in regions])) for head, (mesh, regions) in brains.items()
     }
@@ -79,7 +97,7 @@ def regions_picture(
         for view in named_views(views)
     ]
     legend = [Patch(color=colours[name], label=name) for name in names.values()]
-    legend.append(Patch(color=NO_REGION_COLOUR, label="no region"))
+    legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     return panel_grid(list(painted), rows, synthetic=synthetic, measured=measured, legend=legend)
 
 
@@ -100,7 +118,7 @@ def regions_chart(
     regions : columns subject, run, week, hemisphere, region, metric, value, unit
     asymmetry : columns subject, run, week, region, metric, asymmetry_index
     """
-    colours = run_colours(regions["region"])
+    colours = region_colours(regions["region"])
     shown = [name for name in TITLES if (regions["metric"] == name).any()]
     runs = simulated_runs(regions["run"])[:MOST_RUNS]
     rows_of_panels = -(-(len(shown) + 1) // 3)
@@ -113,7 +131,7 @@ def regions_chart(
         _panel(axes, values, colours, runs)
         unit = shown_unit(rows["unit"].iloc[0])
         axes.set_title(TITLES[name] + (f" ({unit})" if unit else ""))
-        if name != "mean_curvature":
+        if name not in NOT_FROM_ZERO:
             from_zero(axes)
     axes = panels[len(shown)]
     rows = asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)]
@@ -121,7 +139,8 @@ def regions_chart(
     axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
     axes.set_title("asymmetry of area, 2 (L − R)/(L + R)")
     for axes in panels[len(shown) + 1 :]:
-        axes.set_axis_off()
+        axes.remove()
+    add_letters(panels[: len(shown) + 1])
     handles = [
         Line2D([], [], color=colour, marker="s", linestyle="none", label=name) for name, colour in colours.items()
     ]

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from .panels import Panel, Row, panel_grid
-from .scene import MAP, View, colour_scale, named_views, paint, uniform_colours
+from .scene import MAP, UNKNOWN_COLOUR, View, colour_scale, named_views, paint, uniform_colours
 from .style import (
     MAGNITUDES,
     NEUTRAL_COLOUR,
@@ -29,6 +29,8 @@ SurfaceMap = tuple[TriangleMesh, Floats]
 SIDE_VIEWS = ("left", "top")
 DISPLACEMENT_VIEWS = ("left", "top", "back")
 PRESSURE_COLOURS = "YlOrRd"
+SIGNED = "RdBu_r"
+ROUNDING = 1e-9
 _MOST = 0.995
 """Part of the vertices that a colour scale reaches."""
 
@@ -182,6 +184,18 @@ def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
     return colour_scale(colours, 0.0, end, cut=bool((known > end).any()))
 
 
+def signed_scale(values: Floats) -> ScalarMappable:
+    """Returns a scale that is pale at zero and as wide on both sides, for values of which some are below zero."""
+    known = np.abs(values[np.isfinite(values)])
+    end = round_up(float(np.quantile(known, _MOST)))
+    return colour_scale(SIGNED, -end, end, cut=bool((known > end).any()))
+
+
+def goes_below_zero(values: Floats) -> bool:
+    """Returns whether values go below zero by more than rounding."""
+    return bool(np.nanmin(values) < -ROUNDING * np.nanmax(np.abs(values)))
+
+
 def round_up(value: float) -> float:
     """Returns a positive value rounded up to two digits, so that a colour bar ends at a number one can say."""
     step = 10.0 ** (np.floor(np.log10(value)) - 1)
@@ -245,6 +259,8 @@ def scalar_maps(
         for group, known in maps.items()
     ]
     legend = [Patch(color=NEUTRAL_COLOUR, label="no contact")] if quantity in PRESSURES else []
+    if not np.isfinite(values).all():
+        legend.append(Patch(color=UNKNOWN_COLOUR, label="not measured"))
     return panel_grid(
         [column_label(key) for key in keys],
         rows,

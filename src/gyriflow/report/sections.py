@@ -13,13 +13,25 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..parameters.terms import BRIDGE, LEFT, RIGHT
-from .style import FULL_WIDTH_IN, MAGNITUDES, RUN_COLOURS, add_letters, new_figure, styled, week_label
+from .renders import ROUNDING, SIGNED, goes_below_zero
+from .style import (
+    FULL_WIDTH_IN,
+    MAGNITUDES,
+    RIGHT_COLOUR,
+    RUN_COLOURS,
+    add_letters,
+    new_figure,
+    styled,
+    week_label,
+    wrap,
+)
 
 PLANES = {
     # name: (axis across the plane, axes to the right and up)
@@ -29,11 +41,11 @@ PLANES = {
 }
 AXIS_NAMES = ("x: left − to right + (mm)", "y: posterior − to anterior + (mm)", "z: inferior − to superior + (mm)")
 SHOWN = ("coronal", "axial")
-HEMISPHERES = {LEFT: ("left", "#0072B2"), RIGHT: ("right", "#F0E442"), BRIDGE: ("between the planes", "#CC79A7")}
+HEMISPHERES = {LEFT: ("left", "#0072B2"), RIGHT: ("right", RIGHT_COLOUR), BRIDGE: ("between the planes", "#CC79A7")}
 GROWING = {1: ("growing", "#D55E00"), 0: ("no growth", "#56B4E9")}
 """Codes of the elements' tags, their names and colours, those of the boundary's zones, near the paper's."""
 WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth per step (10⁻³)", "shear modulus (Pa)"
-_FOOT_IN, _LABEL_IN = 0.66, 1.3
+_FOOT_IN, _LABEL_IN = 0.72, 1.3
 _ARROWS_ACROSS = 26
 _ARROWS = {"pial vertices": RUN_COLOURS[0], "vertices inside": RUN_COLOURS[1]}
 
@@ -96,8 +108,10 @@ def cross_sections(
     _require_fitting(mesh, fields, tags)
     grid = _grid(mesh, fields, {name: codes for name, (codes, _) in tags.items()})
     figure, panels, foot = _rows(mesh, planes, len(tags) + len(fields), synthetic)
+    # a letter is about 0.055 in wide; the one by which a caption calls the panel stands beside the title
+    letters = int((FULL_WIDTH_IN - 0.5) / panels.shape[1] / 0.055) - 6
     for column, name in enumerate((*tags, *fields)):
-        panels[0, column].set_title(name.partition(" (")[0], fontsize=7)
+        panels[0, column].set_title(wrap(name.partition(" (")[0], letters), fontsize=7)
         for axes, plane in zip(panels[:, column], planes, strict=True):
             points, triangles, section = _section(grid, plane)
             scale: Colormap = mpl.colormaps[MAGNITUDES]
@@ -107,13 +121,19 @@ def cross_sections(
                 scale = ListedColormap(colours)
             else:
                 values = section.point_data[name][triangles].mean(axis=1)
-                limits = float(np.min(fields[name])), float(np.max(fields[name]))
+                limits, scale = (
+                    _limits(fields[name]),
+                    mpl.colormaps[SIGNED if goes_below_zero(fields[name]) else MAGNITUDES],
+                )
             drawn = _draw(axes, points, triangles, values, scale, limits)
+            if panels.shape[1] > 3:
+                axes.xaxis.set_major_locator(MaxNLocator(2))
             if ellipsoid:
                 _outline(axes, ellipsoid, plane, _middle(mesh)[PLANES[plane][0]])
         if name in fields:
             bar = figure.colorbar(drawn, cax=foot[column].inset_axes((0.05, 0.8, 0.9, 0.1)), orientation="horizontal")
-            bar.set_label(name, fontsize=7)
+            bar.set_label(wrap(name, letters + 6), fontsize=7)
+            bar.ax.xaxis.set_major_locator(MaxNLocator(nbins=3))
         else:
             keys: list[Artist] = [Patch(color=colour, label=label) for label, colour in tags[name][1].values()]
             if ellipsoid and name == list(tags)[-1]:
@@ -215,7 +235,7 @@ def _rows(
     """Returns a figure with its panels, a row for each plane, all at one scale, and a place for a key per column."""
     middle, half = _middle(mesh), 0.515 * np.ptp(mesh.vertices, axis=0)
     width = max(half[PLANES[plane][1]] for plane in known(planes))
-    inches_per_mm = (FULL_WIDTH_IN - 0.5 - 0.1 * columns) / columns / width
+    inches_per_mm = (FULL_WIDTH_IN - 0.8 - 0.1 * columns) / columns / width
     tall = [max(half[PLANES[plane][2]], _LABEL_IN / inches_per_mm) for plane in planes]
     heights = [inches_per_mm * height for height in tall] + [_FOOT_IN]
     total = sum(heights) + 0.5 + 0.12 * len(planes) + 0.17 * synthetic
@@ -234,6 +254,14 @@ def _rows(
     for axes in panels[-1]:
         axes.set_axis_off()
     return figure, panels[:-1], panels[-1]
+
+
+def _limits(values: Floats) -> tuple[float, float]:
+    """Returns the ends of the colour scale of a field: from zero where it is the same everywhere but for rounding."""
+    low, high = float(np.min(values)), float(np.max(values))
+    if goes_below_zero(values):
+        return min(low, -high), max(high, -low)
+    return (low, high) if high - low > ROUNDING * high else (0.0, high)
 
 
 def _middle(mesh: TetrahedralMesh) -> Floats:

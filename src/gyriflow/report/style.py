@@ -25,6 +25,8 @@ RUN_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
 """Okabe and Ito's colour-blind-safe colours, without black (measured brains) and yellow (too pale on white)."""
 REAL_COLOUR = "#000000"
 MUTED_COLOUR = "#767676"
+RIGHT_COLOUR = "#E0B400"
+"""The right hemisphere and what it touches: the paper's yellow, dark enough for lines on white."""
 SIMULATED_SURFACE_COLOUR = "#8FB4DC"
 REAL_SURFACE_COLOUR = "#EBD6B4"
 
@@ -141,6 +143,15 @@ def shown_unit(unit: object) -> str:
     return _UNITS.get(unit, unit) if isinstance(unit, str) else ""
 
 
+def shown_number(value: float) -> str:
+    """Returns a number with at most three digits, a very large or small one with its power of ten, as in 2·10⁻⁷."""
+    digits, _, power = f"{value:.3g}".replace("-", "−").partition("e")
+    if not power:
+        return digits
+    factor = "" if digits == "1" else f"{digits}·"
+    return f"{factor}10$^{{{int(power.replace('−', '-'))}}}$"
+
+
 def week_label(week: float) -> str:
     """Returns a gestational week as shown, for example "21 GW" or "21.5 GW"."""
     return f"{week:g} GW"
@@ -202,7 +213,7 @@ def run_colours(runs: Iterable[str]) -> dict[str, Any]:
 def week_axis(axes: Axes, weeks: Iterable[float] | None = None) -> None:
     """Labels the horizontal axis as gestational weeks with whole weeks as ticks."""
     axes.set_xlabel("gestational age (GW)")
-    axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1))
     if weeks is not None:
         values = list(weeks)
         margin = 0.04 * max(max(values) - min(values), 1.0)

@@ -108,7 +108,9 @@ def smoothing_chart(
     weeks = sorted(rows["week"].unique())
     colours = run_colours([f"{week:g} GW" for week in weeks])
     figure = new_figure(FULL_WIDTH_IN, 3.2, synthetic=synthetic)
-    for axes, (measure, name) in zip(figure.subplots(1, 2), MEASURES.items(), strict=True):
+    panels = figure.subplots(1, 2)
+    add_letters(panels)
+    for axes, (measure, name) in zip(panels, MEASURES.items(), strict=True):
         for week, colour in zip(weeks, colours.values(), strict=True):
             line = rows[rows["week"] == week].groupby("length")[f"gain_{measure}"].mean()
             axes.plot(line.index, line, "o-", color=colour)

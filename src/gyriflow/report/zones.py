@@ -25,16 +25,16 @@ from ..parameters.terms import (
 )
 from ..units import CM2_PER_MM2
 from .panels import Panel, Row, panel_grid
-from .renders import magnitude_scale
+from .renders import goes_below_zero, magnitude_scale, signed_scale
 from .scene import MAP, hemisphere_faces, named_views, paint, restricted
-from .style import MAGNITUDES, NEUTRAL_COLOUR, styled
+from .style import MAGNITUDES, NEUTRAL_COLOUR, RIGHT_COLOUR, styled
 
 ZONE_VIEWS = ("left", "bottom", "left medial", "right medial")
 COLOURS = {
     FREE: "#D55E00",
     CLAMPED: "#009E73",
     LEFT_CONTACT: "#0072B2",
-    RIGHT_CONTACT: "#F0E442",
+    RIGHT_CONTACT: RIGHT_COLOUR,
     BETWEEN_PLANES: "#CC79A7",
     BASE: "#999999",
     SIDE_X: "#56B4E9",
@@ -106,7 +106,7 @@ def field_picture(
     label
         Name and unit, for example "growth weight" or "tangential growth increment (10⁻³)".
     """
-    scale = magnitude_scale(values, MAGNITUDES)
+    scale = signed_scale(values) if goes_below_zero(values) else magnitude_scale(values, MAGNITUDES)
     columns, rows = _one_row(mesh, paint(values, scale, zero_is_nothing=True), views, fissure_x_mm)
     return panel_grid(
         columns,

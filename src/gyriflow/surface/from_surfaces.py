@@ -122,6 +122,8 @@ def from_pial(
     _require_both(mesh, report)
     pose = pose_surface_by_shape(mesh, coordinates)
     report["pose_by"] = pose.by
+    if np.array_equal(pose.rotation, CONVENTIONS["lps"]):
+        report["coordinates"] = "lps"
     for warning in pose.warnings:
         warn(report, warning)
     mesh = transformed(mesh, motion(pose.rotation))

@@ -74,6 +74,7 @@ def single_hemisphere(
         upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [wall])
         chosen, report["pose_by"] = upright.as_matrix() @ CONVENTIONS[nearest], "file"
         if nearest != "ras":
+            report["coordinates"] = nearest
             warn(report, f"the shape says that the coordinates are {nearest.upper()}")
     elif clear:
         chosen, report["pose_by"] = rotation, "shape"

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, TextIO
 
-from .logs import FoldingStep, GrowingLog, cause, last_step, size_in, warnings_in
+from .logs import FoldingStep, GrowingLog, cause, ended_by_slurm, last_step, size_in, warnings_in
 from .stages import subject
 from .time_left import LEAST_SHARE, Pace, as_duration, as_seconds
 
@@ -140,7 +140,7 @@ class RunDisplay:
             return
         what = job.what if job else rule
         text = "".join(GrowingLog(Path(log)).all_text() for log in logs)
-        why = cause(text) or otherwise or "it left no message"
+        why = ended_by_slurm(otherwise, rule) or cause(text) or otherwise or "it left no message"
         self.failed.append({"what": what, "why": why, "logs": [str(Path(log).absolute()) for log in logs]})
         first, *rest = why.splitlines()
         self.line(f"failed  {what}: {first}")
@@ -173,10 +173,10 @@ class RunDisplay:
         if self.interrupted:
             self.line(f"gyriflow: stopped after {took}, {self.done} of {self.total} steps are done")
         elif self.failed:
-            count = len(self.failed)
+            count, left = len(self.failed), self.total - self.done
             self.line(
-                f"gyriflow: {count} step{'s' if count > 1 else ''} failed after {took}, {self.total - self.done} are "
-                "not done; once the cause is mended, the same command goes on from here"
+                f"gyriflow: {count} step{'s' if count > 1 else ''} failed after {took}, {left} "
+                f"{'are' if left > 1 else 'is'} not done; once the cause is mended, the same command goes on from here"
             )
         elif self.up_to_date:
             self.line("gyriflow: everything is up to date" + _place(USUAL_REPORT))

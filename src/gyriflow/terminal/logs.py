@@ -15,6 +15,19 @@ ERROR = re.compile(OWN.format(level="ERROR"), re.MULTILINE)
 UNEXPECTED = "unexpected error"
 MESSAGE = re.compile(r"^gyriflow: (.+(?:\n {2,}.+)*)$", re.MULTILINE)
 RAISED = re.compile(r"^(\w[\w.]*(?:Error|Exception|Interrupt|Warning)\b.*)$", re.MULTILINE)
+OF_SNAKEMAKE = "WorkflowError"
+"""How the names of exceptions end that say no more than that a step has failed; logs of jobs on a cluster end so."""
+SLURM = re.compile(r"SLURM-job '(\d+)' failed.*SLURM status is: '(\w+)'", re.DOTALL)
+"""How the executor for Slurm says in which state a job has ended."""
+STATES = {
+    "CANCELLED": "it was cancelled",
+    "TIMEOUT": "its time ran out: more is given by --set-resources {rule}:runtime=MINUTES",
+    "OUT_OF_MEMORY": "its memory ran out: more is given by --set-resources {rule}:mem_mb=MIB",
+    "NODE_FAIL": "its node was lost",
+    "BOOT_FAIL": "its node did not start",
+    "DEADLINE": "its deadline passed",
+}
+"""What states of Slurm mean that say more than the job's log; a program that has failed by itself says why there."""
 LINES_OF_OTHERS = 5
 
 
@@ -44,6 +57,12 @@ def last_step(text: str) -> FoldingStep | None:
     return FoldingStep(float(steps[-1]["week"]), float(steps[-1]["end"]), steps[-1]["left"]) if steps else None
 
 
+def ended_by_slurm(message: str, rule: str) -> str:
+    """Returns what Slurm has done to a job, from the executor's message on it; empty where it did nothing."""
+    found = SLURM.search(message)
+    return f"Slurm job {found[1]}: {STATES[found[2]].format(rule=rule)}" if found and found[2] in STATES else ""
+
+
 def cause(text: str) -> str:
     """Returns why a job failed, from its log: gyriflow's own message, else the exception, else the last lines."""
     of_program = [match[1] for match in MESSAGE.finditer(text)]
@@ -54,7 +73,7 @@ def cause(text: str) -> str:
         # a message may go over several lines, up to the next record
         rest = text[errors[0].start(1) :]
         return re.split(r"^\d{4}-\d\d-\d\d ", rest, maxsplit=1, flags=re.MULTILINE)[0].strip()
-    raised = RAISED.findall(text)
+    raised = [line for line in RAISED.findall(text) if not line.partition(":")[0].endswith(OF_SNAKEMAKE)]
     if raised:
         return f"unexpected {raised[-1]}"
     return "\n".join([line for line in text.splitlines() if line.strip()][-LINES_OF_OTHERS:])

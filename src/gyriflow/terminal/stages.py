@@ -23,6 +23,8 @@ ORDER = (
     *("studies", "calibration", "figures", "report"),
 )
 """Stages in the order in which data flow."""
+RULE = re.compile(r"^(?:checkpoint|(?:use )?rule) (?:\w+ as )?(\w+)(?::| with:)", flags=re.MULTILINE)
+"""The line on which a rule or a checkpoint begins."""
 
 
 @cache
@@ -31,7 +33,7 @@ def stages(rules: Path) -> dict[str, str]:
     found = {}
     for file in sorted(rules.glob("*.smk")):
         stage = FILES.get(file.stem, file.stem)
-        for name in re.findall(r"^(?:use )?rule (?:\w+ as )?(\w+)(?::| with:)", file.read_text(), flags=re.MULTILINE):
+        for name in RULE.findall(file.read_text()):
             found[name] = "figures" if name.endswith("_figure") else stage
     return found
 

@@ -7,7 +7,7 @@ import pandas as pd
 
 from ..errors import InputError
 from ..geometry.motion import rigid_fit, without_rigid_motion
-from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
+from ..geometry.triangles import Floats, Ints, TriangleMesh, face_components, signed_volume, vertex_areas
 
 COLUMNS = [
     *("from_week", "to_week", "displacement_r", "displacement_slope", "displacement_r_scaling"),
@@ -33,7 +33,8 @@ def displacement_table(weeks: Sequence[float], simulated: Floats, measured: Floa
 
     The rigid part of each interval is removed from both, and the simulated vectors are turned as the simulated brain
     lies to the measured one. Beside it stands uniform scaling: all vertices of the measured surface moved away from its
-    centroid so that its volume grows as measured.
+    centroid so that the volume grows as measured. All this is done piece by piece where the surface has several:
+    nothing joins hemispheres that are bodies of their own, so that growth does not say how they lie to each other.
 
     Parameters
     ----------
@@ -56,16 +57,22 @@ def displacement_table(weeks: Sequence[float], simulated: Floats, measured: Floa
             found=f"{len(weeks)} weeks, positions {simulated.shape} and {measured.shape}",
             expected="two or more weeks, equal shapes",
         )
+    component = face_components(TriangleMesh(measured[0], faces))
+    pieces = [np.unique(faces[component == number]) for number in range(component.max() + 1)]
     rows = []
     for number in range(len(weeks) - 1):
         shape = TriangleMesh(measured[number], faces)
         weights = vertex_areas(shape)
-        turn = rigid_fit(simulated[number], measured[number], weights)[:3, :3]
-        own = without_rigid_motion(simulated[number], simulated[number + 1], weights) @ turn.T
-        real = without_rigid_motion(measured[number], measured[number + 1], weights)
         grown = signed_volume(TriangleMesh(measured[number + 1], faces)) / signed_volume(shape)
-        centre = np.average(shape.vertices, axis=0, weights=weights)
-        scaling = (np.cbrt(grown) - 1) * (shape.vertices - centre)
+        own, real, scaling = (np.zeros_like(shape.vertices) for _ in range(3))
+        for piece in pieces:
+            (first, then), (was, became) = (
+                (places[number, piece], places[number + 1, piece]) for places in (simulated, measured)
+            )
+            turn = rigid_fit(first, was, weights[piece])[:3, :3]
+            own[piece] = without_rigid_motion(first, then, weights[piece]) @ turn.T
+            real[piece] = without_rigid_motion(was, became, weights[piece])
+            scaling[piece] = (np.cbrt(grown) - 1) * (was - np.average(was, axis=0, weights=weights[piece]))
         r, slope = vector_agreement(own, real, weights)
         r_scaling, slope_scaling = vector_agreement(scaling, real, weights)
         sizes = [float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights))) for vectors in (own, real)]

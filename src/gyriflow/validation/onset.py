@@ -1,5 +1,6 @@
 """In which week a sulcus appears that is not there at the start."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -117,9 +118,51 @@ def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["region", "there_at_start", "onset_week", "first_relief_mm", "last_relief_mm"])
 
 
-def numbered(regions: NDArray[np.integer], side: str) -> dict[int, str]:
-    """Returns the names of numbered regions of a side, such as "left 1"."""
-    return {number: f"{side} {number}" for number in range(1, int(regions.max()) + 1)}
+def named(
+    mesh: TriangleMesh,
+    sulci: NDArray[np.integer],
+    regions: NDArray[np.integer],
+    names: Mapping[int, str],
+    side: str,
+) -> tuple[Ints, dict[int, str]]:
+    """Returns the sulci of a hemisphere by the regions of the cortex that they lie in, and their names.
+
+    A connected valley that reaches through several regions is parted between those that have `LEAST_REGION_MM2` or
+    more of it; what is left of it goes to the largest part, and so does what is in no region, unless that is more
+    than half. Names are as "left central", with a number from the second one of a region on, by size; parts outside
+    of all regions are called by the number of their valley, as "left 4".
+
+    Parameters
+    ----------
+    sulci
+        (n,) numbers of `sulcal_regions`.
+    regions, names
+        (n,) labels of the vertices, and the names of those that are regions; without any, sulci are "left 1" and so on.
+    """
+    areas, parts = vertex_areas(mesh), []
+    labels = np.where(np.isin(regions, list(names)), regions, 0)
+    for number in range(1, int(sulci.max()) + 1):
+        inside = sulci == number
+        sizes = np.bincount(labels[inside], areas[inside], minlength=int(labels.max()) + 1)
+        own = [int(label) for label in np.flatnonzero(sizes >= LEAST_REGION_MM2)]
+        # the rim of a sulcus is often in no region
+        if sizes[0] <= sizes.sum() / 2:
+            own = [label for label in own if label > 0]
+        own = own or [int(np.argmax(sizes))]
+        largest = max(own, key=lambda label: sizes[label])
+        of_part = np.where(np.isin(labels, own), labels, largest)
+        parts += [(number, label, inside & (of_part == label)) for label in own]
+    parts.sort(key=lambda part: -areas[part[2]].sum())
+    found, count = np.zeros(len(sulci), dtype=np.int64), Counter[int]()
+    called: dict[int, str] = {}
+    for place, (number, label, vertices) in enumerate(parts, start=1):
+        found[vertices] = place
+        count[label] += 1
+        again = f" {count[label]}" if count[label] > 1 else ""
+        name = f"{side} {names[label]}{again}" if label in names else f"{side} {number}"
+        # a region may be called by a number too
+        called[place] = f"{name} ({place})" if name in called.values() else name
+    return found, called
 
 
 def onset_on_surfaces(

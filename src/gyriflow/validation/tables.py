@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..geometry.triangles import TriangleMesh, area, signed_volume
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .folds import against_real, fold_measures
+from .horizon import by_kind
 from .placement import MEASURES, SKILLED_FROM, placement
 from .shapes import Shape
 
@@ -121,7 +122,8 @@ def summary(validation: pd.DataFrame, displacement: pd.DataFrame) -> dict[str, d
         skill_shape_index, skill_mean_curvature, curvature_rms_ratio, last_week (the last week compared, means over
         seeds and starts); displacement_r, displacement_slope (of the last interval up to that week);
         skill_by_horizon for each measure, {weeks since the start: mean}, with the gain r − r(start) at horizon 1, where
-        there is no skill; gain_by_horizon. None where there is no number.
+        there is no skill; gain_by_horizon; horizon, the same by kind, so that explained and predicted weeks of several
+        starts are not mixed (`horizon.by_kind`). None where there is no number.
 
     InputError where a column is missing.
     """
@@ -146,7 +148,7 @@ def summary(validation: pd.DataFrame, displacement: pd.DataFrame) -> dict[str, d
         skills, gains = ({m: _by_horizon(rows, f"{kind}_{m}") for m in MEASURES} for kind in ("skill", "gain"))
         for measure, by_horizon in skills.items():
             by_horizon |= {horizon: gain for horizon, gain in gains[measure].items() if float(horizon) <= SKILLED_FROM}
-        run |= {"skill_by_horizon": skills, "gain_by_horizon": gains}
+        run |= {"skill_by_horizon": skills, "gain_by_horizon": gains, "horizon": by_kind(rows)}
         found[str(name)] = run
     return found
 

@@ -6,7 +6,7 @@ import pytest
 from gyriflow.config import load
 from gyriflow.config.mesh import MeshSettings
 from gyriflow.cost import MEASURED, typical_seconds
-from gyriflow.cost.prediction import Job, predict
+from gyriflow.cost.prediction import Job, folding_needs, predict
 from gyriflow.cost.sizes import cubes
 from gyriflow.io.files import read_json
 
@@ -75,6 +75,37 @@ def test_the_memory_of_a_folding_is_that_of_its_solver():
     predicted = predict([Job("simulate", "reference", "a", 3)], study, COEFFICIENTS, 4, memory)
     assert predicted.memory_mib == 1234.0
     assert asked == [(3, "global", 1)]
+
+
+def test_runs_of_studies_and_calibrations_cost_what_runs_do():
+    study = STUDY | {
+        "runs": {"reference": {}},
+        "studies": {"thick": {"base": "reference", "vary": {"thickness_mm": [2.0, 3.0]}, "compare_week": 22}},
+        "calibrate": {
+            "base": "reference", "compare_week": 22, "parameters": {"thickness_mm": [1.0, 3.0]},
+            "score": {"size": 1.0}, "first_runs": 3,
+        },
+    }  # fmt: skip
+    config = load(study)
+    assert config.calibrate is not None
+    calibrated = next(iter(config.calibrate.runs))
+    usual = predict([Job("simulate", "reference", "a", 2)], config, COEFFICIENTS, 2)
+    assert usual.core_seconds == usual.folding_core_seconds > 0.5
+    for run in (*config.study_runs, calibrated):
+        member = predict([Job("simulate_member", run, "a", 2)], config, COEFFICIENTS, 2)
+        assert member.core_seconds == pytest.approx(usual.core_seconds), run
+        assert member.disk_mib == pytest.approx(usual.disk_mib), run
+
+
+def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
+    config = load(STUDY | {"folding": {"end_week": 40, "step_s": 60}})
+    predicted = predict([Job("simulate", "reference", "a", 2)], config, COEFFICIENTS, 2, lambda *_: 4000.0)
+    mib, minutes = folding_needs("reference", "a", config, COEFFICIENTS, lambda *_: 4000.0)
+    assert mib == 6000
+    assert minutes == pytest.approx(2 * predicted.wall_seconds / 60, abs=1)
+    assert minutes > 60
+    # a small one has what every job needs
+    assert folding_needs("reference", "a", load(STUDY), COEFFICIENTS, lambda *_: 10.0) == (2000, 60)
 
 
 def test_what_was_measured_has_all_that_predictions_need():

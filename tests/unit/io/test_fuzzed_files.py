@@ -170,7 +170,7 @@ def test_maps_in_hdf5(tmp_path, wholes, data):
 TABLE = b"participant_id\tage\tfiles\nsub-01\t24.5\ta.nii.gz\nsub-02\tn/a\tb.nii.gz\n"
 
 
-@pytest.mark.parametrize("read", [read_tab_separated, partial(read_table, separator="\t"), read_text])
+@pytest.mark.parametrize("read", [read_tab_separated, read_table, read_text])
 @MANY
 @given(content=st.one_of(damaged(TABLE), st.binary(max_size=80)))
 def test_tables(tmp_path, read, content):

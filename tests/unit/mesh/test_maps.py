@@ -12,12 +12,11 @@ from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 from gyriflow.mesh.maps import (
     move_nearest,
     require_within,
-    surface_pose,
-    ventricles_on_mesh,
+    ventricle_map,
     vertex_map_on_mesh,
     volume_map_on_mesh,
-    volume_pose,
 )
+from gyriflow.parameters.folding import VENTRICLES
 
 RADIUS = 20.0
 SLOPE = np.array([0.3, -0.7, 0.2])
@@ -204,30 +203,6 @@ def test_values_that_a_parameter_cannot_have_are_refused_with_their_count():
     assert all(words in str(caught.value) for words in ("thickness.shape.gii", "medial wall"))
 
 
-def test_a_volume_follows_the_one_motion_of_a_brain():
-    motion = pose(10, 20, 30)
-    for posing in ({}, {"posing": {"together": True}}):
-        assert volume_pose({"pose": motion.tolist()} | posing, "a.nii") == pytest.approx(motion)
-
-
-@pytest.mark.parametrize("source", ["pial", "hemisphere", "hemispheres"])
-@pytest.mark.parametrize("coordinates", ["lps", "ras"])
-def test_surfaces_in_lps_are_flipped_once_and_volumes_never(source, coordinates):
-    lps, turn = np.diag([-1.0, -1.0, 1.0, 1.0]), pose(0, 10, 0)
-    flip = lps if coordinates == "lps" else np.eye(4)
-    # the surface stage flips hemispheres before it poses them, other surfaces as part of their pose
-    reported = turn if source == "hemispheres" else turn @ flip
-    report = {"source": source, "coordinates": coordinates, "pose": reported.tolist()}
-    assert surface_pose(report) == pytest.approx(turn @ flip)
-    assert volume_pose(report, "a.nii") == pytest.approx(turn)
-
-
-def test_a_volume_cannot_follow_hemispheres_that_were_posed_separately():
-    report = {"pose": np.eye(4).tolist(), "posing": {"together": False}}
-    with pytest.raises(InputError, match=r"a\.nii: a volume cannot be the map.*posed separately.*per vertex \(GIFTI\)"):
-        volume_pose(report, "a.nii")
-
-
 def test_ventricles_are_where_the_labels_have_them(ball):
     points = ball.vertices
     low = points.min(axis=0) - 2
@@ -237,10 +212,9 @@ def test_ventricles_are_where_the_labels_have_them(ball):
     places = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) * 0.5 + low
     inside = np.linalg.norm(places, axis=-1) < 0.5 * RADIUS
     labels = np.where(inside, 7, 1)
-    report = {"pose": np.eye(4).tolist(), "source": "labels"}
-    found = ventricles_on_mesh(points, labels, affine, (7, 8), report, "labels.nii.gz")
+    found = ventricle_map(points, labels, affine, (7, 8), "labels.nii.gz")[VENTRICLES]
     depth = np.linalg.norm(points, axis=1)
     assert (found[depth < 0.5 * RADIUS - 1] == 1).all()
     assert (found[depth > 0.5 * RADIUS + 1] == 0).all()
     with pytest.raises(InputError, match="know no ventricles"):
-        ventricles_on_mesh(points, labels, affine, (2,), report, "labels.nii.gz")
+        ventricle_map(points, labels, affine, (2,), "labels.nii.gz")

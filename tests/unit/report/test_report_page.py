@@ -52,9 +52,11 @@ def page(shown: list[Shown], view: dict | None = None) -> str:
         surfaces=SURFACES,
         runs=RUNS,
         provenance={
-            "commit": "abc",
-            "made": "2026-01-01",
-            "versions": {"gyriflow": "0.1"},
+            "commit": "abc-dirty",
+            "recorded": "2026-01-01T12:30:00+00:00",
+            "gyriflow": "0.1",
+            "python": "3.13",
+            "packages": {"numpy": "2.0", "absent": None},
             "files": [{"brain": "young", "what": "labels", "sha256": "12ab"}],
         },
         metrics={"curvature_radius_mm": {"value": 2.4, "unit": "mm", "description": "Radius."}},
@@ -86,7 +88,9 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     ]
     assert order == sorted(order)
     assert "12ab" in text
-    assert "Made 2026-01-01 by gyriflow 0.1, commit abc." in text
+    assert "Made 2026-01-01 12:30 UTC by gyriflow 0.1, commit abc, changed." in text
+    assert "numpy" in text
+    assert "absent" not in text
 
 
 @pytest.mark.fault(61)

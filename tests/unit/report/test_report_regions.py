@@ -8,8 +8,8 @@ import trimesh
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.report.regions import NO_REGION_COLOUR, regions_chart, regions_picture
-from gyriflow.report.style import RUN_COLOURS
+from gyriflow.report.regions import region_colours, regions_chart, regions_picture
+from gyriflow.report.style import NEUTRAL_COLOUR, RUN_COLOURS
 from gyriflow.report.tables import region_table
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
@@ -41,7 +41,7 @@ def test_regions_are_seen_in_their_colours_where_they_are():
     def hue(row: float, column: float) -> str:
         """Returns whose hue a place of the picture is nearest to."""
         pixel = image[int(row * height), int(column * width)] / 255.0
-        palette = {"front": RUN_COLOURS[0], "back": RUN_COLOURS[1], "none": NO_REGION_COLOUR}
+        palette = {"front": RUN_COLOURS[0], "back": RUN_COLOURS[1], "none": NEUTRAL_COLOUR}
         shades = {name: np.array(mpl.colors.to_rgb(colour)) for name, colour in palette.items()}
         return min(shades, key=lambda name: np.linalg.norm(shades[name] / shades[name].sum() - pixel / pixel.sum()))
 
@@ -59,6 +59,13 @@ def test_a_legend_of_many_regions_does_not_lie_over_the_brains():
     figure.canvas.draw()
     top = figure.legends[0].get_window_extent().y1
     assert top <= min(axes.get_window_extent().y0 for axes in figure.axes if axes.images)
+
+
+def test_many_regions_have_colours_of_their_own_and_none_is_darker_than_those_of_runs():
+    colours = region_colours([f"region {number}" for number in range(21)])
+    assert len({tuple(np.round(colour, 3)) for colour in colours.values()}) == 21
+    brightness = [max(colour) for colour in colours.values()]
+    assert min(brightness) >= min(max(mpl.colors.to_rgb(colour)) for colour in RUN_COLOURS)
 
 
 def test_without_a_brain_there_is_no_picture():

@@ -13,7 +13,14 @@ from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.io.figures import write_figure
 from gyriflow.parameters.terms import ZONE_NAMES
 from gyriflow.report.panels import round_length
-from gyriflow.report.renders import displacement_maps, round_up, runs_comparison, scalar_maps, weekly_comparison
+from gyriflow.report.renders import (
+    displacement_maps,
+    round_up,
+    runs_comparison,
+    scalar_maps,
+    signed_scale,
+    weekly_comparison,
+)
 from gyriflow.report.scene import MAP, TISSUE, VIEWS, render, uniform_colours
 from gyriflow.report.sections import Normals, cross_sections, normal_arrows
 from gyriflow.report.zones import ZONES, field_picture, zones_picture
@@ -262,6 +269,32 @@ def test_field_picture_names_the_field():
     figure = field_picture(box((20, 30, 20)), np.linspace(0, 2, 8), label="growth (1)", fissure_x_mm=0.0)
     (bar,) = [axes for axes in figure.axes if axes.get_xlabel() == "growth (1)"]
     assert bar.get_xlim() == (0.0, 2.0)
+
+
+def test_a_field_that_goes_below_zero_has_a_scale_as_wide_on_both_sides():
+    figure = field_picture(box((20, 30, 20)), np.linspace(-1, 2, 8), label="growth (1)", fissure_x_mm=0.0)
+    (bar,) = [axes for axes in figure.axes if axes.get_xlabel() == "growth (1)"]
+    assert bar.get_xlim() == (-2.0, 2.0)
+    scale = signed_scale(np.array([-1.0, 0.0, 2.0]))
+    minus, zero, plus = scale.to_rgba([-1.0, 0.0, 1.0])[:, :3]
+    # blue, pale, red
+    assert minus[2] > minus[0]
+    assert zero.min() > 0.9
+    assert plus[0] > plus[2]
+
+
+def test_a_field_that_is_the_same_everywhere_has_one_colour():
+    values = np.full(5, 300.0) * (1 + 1e-15 * np.arange(5))
+    figure = cross_sections(CORNER, {"modulus (Pa)": values}, planes=("axial",))
+    drawn = figure.axes[0].collections[0]
+    assert drawn.get_clim() == (0.0, pytest.approx(300.0))
+    np.testing.assert_allclose(drawn.to_rgba(drawn.get_array()).std(axis=0), 0, atol=0.01)
+
+
+def test_what_was_not_measured_is_keyed():
+    mesh = box((20, 30, 20))
+    figure = scalar_maps({"real brain": {21.0: (mesh, np.array([np.nan, *range(7)]))}}, quantity="thickness_mm")
+    assert [text.get_text() for text in figure.legends[0].texts] == ["not measured"]
 
 
 CORNER = TetrahedralMesh(

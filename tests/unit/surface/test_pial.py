@@ -28,8 +28,9 @@ from gyriflow.mesh.maps import move_to_mesh
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
+from gyriflow.surface.file_poses import surface_pose, volume_pose
 from gyriflow.surface.from_labels import from_labels
-from gyriflow.surface.from_surfaces import from_hemispheres, from_pial
+from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres, from_pial
 from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
 from gyriflow.surface.repair import pieces
 from gyriflow.surface.size import require_plausible_size
@@ -179,19 +180,25 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
     assert any("moved apart" in warning for warning in surface.report["warnings"])
 
 
-def test_maps_on_surfaces_in_lps_lie_on_the_brain(halves):
-    whole = transformed(merged(*halves), LPS)
+def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain(halves):
+    world = merged(*halves)
+    sides, whole = [transformed(half, LPS) for half in halves], transformed(world, LPS)
     surfaces = {
         "pial": from_pial(whole, week=24.0, coordinates="lps", **QUICK),
-        "hemispheres": from_hemispheres(
-            *(transformed(half, LPS) for half in halves), week=24.0, coordinates="lps", **QUICK
-        ),
+        "pial, found": from_pial(whole, week=24.0, coordinates="auto", **QUICK),
+        "hemisphere, found": from_hemisphere(sides[1], "right", week=24.0, coordinates="auto", **QUICK),
+        "hemispheres": from_hemispheres(*sides, week=24.0, coordinates="lps", **QUICK),
+        "hemispheres, found": from_hemispheres(*sides, week=24.0, coordinates="auto", **QUICK),
     }
     for source, surface in surfaces.items():
-        points = surface.whole.vertices
-        moved = move_to_mesh(points, whole, surface.report)
-        assert np.abs(moved.vertices.mean(axis=0) - points.mean(axis=0)).max() < 0.5, source
-        assert np.abs(np.ptp(moved.vertices, axis=0) - np.ptp(points, axis=0)).max() < 1.5, source
+        points, one = surface.whole.vertices, source.startswith("hemisphere,")
+        given, there = (sides[1], halves[1]) if one else (whole, world)
+        moved = move_to_mesh(points, given, surface_pose(surface.report))
+        # a volume knows the brain in the world, which is RAS+
+        voxels = transformed(there, volume_pose(surface.report, "a.nii"))
+        for found in (moved, voxels):
+            for end in (np.min, np.max):
+                assert np.abs(end(found.vertices, axis=0) - end(points, axis=0)).max() < 1.5, source
 
 
 @pytest.mark.fault(9)

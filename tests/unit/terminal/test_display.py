@@ -119,7 +119,8 @@ def test_a_terminal_has_a_last_line_that_is_written_over(clock, monkeypatch):
 def test_rules_have_the_stage_of_their_file_and_figures_their_own():
     found = stages(SHIPPED / "workflow" / "rules")
     assert found["pial_from_labels"] == "surface"
-    assert found["simulate"] == "folding"
+    # a checkpoint is a rule, too
+    assert found["simulate"] == found["simulate_member"] == "folding"
     assert found["overlay_figure"] == found["weekly_figure"] == "figures"
     assert found["measure"] == "metrics"
     assert found["refused_quality_figure"] == "figures"

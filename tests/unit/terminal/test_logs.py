@@ -2,7 +2,7 @@
 
 import pytest
 
-from gyriflow.terminal.logs import FoldingStep, GrowingLog, cause, last_step, warnings_in
+from gyriflow.terminal.logs import FoldingStep, GrowingLog, cause, ended_by_slurm, last_step, warnings_in
 
 STEPS = """53301 elements, 37038 unknowns, 2 ranks, about 713 MiB
 warning: fewer than two elements through the cortex (0.98): folds may be mesh noise
@@ -44,12 +44,35 @@ def test_warnings_are_those_of_gyriflow():
             '  File "a.py", line 1, in <module>\n    1 / 0\nZeroDivisionError: division by zero\n',
             "unexpected ZeroDivisionError: division by zero",
         ),
+        (
+            "ValueError: no such week\nsnakemake_interface_common.exceptions.WorkflowError: At least one job did not "
+            "complete successfully.\nWorkflowError:\nAt least one job did not complete successfully.\n",
+            "unexpected ValueError: no such week",
+        ),
         ("mpiexec: one\n\ntwo\n", "mpiexec: one\ntwo"),
         ("", ""),
     ],
 )  # fmt: skip
 def test_the_cause_is_gyriflows_own_message_or_else_the_exception_or_the_end(log, expected):
     assert cause(log) == expected
+
+
+@pytest.mark.parametrize(
+    ("state", "expected"),
+    [
+        ("CANCELLED", "Slurm job 12: it was cancelled"),
+        ("OUT_OF_MEMORY", "Slurm job 12: its memory ran out: more is given by --set-resources measure:mem_mb=MIB"),
+        # the log says why
+        ("FAILED", ""),
+    ],
+)
+def test_what_slurm_has_done_to_a_job_is_told(state, expected):
+    # as snakemake-executor-plugin-slurm 2.8 puts it
+    message = f"SLURM-job '12' failed, SLURM status is: '{state}'. Reason: Unknown."
+    assert ended_by_slurm(message, "measure") == expected
+    lost = "SLURM-job '12' failed due to a node failure, SLURM status is: 'NODE_FAIL'. Failed nodes will be excluded"
+    assert ended_by_slurm(lost, "measure") == "Slurm job 12: its node was lost"
+    assert ended_by_slurm("", "measure") == ""
 
 
 def test_a_growing_log_gives_each_whole_line_once(tmp_path):

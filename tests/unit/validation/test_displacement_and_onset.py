@@ -5,7 +5,7 @@ import trimesh
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.validation.displacement import displacement_table, vector_agreement
-from gyriflow.validation.onset import onset, regions_on, relief, sulcal_regions
+from gyriflow.validation.onset import named, onset, regions_on, relief, sulcal_regions
 
 BALL = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
 POINTS, FACES = np.asarray(BALL.vertices), np.asarray(BALL.faces)
@@ -52,6 +52,20 @@ def test_uniform_scaling_stands_beside_it():
     alike = displacement_table([21, 22], uniform, uniform, FACES)
     assert alike["displacement_r_scaling"].iloc[0] == pytest.approx(1.0)
     assert alike["displacement_slope_scaling"].iloc[0] == pytest.approx(1.0)
+
+
+def test_bodies_that_nothing_joins_may_move_apart():
+    faces = np.concatenate([FACES, FACES + len(POINTS)])
+    measured = np.stack(
+        [np.concatenate([stretched(week) - [22, 0, 0], stretched(week) + [22, 0, 0]]) for week in (21, 22)]
+    )
+    apart = np.stack([measured[0], measured[1] + np.repeat([[-3.0, 0, 1], [2, 0, 0]], len(POINTS), axis=0)])
+    table = displacement_table([21, 22], apart, measured, faces)
+    assert table["displacement_r"].iloc[0] == pytest.approx(1.0)
+    assert table["rms_mm"].iloc[0] == pytest.approx(table["measured_rms_mm"].iloc[0])
+    one = displacement_table([21, 22], measured[:, : len(POINTS)], measured[:, : len(POINTS)], FACES)
+    for name in ("displacement_r_scaling", "displacement_slope_scaling", "measured_rms_mm"):
+        assert table[name].iloc[0] == pytest.approx(one[name].iloc[0])
 
 
 def test_other_vertices_are_refused():
@@ -110,3 +124,43 @@ def test_sulci_are_valleys_found_by_their_depth_and_carried_to_an_earlier_surfac
     found = regions_on(smooth, np.asarray(smooth.vertices), mesh, regions)
     assert np.mean((found == 1) == inside) > 0.98
     assert not sulcal_regions(*groove(1.0), bend).any()
+
+
+def test_sulci_are_named_by_the_regions_that_they_lie_in():
+    longitude = np.degrees(np.arctan2(POINTS[:, 1], POINTS[:, 0]))
+    band = np.abs(POINTS[:, 2]) < 3
+    # a long valley over two regions and a bit of a third, a short one in the second, and one in none
+    sulci = np.select(
+        [band & (np.abs(longitude + 10) < 50), band & (np.abs(longitude - 90) < 12), POINTS[:, 2] < -18.5], [1, 2, 3], 0
+    )
+    regions = np.select([POINTS[:, 2] < -10, longitude < -57, longitude < 0], [0, 9, 4], 7)
+    mesh = TriangleMesh(POINTS, FACES)
+    found, names = named(mesh, sulci, regions, {4: "central", 7: "calcarine", 9: "cingulate"}, "left")
+    assert sorted(names.values()) == ["left 3", "left calcarine", "left calcarine 2", "left central"]
+    of = {name: found == number for number, name in names.items()}
+    assert np.array_equal(of["left calcarine"], (sulci == 1) & (regions == 7))
+    # the bit of the third goes to the largest part, and nothing is lost
+    assert np.array_equal(of["left central"] | of["left calcarine"], sulci == 1)
+    assert np.array_equal(of["left calcarine 2"], sulci == 2)
+    assert np.array_equal(of["left 3"], sulci == 3)
+    assert np.array_equal(found > 0, sulci > 0)
+    # a rim in no region is the sulcus's too
+    rim = np.where(np.abs(POINTS[:, 2]) > 2, 0, regions)
+    within, same_names = named(mesh, sulci, rim, {4: "central", 7: "calcarine", 9: "cingulate"}, "left")
+    assert sorted(same_names.values()) == sorted(names.values())
+    assert np.array_equal(within > 0, sulci > 0)
+    # without names all is as it was
+    same, numbers = named(mesh, sulci, regions, {}, "left")
+    assert sorted(numbers.values()) == ["left 1", "left 2", "left 3"]
+    assert {numbers[int(number)] for number in np.unique(same[sulci == 2])} == {"left 2"}
+
+
+def test_the_same_sulcus_has_its_name_at_its_week():
+    """A groove in a named region, which deepens: its row has the region's name and the week."""
+    mesh, depths = groove(4.0)
+    sulci = sulcal_regions(mesh, depths, np.where(depths > 1.0, -0.2, 0.05))
+    regions, names = named(mesh, sulci, np.where(POINTS[:, 0] > 0, 3, 5), {3: "central", 5: "calcarine"}, "right")
+    reliefs = {20.0 + depth: relief(*groove(depth), regions, names) for depth in (0.0, 1.0, 2.0, 3.0, 4.0)}
+    table = onset(reliefs).set_index("region")
+    assert list(table.index) == ["right central"]
+    assert 22 <= table.loc["right central", "onset_week"] < 24

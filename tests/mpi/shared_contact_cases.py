@@ -1,0 +1,124 @@
+"""Contact shared out between ranks: together they find what one finds alone, and each of them does its part."""
+
+import numpy as np
+import pytest
+from boxes import COMM
+from contact_bodies import GAP_MM, MU, two_blocks
+from mpi4py import MPI
+
+from gyriflow.folding.contact import ContactSettings, SelfContact
+from gyriflow.folding.domain import Domain
+from gyriflow.geometry.tetrahedra import boundary_faces, quadratic
+from gyriflow.units import M_PER_MM
+
+
+def contact_in(comm, mesh, distance=0.15):
+    """Returns a domain, an array for the displacement of its nodes, and the contact of the mesh with itself."""
+    domain = Domain(comm, mesh)
+    displacement = np.zeros((len(domain.vertex_of_node), 3))
+    contact = SelfContact(domain, displacement, boundary_faces(mesh)[0], ContactSettings(2 * MU, distance))
+    return domain, displacement, contact
+
+
+def blocks(order):
+    """Returns two blocks whose meshes do not match, and what brings them near each other, shaken, in mm."""
+    mesh = two_blocks(other=(4, 3, 3))
+    if order == 2:
+        mesh = quadratic(two_blocks(cells=(3, 3, 1), other=(2, 2, 1)))
+    shaken = np.random.default_rng(7).uniform(-0.03, 0.03, mesh.vertices.shape)
+    # no face may cross one that adjoins it
+    shaken[:, 2] *= 0.3
+    shaken[:, 2] -= np.sign(mesh.vertices[:, 2]) * GAP_MM / 4
+    return mesh, shaken
+
+
+def what_is_found(comm, mesh, moved_mm, further_mm):
+    """Returns what contact says of a displaced body: numbers, fields on all vertices, and a product's."""
+    domain, displacement, contact = contact_in(comm, mesh)
+    displacement[:] = domain.local(moved_mm) * M_PER_MM
+    x = np.random.default_rng(8).standard_normal(mesh.vertices.shape)
+    stiffness = contact.stiffness()
+    product, other = stiffness.createVecs()
+    product.array[:] = domain.local(x)[: domain.owned].ravel()
+    stiffness.mult(product, other)
+    forces = np.zeros((domain.owned, 3))
+    vector = other.duplicate()
+    vector.set(0.0)
+    contact.add_residual(vector)
+    forces[:] = vector.array_r.reshape(-1, 3)
+    return {
+        "pairs": contact.pair_count(),
+        "energy": contact.energy(),
+        "smallest": contact.smallest_distance_mm(),
+        "step": contact.largest_step(domain.local(further_mm) * M_PER_MM),
+        "forces": contact.forces(),
+        "residual": domain.gathered(forces),
+        "product": domain.gathered(other.array_r.reshape(-1, 3)),
+        "pressure": contact.pressure(),
+    }, contact
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_all_ranks_together_find_what_one_finds_alone(order):
+    mesh, moved = blocks(order)
+    closer = np.zeros_like(moved)
+    closer[:, 2] = -np.sign(mesh.vertices[:, 2]) * GAP_MM
+    found, contact = what_is_found(COMM, mesh, moved, closer)
+    alone, whole = what_is_found(MPI.COMM_SELF, mesh, moved, closer)
+    pairs = alone["pairs"]
+    assert pairs > 100
+    # none does all of it
+    assert len(contact._state().pairs) <= (1 if COMM.size == 1 else 0.8) * pairs
+    kinds = whole._state().pairs
+    assert min(len(kinds.ev_collisions), len(kinds.ee_collisions), len(kinds.fv_collisions)) > 5
+    assert found["pairs"] == pairs
+    assert 0 < alone["step"] < 1
+    for name in ("energy", "smallest", "step"):
+        assert found[name] == pytest.approx(alone[name], rel=1e-10), name
+    for name in ("forces", "residual", "product", "pressure"):
+        size = np.abs(alone[name]).max()
+        assert size > 0
+        assert np.abs(found[name] - alone[name]).max() <= 1e-10 * size, name
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_parts_of_the_ranks_follow_a_surface_that_moves_far(order):
+    mesh, moved = blocks(order)
+    domain, displacement, contact = contact_in(COMM, mesh)
+    found = []
+    for shift in (0.0, 30.0, -4.0):
+        displacement[:] = domain.local(moved + [shift, -shift / 2, 0.0]) * M_PER_MM
+        # a way longer than the part has room for
+        aside = np.tile([0.0, 0.0, 7.0], (len(displacement), 1)) * M_PER_MM
+        assert contact.largest_step(aside) == 1.0
+        found.append([contact.pair_count(), contact.energy(), np.abs(contact.forces()).sum()])
+    assert found[0][0] > 100
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+    assert found[2] == pytest.approx(found[0], rel=1e-9)
+
+
+def test_parts_that_touch_are_joined_wherever_a_rank_sees_it():
+    # only one corner of the blocks comes near, in one rank's part
+    mesh = two_blocks(gap=0.5)
+    x, y, z = mesh.vertices.T
+    lifted = mesh.vertices.copy()
+    lifted[:, 2] += np.where(z > 0, -0.4 * np.exp(-((x - 3) ** 2) - (y - 3) ** 2), 0.0)
+    for vertices, parts in ((mesh.vertices, 2), (lifted, 1)):
+        domain, _, contact = contact_in(COMM, type(mesh)(vertices, mesh.tets), distance=0.15)
+        assert domain.part.max() == 1
+        assert len(np.unique(contact.joined(domain.part))) == parts
+
+
+@pytest.mark.parametrize("part", [0.44, 0.47, 0.8])
+def test_a_step_leaves_a_part_of_the_gap_whether_it_is_swept_or_not(part):
+    # below 0.45 of the gap on either side nothing is swept
+    mesh = two_blocks()
+    domain, displacement, contact = contact_in(COMM, mesh, distance=0.3)
+    way = np.zeros_like(mesh.vertices)
+    way[:, 2] = -np.sign(mesh.vertices[:, 2]) * part * GAP_MM * M_PER_MM
+    length = contact.largest_step(domain.local(way))
+    assert (length == 1.0) == (part < 0.5)
+    displacement[:] = length * domain.local(way)
+    left = contact.smallest_distance_mm() / GAP_MM
+    assert left == pytest.approx(1 - 2 * part * length, rel=1e-6)
+    assert left > 0.05

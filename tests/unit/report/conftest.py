@@ -1,0 +1,81 @@
+"""What holds for every figure that a test of the report draws."""
+
+import sys
+from collections import Counter
+from itertools import combinations
+from pathlib import Path
+from string import ascii_lowercase
+
+import matplotlib as mpl
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+SMALLEST_PT = 6.0
+"""Least size of print in a figure."""
+TOUCH = 3.0
+"""By how many dots texts may reach into each other or over the edge: boxes are a little larger than letters."""
+LAID_OUT = 3
+"""How many figures of each kind are laid out, which takes time."""
+laid_out: Counter[str] = Counter()
+
+
+@pytest.fixture(autouse=True)
+def figures_can_be_printed(monkeypatch):
+    """Figures of several panels have letters, each once, and no text is small, cut off, or over another one."""
+    drawn, begin = [], Figure.__init__
+
+    def noted(figure, *arguments, **settings):
+        begin(figure, *arguments, **settings)
+        drawn.append((figure, kind_of_figure()))
+
+    monkeypatch.setattr(Figure, "__init__", noted)
+    yield
+    for figure, kind in drawn:
+        drawn_on = [axes for axes in figure.axes if axes.axison or axes.has_data()]
+        panels = [axes for axes in drawn_on if axes.get_label() != "scale bar" and not hasattr(axes, "_colorbar")]
+        bold = [text for text in figure.findobj(Text) if text.get_fontweight() == "bold"]
+        letters = sorted(text.get_text() for text in bold if len(text.get_text()) == 1)
+        assert letters == list(ascii_lowercase[: len(letters)])
+        assert (len(letters) > 1) == (len(panels) > 1), [axes.get_title() for axes in panels]
+        laid_out[kind] += 1
+        if laid_out[kind] <= LAID_OUT:
+            require_legible(figure)
+
+
+def kind_of_figure() -> str:
+    """Returns which function of the report is drawing."""
+    frame, names = sys._getframe(), []
+    while frame := frame.f_back:
+        if Path(frame.f_code.co_filename).parent.name == "report" and "gyriflow" in frame.f_code.co_filename:
+            names.append(frame.f_code.co_qualname)
+    return " ".join(names)
+
+
+def require_legible(figure: Figure) -> None:
+    figure.draw_without_rendering()
+    boxes = {text: text.get_window_extent() for text in shown_texts(figure)}
+    small = {text.get_text() for text in boxes if text.get_fontsize() < SMALLEST_PT}
+    assert not small
+    page = figure.bbox.padded(TOUCH)
+    assert not [text.get_text() for text, box in boxes.items() if not page.containsx(box.x0)
+                or not page.containsx(box.x1) or not page.containsy(box.y0) or not page.containsy(box.y1)]  # fmt: skip
+    for (text, box), (other, near) in combinations(boxes.items(), 2):
+        common = mpl.transforms.Bbox.intersection(box, near)
+        over = common is not None and min(common.width, common.height) > TOUCH
+        assert not over, (text.get_text(), other.get_text())
+
+
+def shown_texts(figure: Figure) -> set[Text]:
+    """Returns the texts that are seen: not those of ticks beyond an axis, nor of an axis that is off."""
+    hidden = set()
+    for axes in figure.findobj(Axes):
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                if not axes.axison or not low <= tick.get_loc() <= high:
+                    hidden |= {tick.label1, tick.label2}
+            if not axes.axison:
+                hidden |= {axis.label, axis.offsetText}
+    return {text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()} - hidden

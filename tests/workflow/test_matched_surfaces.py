@@ -1,0 +1,156 @@
+"""Local growth from surfaces with the same vertices in all weeks, with the real commands, where it is known."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.motion import without_rigid_motion
+from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.io.files import read_json
+from gyriflow.io.registrations import read_carried_mesh
+from gyriflow.io.surfaces import write_surface
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.parameters.terms import SIDES
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import phantom_labels
+from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
+from gyriflow.surface.repair import pieces
+
+WEEKS = (21, 22, 23)
+SMOOTHING_MM = 3.0
+FASTER_PER_MM = 0.002
+"""How the growth of length from back to front differs from place to place, per week."""
+STUDY = {
+    "start": "b21",
+    "surface": {"edge_length_mm": 2.5},
+    "mesh": {
+        "order": 1,
+        "mesher": "tetgen",
+        "surface_edge_mm": 2.5,
+        "core_edge_mm": 5.0,
+        "max_surface_distance_mm": 1.0,
+    },
+    "folding": {
+        "end_week": 23,
+        "thickness_mm": 4.0,
+        "step_s": 302400,
+        "preset": "measured",
+        "follow": {"regional": 1.0, "directional": 1.0, "smoothing_mm": SMOOTHING_MM},
+    },
+    "metrics": {"curvature_radius_mm": 6, "spangy_modes": 60},
+}
+# files of one study are in unlike poses, as those of some programs are
+POSES = {21: np.eye(4), 22: np.diag([-1.0, -1.0, 1.0, 1.0]), 23: np.eye(4)}
+POSES[23][:3, :3] = Rotation.from_euler("xyz", [4, -3, 5], degrees=True).as_matrix()
+POSES[23][:3, 3] = 30.0, -20.0, 10.0
+
+
+def grown(points: np.ndarray, week: int) -> np.ndarray:
+    """Returns where places of week 21 are in another week: a harmonic displacement, so that the inside is known too."""
+    weeks = week - 21
+    x, y, z = points.T
+    faster = FASTER_PER_MM * weeks * (y**2 - x**2) / 2
+    return np.stack([1.04**weeks * x, 1.04**weeks * y + faster, 1.02**weeks * z], axis=1)
+
+
+def growth_of_volume(points: np.ndarray, first: int) -> np.ndarray:
+    """Returns the local log growth per week from a week to the next, at places of week 21."""
+    sizes = [1.04**t * (1.04**t + FASTER_PER_MM * t * points[:, 1]) * 1.02**t for t in (first - 21, first - 20)]
+    return np.log(sizes[1] / sizes[0])
+
+
+@pytest.fixture(scope="module")
+def hemispheres() -> dict[str, TriangleMesh]:
+    """Closed hemispheres of a phantom of week 21, about its centre."""
+    labels, affine = phantom_labels(21, voxel_mm=2.0)
+    mask = np.pad(np.isin(pathologies.apart(labels, affine), pathologies.CEREBRUM), 4)
+    brain = isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+    centre = brain.vertices.mean(axis=0)
+    sides = sorted(pieces(brain), key=lambda piece: piece.vertices[:, 0].mean())
+    return {side: TriangleMesh(mesh.vertices - centre, mesh.faces) for side, mesh in zip(SIDES, sides, strict=True)}
+
+
+def write_study(workflow, hemispheres, kind="hemispheres", shuffled=None, thinned=None, **changes) -> str:
+    """Writes the surfaces of all weeks, in one of which vertices may be exchanged or missing, and their study."""
+    brains = []
+    for week in WEEKS:
+        files = {}
+        for side, mesh in hemispheres.items():
+            vertices, faces = transform_points(grown(mesh.vertices, week), POSES[week]), mesh.faces
+            if week == shuffled:
+                vertices = np.random.default_rng(1).permutation(vertices)
+            if week == thinned:
+                faces = faces[1:]
+            # the order of corners is the other one in one of the weeks
+            faces = faces[::-1, ::-1] if week == 22 else faces
+            files[side] = f"week{week}.{side}.surf.gii"
+            write_surface(workflow.directory / files[side], TriangleMesh(vertices, faces))
+        one = {"file": files["left"], "side": "left"}
+        source = {"hemispheres": files} if kind == "hemispheres" else {"hemisphere": one}
+        brains.append({"id": f"b{week}", "week": week, **source, "coordinates": "lps" if week == 22 else "ras"})
+    return workflow.write("study.yaml", STUDY | {"brains": brains} | changes)
+
+
+def in_week_21(results, points: np.ndarray) -> np.ndarray:
+    """Returns the places of mesh points in the files of week 21, by the motion of their hemisphere."""
+    report = read_json(results / "brains/b21/surface/surface.json")
+    motions = report.get("motions", dict.fromkeys(SIDES, report["pose"]))
+    left, right = (transform_points(points, np.linalg.inv(motions[side])) for side in SIDES)
+    return np.where(points[:, :1] < report["fissure_x_mm"], left, right)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hemispheres", "hemisphere"])
+def test_known_growth_comes_back(workflow, hemispheres, kind):
+    name = write_study(workflow, hemispheres, kind)
+    outcome = workflow.run("results/brains/b21/mesh/carried.h5", "--cores", "2", "--configfile", name)
+    assert outcome.returncode == 0, outcome.stderr[-3000:]
+    results = workflow.directory / "results"
+    mesh = read_tetrahedral_mesh(results / "brains/b21/mesh/brain.xdmf")
+    carried = read_carried_mesh(results / "brains/b21/mesh/carried.h5")
+    assert carried.weeks.tolist() == list(WEEKS)
+    places = in_week_21(results, mesh.vertices)
+    for number, first in enumerate(WEEKS[:-1]):
+        known = growth_of_volume(places, first)
+        found = carried.growth[SMOOTHING_MM]["volume"][number]
+        assert known.std() > 0.02
+        assert np.corrcoef(known, found)[0, 1] > 0.99
+        assert np.abs(found - known).mean() < 0.002
+        assert np.abs(found - known).max() < 0.015
+    # along x, y and z in the middle, where growth along y is as along x
+    middle, lengths = np.abs(places[:, 1]) < 5, np.log([1.04, 1.04, 1.02])
+    strain = carried.growth[SMOOTHING_MM]["strain"][0][middle, :3].mean(axis=0)
+    assert strain == pytest.approx(lengths - lengths.mean(), abs=0.001)
+    # where the surface goes, whatever the pose of the files
+    pial = boundary_surface(mesh)[1]
+    moved, wanted = carried.positions[2][pial], grown(places[pial], 23)
+    away = without_rigid_motion(wanted, moved, np.ones(len(pial)))
+    assert np.linalg.norm(wanted - places[pial], axis=1).mean() > 1
+    assert np.linalg.norm(away, axis=1).mean() < 0.03
+
+
+def test_matched_vertices_take_the_place_of_registration(workflow, hemispheres):
+    jobs = workflow.jobs("all", "validate", "--configfile", write_study(workflow, hemispheres))
+    assert [jobs[rule] for rule in ("matched_surface", "match_surfaces", "carried_mesh", "onset")] == [3, 2, 1, 1]
+    assert "register" not in jobs
+
+
+def test_other_vertices_tell_of_no_growth_and_say_why(workflow, hemispheres):
+    uniform = {"folding": STUDY["folding"] | {"follow": {"regional": 0.0, "directional": 0.0}}}
+    name = write_study(workflow, hemispheres, thinned=23, **uniform)
+    planned = workflow.run("-n", "all", "validate", "--configfile", name)
+    assert planned.returncode == 0, planned.stderr[-2000:]
+    assert "no local growth from the surfaces of surface: b23 has " in planned.stderr
+    assert not re.search("match_surfaces|carried_mesh|displacement_agreement|onset", planned.stdout + planned.stderr)
+
+
+@pytest.mark.slow
+def test_regional_growth_from_other_vertices_is_refused(workflow, hemispheres):
+    name = write_study(workflow, hemispheres, "hemisphere", thinned=23)
+    outcome = workflow.run("results/runs/reference/b21/params.yaml", "--cores", "2", "--configfile", name)
+    assert outcome.returncode == 2, outcome.stderr[-2000:]
+    assert "the brains' surfaces do not tell of regional growth; found b23 has " in outcome.stderr
