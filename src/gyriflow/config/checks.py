@@ -5,8 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from ..parameters.folding import GROWTH_RATES, VARYING, value_problems
 from ..parameters.messages import nearest
-from ..parameters.schemes import SCHEMES
+from ..parameters.schemes import SCHEMES, SchemeSettings
 from ..parameters.settings import Problem
+from ..parameters.synthetic import PhantomSettings
 from ..parameters.terms import LONGEST_NAME
 from ..parameters.varying import Varying
 from .brains import Brain
@@ -105,17 +106,37 @@ def run_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[str
         for week, called in starts or ([(run.end_week - 1e-9, "the start")] if run.has("end_week") else []):
             for problem in value_problems(run, week, {}, called):
                 yield Problem(problem.text, _place(name, problem.key, runs))
-        follow = run.follow if run.has("follow") else None
-        if follow is not None and follow.has("ventricles_ml") and follow.ventricles_ml is not None:
-            bare = [brain.id for brain in brains if brain.has("id", "source") and not brain.has_labels]
-            if found := [brain for brain in bare if brain in ids]:
-                text = f"needs labels that say where the ventricles are, which {', '.join(found)} has not"
-                yield Problem(text, _place(name, ("follow", "ventricles_ml"), runs))
         for key in VARYING if len(ids) > 1 else ():
             value = getattr(run, key, None)
             if isinstance(value, Varying) and value.surface is not None:
                 text = f"has a map on a surface, which belongs to one brain; the run starts from {', '.join(ids)}"
                 yield Problem(text, _place(name, (key,), runs))
+
+
+def ventricle_problems(
+    start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run], schemes: Mapping[str, SchemeSettings]
+) -> Iterator[Problem]:
+    """Yields the runs whose ventricles are to grow by a curve of their own, from brains whose labels know none."""
+    for name, run in runs.items():
+        follow = run.follow if run.has("follow") else None
+        if follow is None or not follow.has("ventricles_ml") or follow.ventricles_ml is None:
+            continue
+        ids = start_ids(run.start if run.has("start") and run.start is not None else start, ids_of(brains))
+        for brain in brains:
+            if brain.has("id", "source") and brain.id in ids and (cause := _no_ventricles(brain, schemes)):
+                text = f"needs a start brain whose labels know ventricles; {cause}"
+                yield Problem(text, _place(name, ("follow", "ventricles_ml"), runs))
+
+
+def _no_ventricles(brain: Brain, schemes: Mapping[str, SchemeSettings]) -> str:
+    """Returns why the labels of a brain know no ventricles; empty where they do, or their scheme is unknown."""
+    if not brain.has_labels:
+        return f"{brain.id} has no labels"
+    if not brain.has("scheme", "phantom"):
+        return ""
+    scheme = brain.scheme or (brain.phantom or PhantomSettings()).scheme
+    found = schemes.get(scheme, SCHEMES.get(scheme))
+    return "" if found is None or found.ventricles else f"{scheme}, the scheme of {brain.id}, names none"
 
 
 def _place(run: str, key: tuple[str | int, ...], runs: Mapping[str, Run]) -> tuple[str | int, ...]:

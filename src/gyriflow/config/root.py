@@ -109,7 +109,9 @@ class Config(Settings):
 
     @check
     def _runs(self) -> Iterator[Problem]:
-        yield from checks.run_problems(self.start if self.has("start") else None, self.brains, self.runs)
+        start = self.start if self.has("start") else None
+        yield from checks.run_problems(start, self.brains, self.runs)
+        yield from checks.ventricle_problems(start, self.brains, self.runs, self.schemes)
 
     @check
     def _growth(self) -> Iterator[Problem]:

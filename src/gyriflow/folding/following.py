@@ -197,15 +197,37 @@ class SteeredStep(Step):
         return response.agreeing(self.rates, found)
 
 
-def missed_curves(row: Mapping[str, Any]) -> str:
-    """Returns what to say of a step that is more than `FOLLOWED` off a curve; empty where it is not."""
-    parts = []
-    for name, unit in (("area", "cm2"), ("volume", "ml"), ("ventricles", "ml")):
-        if (aim := row.get(f"{name}_aim_{unit}")) is not None:
-            error = row[f"{name}_{unit}"] / aim - 1
-            if abs(error) > FOLLOWED:
-                parts.append(f"{name} {100 * error:+.1f} % off its curve")
-    return f"at GW {row['week']:g} the brain is {' and '.join(parts)}" if parts else ""
+def missed_curves(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Returns what to say of curves that are missed by more than `FOLLOWED`; empty where none is.
+
+    Area and volume count where the last step ends; the ventricles, whose rate is not corrected within a step, where
+    they were farthest off.
+
+    Parameters
+    ----------
+    rows
+        Of the step table, from an output week to the next.
+    """
+    row, notes = rows[-1], []
+    if row.get("area_aim_cm2") is not None:
+        errors = {name: _error(row, name, unit) for name, unit in (("area", "cm2"), ("volume", "ml"))}
+        parts = [
+            f"{name} {100 * error:+.1f} % off its curve" for name, error in errors.items() if abs(error) > FOLLOWED
+        ]
+        if parts:
+            notes.append(f"at GW {row['week']:g} the brain is {' and '.join(parts)}")
+    if row.get("ventricles_aim_ml") is not None:
+        farthest = max(rows, key=lambda each: abs(_error(each, "ventricles", "ml")))
+        error = _error(farthest, "ventricles", "ml")
+        if abs(error) > FOLLOWED:
+            at_bound = error > 0 and farthest["ventricle_growth_rate_per_s"] == 0
+            why = ": at a rate of 0 what grows around them takes them along" if at_bound else ""
+            notes.append(f"at GW {farthest['week']:.4g} the ventricles are {100 * error:+.1f} % off their curve{why}")
+    return notes
+
+
+def _error(row: Mapping[str, Any], name: str, unit: str) -> float:
+    return float(row[f"{name}_{unit}"] / row[f"{name}_aim_{unit}"] - 1)
 
 
 def size_of(positions_mm: Floats, tissue: Tissue) -> Size:

@@ -54,7 +54,7 @@ def run(
         if comm.rank == 0:
             save_frame(folder, weeks[0], start, start, zones, folding.present, maps, contact, elements)
     first, resumed, diverged = len(state.rows), time.monotonic(), None
-    for week in weeks[1:]:
+    for before, week in pairwise(weeks):
         until = seconds_to(week, parameters)
         while state.time_s < until * (1 - 1e-12) and diverged is None:
             try:
@@ -68,9 +68,9 @@ def run(
             asked = parameters.fields if arrived else ()
             contact, elements = folding.contact_fields(asked), folding.element_fields(asked)
             if comm.rank == 0:
-                if arrived and (missed := missed_curves(state.rows[-1])):
-                    say(f"warning: {missed}")
                 if arrived:
+                    for missed in missed_curves([row for row in state.rows if row["week"] > before + 1e-9]):
+                        say(f"warning: {missed}")
                     save_frame(folder, week, state.positions, start, zones, folding.present, maps, contact, elements)
                 write_checkpoint(folder / "state.h5", key, state)
                 rate = (time.monotonic() - resumed) / (len(state.rows) - first)

@@ -126,15 +126,20 @@ def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str, un
     known = table["known_until_gw"].isna() if until is None else table["known_until_gw"] == until
     rows = table[known & (table["series"] == series) & (table["quantity"] == quantity)]
     if not len(rows):
+        remedy = "List brains of other weeks, or give follow a table such as {area_cm2: {21: 99, 30: 252}}"
         weeks_known = "two weeks or more" + ("" if until is None else f" up to {until:g} GW")
-        if quantity in MORE and (known & (table["series"] == series)).any():
+        in_series = (known & (table["series"] == series)).any()
+        if quantity == VENTRICLES and in_series:
+            found = f"the labels of its brains do not know ventricles in {weeks_known}"
+            remedy = "Set follow.ventricles_ml to null, or give it a table such as {21: 3, 30: 6}"
+        elif quantity == THICKNESS and in_series:
             found = f"its brains have no {quantity} in {weeks_known}"
         else:
             found = f"the start brain is in no series of brains of {weeks_known}"
         raise InputError(
             f"no measured curve of {quantity} can be followed",
             found=found,
-            remedy="List brains of other weeks, or give follow a table such as {area_cm2: {21: 99, 30: 252}}",
+            remedy=remedy,
         )
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
     return Curve(weeks, values, np.zeros(len(rows)))

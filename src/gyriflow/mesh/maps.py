@@ -148,13 +148,11 @@ def ventricle_map(
     fluid = np.isin(labels, ventricles).astype(float)
     found = volume_map_on_mesh(mesh_vertices_mm, fluid, affine, path)
     if found.max() < 0.5:
-        named = (
-            f"voxels labelled {', '.join(map(str, ventricles))}" if len(ventricles) else "a scheme without ventricles"
-        )
+        named = ", ".join(map(str, ventricles))
         raise InputError(
             "the labels know no ventricles in the brain, so that these cannot grow by a curve of their own",
             path=path,
-            found=f"no vertex of the mesh in {named}" if len(ventricles) else named,
+            found=f"no vertex of the mesh in voxels labelled {named}" if named else "a scheme that names none",
             expected="ventricles in the cerebrum, named by the labels' scheme",
             remedy="Set follow.ventricles_ml to null, or name the ventricles in the scheme.",
         )

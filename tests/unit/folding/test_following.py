@@ -55,9 +55,26 @@ def test_a_map_holds_from_its_week_to_the_next():
 
 def test_a_curve_that_is_missed_is_named_with_how_far():
     row = {"week": 23.0, "area_cm2": 99.0, "area_aim_cm2": 100.0, "volume_ml": 50.1, "volume_aim_ml": 50.0}
-    assert missed_curves(row) == "at GW 23 the brain is area -1.0 % off its curve"
-    assert missed_curves(row | {"area_cm2": 100.2}) == ""
-    assert missed_curves({"week": 23.0, "area_cm2": 99.0, "volume_ml": 50.0}) == ""
+    assert missed_curves([row]) == ["at GW 23 the brain is area -1.0 % off its curve"]
+    assert missed_curves([row, row | {"area_cm2": 100.2}]) == []
+    assert missed_curves([{"week": 23.0, "area_cm2": 99.0, "volume_ml": 50.0}]) == []
+
+
+def test_ventricles_are_named_where_they_were_farthest_off_and_why():
+    met = {"area_cm2": 1.0, "area_aim_cm2": 1.0, "volume_ml": 1.0, "volume_aim_ml": 1.0, "ventricles_aim_ml": 5.0}
+    growing = {"ventricle_growth_rate_per_s": 1e-8}
+    rows = [
+        met | growing | {"week": 22.2, "ventricles_ml": 5.01},
+        met | {"week": 22.5714, "ventricles_ml": 5.15, "ventricle_growth_rate_per_s": 0.0},
+        met | growing | {"week": 23.0, "ventricles_ml": 5.0},
+    ]
+    assert missed_curves(rows[::2]) == []
+    (note,) = missed_curves(rows)
+    assert note.startswith("at GW 22.57 the ventricles are +3.0 % off their curve: at a rate of 0 what grows")
+    # too narrow at a rate of 0 has another cause, and so has a rate that is free
+    (note,) = missed_curves([rows[1] | {"ventricles_ml": 4.85}])
+    assert note == "at GW 22.57 the ventricles are -3.0 % off their curve"
+    assert missed_curves([rows[1] | growing]) == ["at GW 22.57 the ventricles are +3.0 % off their curve"]
 
 
 def test_a_run_that_follows_begins_with_the_growth_that_leads_to_its_curves():

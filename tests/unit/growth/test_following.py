@@ -99,5 +99,5 @@ def test_ventricles_have_a_curve_where_labels_know_them_and_may_shrink():
     # labels that know none have volumes of zero, or none at all
     (without,) = fits_of_series(AREAS.assign(ventricles_ml=0.0)).values()
     assert set(without) == {"area_cm2", "volume_ml"}
-    with pytest.raises(InputError, match="no ventricles_ml in two weeks or more"):
+    with pytest.raises(InputError, match="labels of its brains do not know ventricles in two weeks or more"):
         followed_sizes(follow, curves(), "volume", [21.0, 23.0], False)
