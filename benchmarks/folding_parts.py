@@ -39,9 +39,7 @@ PARTS = {
     "layers": [(Folding, "_set_tissue")],
     "contact: pairs": [(SelfContact, "_state"), (SelfContact, "mesh_moved")],
     "contact: sweep": [(SelfContact, "largest_step")],
-    "contact: forces, energy and stiffness": [
-        *((SelfContact, name) for name in ("energy", "forces", "stiffness"))
-    ],
+    "contact: forces, energy and stiffness": [*((SelfContact, name) for name in ("energy", "forces", "stiffness"))],
 }
 """Methods by part; what one of them spends in another counts there alone."""
 
