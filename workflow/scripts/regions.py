@@ -3,6 +3,7 @@
 import numpy as np
 
 from gyriflow.folding.following import growing_at_start
+from gyriflow.folding.free_growth import Tissue
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.regions import cell_tags, facet_tags
 from gyriflow.folding.zone_checks import refuse_impossible
@@ -25,7 +26,7 @@ with step(snakemake.log[0]):
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    growing = growing_at_start(parameters, mesh.vertices, zones, maps)
+    growing = growing_at_start(parameters, mesh.vertices, Tissue.of(mesh, zones, maps))
     fields = layer_fields(mesh.vertices, zones, growing, maps, parameters.start_week, REGION_FIELDS)
     boundary = TriangleMesh(mesh.vertices, zones.facets)
     if parameters.side is None:
