@@ -134,7 +134,7 @@ def meshed(workflow):
     return workflow, disturbed
 
 
-@pytest.mark.promise(3)
+@pytest.mark.fault(63)
 def test_cancelled_jobs_and_lost_nodes_change_nothing_in_the_result(meshed, slurm):
     workflow, folder = meshed
     study = Submitted(workflow, slurm, folder)

@@ -16,7 +16,6 @@ from ..cost.prediction import Prediction, predict
 from ..errors import GyriflowError
 from ..folding.predicted_memory import predicted_memory_mib
 from ..io.files import read_json
-from ..io.surfaces import read_surface
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import read_yaml
 from ..parameters.schemes import LabelScheme
@@ -102,6 +101,8 @@ def _check_files(brain: Brain, config: Config) -> None:
     for file in brain.files:
         # files of atlases may be missing yet
         if file != brain.labels and Path(file).is_file():
+            from ..io.surfaces import read_surface  # takes half a second, which label volumes need not wait for
+
             read_surface(file)
 
 

@@ -62,7 +62,7 @@ class LinearLadder:
     def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
         return new_krylov(self.problem.domain.comm, method, preconditioner, self.max_iterations, self.problem.hierarchy)
 
-    def _renew_cg(self) -> None:
+    def renew_cg(self) -> None:
         """Makes conjugate gradients anew: set up again, PETSc 3.25's would keep some of the old smoother."""
         self._cg.destroy()
         self._cg = self._new_krylov("cg", "gamg")
@@ -141,7 +141,7 @@ class LinearLadder:
                 return reason
             count.rung = max(count.rung, REBUILT)
         system.tangent.whole().setNearNullSpace(self.problem.near_null_space())
-        self._renew_cg()
+        self.renew_cg()
         reason, iterations = system.run(self._cg, reuse=False, fast=not shifted)
         count.iterations += iterations
         self._wear.renew()

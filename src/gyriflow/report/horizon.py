@@ -11,8 +11,8 @@ from matplotlib.ticker import MaxNLocator
 from .style import FULL_WIDTH_IN, MUTED_COLOUR, add_letters, chosen_colours, light_grid, new_figure, run_legend, styled
 from .validation import CEILING, MEASURES
 
-KINDS = {"explained": "growth known", "predicted": "growth not known"}
-"""Rows of panels, never drawn together."""
+KINDS = ("explained", "predicted")
+"""Rows of panels, never drawn together: weeks whose growth was known, and those whose growth was not."""
 
 
 @styled
@@ -71,9 +71,12 @@ def horizon_chart(
                     line = rows.sort_values("horizon")
                     axes.plot(line["horizon"], line[f"gain_{measure}"], ":", color=MUTED_COLOUR)
             axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
-            axes.set_title(f"{name}: r less that of the scaled start, {KINDS[kind]}")
+            axes.set_title(f"{name}, {kind}")
+            axes.margins(x=0.1)
             axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
             light_grid(axes)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("r less that of the scaled start")
     for axes in panels[-1]:
         axes.set_xlabel("weeks after the start (its week stands at the line's end)")
     extra = [Line2D([], [], color=MUTED_COLOUR, linestyle=":", label=CEILING)] if ceiling is not None else []
