@@ -1,7 +1,8 @@
 """Correspondences between brains, and meshes carried along them, in HDF5 files of the project's own, RAS+ mm."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,17 +32,27 @@ def write_deformation(path: AnyPath, deformation: Deformation, report: Mapping[s
 
 def read_deformation(path: AnyPath) -> tuple[Deformation, dict[str, Any]]:
     """Returns the deformation and the report of a file of `write_deformation`; InputError where it is none."""
+    with _reading(path, "a deformation", "an HDF5 file with matrix, displacement and affine") as file:
+        return _deformation(file), json.loads(file.attrs["report"])
+
+
+def _deformation(file: h5py.File) -> Deformation:
+    return Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
+
+
+@contextmanager
+def _reading(path: AnyPath, what: str, expected: str) -> Iterator[h5py.File]:
+    """Opens a file that tells how brains correspond; InputError for whatever goes wrong while it is read."""
     try:
         with h5py.File(path) as file:
-            deformation = Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
-            return deformation, json.loads(file.attrs["report"])
+            yield file
     except Exception as error:  # HDF5 raises whatever a torn file leads it into
         raise InputError(
-            "cannot be read as a deformation",
+            f"cannot be read as {what}",
             path=path,
             found=error,
-            expected="an HDF5 file with matrix, displacement and affine",
-            remedy="Run the registration again.",
+            expected=expected,
+            remedy="Register the brains, or match their surfaces, again.",
         ) from error
 
 
@@ -56,19 +67,11 @@ def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapp
 
 def read_correspondence(path: AnyPath) -> Correspondence:
     """Returns what `write_deformation` or `write_matched_surfaces` has written; InputError for other files."""
-    try:
-        with h5py.File(path) as file:
-            if "faces" in file:
-                return MatchedSurfaces(TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:])
-    except Exception as error:  # HDF5 raises whatever a torn file leads it into
-        raise InputError(
-            "cannot be read as a correspondence of brains",
-            path=path,
-            found=error,
-            expected="an HDF5 file of a registration, or with first, second and faces",
-            remedy="Register the brains, or match their surfaces, again.",
-        ) from error
-    return read_deformation(path)[0]
+    expected = "an HDF5 file with matrix, displacement and affine, or with first, second and faces"
+    with _reading(path, "a correspondence of brains", expected) as file:
+        if "faces" in file:
+            return MatchedSurfaces(TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:])
+        return _deformation(file)
 
 
 @dataclass(frozen=True, eq=False)
