@@ -73,3 +73,15 @@ def test_the_smoother_keeps_its_bounds_and_takes_no_more_iterations(monkeypatch)
     assert bounds_estimated(folding.solver.ladder._cg)
     iterations = [sum(row["krylov"] for row in state.rows) for state in (kept, anew)]
     assert iterations[0] <= 1.1 * iterations[1]
+
+
+def test_a_smoother_that_elements_have_outgrown_estimates_its_bounds_anew(monkeypatch):
+    folding, state = closing_sulcus("global", **TIGHT)
+    state = after_steps(folding, state, 1)
+    ladder_of_run = folding.solver.ladder
+    # an eigenvalue far above what was estimated, as of an element drawn out since, makes multigrid indefinite
+    low, high = ctypes.c_double(0.05), ctypes.c_double(0.5)
+    _PETSC.KSPChebyshevSetEigenvalues(_finest_smoother(ladder_of_run._cg), high, low)
+    monkeypatch.setattr(ladder_of_run, "renew_cg", lambda: pytest.fail("the preconditioner itself is good"))
+    after_steps(folding, state, 1)
+    assert not bounds_estimated(ladder_of_run._cg)

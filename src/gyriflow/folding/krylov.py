@@ -54,6 +54,9 @@ class Wear:
         self._excess = np.inf
 
 
+BOUND_STEPS = 30
+"""Steps that a smoother's largest eigenvalue is estimated in. A drawn-out element has one apart from all others: ten
+steps, PETSc's default, miss it by more than Chebyshev's polynomials allow, and multigrid is no longer positive."""
 ALGEBRAIC = {
     "pc_gamg_threshold": 0.01,
     # else a rebuilt preconditioner would keep the coarse spaces of the first shape
@@ -61,12 +64,14 @@ ALGEBRAIC = {
     "pc_gamg_aggressive_coarsening": 1,
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_ksp_max_it": 2,
+    "mg_levels_ksp_chebyshev_esteig_steps": BOUND_STEPS,
     "mg_levels_pc_type": "pbjacobi",
 }
 """Options of algebraic multigrid."""
 BY_ORDER = {
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_ksp_max_it": 1,
+    "mg_levels_ksp_chebyshev_esteig_steps": BOUND_STEPS,
     "mg_levels_pc_type": "pbjacobi",
     "mg_coarse_ksp_type": "preonly",
     "mg_coarse_pc_type": "gamg",
@@ -137,7 +142,7 @@ def estimate_bounds(krylov: PETSc.KSP) -> None:
 def keep_bounds(krylov: PETSc.KSP) -> None:
     """Has the smoother of the finest level keep the bounds that it has estimated in the last solve.
 
-    PETSc would estimate them anew for each matrix, in ten products. They hold as long as the preconditioner does: what
+    PETSc would estimate them anew for each matrix, in many products. They hold as long as the preconditioner does: what
     deformation changes is within the tenth that is added, and terms of contact have no eigenvalue above 1 (see
     `tangent.Tangent.smoothing`).
     """
@@ -151,6 +156,17 @@ def keep_bounds(krylov: PETSc.KSP) -> None:
     if code == 0 and np.isfinite(largest.value) and largest.value > 0:
         low, high = (part * largest.value for part in BAND)
         _PETSC.KSPChebyshevSetEigenvalues(smoother, ctypes.c_double(high), ctypes.c_double(low))
+
+
+def renew_bounds(krylov: PETSc.KSP, residual: PETSc.Vec) -> None:
+    """Has the smoother of the finest level keep bounds that are estimated now, with a residual for the first cycle."""
+    estimate_bounds(krylov)
+    smoother = krylov.getPC().getMGSmoother(krylov.getPC().getMGLevels() - 1)
+    smoother.setOperators(*smoother.getOperators())  # so that it is set up again
+    corrected = residual.duplicate()
+    krylov.getPC().apply(residual, corrected)  # PETSc estimates on the way, but goes by what it was told to keep
+    corrected.destroy()
+    keep_bounds(krylov)
 
 
 def _finest_smoother(krylov: PETSc.KSP) -> ctypes.c_void_p:

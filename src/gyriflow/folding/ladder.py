@@ -10,7 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import SolverError
-from .krylov import Wear, estimate_bounds, keep_bounds, new_krylov, smooth_with
+from .krylov import Wear, estimate_bounds, keep_bounds, new_krylov, renew_bounds, smooth_with
 from .problem import Problem
 from .tangent import Tangent
 
@@ -216,6 +216,12 @@ class _System:
                 if not (fast and reuse):
                     estimate_bounds(krylov)
             krylov.solve(self.residual, self.direction)
+            iterations = krylov.getIterationNumber()
+            if fast and reuse and krylov.getConvergedReason() == INDEFINITE[1]:
+                # elements drawn out since have taken the smoother beyond the bounds that it kept
+                renew_bounds(krylov, self.residual)
+                krylov.solve(self.residual, self.direction)
+                iterations += krylov.getIterationNumber()
             if fast:
                 keep_bounds(krylov)
         except PETSc.Error:  # a factorisation that broke down
@@ -223,4 +229,4 @@ class _System:
         self.direction.scale(-1.0)
         self.problem.hold(self.direction)
         finite = bool(np.isfinite(self.direction.norm()))
-        return krylov.getConvergedReason() if finite else 0, krylov.getIterationNumber()
+        return krylov.getConvergedReason() if finite else 0, iterations

@@ -1,5 +1,6 @@
 """What differs between versions of dolfinx (0.9 to 0.11) and of the PETSc that comes with them, in one place."""
 
+import os
 from functools import cache
 
 import dolfinx
@@ -8,6 +9,10 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+
+# read by Scotch when it first shares out a mesh: else a run would not give the same numbers twice
+for name in ("SCOTCH_RANDOM_FIXED_SEED", "SCOTCH_DETERMINISTIC", "SCOTCH_PTHREAD_NUMBER"):
+    os.environ.setdefault(name, "1")
 
 
 def create_mesh(
