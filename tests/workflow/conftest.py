@@ -11,6 +11,11 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
+from shapes import ellipsoid_mesh, hemisphere
+
+from gyriflow.io.files import write_json
+from gyriflow.io.surfaces import write_surface
+from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
 CHECKOUT = Path(__file__).parents[2]
 SMALL_STUDY = {
@@ -82,6 +87,20 @@ class Workflow:
         """Has Snakemake take the files of a call that are there for made."""
         touched = self.run("--touch", "--cores", "1", *arguments)
         assert touched.returncode == 0, touched.stderr
+
+    def count_ellipsoid_as_meshed(self, config: dict, cells: int) -> None:
+        """Writes a configuration of one brain, `a`, as study.yaml, with an ellipsoid's surface and mesh taken for made.
+
+        `cells` is the number of the mesh's cells along an axis.
+        """
+        arguments = ("mesh", "--configfile", self.write("study.yaml", config))
+        self.lay_out(*arguments)
+        brain = self.directory / "results" / "brains" / "a"
+        write_json(brain / "surface" / "surface.json", {"fissure_x_mm": 0.0})
+        for side, sign in (("left", -1), ("right", 1)):
+            write_surface(brain / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
+        write_tetrahedral_mesh(brain / "mesh" / "brain.xdmf", ellipsoid_mesh(cells, (20.0, 26.0, 18.0)))
+        self.count_as_made(*arguments)
 
     def surfaces(self, config: dict) -> SimpleNamespace:
         """Makes the pial surfaces of all brains of a configuration, and their thickness, as far as that goes."""

@@ -9,11 +9,8 @@ from contextlib import suppress
 
 import psutil
 import pytest
-from shapes import ellipsoid_mesh, hemisphere
 
-from gyriflow.io.files import read_json, write_json
-from gyriflow.io.surfaces import write_surface
-from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+from gyriflow.io.files import read_json
 
 from .conftest import SMALL_STUDY
 
@@ -32,14 +29,7 @@ LOG = "results/runs/reference/a/logs/simulate.log"
 @pytest.fixture
 def meshed(workflow):
     """A study whose surface and mesh count as made: an ellipsoid."""
-    workflow.write("study.yaml", STUDY)
-    workflow.lay_out("mesh", "--configfile", "study.yaml")
-    results = workflow.directory / "results" / "brains" / "a"
-    write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
-    for side, sign in (("left", -1), ("right", 1)):
-        write_surface(results / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
-    write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", ellipsoid_mesh(10, (20.0, 26.0, 18.0)))
-    workflow.count_as_made("mesh", "--configfile", "study.yaml")
+    workflow.count_ellipsoid_as_meshed(STUDY, cells=10)
     return workflow
 
 

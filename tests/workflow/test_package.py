@@ -68,4 +68,6 @@ def test_the_command_works_in_an_empty_folder(installed, tmp_path):
     assert (tmp_path / target).is_file()
     assert str(CHECKOUT) not in outcome.stdout + outcome.stderr
     # nothing is missing further down
-    assert gyriflow("run", "--dry-run").returncode == 0
+    dry = gyriflow("run", "--dry-run")
+    assert dry.returncode == 0
+    assert " core hours, " in dry.stdout

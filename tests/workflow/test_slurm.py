@@ -8,12 +8,9 @@ from importlib.util import find_spec
 import numpy as np
 import pandas as pd
 import pytest
-from shapes import ellipsoid_mesh, hemisphere
 
-from gyriflow.io.files import read_json, write_json
+from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_positions
-from gyriflow.io.surfaces import write_surface
-from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
 from .conftest import SMALL_STUDY
 from .slurm_cluster import cluster, missing
@@ -117,14 +114,7 @@ def meshed(workflow):
 
     Its surface and mesh, an ellipsoid, count as made.
     """
-    workflow.write("study.yaml", STUDY)
-    workflow.lay_out("mesh", "--configfile", "study.yaml")
-    results = workflow.directory / "results" / "brains" / "a"
-    write_json(results / "surface" / "surface.json", {"fissure_x_mm": 0.0})
-    for side, sign in (("left", -1), ("right", 1)):
-        write_surface(results / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
-    write_tetrahedral_mesh(results / "mesh" / "brain.xdmf", ellipsoid_mesh(8, (20.0, 26.0, 18.0)))
-    workflow.count_as_made("mesh", "--configfile", "study.yaml")
+    workflow.count_ellipsoid_as_meshed(STUDY, cells=8)
     made = workflow.run(*BEFORE, "--cores", "2", "--configfile", "study.yaml", timeout_s=900)
     assert made.returncode == 0, made.stdout + made.stderr
     disturbed = workflow.directory.with_name("disturbed")

@@ -1,4 +1,6 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
+from functools import cache
+
 from gyriflow.cost import MEASURED as MEASURED_COSTS
 from gyriflow.cost.prediction import folding_needs
 from gyriflow.folding.predicted_memory import predicted_memory_mib
@@ -192,15 +194,10 @@ def ranks(wildcards):
     return CONFIG.run(run).ranks
 
 
-def folding_limits(wildcards):
+@cache
+def folding_limits(run, brain):
     """Returns the memory in MiB and the minutes of a run's job on a cluster, predicted from measured runs."""
-    return folding_needs(
-        wildcards.run,
-        wildcards.brain,
-        CONFIG,
-        read_json(MEASURED_COSTS),
-        predicted_memory_mib,
-    )
+    return folding_needs(run, brain, CONFIG, read_json(MEASURED_COSTS), predicted_memory_mib)
 
 
 def solve_options(*more):
@@ -228,8 +225,8 @@ rule simulate:
     resources:
         mpi="mpiexec",
         tasks=ranks,
-        mem_mb=lambda wildcards: folding_limits(wildcards)[0],
-        runtime=lambda wildcards: folding_limits(wildcards)[1],
+        mem_mb=lambda wildcards: folding_limits(wildcards.run, wildcards.brain)[0],
+        runtime=lambda wildcards: folding_limits(wildcards.run, wildcards.brain)[1],
     params:
         folder=subpath(output.steps, parent=True),
         options=solve_options(),
@@ -257,8 +254,8 @@ checkpoint simulate_member:
     resources:
         mpi="mpiexec",
         tasks=ranks,
-        mem_mb=lambda wildcards: folding_limits(wildcards)[0],
-        runtime=lambda wildcards: folding_limits(wildcards)[1],
+        mem_mb=lambda wildcards: folding_limits(wildcards.run, wildcards.brain)[0],
+        runtime=lambda wildcards: folding_limits(wildcards.run, wildcards.brain)[1],
     params:
         folder=subpath(output.steps, parent=True),
         options=solve_options("--may-diverge"),

@@ -59,8 +59,19 @@ def check_study(
     if missing:
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
     if not bad:
-        arguments = ["--configfile", str(path.resolve()), "--directory", str(directory.resolve()), *stages]
-        yield from _work(plan(arguments), settings, directory, cores, price)
+        yield from _work(_planned(path, directory, stages), settings, directory, cores, price)
+
+
+def work_of_study(config: Path | None, directory: Path, cores: int, further: Sequence[str]) -> Iterator[str]:
+    """Yields lines on what a study will take, without a look at its files; `further` are arguments of Snakemake's."""
+    path = config or DEMO
+    settings = load(read_yaml(path), path.resolve().parent)
+    for line, _ in _work(_planned(path, directory, further), settings, directory, cores, None):
+        yield line
+
+
+def _planned(config: Path, directory: Path, further: Sequence[str]) -> list[PlannedJob]:
+    return plan(["--configfile", str(config.resolve()), "--directory", str(directory.resolve()), *further])
 
 
 def _contents(config: Config) -> str:

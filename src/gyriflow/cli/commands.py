@@ -154,7 +154,7 @@ def check(
 def run(
     directory: Path, cores: int, stages: Sequence[str], dry_run: bool, verbose: bool, further: Sequence[str]
 ) -> None:
-    """Run a study; what is there and up to date is kept.
+    """Run a study; what is there and up to date is kept. With --dry-run, say what it would take.
 
     CONFIG is gyriflow.yaml where none is named, or else the demo. Further arguments go to Snakemake, such as
     `--profile profiles/slurm`.
@@ -171,8 +171,14 @@ def run(
     if not (default and any(argument.partition("=")[0] in ELSEWHERE for argument in further)):
         arguments += ["--cores", str(cores)]
     # an option of one value stands before the targets
-    arguments += ["--directory", str(directory), *stages, *further[int(named) :]]
-    sys.exit(launch(arguments))
+    targets = [*stages, *further[int(named) :]]
+    code = launch([*arguments, "--directory", str(directory), *targets])
+    if dry_run and code == 0:
+        from .checking import work_of_study
+
+        for line in work_of_study(chosen, directory, cores, targets):
+            click.echo(line)
+    sys.exit(code)
 
 
 @main.command()
