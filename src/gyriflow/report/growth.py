@@ -91,9 +91,11 @@ def _sizes_panel(
     from_zero(axes)
     week_axis(axes, areas["week"])
     light_grid(axes)
-    axes.set_title(wrap(measured, 32))
-    if len(colours) > 1:
-        axes.legend(loc="lower right", reverse=True)
+    if len(colours) == 1:
+        axes.set_title(wrap(measured, 32))
+    else:
+        # in the place of a title, where no curve can be
+        axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.01), borderaxespad=0, reverse=True)
 
 
 def _rates_panel(
