@@ -221,6 +221,8 @@ rule simulate:
         run=one_of(CONFIG.runs),
     conda:
         ENVIRONMENT
+    # the runs that all else is compared with, and the longest: members of studies fill the cores beside them
+    priority: 1
     threads: ranks
     resources:
         mpi="mpiexec",
