@@ -30,6 +30,7 @@ from .style import (
     add_letters,
     light_grid,
     new_figure,
+    shown_unit,
     styled,
     wrap,
 )
@@ -38,6 +39,7 @@ ABSENT = "ended\nbefore\nthis week"
 """What stands in the place of a member of a study that has not come to the week."""
 HEMISPHERE_MARKERS = {"whole": "o", "left": "<", "right": ">"}
 _COLUMNS = 3
+_SIZES = ("area", "volume", "gyrification_index")
 _UNITS = {"_mm_per_gw": "mm/GW", "_per_s": "s⁻¹", "_pa_per_m": "Pa/m", "_mm": "mm", "_pa": "Pa", "_gw": "GW", "_s": "s"}
 _NAMES = {
     "thickness": "cortical thickness",
@@ -165,9 +167,7 @@ def nearest_chart(
         _nearest_panel(axes, own, sides)
         if published and measure in published:
             axes.axvline(published[measure], color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
-        unit = own["unit"].iloc[0] if "unit" in own else ""
-        unit = f" ({unit})" if isinstance(unit, str) and unit not in ("", "1") else ""
-        axes.set_title(wrap(measure.replace("_", " ") + unit, 30), fontsize=7.5)
+        axes.set_title(wrap(_titled(measure, own), 30), fontsize=7.5)
         axes.set_xlabel(parameter)
         light_grid(axes)
     for axes in grid.flat[len(measures) :]:
@@ -181,6 +181,12 @@ def nearest_chart(
         ncols=3,
     )
     return figure
+
+
+def _titled(measure: str, rows: pd.DataFrame) -> str:
+    """Returns the name of a measure with the unit of its distances: those of sizes are parts of the real brain's."""
+    unit = "share of the real" if measure in _SIZES else shown_unit(rows["unit"].iloc[0] if "unit" in rows else "")
+    return measure.replace("_", " ") + (f" ({unit})" if unit else "")
 
 
 def _nearest_panel(axes: Axes, rows: pd.DataFrame, sides: Sequence[str]) -> None:

@@ -57,12 +57,13 @@ def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: f
 def _untrusted_legend(*, bars: bool = False, points: bool = False, stars: bool = False) -> list[Artist]:
     """Returns the entries of the legend for what is drawn of bands that are cut off or not resolved."""
     entries: list[Artist] = []
-    label = "cut off, a share of what is, or not resolved"
+    label = "cut off or not resolved, or a share of such"
     if bars:
         entries.append(Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_INCOMPLETE_HATCH, label=label))
     for marker, size, drawn, colour in (("o", 5, points, MUTED_COLOUR), ("*", 8, stars, REAL_COLOUR)):
         if drawn:
-            hollow = Line2D([], [], color=colour, marker=marker, markersize=size, markerfacecolor="white", label=label)
+            said = "the same, of the real brain" if entries else label
+            hollow = Line2D([], [], color=colour, marker=marker, markersize=size, markerfacecolor="white", label=said)
             hollow.set_linestyle("none")
             entries.append(hollow)
     return entries
