@@ -163,7 +163,7 @@ def displacement_maps(
         for key in keys:
             mesh, norms = displacements[key]
             place = mesh.vertices[int(np.nanargmax(norms))]
-            where = ", ".join(f"{value:.0f}" for value in place).replace("-", "−")
+            where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
             caption = f"max {np.nanmax(norms):.2f} mm at {where}\nmean {np.nanmean(norms):.2f} mm"
             shown = caption if view == seen[-1] else ""
             panels.append(Panel(mesh, paint(norms, scale), view, shown, MAP, place))
