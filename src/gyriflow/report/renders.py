@@ -61,15 +61,29 @@ def weekly_comparison(
     measured
         What the measured brains are called.
     """
-    return _surface_rows(
-        {
-            "simulated": (simulated, SIMULATED_SURFACE_COLOUR),
-            measured: (real, REAL_SURFACE_COLOUR),
-        },
-        views=views,
-        synthetic=synthetic,
-        measured=measured,
-    )
+    return runs_by_week({"simulated": simulated}, real, views=views, measured=measured, synthetic=synthetic)
+
+
+@styled
+def runs_by_week(
+    runs: Mapping[str, Mapping[float, TriangleMesh]],
+    real: Mapping[float, TriangleMesh],
+    *,
+    views: Sequence[str] = SIDE_VIEWS,
+    measured: str = REAL_BRAIN,
+    synthetic: bool = False,
+) -> Figure:
+    """Returns the brains of several runs (blue) above measured ones (beige), a column per week, their rows by view.
+
+    Parameters
+    ----------
+    runs : {run: {week: surface in RAS+ mm}}
+    real : {week: surface in RAS+ mm}
+        A week that one of them lacks leaves its place empty.
+    """
+    groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items()}
+    groups |= {measured: (real, REAL_SURFACE_COLOUR)}
+    return _surface_rows(groups, views=views, synthetic=synthetic, measured=measured)
 
 
 @styled
