@@ -82,8 +82,8 @@ def page_of(tests):
         "",
         "What goes wrong, what a user then gets, and the tests that try it. Messages name the file, what was found,",
         "what was expected and what to do; the exit codes are on [the command line's page](command-line.md). This page",
-        "is written by a run of the tests, `./run pytest --reliability",
-        "docs/reliability.md`, from `tests/faults.yaml`.",
+        "is written by a run of the tests, `./run pytest",
+        "--reliability=docs/reliability.md`, from `tests/faults.yaml`.",
         "",
         f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
     ]
