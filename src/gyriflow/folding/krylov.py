@@ -121,9 +121,8 @@ def smooth_with(krylov: PETSc.KSP, products: PETSc.Mat, smoothing: PETSc.Mat) ->
         What the finest level's Jacobi smoother is made from.
     """
     multigrid = krylov.getPC()
-    finest = multigrid.getMGLevels() - 1
-    multigrid.getMGSmoother(finest).setOperators(products, smoothing)
-    _store_by_blocks(multigrid, range(1, finest))
+    _finest(krylov).setOperators(products, smoothing)
+    _store_by_blocks(multigrid, range(1, multigrid.getMGLevels() - 1))
     below = multigrid.getMGCoarseSolve().getPC()
     if below.getType() == "gamg":
         _store_by_blocks(below, range(1, below.getMGLevels()))
@@ -161,7 +160,7 @@ def keep_bounds(krylov: PETSc.KSP) -> None:
 def renew_bounds(krylov: PETSc.KSP, residual: PETSc.Vec) -> None:
     """Has the smoother of the finest level keep bounds that are estimated now, with a residual for the first cycle."""
     estimate_bounds(krylov)
-    smoother = krylov.getPC().getMGSmoother(krylov.getPC().getMGLevels() - 1)
+    smoother = _finest(krylov)
     smoother.setOperators(*smoother.getOperators())  # so that it is set up again
     corrected = residual.duplicate()
     krylov.getPC().apply(residual, corrected)  # PETSc estimates on the way, but goes by what it was told to keep
@@ -169,9 +168,13 @@ def renew_bounds(krylov: PETSc.KSP, residual: PETSc.Vec) -> None:
     keep_bounds(krylov)
 
 
-def _finest_smoother(krylov: PETSc.KSP) -> ctypes.c_void_p:
+def _finest(krylov: PETSc.KSP) -> PETSc.KSP:
     multigrid = krylov.getPC()
-    return ctypes.c_void_p(multigrid.getMGSmoother(multigrid.getMGLevels() - 1).handle)
+    return multigrid.getMGSmoother(multigrid.getMGLevels() - 1)
+
+
+def _finest_smoother(krylov: PETSc.KSP) -> ctypes.c_void_p:
+    return ctypes.c_void_p(_finest(krylov).handle)
 
 
 def _store_by_blocks(multigrid: PETSc.PC, levels: Iterable[int]) -> None:
