@@ -124,10 +124,10 @@ def main() -> None:
         if "min_distance_mm" in table:
             found[kind]["min_distance_mm"] = float(np.round(table["min_distance_mm"].min(), 4))
     if arguments.figure:
-        from gyriflow.report.renders import weekly_comparison
+        from gyriflow.report.renders import runs_by_week
 
         for kind, surfaces in shown.items():
-            figure = weekly_comparison(surfaces, {})
+            figure = runs_by_week({"simulated": surfaces}, {})
             figure.savefig(arguments.figure.with_stem(f"{arguments.figure.stem}-{kind}"), dpi=150)
     print(json.dumps(found), flush=True)
 

@@ -42,29 +42,6 @@ def _ordered(*groups: Mapping) -> list:
 
 
 @styled
-def weekly_comparison(
-    simulated: Mapping[float, TriangleMesh],
-    real: Mapping[float, TriangleMesh],
-    *,
-    views: Sequence[str] = SIDE_VIEWS,
-    measured: str = REAL_BRAIN,
-    synthetic: bool = False,
-) -> Figure:
-    """Returns simulated (blue) above measured brains (beige), a column per week, a pair of rows per view.
-
-    Parameters
-    ----------
-    simulated, real : {week: surface in RAS+ mm}
-        A week that one of them lacks leaves its place empty.
-    views
-        Names of `scene.VIEWS`.
-    measured
-        What the measured brains are called.
-    """
-    return runs_by_week({"simulated": simulated}, real, views=views, measured=measured, synthetic=synthetic)
-
-
-@styled
 def runs_by_week(
     runs: Mapping[str, Mapping[float, TriangleMesh]],
     real: Mapping[float, TriangleMesh],
@@ -80,6 +57,10 @@ def runs_by_week(
     runs : {run: {week: surface in RAS+ mm}}
     real : {week: surface in RAS+ mm}
         A week that one of them lacks leaves its place empty.
+    views
+        Names of `scene.VIEWS`.
+    measured
+        What the measured brains are called.
     """
     groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items()}
     groups |= {measured: (real, REAL_SURFACE_COLOUR)}

@@ -16,10 +16,10 @@ from gyriflow.report.panels import round_length
 from gyriflow.report.renders import (
     displacement_maps,
     round_up,
+    runs_by_week,
     runs_comparison,
     scalar_maps,
     signed_scale,
-    weekly_comparison,
 )
 from gyriflow.report.scene import MAP, TISSUE, VIEWS, render, uniform_colours
 from gyriflow.report.sections import Normals, cross_sections, normal_arrows
@@ -97,9 +97,9 @@ def test_up_is_superior_and_in_the_top_view_anterior():
         assert 0 < width[:20].max() < width[-20:].max()
 
 
-def test_weekly_comparison_has_a_panel_per_brain_and_leaves_gaps():
+def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps():
     small, large = box((20, 30, 20)), box((25, 36, 25))
-    figure = weekly_comparison({22.0: small, 23.5: large}, {22.0: small}, views=("left", "top"))
+    figure = runs_by_week({"simulated": {22.0: small, 23.5: large}}, {22.0: small}, views=("left", "top"))
     panels = [axes.get_label() for axes in figure.axes if axes.images]
     assert len(panels) == 6
     assert "real brain\nleft view, column 0" in panels
@@ -109,7 +109,7 @@ def test_weekly_comparison_has_a_panel_per_brain_and_leaves_gaps():
 
 
 def test_all_panels_have_one_scale_and_the_bar_its_length():
-    figure = weekly_comparison({22.0: box((20, 30, 20))}, {22.0: box((60, 80, 60))}, views=("left", "top"))
+    figure = runs_by_week({"simulated": {22.0: box((20, 30, 20))}}, {22.0: box((60, 80, 60))}, views=("left", "top"))
     axes = [axes for axes in figure.axes if axes.images]
     scales = [np.ptp(each.get_xlim()) / each.get_window_extent().width for each in axes]
     scales += [np.ptp(each.get_ylim()) / each.get_window_extent().height for each in axes]
@@ -122,7 +122,9 @@ def test_all_panels_have_one_scale_and_the_bar_its_length():
 
 def test_simulated_and_measured_brains_differ_in_colour_and_the_phantom_is_named():
     mesh = box((20, 30, 20))
-    figure = weekly_comparison({22.0: mesh}, {22.0: mesh}, views=("left",), measured="phantom", synthetic=True)
+    figure = runs_by_week(
+        {"simulated": {22.0: mesh}}, {22.0: mesh}, views=("left",), measured="phantom", synthetic=True
+    )
     simulated, measured = (image[covered(image)].mean(axis=0) for image in (picture(figure, 0), picture(figure, 1)))
     assert simulated[2] > simulated[0]
     assert measured[0] > measured[2]
@@ -133,7 +135,7 @@ def test_simulated_and_measured_brains_differ_in_colour_and_the_phantom_is_named
 
 def test_many_weeks_go_on_below():
     mesh = box((20, 30, 20))
-    figure = weekly_comparison({float(week): mesh for week in range(21, 31)}, {}, views=("left",))
+    figure = runs_by_week({"simulated": {float(week): mesh for week in range(21, 31)}}, {}, views=("left",))
     places = [axes.get_position() for axes in figure.axes if axes.images]
     assert len({round(place.y0, 6) for place in places}) == 2
     assert max(place.x1 for place in places) <= 1
@@ -204,7 +206,7 @@ def test_maps_are_darkened_less_by_shade_than_tissue():
 
 
 def test_pictures_keep_their_pixels_in_print(tmp_path):
-    figure = weekly_comparison({22.0: ellipsoid_surface()}, {}, views=("top",))
+    figure = runs_by_week({"simulated": {22.0: ellipsoid_surface()}}, {}, views=("top",))
     write_figure(tmp_path / "a.png", tmp_path / "a.pdf", figure, dpi=300)
     ((axes, image),) = [(axes, axes.images[0]) for axes in figure.axes if axes.images]
     rows, columns, _ = np.asarray(image.get_array()).shape
@@ -233,7 +235,7 @@ def test_an_unknown_quantity_or_view_is_refused():
     with pytest.raises(InputError, match="unknown quantity; found depth"):
         scalar_maps({"simulated": {28.0: (mesh, np.zeros(8))}}, quantity="depth")
     with pytest.raises(InputError, match=r"unknown view.*lateral"):
-        weekly_comparison({21.0: mesh}, {}, views=("lateral",))
+        runs_by_week({"simulated": {21.0: mesh}}, {}, views=("lateral",))
 
 
 def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
