@@ -197,7 +197,9 @@ def ranks(wildcards):
 @cache
 def folding_limits(run, brain):
     """Returns the memory in MiB and the minutes of a run's job on a cluster, predicted from measured runs."""
-    return folding_needs(run, brain, CONFIG, read_json(MEASURED_COSTS), predicted_memory_mib)
+    return folding_needs(
+        run, brain, CONFIG, read_json(MEASURED_COSTS), predicted_memory_mib
+    )
 
 
 def solve_options(*more):
@@ -219,10 +221,10 @@ rule simulate:
         f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(CONFIG.runs),
-    conda:
-        ENVIRONMENT
     # the runs that all else is compared with, and the longest: members of studies fill the cores beside them
     priority: 1
+    conda:
+        ENVIRONMENT
     threads: ranks
     resources:
         mpi="mpiexec",
