@@ -25,6 +25,8 @@ from .style import (
 MEASURES = {"shape_index": "shape index", "mean_curvature": "mean curvature"}
 """What is compared, as in the names of columns, and their titles."""
 CEILING = "registration alone"
+ONE_WEEK = np.array([-0.25, 0.25])
+"""Ends in weeks of a line that stands for a single week."""
 
 
 @styled
@@ -65,7 +67,10 @@ def validation_chart(
             axes.plot(adjacent.index, adjacent, "*", color=REAL_COLOUR, markersize=6)
         if ceiling is not None and len(ceiling):
             for _, rows in ceiling.groupby("start_week"):
-                axes.plot(rows["week"], rows[f"gain_{measure}"], ":", color=MUTED_COLOUR)
+                gain = rows[f"gain_{measure}"]
+                axes.plot(rows["week"], gain, ":", color=MUTED_COLOUR)
+                if len(rows) == 1:  # a line through one point cannot be seen
+                    axes.hlines(gain, *(rows["week"].iloc[0] + ONE_WEEK), colors=MUTED_COLOUR, linestyles=":")
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
         axes.set_title(f"{name}: r less that of the scaled start")
         week_axis(axes, validation["week"])

@@ -37,6 +37,12 @@ def test_gains_are_drawn_with_their_kind_and_the_real_week_before():
     assert any(line.get_linestyle() == ":" for line in axes.lines)
 
 
+def test_what_registration_gives_is_seen_with_a_single_week_too():
+    axes = validation_chart(table(["measured"], [23]), table(["registration"], [23])).axes[0]
+    ends = [segment[:, 0] for lines in axes.collections for segment in lines.get_segments() if np.ptp(segment[:, 0])]
+    np.testing.assert_allclose(ends, [[22.75, 23.25]])
+
+
 def test_gain_stands_over_its_smoothing_length_and_uniform_growth_beyond():
     lengths = {"a": 3.0, "b": 6.0, "c": math.inf}
     axes = smoothing_chart(table([*lengths]), lengths, table(["registration"])).axes[0]
