@@ -85,3 +85,33 @@ def test_a_smoother_that_elements_have_outgrown_estimates_its_bounds_anew(monkey
     monkeypatch.setattr(ladder_of_run, "renew_cg", lambda: pytest.fail("the preconditioner itself is good"))
     after_steps(folding, state, 1)
     assert not bounds_estimated(ladder_of_run._cg)
+
+
+def test_a_worn_preconditioner_waits_for_the_solve_without_contact(monkeypatch):
+    folding, state = closing_sulcus("global", time_scheme="adams-bashforth")
+    state = after_steps(folding, state, 9)
+    assert state.rows[-1]["contact_pairs"] > 0
+    of_run, in_contact = folding.solver.ladder, []
+    renew = of_run.renew_cg
+
+    def noted():
+        in_contact.append(bool(folding.problem.contributions))
+        renew()
+
+    monkeypatch.setattr(of_run, "renew_cg", noted)
+    monkeypatch.setattr(ladder.Wear, "stale", True)
+    after_steps(folding, state, 2)
+    assert in_contact == [False, False]
+
+
+@pytest.mark.parametrize("support", ["box", "free"])
+def test_newtons_method_begins_at_the_best_of_its_guesses(support):
+    folding, state = closing_sulcus("global", support=support)
+    state = after_steps(folding, state, 3)
+    folding.set_layers(state.time_s, state.step_s)
+    folding.solver.solve(folding.domain.local(state.last))
+    found = folding.problem.displacement.copy()
+    for guesses in ((0.5 * found, found), (found, 0.5 * found), (found, 0 * found)):
+        assert folding.solver.solve(*guesses).newton == 0
+        assert np.abs(folding.problem.displacement - found).max() <= 1e-9 * np.abs(found).max()
+    assert folding.solver.solve(0.5 * found).newton > 0

@@ -34,6 +34,11 @@ class Wear:
         """Whether a new preconditioner is due."""
         return self._excess >= SETUP
 
+    @property
+    def useless(self) -> bool:
+        """Whether it has failed, or has yet to be made."""
+        return bool(np.isinf(self._excess))
+
     def add(self, iterations: int, reduction: float) -> None:
         """Takes note of a solve that brought the residual down to a part of what it was."""
         powers = -np.log10(reduction)

@@ -102,9 +102,18 @@ class LinearLadder:
         self._fall_back(system, count)
         return count
 
+    @property
+    def _due(self) -> bool:
+        """Whether a new preconditioner is to be made of the present tangent.
+
+        One without contact makes the better one: where each step has such a solve, a worn one waits for it.
+        """
+        waits = self.problem.summed and self.problem.contributions
+        return self._wear.useless if waits else self._wear.stale
+
     def _solve_with_kept(self, system: "_System", count: LinearCount) -> bool:
         """Tries conjugate gradients with the kept preconditioner alone; returns whether the direction descends."""
-        if self._wear.stale:
+        if self._due:
             return False
         reason, iterations = system.run(self._cg, reuse=True, fast=True)
         count.iterations += iterations
@@ -130,7 +139,7 @@ class LinearLadder:
 
     def _run_cg(self, system: "_System", count: LinearCount, *, shifted: bool) -> int:
         """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
-        if not self._wear.stale:
+        if not self._due:
             reason, iterations = system.run(self._cg, reuse=True, fast=not shifted)
             count.iterations += iterations
             # a matrix that is not positive definite is no fault of the preconditioner

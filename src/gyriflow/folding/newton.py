@@ -1,5 +1,6 @@
 """Newton's method for the displacement of one step: linear solves by the ladder, each guarded by a line search."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,8 +118,8 @@ class NewtonSolver:
         self._first_left = 0.0  # part of the residual that the first iteration of the step before left
         self.inverting: NDArray[np.float64] | None = None
 
-    def solve(self, start: NDArray[np.float64]) -> StepCount:
-        """Solves for the displacement from a first guess of shape (k, 3) in m; it is left in the problem.
+    def solve(self, *guesses: NDArray[np.float64]) -> StepCount:
+        """Solves for the displacement from the best of some guesses (k, 3) in m; it is left in the problem.
 
         Raises
         ------
@@ -126,12 +127,12 @@ class NewtonSolver:
             Where the residual does not fall below the tolerance.
         """
         problem, count = self.problem, StepCount()
-        start, self.inverting = problem.admissible(start), None
-        at_rest = self._residual_at(np.zeros_like(start))
+        self.inverting = None
+        at_rest = self._residual_at(np.zeros_like(problem.displacement))
         if not np.isfinite(at_rest):
             raise NotConvergedError("the forces without any displacement are not finite")
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
-        iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(start, at_rest))
+        iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(guesses, at_rest, tolerance))
         tangent, before, stalled = None, np.inf, 0
         while iterate.norm > tolerance and not iterate.exhausted:
             norm = iterate.norm
@@ -176,15 +177,20 @@ class NewtonSolver:
         self.problem.set_displacement(displacement)
         return self.problem.residual(self._residual)
 
-    def _begin(self, start: NDArray[np.float64], at_rest: float) -> float:
-        """Goes to a first guess where that is better than none; returns the norm of the residual there."""
+    def _begin(self, guesses: Sequence[NDArray[np.float64]], at_rest: float, tolerance: float) -> float:
+        """Goes to the guess that leaves least, none included; returns the norm of the residual there."""
         problem = self.problem
-        problem.set_displacement(problem.largest_step(start) * start)
-        if problem.smallest_volume_ratio() > 0:
-            norm = problem.residual(self._residual)
-            if norm < at_rest:  # not where it is not a number
-                return norm
-        return self._residual_at(np.zeros_like(start))
+        best, least = np.zeros_like(problem.displacement), at_rest
+        norm = np.nan
+        for guess in guesses:
+            if least <= tolerance:
+                break
+            guess = problem.admissible(guess)
+            problem.set_displacement(problem.largest_step(guess) * guess)
+            norm = problem.residual(self._residual) if problem.smallest_volume_ratio() > 0 else np.nan
+            if norm < least:  # not where it is not a number
+                best, least = problem.displacement.copy(), norm
+        return norm if norm == least else self._residual_at(best)
 
     def _reduction(self, norm: float, before: float, tolerance: float) -> float:
         """Returns the part of the residual that the linear solve may leave."""

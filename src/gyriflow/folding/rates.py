@@ -143,9 +143,11 @@ def rate_step(
     """
     domain = problem.domain
     at_start, first = _grown(problem, solver, step_s * domain.local(state.predicted_rate()))
+    # what was in contact stays so: where it leads, the last steps know and growth alone does not
+    led = domain.local(state.predicted(step_s))
     counts = [first]
     if state.rate is None or two_stages:
-        counts.append(_met(problem, solver, at_start / 2))
+        counts.append(_met(problem, solver, at_start / 2, led / 2))
         halfway = domain.gathered(problem.displacement[: domain.owned])
         move_aside(state.positions + halfway, 0.5)
         grown, count = _grown(problem, solver, at_start)
@@ -155,7 +157,7 @@ def rate_step(
     else:
         grown, part = at_start, step_s / state.last_s / 2
         wanted = (1 + part) * grown - part * step_s * domain.local(state.rate)
-    counts.append(_met(problem, solver, wanted))
+    counts.append(_met(problem, solver, wanted, led))
     strained = grown + problem.displacement - wanted
     rate: Floats = domain.gathered(at_start[: domain.owned]) * (1 / step_s)
     return RateStep(rate, strained, summed(counts))
@@ -169,11 +171,11 @@ def _grown(problem: RateProblem, solver: NewtonSolver, guess: Floats) -> tuple[F
     return problem.displacement.copy(), count
 
 
-def _met(problem: RateProblem, solver: NewtonSolver, wanted: Floats) -> StepCount:
-    """Leaves in the problem the displacement nearest to a wanted one that contact lets pass."""
+def _met(problem: RateProblem, solver: NewtonSolver, wanted: Floats, led: Floats) -> StepCount:
+    """Leaves in the problem the displacement nearest to a wanted one that contact lets pass; `led` is a guess of it."""
     if problem.contributions:
         problem.aim_at(wanted)
-        return solver.solve(wanted)
+        return solver.solve(wanted, led)
     problem.set_displacement(problem.admissible(wanted))
     if not problem.smallest_volume_ratio() > 0:
         raise NotConvergedError("an element would turn inside out")
