@@ -21,6 +21,9 @@ SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
 """Parts of its diagonal that are added to a tangent until it is positive definite."""
 FREE_SHIFT = 1e-6
 """The same for the factorisation of a free body's tangent, which is singular."""
+KEPT_SHIFT = 1e-4
+"""The same for the multigrid of a free body. Its coarsest matrix would be singular, and the rigid motions of the shape it
+was made for are not those of the shapes that it is kept for: it would blow them up. Well below the softest bending."""
 FALLBACKS = {GMRES: ("gmres", "gamg"), DIRECT: ("preonly", "lu")}
 
 
@@ -149,9 +152,10 @@ class LinearLadder:
                 self._served(iterations, system.reduction, definite=not shifted)
                 return reason
             count.rung = max(count.rung, REBUILT)
-        system.tangent.whole().setNearNullSpace(self.problem.near_null_space())
-        self.renew_cg()
-        reason, iterations = system.run(self._cg, reuse=False, fast=not shifted)
+        with system.tangent.raised(KEPT_SHIFT if self.problem.free and not shifted else 0.0):
+            system.tangent.whole().setNearNullSpace(self.problem.near_null_space())
+            self.renew_cg()
+            reason, iterations = system.run(self._cg, reuse=False, fast=not shifted)
         count.iterations += iterations
         self._wear.renew()
         self._doubtful = reason == INDEFINITE[0]
