@@ -22,8 +22,8 @@ SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
 FREE_SHIFT = 1e-6
 """The same for the factorisation of a free body's tangent, which is singular."""
 KEPT_SHIFT = 1e-4
-"""The same for the multigrid of a free body. Its coarsest matrix would be singular, and the rigid motions of the shape it
-was made for are not those of the shapes that it is kept for: it would blow them up. Well below the softest bending."""
+"""The same for the multigrid of a free body, well below the softest bending. Its coarsest matrix would be singular, and
+the rigid motions of the shape that it was made for are not those of the shapes it is kept for: it would blow them up."""
 FALLBACKS = {GMRES: ("gmres", "gamg"), DIRECT: ("preonly", "lu")}
 
 
