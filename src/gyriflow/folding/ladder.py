@@ -23,7 +23,7 @@ FREE_SHIFT = 1e-6
 """The same for the factorisation of a free body's tangent, which is singular."""
 KEPT_SHIFT = 1e-4
 """The same for the multigrid of a free body, well below the softest bending. Its coarsest matrix would be singular, and
-the rigid motions of the shape that it was made for are not those of the shapes it is kept for: it would blow them up."""
+the rigid motions of the shape that it was made for are not those of those it is kept for: it would blow them up."""
 FALLBACKS = {GMRES: ("gmres", "gamg"), DIRECT: ("preonly", "lu")}
 
 
