@@ -133,11 +133,13 @@ class RunDisplay:
         self.report = next((path for path in job.outputs if Path(path).name == USUAL_REPORT.name), self.report)
 
     def job_fails(self, number: int, rule: str, logs: Sequence[str], otherwise: str = "") -> None:
-        """Says what failed and why, the cause first; `otherwise` is told where the job's log is silent."""
+        """Says what failed and why, after its last warnings; `otherwise` is told where the job's log is silent."""
         job = self.running.pop(number, None)
         if self.interrupted:
             # it was stopped
             return
+        if job is not None:
+            self._follow(job)
         what = job.what if job else rule
         text = "".join(GrowingLog(Path(log)).all_text() for log in logs)
         why = ended_by_slurm(otherwise, rule) or cause(text) or otherwise or "it left no message"

@@ -101,6 +101,19 @@ def test_a_failure_begins_with_its_cause_and_names_its_log(clock, tmp_path):
     assert display.state()["failed"] == [{"what": "surface, brain a", "why": "a.nii: is no image", "logs": [str(log)]}]
 
 
+def test_what_a_job_said_right_before_it_failed_is_told(clock, tmp_path):
+    display = display_on(io.StringIO(), clock)
+    display.plan({"simulate": 1}, 1)
+    log = tmp_path / "log"
+    display.job_begins(1, "simulate", {"run": "r", "brain": "a"}, ["x"], str(log))
+    log.write_text("12 elements, 9 unknowns, 1 ranks, about 70 MiB\nwarning: too coarse\ngyriflow: memory ran out\n")
+    display.job_fails(1, "simulate", [str(log)])
+    lines = shown(display).splitlines()
+    assert lines[-4] == "warning folding, run r, brain a: too coarse"
+    assert "about 70 MiB" in lines[-3]
+    assert lines[-2] == "failed  folding, run r, brain a: memory ran out"
+
+
 def test_a_terminal_has_a_last_line_that_is_written_over(clock, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     display = display_on(Terminal(), clock)
