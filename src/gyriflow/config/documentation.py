@@ -16,7 +16,8 @@ from .root import Config
 INTRODUCTION = """\
 # Configuration
 
-`config.yaml` is the demo, with each key explained in place; `examples/` has configurations for real data. Your own is
+`config.yaml` is the demo, with the commonest keys explained in place; this page has all of them; `examples/` has
+configurations for real data. Your own is
 given with `./run snakemake --cores 2 --configfile my.yaml` and replaces the demo as a whole. Single values can be
 changed on the command line: `--config 'folding={end_week: 26}'`.
 

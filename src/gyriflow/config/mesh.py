@@ -24,8 +24,8 @@ class MeshSettings(Settings):
     surface_edge_mm: float = setting(
         0.72,
         "mm",
-        "Distance of neighbouring nodes in the cortex, at most half the cortical thickness: the edge length of linear "
-        "elements, half of that of quadratic ones.",
+        "Distance of neighbouring nodes in the cortex, a little less than half the cortical thickness (0.72 for "
+        "1.5 mm): the edge length of linear elements, half of that of quadratic ones.",
         gt=0.1,
         le=10,
     )

@@ -104,7 +104,12 @@ class Solver(Settings):
 
 
 class FoldingSettings(Settings):
-    """The mechanical model, its parameters and its numerics. The defaults are the reference values of the paper."""
+    """The mechanical model, its parameters and its numerics.
+
+    The defaults are the reference values of the paper, except contact (`global`; the paper's is `planes`) and the
+    elements (quadratic; the paper's are linear). `preset: fetalfoldsim` has the paper's contact, `mesh: {order: 1}` its
+    elements.
+    """
 
     preset: Literal["fetalfoldsim", "measured"] | None = setting(
         None, "",
