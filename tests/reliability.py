@@ -81,7 +81,7 @@ def page_of(tests):
         "# Reliability",
         "",
         "What goes wrong, what a user then gets, and the tests that try it. Messages name the file, what was found,",
-        "what was expected and what to do; the exit codes are on [the command line's page](command-line.md). This page",
+        "what was expected and what to do; the exit codes are under [Questions](questions.md). This page",
         "is written by a run of the tests, `./run pytest",
         "--reliability=docs/reliability.md`, from `tests/faults.yaml`.",
         "",
