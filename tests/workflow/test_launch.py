@@ -53,6 +53,23 @@ def test_a_given_configuration_replaces_the_demo_and_its_files_are_beside_it(wor
     assert "phantom" not in outcome.stdout + outcome.stderr
 
 
+def test_a_table_of_participants_is_found_beside_its_configuration(workflow):
+    # the working directory has a cohort of its own
+    for folder in ("study", "elsewhere"):
+        (workflow.directory / folder).mkdir()
+        (workflow.directory / folder / "labels.nii.gz").touch()
+        table = f"participant_id\tage\tlabels\nof-{folder}\t24\tlabels.nii.gz\n"
+        (workflow.directory / folder / "participants.tsv").write_text(table)
+    table = {"file": "participants.tsv", "columns": {"scheme": "binary"}}
+    study = {"participants": table, "start": "all", "folding": {"end_week": 26}}
+    name = workflow.write("study/study.yaml", study)
+    outcome = workflow.run("-n", "surface", "--configfile", name, "--directory", "elsewhere")
+    assert outcome.returncode == 0, outcome.stderr
+    said = outcome.stdout + outcome.stderr
+    assert str(workflow.directory / "study" / "labels.nii.gz") in said
+    assert "of-elsewhere" not in said
+
+
 def test_the_code_of_the_first_failed_step_is_handed_on(workflow):
     (workflow.directory / "labels.nii.gz").write_bytes(b"not an image")
     brains = [{"id": "x", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"}]

@@ -28,7 +28,8 @@ def validated_config():
             # Snakemake's own reading keeps the last of two equal keys
             file = Path(workflow.workdir_init, path)
             content = read_yaml(file)
-            if isinstance(content, dict) and {"brains", "atlas"} & set(content):
+            keys = set(content) if isinstance(content, dict) else set()
+            if keys & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
         return load(config, base, keep_going=keeps_going())
     except GyriflowError as error:

@@ -103,18 +103,24 @@ def input_problems(config: Config) -> Iterator[str]:
 
 
 def _check_files(brain: Brain, config: Config) -> None:
-    if brain.labels is not None and Path(brain.labels).is_file():
-        labels = read_label_volume(brain.labels, brain.affine_from).labels
+    volume = brain.label_volume
+    if volume is not None and Path(volume).is_file():
+        labels = read_label_volume(volume, brain.affine_from).labels
         scheme = LabelScheme(**config.scheme(brain))
         cerebrum_mask(labels, scheme)
-        if scheme.cortex:
+        # the wall of a hemisphere that is alone may have no cortex
+        if scheme.cortex and brain.hemisphere is None:
             require_cortex_outside(labels, scheme)
     for file in brain.files:
         # files of atlases may be missing yet
-        if file != brain.labels and Path(file).is_file():
-            from ..io.surfaces import read_surface  # takes half a second, which label volumes need not wait for
+        if file != volume and Path(file).is_file():
+            # takes half a second, which label volumes need not wait for
+            from ..io.surfaces import read_one_hemisphere, read_surface
 
-            read_surface(file)
+            if brain.hemisphere is None:
+                read_surface(file)
+            else:
+                read_one_hemisphere(file, brain.hemisphere.side)
 
 
 def _work(

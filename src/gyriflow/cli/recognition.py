@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..config.participants import AGES, IDS
+from ..config.participants import AGE, AGES, IDS
 from ..errors import InputError
 from ..io.files import read_tab_separated
 from ..io.volumes import read_label_volume
@@ -31,21 +31,14 @@ OF_SURFACES = {
 }
 OTHER_SURFACES = re.compile(r"sphere|midthickness|inflated|medial|\.(?:shape|func|label)\.gii$", re.IGNORECASE)
 WEEK = re.compile(
-    r"(?:(?:week|wk|gestational[_-]?age|ga|gw|sta|t|age)[-_]?(\d{2}(?:\.\d+)?))(?!\d)|(?<!\d)(\d{2}(?:\.\d+)?)[-_]?(?:weeks?|wk|gw|w)(?![a-z])",
+    # the short ones begin a word, as in HarvardSTA25: no week is in patient23, subject-24, image24
+    r"(?:(?:week|wk|gw|gestational[_-]?age|(?-i:(?<![A-Za-z])|(?<=[a-z])(?=[A-Z]))(?:e?ga|sta|t|age))"
+    r"[-_]?(\d{2}(?:\.\d+)?))(?!\d)|(?<!\d)(\d{2}(?:\.\d+)?)[-_]?(?:weeks?|wk|gw|w)(?![a-z])",
     re.IGNORECASE,
 )
 WEEKS = (18.0, 45.0)
 """Numbers in names that may be gestational ages."""
-AGE_COLUMNS = (
-    *(name for name in AGES if name != "age"),  # which is that after birth in many tables
-    "ga",
-    "ga_weeks",
-    "gestational_weeks",
-    "gestational_age_weeks",
-    "scan_age",
-    "weeks",
-    "age_at_scan",
-)
+AGE_COLUMNS = tuple(name for name in AGES if name != AGE)
 ID_COLUMNS = (*IDS, "subject_id", "subject")
 HIDDEN = ("results", "resources", "derivatives-gyriflow")
 UNSET = "CHOOSE"

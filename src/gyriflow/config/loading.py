@@ -72,13 +72,16 @@ def _participants(
         return [], {}
     plain["participants"] = participants_section(plain["participants"])
     try:
-        return participants_brains(ParticipantsSettings.model_validate(plain["participants"]), base_dir)
+        settings = ParticipantsSettings.model_validate(plain["participants"])
+        entries, left_out, found = participants_brains(settings, base_dir)
     except ValidationError:
         # said with all other keys
         return [], {}
     except InputError as error:
         problems.append(f"participants.file: {error}")
         return [], {}
+    problems += found
+    return entries, left_out
 
 
 def _plain(value: Any) -> Any:

@@ -2,7 +2,8 @@
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,15 @@ from ..parameters.settings import Settings, setting
 from .brains import SOURCES, VOLUME_SUFFIXES, Brain, HemisphereFiles, OneHemisphere, SegmentationSettings, WhiteFiles
 
 IDS = ("participant_id", "id")
-AGES = ("gestational_age", "week", "age")
-"""Names of the column with the gestational age, the first that the table has."""
+AGE = "age"
+"""The one name of the column with the gestational age that is the mother's, or that after birth, in many tables."""
+SURE_AGES = ("gestational_age", "week")
+"""Names of that column which are believed whatever others are there."""
+AGES = (
+    *(*SURE_AGES, "ga", "ga_weeks", "gestational_weeks", "gestational_age_weeks", "scan_age", "weeks", "age_at_scan"),
+    AGE,
+)
+"""All names of that column, in small letters or capitals."""
 FILES = ("file", "files")
 SIDE = "side"
 NESTED: Mapping[str, tuple[str, ...]] = {
@@ -39,10 +47,11 @@ WEEKS = (15.0, 45.0)
 class ParticipantsSettings(Settings):
     """A table of brains, one a row. `participants: FILE` is short for a section with only `file`.
 
-    Columns: `participant_id` (or `id`); the gestational age in weeks, `gestational_age` (or `week` or `age`); and keys
-    of brains, nested ones with a dot, such as `labels`, `scheme` or `hemispheres.left`. In place of these, `files` has
-    a label volume, a pial surface, or those of the left and the right hemisphere with a semicolon between; with `side`,
-    the one hemisphere that there is. `n/a` stands for no value. Other columns are left alone.
+    Columns: `participant_id` (or `id`); the gestational age in weeks, `gestational_age` (or `week`; or, where no two of
+    these differ, `ga`, `scan_age`, `age` and the like); and keys of brains, nested ones with a dot, such as `labels`,
+    `scheme` or `hemispheres.left`. In place of these, `files` has a label volume, a pial surface, or those of the left
+    and the right hemisphere with a semicolon between; with `side`, the one hemisphere that there is. `n/a` stands for
+    no value. Other columns are left alone.
     """
 
     file: str = setting(..., "", "The table, tab-separated; paths in it are relative to it.")
@@ -60,10 +69,11 @@ def participants_section(raw: Any) -> Any:
 
 def participants_brains(
     settings: ParticipantsSettings, folder: Path
-) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
-    """Returns the entries of `brains` that a table stands for, and by id the rows that can't be used.
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], list[str]]:
+    """Returns the entries of `brains` that a table stands for, by id the rows that can't be used, and problems.
 
-    Of the latter, `week` is the age if it is known, and `cause` what is missing. `folder` is that of the configuration.
+    Of the rows, `week` is the age if it is known, and `cause` what is missing. Problems are those that can't be left
+    out with a row: a row that can't be used has the id of another one. `folder` is that of the configuration.
     InputError where the table cannot be read or lacks what every row needs.
     """
     places = [beside(folder, settings.file), Path(settings.file)]
@@ -72,32 +82,39 @@ def participants_brains(
     columns = [*rows[0], *settings.columns] if rows else []
     _require_columns(path, columns)
     id_column = next(name for name in IDS if name in columns)
-    age_column = next(name for name in AGES if name in columns)
-    entries, refused = [], {}
+    age_column = _age_column(path, [settings.columns | row for row in rows])
+    counts = Counter(row[id_column] for row in rows)
+    entries: list[dict[str, Any]] = []
+    refused: dict[str, dict[str, Any]] = {}
+    problems: list[str] = []
     for row in rows:
         name = row[id_column]
         known = {key: value.replace("{id}", name) for key, value in settings.columns.items()} | row
         values = {key: value for key, value in known.items() if value not in NOTHING}
         week, cause = _week(values.get(age_column), age_column)
         entry, problem = _entry(values, path.parent)
-        if cause or problem:
-            refused[name] = {"week": week, "cause": f"{path}: {name}: {cause or problem}"}
-        else:
+        text = f"{path}: {name}: {cause or problem}"
+        if not (cause or problem):
             entries.append({"id": name, "week": week} | entry)
-    return entries, refused
+        elif counts[name] > 1 and name not in NOTHING:
+            problems.append(f"{text} (the id is that of {counts[name]} rows; ids are unique)")
+        else:
+            refused[name] = {"week": week, "cause": text}
+    return entries, refused, problems
 
 
 def _require_columns(path: Path, columns: list[str]) -> None:
-    for names, what in ((IDS, "ids"), (AGES, "gestational ages")):
-        if not set(names) & set(columns):
+    ages = {name.lower() for name in columns}
+    for names, there, what in ((IDS, set(columns), "ids"), (AGES, ages, "gestational ages")):
+        if not set(names) & there:
             raise InputError(
                 f"has no column of {what}",
                 path=path,
                 found=", ".join(columns) or "no rows",
                 expected=" or ".join(names),
             )
-    known = {*IDS, *AGES, *FILES, SIDE, *COLUMNS}
-    for column in set(columns) - known:
+    known = {*IDS, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS}
+    for column in {name for name in columns if name.lower() not in AGES} - known:
         nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
         if nearest:
             raise InputError(
@@ -107,6 +124,24 @@ def _require_columns(path: Path, columns: list[str]) -> None:
                 expected=nearest[0],
                 remedy="Rename it; columns with quite other names are left alone.",
             )
+
+
+def _age_column(path: Path, rows: Sequence[Mapping[str, str]]) -> str:
+    """Returns the column with the gestational age; InputError where several may be it that do not say the same."""
+    columns = list(rows[0])
+    found = [name for name in SURE_AGES if name in columns][:1] or [
+        column for name in AGES for column in columns if column.lower() == name
+    ]
+    ages = [[_week(row[column], column)[0] for row in rows] for column in found]
+    if any(other != ages[0] for other in ages[1:]):
+        raise InputError(
+            "has several columns that may be the gestational age, which differ",
+            path=path,
+            found=" and ".join(found),
+            expected="one of them",
+            remedy=f"Call that of the gestational age in weeks {SURE_AGES[0]}; it is taken whatever others are there.",
+        )
+    return found[0]
 
 
 def _week(text: str | None, column: str) -> tuple[float | None, str]:
@@ -126,7 +161,11 @@ def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str
     values = dict(values)
     files = next((values[name] for name in FILES if name in values), None)
     if files is not None:
-        values |= _of_files([part.strip() for part in files.split(";")], values.get(SIDE))
+        parts, side = [part.strip() for part in files.split(";")], values.get(SIDE)
+        most, expected = (2, "a left and a right hemisphere at most") if side is None else (1, "the one of its side")
+        if len(parts) > most:
+            return {}, f"files: found {len(parts)}, {'; '.join(parts)}; expected {expected}"
+        values |= _of_files(parts, side)
     entry: dict[str, Any] = {}
     for column in COLUMNS:
         if column not in values or column == "week":

@@ -4,11 +4,12 @@ import json
 import math
 import shutil
 import uuid
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -101,7 +102,11 @@ def write_table(path: AnyPath, table: pd.DataFrame) -> None:
 def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     """Returns the rows of a tab-separated table with a heading, as texts by column; InputError where it is none."""
     try:
-        table = pd.read_csv(path, sep="\t", dtype=str, keep_default_na=False, encoding="utf-8-sig")
+        table = _read_texts(path)
+        # rows that are longer than the heading have names before it, as R writes them, or tabs at their end
+        if (table.iloc[:, -table.index.nlevels :] == "").all(axis=None) and not isinstance(table.index, pd.RangeIndex):
+            with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):
+                table = _read_texts(path, index_col=False)
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read as a tab-separated table: {error}", path=path) from error
     rows = [{str(name).strip(): value.strip() for name, value in row.items()} for row in table.to_dict("records")]
@@ -117,6 +122,10 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     if not rows:
         raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
     return rows
+
+
+def _read_texts(path: AnyPath, index_col: Literal[False] | None = None) -> pd.DataFrame:
+    return pd.read_csv(path, sep="\t", dtype=str, keep_default_na=False, encoding="utf-8-sig", index_col=index_col)
 
 
 def read_table(path: AnyPath) -> pd.DataFrame:

@@ -30,6 +30,16 @@ LABELS = ATLAS / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
         ("sub-21_dseg.nii.gz", None),
         ("week99.nii.gz", None),
         ("T2w.nii.gz", None),
+        ("GestationalAge24_seg", 24),
+        ("sub-01_EGA25_seg", 25),
+        # numbers of subjects after words that end as a name of an age does
+        ("patient23_seg.nii.gz", None),
+        ("subject-24", None),
+        ("fet_30_labels.nii.gz", None),
+        ("infant-31_seg.nii.gz", None),
+        ("image24_seg.nii.gz", None),
+        ("dataset_21", None),
+        ("PATIENT23", None),
     ],
 )
 def test_ages_are_read_from_names(name, week):

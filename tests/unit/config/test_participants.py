@@ -92,6 +92,52 @@ def test_tables_without_what_is_needed_are_refused(folder, head, said):
         config(folder)
 
 
+@pytest.mark.parametrize("name", ["ga", "GA_weeks", "scan_age", "gestational_age_weeks", "Gestational_Age", "Age"])
+def test_the_age_is_found_by_any_of_its_names(folder, name):
+    write(folder, ("id", name, "labels", "scheme"), ("sub-1", "24.3", "a.nii.gz", "feta-7"))
+    assert config(folder).brains[0].week == 24.3
+
+
+@pytest.mark.parametrize("name", ["ga", "GA_weeks", "scan_age", "gestational_age_weeks", "Gestational_Age"])
+def test_the_mothers_age_is_not_taken_for_the_gestational_age(folder, name):
+    head, row = ("id", "age", name, "labels", "scheme"), ("a.nii.gz", "feta-7")
+    write(folder, head, ("sub-1", "31", "24.3", *row))
+    with pytest.raises(InputError, match=rf"participants\.tsv: has several columns(.|\n)*found {name} and age"):
+        config(folder)
+    # two that say the same leave no doubt
+    write(folder, head, ("sub-1", "24.30", "24.3", *row), ("sub-2", "n/a", "n/a", *row))
+    assert [brain.week for brain in config(folder, keep_going=True).brains] == [24.3]
+
+
+def test_the_column_called_gestational_age_is_believed(folder):
+    head = ("id", "age", "ga", "gestational_age", "labels", "scheme")
+    write(folder, head, ("sub-1", "31", "38", "24.3", "a.nii.gz", "feta-7"))
+    assert config(folder).brains[0].week == 24.3
+
+
+def test_rows_of_one_id_are_problems_where_one_cannot_be_used(folder):
+    head, row = ("id", "age", "labels", "scheme"), ("a.nii.gz", "feta-7")
+    write(folder, head, ("sub-1", "24", *row), ("sub-2", "n/a", *row), ("sub-2", "170", *row))
+    with pytest.raises(InputError, match=r"2 problems(.|\n)*sub-2: age: found n/a(.|\n)*sub-2: age: found 170"):
+        config(folder)
+    write(folder, head, ("sub-1", "24", *row), ("sub-1", "n/a", *row))
+    with pytest.raises(InputError, match=r"sub-1: age: found n/a(.|\n)*the id is that of 2 rows; ids are unique"):
+        config(folder, keep_going=True)
+
+
+@pytest.mark.parametrize(
+    ("files", "side", "said"),
+    [
+        ("lh.surf.gii; rh.surf.gii; a.nii.gz", "n/a", "found 3, lh.surf.gii; rh.surf.gii; a.nii.gz; expected a left"),
+        ("lh.surf.gii; rh.surf.gii", "left", "found 2, lh.surf.gii; rh.surf.gii; expected the one of its side"),
+    ],
+)
+def test_more_files_than_are_used_are_refused(folder, files, side, said):
+    write(folder, ("id", "age", "files", "side"), ("sub-1", "24", files, side))
+    with pytest.raises(InputError, match=f"sub-1: files: {said}"):
+        config(folder)
+
+
 def test_a_hemisphere_is_a_surface_or_labels_with_a_scheme(folder):
     def problems(**keys):
         brain = {"id": "a", "week": 24} | keys

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from gyriflow.errors import InputError, StorageError
-from gyriflow.io.files import read_json, read_table, replaced, write_json, write_table
+from gyriflow.io.files import read_json, read_tab_separated, read_table, replaced, write_json, write_table
 
 
 @pytest.mark.promise(1)
@@ -75,3 +75,24 @@ def test_table_comes_back(tmp_path):
     table = pd.DataFrame({"subject": ["a", "b"], "value": [1 / 3, 1e-12]})
     write_table(tmp_path / "a.csv", table)
     pd.testing.assert_frame_equal(read_table(tmp_path / "a.csv"), table, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ("s1\t24\ta", "s2\t25\tb"),
+        # tabs at the end of the rows that the heading does not have
+        ("s1\t24\ta\t", "s2\t25\tb\t"),
+        ("s1\t24\ta\t\t", "s2\t25\tb\t\t"),
+        ("s1\t24\ta\t", "s2\t25\tb"),
+        # names of the rows without a heading, as R writes them
+        ("1\ts1\t24\ta", "2\ts2\t25\tb"),
+    ],
+)
+def test_cells_stay_below_their_heading(tmp_path, rows):
+    path = tmp_path / "participants.tsv"
+    path.write_text("\n".join(("id\tage\tfile", *rows)) + "\n")
+    assert read_tab_separated(path) == [
+        {"id": "s1", "age": "24", "file": "a"},
+        {"id": "s2", "age": "25", "file": "b"},
+    ]
