@@ -8,7 +8,7 @@ from shapes import hemisphere, save_gifti
 
 from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
 from gyriflow.io.files import read_json
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 
@@ -53,8 +53,11 @@ BAD = {
     "metres": (*both(motion(size=1e-3)), PAIR, "the cerebrum's size is not that of week 21"),
     "nowhere": (without_place(LEFT), RIGHT, "{0}.left.gii", "has NaN or infinite coordinates; found 3 vertices"),
     "torn": (LEFT, RIGHT, "{0}.right.gii", "cannot be read as GIFTI"),
+    "named": (LEFT, RIGHT, "{0}.left.gii", "is of the other hemisphere; found CortexRight"),
 }
-REFUSED = trying({"swapped": 9, "unequal": 14, "overlapping": 14, "microns": 4, "metres": 4, "nowhere": 13, "torn": 12})
+REFUSED = trying(
+    {"swapped": 9, "named": 9, "unequal": 14, "overlapping": 14, "microns": 4, "metres": 4, "nowhere": 13, "torn": 12}
+)
 GUESSES = {"microns": "The file seems to be in micrometres", "metres": "The file seems to be in metres"}
 MATRIX = motion(0, 0, 90, shift=(7.0, 8.0, 9.0))
 LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -73,6 +76,7 @@ def study(checkout_copy, tmp_path_factory):
             save_gifti(workflow.directory / files[side], surface, matrix)
         coordinates = "lps" if name == "lps" else "ras"
         brains.append({"id": name, "week": 21, "coordinates": coordinates, "hemispheres": files})
+    write_surface(workflow.directory / "named.left.gii", LEFT, "CortexRight")
     torn = workflow.directory / "torn.right.gii"
     torn.write_bytes(torn.read_bytes()[: torn.stat().st_size // 2])
     config = {"brains": brains, "start": "placed", "surface": {"edge_length_mm": 2.0}, "folding": {"end_week": 23}}

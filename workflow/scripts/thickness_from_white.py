@@ -1,13 +1,17 @@
 """Cortical thickness at the vertices of a brain's pial surface: its distance from the white surfaces."""
 
 from gyriflow.io.files import read_json, write_json
-from gyriflow.io.surfaces import read_surface, write_vertex_maps
+from gyriflow.io.surfaces import read_one_hemisphere, read_surface, write_vertex_maps
+from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 from gyriflow.surface.white import thickness_from_white
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], *params.white.values()):
-    whites = {side: read_surface(path) for side, path in params.white.items()}
+    whites = {
+        side: read_one_hemisphere(path, side) if side in SIDES else read_surface(path)
+        for side, path in params.white.items()
+    }
     thickness = thickness_from_white(read_surface(files.surface), read_json(files.report), whites)
     write_vertex_maps(snakemake.output.thickness, {"cortical thickness (mm)": thickness.values_mm})
     write_vertex_maps(snakemake.output.measured, {"thickness_mm": thickness.measured_mm})

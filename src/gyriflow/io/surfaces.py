@@ -41,7 +41,7 @@ def read_surface(path: AnyPath) -> TriangleMesh:
         vertices, faces = _read_with_trimesh(path)
     elif suffix in VTK_SUFFIXES:
         vertices, faces = _read_with_pyvista(path)
-    elif suffix == ".gii" or path.name.endswith(".gii.gz"):
+    elif _is_gifti(path):
         vertices, faces = _read_gifti_surface(path)
     else:
         vertices, faces = read_freesurfer_surface(path)
@@ -74,16 +74,11 @@ def declared(path: AnyPath) -> tuple[str | None, str | None]:
     Both are None where it does not say so. The space is a NIfTI transform code's name, such as
     "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
     """
-    suffix = Path(path).suffix.lower()
-    if suffix in (*MESH_SUFFIXES, *VTK_SUFFIXES):
+    if Path(path).suffix.lower() in (*MESH_SUFFIXES, *VTK_SUFFIXES):
         return None, None
-    if suffix != ".gii" and not Path(path).name.endswith(".gii.gz"):
-        return freesurfer_space(path), FREESURFER_SIDES.get(Path(path).name.split(".")[0])
-    image = load_gifti(path)
-    points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
-    if not points:
-        return None, None
-    structure = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
+    structure = _structure(path)
+    if not _is_gifti(path):
+        return freesurfer_space(path), structure
     return to_scanner_space(coordinate_systems(path), path)[1], structure
 
 
@@ -99,14 +94,15 @@ def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, Trian
 
 def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
     """Returns the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
-    found, expected = declared(path)[1], STRUCTURES[side]
+    found, expected = _structure(path), STRUCTURES[side]
     if found in STRUCTURES.values() and found != expected:
         raise InputError(
             "is of the other hemisphere",
             path=path,
             found=found,
             expected=expected,
-            remedy="Swap `left` and `right`, or set the other `side`, in the configuration.",
+            remedy="Swap `left` and `right`, or set the other `side`, in the configuration; or mend what the file says "
+            "of itself (AnatomicalStructurePrimary, lh or rh in its name), if that is wrong.",
         )
     return read_surface(path)
 
@@ -190,6 +186,24 @@ def load_gifti(path: AnyPath) -> GiftiImage:
     if not isinstance(image, GiftiImage):
         raise InputError("is not a GIFTI file", path=path, found=type(image).__name__, expected="a .gii file")
     return image
+
+
+def _is_gifti(path: AnyPath) -> bool:
+    return Path(path).suffix.lower() == ".gii" or Path(path).name.endswith(".gii.gz")
+
+
+def _structure(path: AnyPath) -> str | None:
+    """Returns the structure that a surface's file names, such as "CortexLeft"; None where it names none."""
+    if Path(path).suffix.lower() in (*MESH_SUFFIXES, *VTK_SUFFIXES):
+        return None
+    if not _is_gifti(path):
+        return FREESURFER_SIDES.get(Path(path).name.split(".")[0])
+    image = load_gifti(path)
+    points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
+    if not points:
+        return None
+    found: str | None = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
+    return found
 
 
 def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:

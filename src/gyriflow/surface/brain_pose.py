@@ -79,21 +79,18 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     expected = {"cerebellum": TO_CEREBELLUM, "brainstem": TO_BRAINSTEM}
     found = {name: centres[name] - centres["cerebrum"] for name in expected if name in centres}
     rotation = _from_hindbrain(found, expected) if len(found) == 2 else None
-    sides = centres["right"] - centres["left"] if {"left", "right"} <= set(centres) else None
-    if sides is not None:
-        sides = sides / np.linalg.norm(sides)
-        if rotation is not None and (rotation @ sides)[0] < 0:
+    sides = _unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None
+    if sides is not None and found:
+        hindbrain = [(_unit(found[name]), expected[name]) for name in found]
+        turn, mirrored = (_turn_onto([(one, TO_RIGHT), *hindbrain]) for one in (sides, -sides))
+        if _is_mirrored(turn, mirrored) if rotation is None else (rotation @ sides)[0] < 0:
             raise InputError(
                 "labels of the left hemisphere lie on the right",
-                found="the sides are the wrong way round where cerebellum and brainstem are below and behind",
+                found=f"the sides are the wrong way round with {' and '.join(found)} below and behind",
                 expected="left at the smaller x (RAS+)",
                 remedy="The volume's affine mirrors the brain, or the scheme's sides are swapped.",
             )
-        if found:
-            pairs = [(sides, TO_RIGHT), *((_unit(found[name]), expected[name]) for name in found)]
-            rotation = Rotation.align_vectors([ours for _, ours in pairs], [theirs for theirs, _ in pairs])[
-                0
-            ].as_matrix()
+        rotation = turn
     if rotation is None:
         return None
     by = " and ".join([*found, *(["the labelled sides"] if sides is not None else [])])
@@ -171,6 +168,26 @@ def pose_surface_by_shape(mesh: TriangleMesh, coordinates: str) -> BrainPose:
     return BrainPose(rotation, "shape", (f"the brain was turned by {angles['ras']:.0f}°, as its shape says",))
 
 
+def doubts_of_hemispheres(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> list[str]:
+    """Returns what the shapes of two hemispheres say against their sides and the coordinates, "ras" or "lps".
+
+    The surfaces are in RAS+ already, if these are right. Files of the wrong side in the wrong one of the two still
+    lie side by side, but with their Sylvian fissures behind the middle.
+    """
+    shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
+    clear = min(shape.confidence for shape in shapes) >= LEAST_CONFIDENCE
+    turns = [angle_deg(shape.rotation) for shape in shapes]
+    ahead = float(np.mean([shape.sylvian for shape in shapes]))
+    # a doubtful shape may be upside down, where front and back change places
+    if ahead < -SYLVIAN_AHEAD and (clear or max(turns) < LEAST_TURN_DEG):
+        return [f"the Sylvian fissures lie {-ahead:.2f} of the size behind the middle: are left and right swapped, and "
+                f"the coordinates not {coordinates.upper()}? Check both, or set coordinates: auto"]  # fmt: skip
+    if ahead >= SYLVIAN_AHEAD and clear and min(turns) > LEAST_TURN_DEG:
+        return [f"the shapes say that the hemispheres are turned by {np.mean(turns):.0f}° against the coordinates "
+                f"{coordinates}: check them, or set coordinates: auto"]  # fmt: skip
+    return []
+
+
 def _from_hindbrain(found: dict[str, Floats], expected: dict[str, Floats]) -> Floats | None:
     """Returns the rotation from cerebellum and brainstem; None where they lie in one direction."""
     one, other = _unit(found["cerebellum"]), _unit(found["brainstem"])
@@ -185,11 +202,35 @@ def _from_hindbrain(found: dict[str, Floats], expected: dict[str, Floats]) -> Fl
     return np.asarray(Rotation.align_vectors(ours, theirs)[0].as_matrix())
 
 
+def _turn_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
+    """Returns the rotation (3, 3) that brings the first direction of each pair nearest to the second."""
+    ours, theirs = zip(*pairs, strict=True)
+    return np.asarray(Rotation.align_vectors(theirs, ours)[0].as_matrix())
+
+
+def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
+    """Returns whether exchanged sides explain a volume better than a turn does.
+
+    Sides and one more direction fit some rotation, `turn`, even where they are mirrored: a half turn about an oblique
+    axis. With the sides exchanged they fit `mirrored`, which is then as small as the brain's tilt. Wrong axis codes
+    turn by quarters instead, most often from LPS; else sides of a brain that is upright are taken to be exchanged.
+    """
+    if angle_deg(turn) < LEAST_TURN_DEG:
+        return False
+    off_lps, off_quarters = (angle_deg(turn @ axes.T) for axes in (CONVENTIONS["lps"], _nearest_quarters(turn)))
+    return angle_deg(mirrored) < min(LEAST_TURN_DEG, off_lps, max(DOUBTFUL_TURN_DEG, off_quarters))
+
+
+def _nearest_quarters(rotation: Floats) -> Floats:
+    """Returns the rotation by quarter turns that is nearest to a (3, 3) rotation."""
+    quarters = Rotation.create_group("O").as_matrix()
+    return np.asarray(min(quarters, key=lambda turn: angle_deg(rotation @ turn.T)).round())
+
+
 def _turn_by_quarters(rotation: Floats) -> Floats:
     """Returns the rotation by quarter turns that is within 15° of a (3, 3) rotation, else the rotation."""
-    quarters = Rotation.create_group("O").as_matrix()
-    nearest = min(quarters, key=lambda turn: angle_deg(rotation @ turn.T))
-    return np.asarray(nearest.round() if angle_deg(rotation @ nearest.T) < QUARTERS_DEG else rotation)
+    nearest = _nearest_quarters(rotation)
+    return nearest if angle_deg(rotation @ nearest.T) < QUARTERS_DEG else rotation
 
 
 def _keep_or_turn(rotation: Floats, by: str) -> BrainPose:

@@ -93,7 +93,8 @@ def from_labels(
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
     box, first = crop(mask)
     extents = np.linalg.norm(affine[:3, :3], axis=0) * [side.stop - side.start for side in box]
-    require_plausible_size(volume, extents, week)
+    for doubt in require_plausible_size(volume, extents, week):
+        warn(report, doubt)
     report["mask_volume_mL"] = volume * ML_PER_MM3
     report_border(mask, report)
     mask, tissue = np.pad(mask[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS)
@@ -169,7 +170,9 @@ def hemisphere_from_labels(
     mask = np.isin(tissue, scheme.cerebrum)
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
     box, first = crop(mask)
-    require_plausible_size(2.0 * volume, np.linalg.norm(affine[:3, :3], axis=0) * [s.stop - s.start for s in box], week)
+    extents = np.linalg.norm(affine[:3, :3], axis=0) * [along.stop - along.start for along in box]
+    for doubt in require_plausible_size(2.0 * volume, extents, week):
+        warn(report, doubt)
     report["mask_volume_mL"] = volume * ML_PER_MM3
     report_border(mask, report)
     affine = shifted_affine(affine, first)

@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import TriangleMesh, area, corners, merged, signed_volume, transformed
-from .brain_pose import DOUBTFUL_BRAIN, NARROWEST_BRAIN, narrowness, pose_surface_by_shape
+from .brain_pose import (
+    DOUBTFUL_BRAIN,
+    NARROWEST_BRAIN,
+    doubts_of_hemispheres,
+    narrowness,
+    pose_surface_by_shape,
+)
 from .fissure import SHIFTED_MM, fissure_between
 from .hemisphere_pose import CONVENTIONS, pair_by_shape
 from .hemispheres import least_gap, left_faces, require_common_pose, require_pair, set_apart
@@ -46,15 +52,16 @@ def from_hemispheres(
     The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
     other. With coordinates "auto" each may be in any rigid pose; `posing` is then the report of the pose if it is known
-    already, as from all brains of a study. InputError where the pose cannot be determined, or the hemispheres are
-    swapped, of different size or not of the week's size; MeshError where one can't be made a closed surface without
-    handles and intersections.
+    already, as from all brains of a study. With coordinates that are named, a shape that contradicts them is told.
+    InputError where the pose cannot be determined, or the hemispheres are swapped, of different size or not of the
+    week's size; MeshError where one can't be made a closed surface without handles and intersections.
     """
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
     left, report["repair_left"] = hemisphere(in_ras(left, coordinates), max_hole_mm, report)
     right, report["repair_right"] = hemisphere(in_ras(right, coordinates), max_hole_mm, report)
     volume = signed_volume(left) + signed_volume(right)
-    require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week)
+    for doubt in require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week):
+        warn(report, doubt)
     placing = None
     if coordinates == "auto":
         placing = as_poses(posing) if posing else poses([pair_by_shape(left, right, limits)], [False])[0]
@@ -62,8 +69,11 @@ def from_hemispheres(
         for warning in placing.report["warnings"]:
             warn(report, warning)
     both = merged(left, right)
-    for warning in require_pair(left, right, limits):
-        warn(report, warning)
+    doubts = require_pair(left, right, limits, coordinates)
+    if coordinates != "auto":
+        doubts += doubts_of_hemispheres(left, right, coordinates)
+    for doubt in doubts:
+        warn(report, doubt)
     left = make_sound(left, smoothing_iterations, edge_length_mm, report, "mesh_left")
     right = make_sound(right, smoothing_iterations, edge_length_mm, report, "mesh_right")
     plane = mid_plane(merged(left, right))
@@ -117,7 +127,8 @@ def from_pial(
     mesh, report["repair"] = clean(mesh, max_hole_mm)
     _report_dropped(report["repair"], area(mesh), report)
     mesh = without_stalks(mesh, report)
-    require_plausible_size(signed_volume(mesh), np.ptp(mesh.vertices, axis=0), week)
+    for doubt in require_plausible_size(signed_volume(mesh), np.ptp(mesh.vertices, axis=0), week):
+        warn(report, doubt)
     mesh = make_sound(mesh, smoothing_iterations, edge_length_mm, report)
     _require_both(mesh, report)
     pose = pose_surface_by_shape(mesh, coordinates)
@@ -153,7 +164,8 @@ def from_hemisphere(
     """
     report: dict[str, Any] = {"source": "hemisphere", "side": side, "coordinates": coordinates}
     mesh, report["repair"] = hemisphere(mesh, max_hole_mm, report)
-    require_plausible_size(2.0 * signed_volume(mesh), np.ptp(mesh.vertices, axis=0), week)
+    for doubt in require_plausible_size(2.0 * signed_volume(mesh), np.ptp(mesh.vertices, axis=0), week):
+        warn(report, doubt)
     require_one(mesh)
     mesh = make_sound(mesh, smoothing_iterations, edge_length_mm, report)
     return single_hemisphere(mesh, side, coordinates, report, week)

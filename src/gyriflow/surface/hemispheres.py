@@ -103,10 +103,11 @@ def cut_sides(mesh: TriangleMesh, left: NDArray[np.bool_]) -> tuple[TriangleMesh
     return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
 
 
-def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits) -> list[str]:
+def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits, coordinates: str) -> list[str]:
     """Returns what is doubtful about two surfaces in RAS+ as the left and right hemisphere of one brain.
 
-    InputError where their centroids are not in order (left is the smaller x), or their volumes too different.
+    `coordinates` are those that the user has named, "ras", "lps" or "auto". InputError where their centroids are not in
+    order (left is the smaller x), or their volumes too different.
     """
     x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
     if x_left >= x_right:
@@ -114,7 +115,7 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits) -> lis
             "the left hemisphere lies to the right of the right one",
             found=f"centroids at x = {x_left:.1f} (left) and {x_right:.1f} mm (right)",
             expected="left at the smaller x (RAS+)",
-            remedy="The files are swapped, or their coordinates are LPS: set coordinates: lps.",
+            remedy=_remedy_of_order(coordinates),
         )
     volumes = signed_volume(left), signed_volume(right)
     ratio = max(volumes) / min(volumes)
@@ -129,6 +130,17 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits) -> lis
     if ratio > DOUBTFUL_RATIO:
         return [f"the hemispheres' volumes differ by {100 * (ratio - 1):.0f} %: are they of one brain?"]
     return []
+
+
+def _remedy_of_order(coordinates: str) -> str:
+    """Returns what to do where left and right are not in order in the coordinates that the user has named."""
+    other = {"ras": "lps", "lps": "ras"}.get(coordinates)
+    if other is None:
+        return "The files seem to be swapped: swap `left` and `right`; or, if they are right, name the coordinates."
+    return (
+        f"Either the coordinates are {other.upper()} (set coordinates: {other}) or the files are swapped (swap `left` "
+        "and `right`). Both changes together would turn the brain back to front; in doubt, set coordinates: auto."
+    )
 
 
 def least_gap(left: TriangleMesh, right: TriangleMesh) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.layers import layer_thickness, nearest_on
 from ..geometry.triangles import TriangleMesh, merged, transformed, vertex_areas
+from ..parameters.terms import SIDES
 from .thickness import Thickness, summary
 
 Floats = NDArray[np.float64]
@@ -27,9 +28,10 @@ def thickness_from_white(
 
     `surface` is the whole pial surface and `report` what was found when it was made, with its pose. `whites` are the
     white surfaces in the coordinates of the files that the pial one was made from, by side: "left", "right", or
-    "whole". InputError where a white surface crosses the pial one.
+    "whole". InputError where that of a side lies on the other one, and where a white surface crosses the pial one.
     """
     for side, white in _posed(report, whites).items():
+        _require_own_side(white, side, report["fissure_x_mm"])
         _require_inside(white, surface, side)
     inner = merged(*_posed(report, whites).values())
     values = layer_thickness(surface, inner)
@@ -52,6 +54,18 @@ def posed_whites(report: Mapping[str, Any], whites: Mapping[str, TriangleMesh]) 
 def _posed(report: Mapping[str, Any], whites: Mapping[str, TriangleMesh]) -> dict[str, TriangleMesh]:
     motions = report.get("motions", {})
     return {side: transformed(mesh, np.array(motions.get(side, report["pose"]))) for side, mesh in whites.items()}
+
+
+def _require_own_side(white: TriangleMesh, side: str, fissure_x_mm: float) -> None:
+    """Raises InputError where the middle of a side's white surface is beyond the fissure."""
+    middle = float(np.average(white.vertices[:, 0], weights=vertex_areas(white)))
+    if side in SIDES and (middle < fissure_x_mm) != (side == "left"):
+        raise InputError(
+            f"the white surface ({side}) lies in the other hemisphere",
+            found=f"its middle at x = {middle:.1f} mm, the fissure at {fissure_x_mm:.1f} mm",
+            expected=f"{'<' if side == 'left' else '>'} {fissure_x_mm:.1f} mm (RAS+)",
+            remedy="Give each side its own white surface: they are swapped, or both are of one side.",
+        )
 
 
 def _require_inside(white: TriangleMesh, pial: TriangleMesh, side: str) -> None:

@@ -11,7 +11,14 @@ from nibabel.nifti1 import data_type_codes, intent_codes
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, is_closed, signed_volume
-from gyriflow.io.surfaces import declared, read_surface, read_vertex_maps, write_surface, write_vertex_maps
+from gyriflow.io.surfaces import (
+    declared,
+    read_one_hemisphere,
+    read_surface,
+    read_vertex_maps,
+    write_surface,
+    write_vertex_maps,
+)
 
 
 @pytest.fixture
@@ -154,6 +161,18 @@ def test_freesurfer_surface_without_its_volume_stays_and_that_is_said(tmp_path, 
     assert read_surface(tmp_path / "rh.white").vertices == pytest.approx(ball.vertices, abs=1e-4)
     assert "relative to its centre" in caplog.text
     assert declared(tmp_path / "rh.white") == (None, "CortexRight")
+
+
+def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
+    write_surface(tmp_path / "a.surf.gii", ball, "CortexRight")
+    write_geometry(tmp_path / "rh.pial", ball.vertices, ball.faces, volume_info=volume())
+    for name in ("a.surf.gii", "rh.pial"):
+        assert len(read_one_hemisphere(tmp_path / name, "right").faces) == len(ball.faces)
+        with pytest.raises(InputError, match=rf"{name}: is of the other hemisphere.*Swap `left` and `right`"):
+            read_one_hemisphere(tmp_path / name, "left")
+    # the matrix of a file is told once
+    read_one_hemisphere(in_spaces(tmp_path / "b.gii", ball, (U, SCANNER, TURN)), "left")
+    assert caplog.text.count("was applied") == 1
 
 
 def test_file_of_no_known_kind_is_refused_with_those_known(tmp_path):

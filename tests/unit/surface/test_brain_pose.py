@@ -12,7 +12,7 @@ from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import phantom_labels
-from gyriflow.surface.brain_pose import narrowness, pose_of_labels, pose_surface_by_shape
+from gyriflow.surface.brain_pose import doubts_of_hemispheres, narrowness, pose_of_labels, pose_surface_by_shape
 from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 
 TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]
@@ -73,6 +73,19 @@ def test_a_turned_brain_is_turned_and_a_mirrored_one_is_called_so(brain, turn):
         pose_of_labels(labels, turned(turn) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
 
 
+@pytest.mark.parametrize("lost", [(10,), (11, 12)], ids=["cerebellum", "brainstem"])
+def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(brain, lost):
+    labels, affine = pathologies.add_sides(*brain), brain[1]
+    labels = np.where(np.isin(labels, lost), 0, labels)
+    for turn in TURNS:
+        pose = pose_of_labels(labels, turned(turn) @ affine, SCHEMES["dhcp-19"])
+        np.testing.assert_allclose(pose.rotation @ turned(turn)[:3, :3], np.eye(3), atol=1e-9)
+    for tilt in ((0, 0, 0), (0, 10, 8), (0, -5, 12)):
+        assert pose_of_labels(labels, turned(tilt) @ affine, SCHEMES["dhcp-19"]).by == "file"
+        with pytest.raises(InputError, match=r"left hemisphere lie on the right.*affine mirrors"):
+            pose_of_labels(labels, turned(tilt) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
+
+
 def test_labels_without_hindbrain_and_sides_tell_no_pose(brain):
     labels, affine = brain
     assert pose_of_labels((labels > 0).astype(int), affine, SCHEMES["binary"]) is None
@@ -118,3 +131,15 @@ def test_hemispheres_are_narrow_and_brains_are_not(brain):
     labels, affine = brain
     assert narrowness(surface_of(labels, affine)) > 0.6
     assert narrowness(surface_of(pathologies.one_hemisphere(labels, affine), affine)) < 0.45
+
+
+@pytest.mark.fault(9, 10)
+def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted(brain):
+    left, right = (surface_of(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right"))
+    assert doubts_of_hemispheres(left, right, "ras") == []
+    # files that are swapped, and in the other one of RAS and LPS: back to front
+    about = [transformed(side, turned((0, 0, 180))) for side in (right, left)]
+    (doubt,) = doubts_of_hemispheres(*about, "lps")
+    assert "behind the middle: are left and right swapped, and the coordinates not LPS?" in doubt
+    (doubt,) = doubts_of_hemispheres(*(transformed(side, turned((180, 0, 0))) for side in (left, right)), "ras")
+    assert "turned by 1" in doubt

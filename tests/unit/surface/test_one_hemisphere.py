@@ -91,3 +91,7 @@ def test_white_surfaces_give_the_thickness_in_any_pose_and_may_not_cross(sides):
     assert thickness.measured.mean() > 0.98
     with pytest.raises(InputError, match=r"the white surface \(left\) crosses the pial one"):
         thickness_from_white(surface.whole, surface.report, whites | {"left": inner(moved[0], -1.5)})
+    with pytest.raises(
+        InputError, match=r"the white surface \(right\) lies in the other hemisphere.*both are of one side"
+    ):
+        thickness_from_white(surface.whole, surface.report, whites | {"right": whites["left"]})

@@ -33,7 +33,7 @@ from gyriflow.surface.from_labels import from_labels
 from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres, from_pial
 from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
 from gyriflow.surface.repair import pieces
-from gyriflow.surface.size import require_plausible_size
+from gyriflow.surface.size import expected_volume_ml, require_plausible_size
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
 ATLAS = SCHEMES["spina-bifida-atlas"]
@@ -152,6 +152,21 @@ def test_small_large_and_adult_brains_pass(week, volume_ml):
     require_plausible_size(volume_ml * 1e3, np.ones(3), week)
 
 
+@pytest.mark.parametrize(("share", "doubted"), [(0.57, False), (1.24, False), (0.8**-3, True), (0.3, True)])
+def test_a_volume_far_from_that_of_the_week_is_doubted(share, doubted):
+    said = require_plausible_size(share * expected_volume_ml(24.0) * 1e3, np.ones(3), 24.0)
+    assert [f"has {100 * share:.0f} % of the volume expected at week 24" in doubt for doubt in said] == [True] * doubted
+
+
+@pytest.mark.fault(4)
+def test_a_surface_in_voxel_indices_is_told(phantom):
+    assert not any("voxel indices" in warning for warning in phantom.report["warnings"])
+    # voxels of 0.7 mm
+    indices = transformed(phantom.whole, np.diag([1 / 0.7] * 3 + [1.0]))
+    surface = from_pial(indices, week=24.0, edge_length_mm=3.0)
+    assert any("not in voxel indices?" in warning for warning in surface.report["warnings"])
+
+
 def test_hemispheres_are_merged_apart_and_whole(halves):
     surface = from_hemispheres(*halves, week=24.0, **QUICK)
     require_sound(surface, surfaces=2)
@@ -203,8 +218,20 @@ def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain(halves
 
 @pytest.mark.fault(9)
 def test_swapped_hemispheres_are_refused(halves):
-    with pytest.raises(InputError, match="swapped"):
+    with pytest.raises(InputError, match=r"are LPS \(set coordinates: lps\) or the files are swapped.*Both changes"):
         from_hemispheres(*reversed(halves), week=24.0)
+    with pytest.raises(InputError, match=r"are RAS \(set coordinates: ras\) or the files are swapped.*Both changes"):
+        from_hemispheres(*halves, week=24.0, coordinates="lps")
+
+
+@pytest.mark.fault(9)
+def test_hemispheres_that_are_swapped_and_in_other_coordinates_are_doubted(halves):
+    wrong, good = (
+        from_hemispheres(*sides, week=24.0, coordinates=name, edge_length_mm=2.5).report["warnings"]
+        for sides, name in ((halves[::-1], "lps"), (halves, "ras"))
+    )
+    assert any("behind the middle" in warning for warning in wrong)
+    assert not any("behind the middle" in warning for warning in good)
 
 
 @pytest.mark.fault(14)
