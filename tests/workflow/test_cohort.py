@@ -131,6 +131,10 @@ def test_tables_and_figures_are_of_the_side_that_there_is(cohort):
     for name in ("metrics", "similarity"):
         assert set(pd.read_csv(study / f"{name}.csv")["hemisphere"]) == {"whole", "left"}
     assert set(pd.read_csv(study / "spectra.csv")["hemisphere"]) == {"left"}
+    published = pd.read_csv(cohort.results / "brains" / "sub-02" / "metrics" / "published_centiles.csv")
+    # the norms are of both sides
+    assert set(published["flag"]) == {"one hemisphere"}
+    assert published["centile"].isna().all()
     for name in ("zones", "shape_index"):
         assert (cohort.results / "runs" / "reference" / "sub-01" / "figures" / f"{name}.png").exists()
 

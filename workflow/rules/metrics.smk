@@ -244,5 +244,6 @@ rule label_volumes:
         labels=lambda wildcards: brain_labels(f"brains/{wildcards.brain}/metrics"),
         affine_from=lambda wildcards: CONFIG.brain(wildcards.brain).affine_from,
         scheme=lambda wildcards: CONFIG.scheme(CONFIG.brain(wildcards.brain)),
+        sides=lambda wildcards: sides_of(wildcards.brain),
     script:
         "../scripts/label_volumes.py"

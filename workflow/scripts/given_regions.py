@@ -23,10 +23,8 @@ with step(snakemake.log[0], *given):
         numbers = number_regions(params.names)
         regions = renumber(volume.labels, params.names, numbers)
         back = np.linalg.inv(volume_pose(report, files.volume))
-        found = {
-            side: regions_from_volume(transform_points(mesh.vertices, back), regions, volume.affine)
-            for side, mesh in meshes.items()
-        }
+        points = {side: transform_points(mesh.vertices, back) for side, mesh in meshes.items()}
+        found = regions_from_volume(points, regions, volume.affine)
     else:
         read = {side: read_vertex_labels(files[f"{side}_labels"]) for side in SIDES}
         tables = {side: params.names or names for side, (_, names) in read.items()}

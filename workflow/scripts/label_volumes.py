@@ -21,5 +21,5 @@ with step(snakemake.log[0], labels):
     write_table(output.volumes, table.assign(**params.labels)[[*params.labels, *table.columns]])
     norms = published_norms(read_yaml(snakemake.input.norms))
     found, others = structure_volumes(volumes, scheme, norms)
-    scores = published_scores(found, params.labels["week"], norms, others)
+    scores = published_scores(found, params.labels["week"], norms, others, params.sides)
     write_table(output.scores, scores.assign(subject=params.labels["subject"])[["subject", *scores.columns]])

@@ -50,12 +50,14 @@ class MetricsSettings(Settings):
         None, "",
         "Ids of the measured brains from which apparent ages are estimated, of at least five weeks. `null`: all that "
         "are not synthetic (of several populations, that of the start brain), or all phantoms if there are no others. "
-        "There is no age profile with fewer than five weeks.",
+        "There is no age profile with fewer than five weeks. Those with other hemispheres than the first start brain "
+        "are left out.",
     )  # fmt: skip
     norm_reference: tuple[str, ...] | None = setting(
         None, "",
         "Ids of the measured brains that others, and each of themselves, are compared with in tables of centiles. "
-        "`null`: chosen as for `age_reference`, of any number of weeks.",
+        "`null`: chosen as for `age_reference`, of any number of weeks. Those with other hemispheres than the first "
+        "start brain are left out.",
     )  # fmt: skip
     regions: dict[str, GivenRegions] = setting(
         {}, "",

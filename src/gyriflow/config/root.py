@@ -296,16 +296,19 @@ class Config(Settings):
         if not self.start_brains:
             return []
         start = self.brain(self.start_brains[0])
-        alike = [brain for brain in self.brains if brain.sides == start.sides]
-        return age_reference(alike, self.metrics.age_reference, start.population)
+        return age_reference(self._with_sides_of(start), self.metrics.age_reference, start.population)
 
     @property
     def norm_reference(self) -> list[str]:
         """The ids of the measured brains that centiles are of."""
         if not self.start_brains:
             return []
-        population = self.brain(self.start_brains[0]).population
-        return reference_brains(self.brains, self.metrics.norm_reference, population)
+        start = self.brain(self.start_brains[0])
+        return reference_brains(self._with_sides_of(start), self.metrics.norm_reference, start.population)
+
+    def _with_sides_of(self, start: Brain) -> list[Brain]:
+        """Returns the brains that have the hemispheres of a start brain: half a brain is no measure of whole ones."""
+        return [brain for brain in self.brains if brain.sides == start.sides]
 
     def regions_from(self, brain: str) -> str | None:
         """Returns the brain whose regions a brain gets; None where no regions are given, or it has one side only."""

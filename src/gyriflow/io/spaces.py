@@ -2,6 +2,7 @@
 
 import logging
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -23,6 +24,8 @@ UNKNOWN = "NIFTI_XFORM_UNKNOWN"
 SCANNER = "NIFTI_XFORM_SCANNER_ANAT"
 SUBJECT = (SCANNER, "NIFTI_XFORM_ALIGNED_ANAT")
 RIGID = 1e-3
+C_RAS = ("VolGeomC_R", "VolGeomC_A", "VolGeomC_S")
+"""FreeSurfer's metadata of points in GIFTI: where the centre of their volume is in scanner space, in mm."""
 
 
 def coordinate_systems(path: AnyPath) -> list[System]:
@@ -91,6 +94,26 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
         return nothing, None
     named = next((to for data, to, _ in systems if UNKNOWN not in (data, to)), None)
     return nothing, named or next((to for _, to, _ in systems if to in SUBJECT), None)
+
+
+def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
+    """Warns where points whose space a file does not say may be relative to the centre of a volume (tkr RAS).
+
+    `metadata` are those of the points. FreeSurfer's converter gives the volume's centre there, whichever space it
+    writes the points in.
+    """
+    try:
+        centre = [float(metadata[key]) for key in C_RAS]
+    except (KeyError, ValueError):
+        return
+    if any(abs(place) > 1e-3 for place in centre):
+        log.warning(
+            "%s: does not say the space of its coordinates: they may be relative to the centre of FreeSurfer's volume "
+            "(tkr RAS), off volumes in scanner space by C_RAS = (%g, %g, %g) mm. Before volumes of regions or maps are "
+            "used with it, convert it anew with mris_convert --to-scanner",
+            path,
+            *centre,
+        )
 
 
 def freesurfer_space(path: AnyPath) -> str | None:

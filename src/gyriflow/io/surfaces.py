@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..geometry.triangles import TriangleMesh, is_closed
 from ..parameters.terms import Side
 from .files import AnyPath, replaced
-from .spaces import coordinate_systems, freesurfer_space, read_freesurfer_surface, to_scanner_space
+from .spaces import coordinate_systems, freesurfer_space, read_freesurfer_surface, to_scanner_space, warn_of_tkr_ras
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 STRUCTURES: dict[str, Structure] = {"left": "CortexLeft", "right": "CortexRight"}
@@ -218,7 +218,9 @@ def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
             expected="one of each (.surf.gii)",
         )
     vertices = np.asarray(points[0].data, dtype=float)
-    matrix, _ = to_scanner_space(coordinate_systems(path), path)
+    matrix, space = to_scanner_space(coordinate_systems(path), path)
+    if space is None:
+        warn_of_tkr_ras(points[0].meta, path)
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], np.asarray(triangles[0].data)
 
 

@@ -67,6 +67,8 @@ def read_values(
         _require_its_size(image, path)
         values = np.asanyarray(image.dataobj)
     except FileNotFoundError as error:
+        # of a pair of files the one that is not there
+        path = error.filename or path
         raise InputError("no such file", path=path, expected=f"a volume of {content} (.nii, .nii.gz, .mgz)") from error
     except InputError:
         raise
@@ -78,8 +80,7 @@ def read_values(
             remedy="The file may be truncated or of another kind: copy or download it again.",
         ) from error
     values = _three_axes(values, path, content)
-    affine = _nifti_affine(image, affine_from, path) if isinstance(image, nib.Nifti1Image) else image.affine
-    return values, _checked_affine(np.array(affine, dtype=float), path)
+    return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
 
 
 def require_same_grid(labels: LabelVolume, path: AnyPath, image_path: AnyPath, affine_from: AffineSource) -> None:
@@ -116,19 +117,36 @@ def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
 def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
     """Raises InputError where a header asks for more values than its file can hold, before memory is taken for them."""
     needed = math.prod(map(int, image.shape)) * image.get_data_dtype().itemsize
-    packed = str(path).lower().endswith((".gz", ".mgz", ".bz2"))
-    size = Path(path).stat().st_size
+    # of a pair of files the one with the values, not the header
+    data = Path(image.file_map["image"].filename or path)
+    packed = data.name.lower().endswith((".gz", ".mgz", ".bz2"))
+    size = data.stat().st_size
     if needed < 0 or needed > size * (MOST_PACKED if packed else 1):
         raise InputError(
             "is shorter than its header says",
-            path=path,
+            path=data,
             found=f"{size} bytes{' (packed)' if packed else ''}",
             expected=f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}",
             remedy="The file is truncated or its header is damaged: copy or download it again.",
         )
 
 
-def _nifti_affine(image: nib.Nifti1Image, affine_from: AffineSource, path: AnyPath) -> NDArray[np.float64]:
+def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> NDArray[np.float64]:
+    # a single NIfTI file is a special kind of pair to nibabel, and a pair a special kind of Analyze
+    if isinstance(image, nib.Nifti1Pair):
+        return _nifti_affine(image, affine_from, path)
+    if isinstance(image, nib.AnalyzeImage):
+        raise InputError(
+            "is in the Analyze format, which holds no orientation, so left and right are unknown",
+            path=path,
+            found=type(image).__name__,
+            expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)",
+            remedy="Convert it to NIfTI from the images that it was made of, and check its left and right.",
+        )
+    return image.affine
+
+
+def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath) -> NDArray[np.float64]:
     header = image.header
     try:
         matrices = {"sform": header.get_sform(), "qform": header.get_qform()}

@@ -11,6 +11,7 @@ from scipy import stats
 from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..parameters.schemes import LabelScheme
+from ..parameters.terms import SIDES, Side
 from .age_metrics import BRAIN, MEASURED, OF_THE_ANALYSIS
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
@@ -25,6 +26,9 @@ LEAST_FREEDOM = 3
 WINDOW_GW = 0.5
 """Brains at most this far from a week are of that week."""
 
+OTHER_SIDES = "other hemispheres"
+"""The flag of a brain that has other hemispheres than those it would be compared with."""
+
 
 @dataclass(frozen=True)
 class PublishedNorm:
@@ -38,6 +42,8 @@ class PublishedNorm:
         The label scheme in which it was measured, and the labels that were counted.
     tissue
         The list of a `LabelScheme` that is nearest to it in other schemes; "" where there is none.
+    side
+        The hemisphere that the structure is in; None where it is in both.
     subjects
         How many brains it was made of; None where its source does not say.
     """
@@ -50,6 +56,7 @@ class PublishedNorm:
     subjects: int | None
     scheme: str = ""
     tissue: str = ""
+    side: Side | None = None
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
@@ -66,6 +73,7 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
             data["subjects"],
             data.get("scheme", ""),
             entry.get("tissue", ""),
+            entry.get("side"),
         )
         lowest = float(np.polyval(norm.sd, np.linspace(first, last, 201)).min())
         if lowest <= 0:
@@ -101,7 +109,11 @@ def structure_volumes(
 
 
 def published_scores(
-    volumes: Mapping[str, float], week: float, norms: Mapping[str, PublishedNorm], others: Sequence[str] = ()
+    volumes: Mapping[str, float],
+    week: float,
+    norms: Mapping[str, PublishedNorm],
+    others: Sequence[str] = (),
+    sides: Sequence[Side] = SIDES,
 ) -> pd.DataFrame:
     """Returns where the volumes of a brain stand among published ones.
 
@@ -111,14 +123,16 @@ def published_scores(
         By structure, in the norms' unit; structures without a norm are left out.
     others
         Structures that are of labels of another scheme than the norms'.
+    sides
+        The hemispheres that the brain has.
 
     Returns
     -------
     DataFrame
         structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution, 0 to
         100), brains (that the norm was made of; NaN where its source does not say), flag ("ok"; "other labels": the
-        norm was measured with labels of another scheme; "outside the norm's weeks", then without expected, z and
-        centile).
+        norm was measured with labels of another scheme; "outside the norm's weeks", or "one hemisphere" where the norm
+        is of more than the brain has, then without expected, z and centile).
     """
     rows = []
     for name, value in volumes.items():
@@ -126,10 +140,14 @@ def published_scores(
             continue
         norm = norms[name]
         inside = norm.weeks[0] <= week <= norm.weeks[1]
-        mean, sd = (float(np.polyval(curve, week)) if inside else np.nan for curve in (norm.mean, norm.sd))
+        there = len(sides) == len(SIDES) or norm.side in sides
+        scored = inside and there
+        mean, sd = (float(np.polyval(curve, week)) if scored else np.nan for curve in (norm.mean, norm.sd))
         z = (value - mean) / sd
         brains = np.nan if norm.subjects is None else norm.subjects
-        flag = ("other labels" if name in others else "ok") if inside else "outside the norm's weeks"
+        flag = "other labels" if name in others else "ok"
+        if not scored:
+            flag = "outside the norm's weeks" if there else "one hemisphere"
         rows.append((name, week, value, norm.unit, mean, sd, z, 100 * float(stats.norm.cdf(z)), brains, flag))
     columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
     return pd.DataFrame(rows, columns=columns)
@@ -182,21 +200,36 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
         subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile (0 to
         100), brains (of the reference), brains_of_week, flag: "ok"; "one brain a week": z and centile are of the
         scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the
-        reference's weeks" or "too few brains", then without z and centile.
+        reference's weeks", "too few brains" or "other hemispheres" (than the reference has, so compared with none),
+        then without z and centile.
     """
     known = dict(list(_reference(metrics, reference).groupby(["hemisphere", "metric"])))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
+    table = metrics.assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
     rows = []
-    for row in metrics.dropna(subset=["value"])[names].to_dict("records"):
+    for row, alike in zip(table[names].to_dict("records"), table["alike"], strict=True):
         others = known.get((row["hemisphere"], row["metric"]))
         if others is None:
             continue
         if row["run"] == MEASURED:
             others = others[others["subject"] != row["subject"]]
+        if not alike:
+            others = others.iloc[:0]
         weeks, values = others["week"].to_numpy(dtype=float), others["value"].to_numpy(dtype=float)
-        rows.append((*row.values(), *_score(row["week"], row["value"], weeks, values)))
+        *score, flag = _score(row["week"], row["value"], weeks, values)
+        rows.append((*row.values(), *score, flag if alike else OTHER_SIDES))
     columns = [*names, "expected", "sd", "z", "centile", "brains", "brains_of_week", "flag"]
     return pd.DataFrame(rows, columns=columns)
+
+
+def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
+    """Returns for each row of a table of metrics whether its brain has the hemispheres of a reference's brains.
+
+    The whole of a brain with one hemisphere is that hemisphere: its volume and area are half of what others have.
+    """
+    sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
+    known = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
+    return sides.isin(sides[known])
 
 
 def _reference(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:

@@ -1,5 +1,6 @@
 """Regions of the cortex: from what users give to the vertices of a brain's pial surfaces, and from brain to brain."""
 
+import logging
 from collections.abc import Mapping
 
 import igl
@@ -11,9 +12,13 @@ from ..errors import InputError
 from ..geometry.matching import labels_at, match_points
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
 
+log = logging.getLogger(__name__)
+
 NO_REGION = 0
 REACH_MM = 4.0
 """How far from the pial surface voxels may lie that give it their region."""
+LEAST_NEAR, USUAL_NEAR = 0.5, 0.8
+"""Shares of vertices near a region, or of regions near vertices, below which regions are refused, or warned of."""
 ELSEWHERE_MM = 5.0
 """Mean distance beyond which a surface is not that of the brain."""
 
@@ -34,31 +39,61 @@ def renumber(labels: NDArray[np.integer], names: Mapping[int, str], numbers: Map
     return np.array(found, dtype=np.int64)[back].reshape(np.shape(labels))
 
 
-def regions_from_volume(points: Floats, regions: NDArray[np.integer], affine: Floats) -> Ints:
-    """Returns for (n, 3) points in mm the region of the nearest voxel that has one, 0 where none is within 4 mm.
+def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.integer], affine: Floats) -> dict[str, Ints]:
+    """Returns for vertices in mm the region of the nearest voxel that has one, 0 where none is within 4 mm.
 
     Parameters
     ----------
+    points
+        (n, 3) vertices of the pial surfaces of both hemispheres, by side.
     regions, affine
         (i, j, k) numbers, 0 for none, and the (4, 4) matrix from index to the points' space.
 
-    InputError where no point is near a region.
+    InputError where no point of a side is near a region, or the regions lie elsewhere than the surfaces.
     """
     inside = np.argwhere(regions > 0)
     if not len(inside):
         raise InputError("no voxel has a region", expected="labels that are named")
     centres = inside @ affine[:3, :3].T + affine[:3, 3]
-    away, nearest = cKDTree(centres).query(points, distance_upper_bound=REACH_MM)
-    found = np.full(len(points), NO_REGION, dtype=np.int64)
-    near = np.isfinite(away)
-    if not near.any():
-        raise InputError(
-            "no region is near the pial surface",
-            found=f"no named voxel within {REACH_MM:g} mm",
-            expected="regions along the cortex, in the space of the brain's labels",
-        )
-    found[near] = regions[tuple(inside[nearest[near]].T)]
+    tree = cKDTree(centres)
+    found: dict[str, Ints] = {}
+    reached = []
+    for side, vertices in points.items():
+        away, nearest = tree.query(vertices, distance_upper_bound=REACH_MM)
+        near = np.isfinite(away)
+        if not near.any():
+            raise InputError(
+                "no region is near the pial surface",
+                found=f"no named voxel within {REACH_MM:g} mm of the {side} one",
+                expected="regions along the cortex, in the space of the brain's labels",
+            )
+        reached.append(near)
+        found[side] = np.full(len(vertices), NO_REGION, dtype=np.int64)
+        found[side][near] = regions[tuple(inside[nearest[near]].T)]
+    share = float(np.concatenate(reached).mean())
+    if share < USUAL_NEAR:
+        # few regions leave most vertices without one, but lie along the surface themselves
+        away, _ = cKDTree(np.concatenate(list(points.values()))).query(centres, distance_upper_bound=REACH_MM)
+        _require_along(max(share, float(np.isfinite(away).mean())))
     return found
+
+
+def _require_along(share: float) -> None:
+    """Raises InputError where too little of the regions and the pial surface lies near the other, warns of little."""
+    if share < LEAST_NEAR:
+        raise InputError(
+            "the regions do not lie along the pial surface",
+            found=f"{100 * share:.0f} % within {REACH_MM:g} mm",
+            expected=f"{100 * LEAST_NEAR:.0f} % or more",
+            remedy="Give them in the space of the brain's own files. Surfaces of FreeSurfer in tkr RAS lie beside "
+            "volumes by C_RAS: convert them with mris_convert --to-scanner.",
+        )
+    if share < USUAL_NEAR:
+        log.warning(
+            "only %.0f %% of the regions and the pial surface lie within %g mm of each other: are they of one space?",
+            100 * share,
+            REACH_MM,
+        )
 
 
 def regions_from_surface(target: TriangleMesh, surface: TriangleMesh, regions: NDArray[np.integer]) -> Ints:

@@ -247,17 +247,25 @@ def _require_both(
         name: bool(np.isin(tissue, np.intersect1d(numbers, scheme.cortex or scheme.cerebrum)).any())
         for name, numbers in (("left", scheme.left), ("right", scheme.right))
     }
+    # a part that is left out below, for its size, makes no second hemisphere
+    parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
+    shape = narrowness(isosurface(smooth_mask(parts, 1.0), affine))
     if scheme.left and sum(sides.values()) == 1:
-        side = "left" if sides["left"] else "right"
+        side, other = ("left", "right") if sides["left"] else ("right", "left")
+        # as a hemisphere that is alone it would be refused for its width
+        if shape > DOUBTFUL_BRAIN:
+            raise InputError(
+                f"a whole brain has labels of the {side} hemisphere only",
+                found=f"a cerebrum whose narrowest extent is {shape:.2f} of its longest",
+                expected=f"labels of the {other} hemisphere's {'cortex' if scheme.cortex else 'cerebrum'} too",
+                remedy="Give each hemisphere its own labels; or choose a scheme without left and right.",
+            )
         raise InputError(
             "the volume holds one hemisphere only",
             found=f"labels of the {side} hemisphere",
             expected="both hemispheres",
             remedy=remedy,
         )
-    # a part that is left out below, for its size, makes no second hemisphere
-    parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
-    shape = narrowness(isosurface(smooth_mask(parts, 1.0), affine))
     # a brain that the field of view cuts off may be as flat, which has been reported already
     if shape < NARROWEST_BRAIN and report["border_share"] <= TOLD_LOSS:
         raise InputError(

@@ -45,8 +45,8 @@ def single_hemisphere(
     """Returns a clean hemisphere posed, in coordinates "ras", "lps" or "auto", with the whole report.
 
     With "auto", the axes of the file are kept where its shape says that they are RAS or LPS within 35°, and its medial
-    wall is then turned upright; else the shape's pose is taken. InputError where it is ambiguous, or the shape is
-    that of the other side.
+    wall is then turned upright; else the shape's pose is taken. The report's "coordinates", if it has any, become those
+    that were found. InputError where the pose is ambiguous, or the shape is that of the other side.
     """
     mirrored = side == "left"
     shape = hemisphere_by_shape(transformed(mesh, MIRROR) if mirrored else mesh)
@@ -74,7 +74,9 @@ def single_hemisphere(
         upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [wall])
         chosen, report["pose_by"] = upright.as_matrix() @ CONVENTIONS[nearest], "file"
         if nearest != "ras":
-            report["coordinates"] = nearest
+            # a volume has none but its affine, and other volumes of the brain are taken to share its mistake
+            if "coordinates" in report:
+                report["coordinates"] = nearest
             warn(report, f"the shape says that the coordinates are {nearest.upper()}")
     elif clear:
         chosen, report["pose_by"] = rotation, "shape"

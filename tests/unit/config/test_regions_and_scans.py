@@ -77,3 +77,13 @@ def test_what_growth_was_made_to_follow():
 def test_the_norm_is_of_all_measured_brains_of_one_kind():
     assert load(study()).norm_reference == ["p21", "p22", "p25"]
     assert load(study(norm_reference=["p22"])).norm_reference == ["p22"]
+
+
+def test_the_norm_is_of_brains_with_the_hemispheres_of_the_start(volume):
+    labels = {"scheme": "feta-7"}
+    brains = [{"id": f"w{week}", "week": week, "labels": volume, **labels} for week in (21, 22)]
+    for side in ("left", "right"):
+        brains.append({"id": side, "week": 21, "hemisphere": {"file": volume, "side": side}, **labels})
+    for start, norm in (("w21", ["w21", "w22"]), ("left", ["left"])):
+        assert load(study(brains) | {"start": start}).norm_reference == norm
+    assert load(study(brains, norm_reference=["w22", "left"]) | {"start": "w21"}).norm_reference == ["w22"]

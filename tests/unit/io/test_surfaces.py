@@ -135,6 +135,28 @@ def test_vtk_surfaces_are_read(tmp_path, ball, name):
         read_surface(tmp_path / "grid.vtk")
 
 
+@pytest.mark.parametrize(
+    ("system", "centre", "said"),
+    [
+        ((U, TALAIRACH, np.eye(4)), (5.3, -17.0, 6.0), True),
+        ((U, U, np.eye(4)), (5.3, -17.0, 6.0), True),
+        ((U, U, np.eye(4)), (0.0, 0.0, 0.0), False),
+        ((SCANNER, SCANNER, np.eye(4)), (5.3, -17.0, 6.0), False),
+        ((U, SCANNER, TURN), (5.3, -17.0, 6.0), False),
+    ],
+)
+def test_coordinates_that_may_be_relative_to_freesurfers_volume_are_told(tmp_path, ball, caplog, system, centre, said):
+    image = nib.load(gifti(tmp_path / "lh.pial.surf.gii", ball.vertices, ball.faces))
+    image.darrays[0].coordsys = GiftiCoordSystem(*system)
+    # as mris_convert writes the centre of its volume, with the points
+    for axis, place in zip("RAS", centre, strict=True):
+        image.darrays[0].meta[f"VolGeomC_{axis}"] = f"{place:.6f}"
+    nib.save(image, tmp_path / "lh.pial.surf.gii")
+    read_surface(tmp_path / "lh.pial.surf.gii")
+    assert ("tkr RAS" in caplog.text) == said
+    assert ("C_RAS = (5.3, -17, 6) mm" in caplog.text) == said
+
+
 AXES = {"xras": [0.0, -1.0, 0.0], "yras": [0.0, 0.0, -1.0], "zras": [-1.0, 0.0, 0.0], "cras": [5.0, 6.0, 7.0]}
 
 

@@ -21,7 +21,7 @@ def labels():
 
 
 def saved(path, values, affine=AFFINE, unit="mm", sform=1, qform=1, qform_affine=None):
-    image = nib.Nifti1Image(values, None)
+    image = (nib.Nifti1Image if ".nii" in path.name else nib.Nifti1Pair)(values, None)
     image.header.set_xyzt_units(unit)
     image.header.set_sform(affine, code=sform)
     image.header.set_qform(affine if qform_affine is None else qform_affine, code=qform)
@@ -90,9 +90,43 @@ def test_of_two_matrices_the_one_that_is_set_counts(tmp_path, labels, sform, qfo
     assert read_label_volume(path).affine == pytest.approx(AFFINE, abs=1e-5)
 
 
-def test_no_orientation_at_all_is_refused(tmp_path, labels):
-    with pytest.raises(InputError, match="left and right are unknown"):
-        read_label_volume(saved(tmp_path / "a.nii", labels, sform=0, qform=0))
+@pytest.mark.parametrize("name", ["a.nii", "a.img"])
+def test_no_orientation_at_all_is_refused(tmp_path, labels, name):
+    with pytest.raises(InputError, match="neither qform nor sform is set, so left and right are unknown"):
+        read_label_volume(saved(tmp_path / name, labels, sform=0, qform=0))
+
+
+@pytest.mark.parametrize("suffix", ["", ".gz"])
+@pytest.mark.parametrize("name", ["a.hdr", "a.img"])
+def test_header_and_image_in_two_files_are_one_volume(tmp_path, labels, name, suffix):
+    saved(tmp_path / f"a.img{suffix}", labels, np.diag([1e3, 1e3, 1e3, 1.0]) @ AFFINE, "micron")
+    volume = read_label_volume(tmp_path / f"{name}{suffix}")
+    assert np.array_equal(volume.labels, labels)
+    assert volume.affine == pytest.approx(AFFINE, rel=1e-5)
+    other = AFFINE.copy()
+    other[0, 3] = 33.0
+    saved(tmp_path / f"a.img{suffix}", labels, qform_affine=other)
+    with pytest.raises(InputError, match="qform and sform disagree"):
+        read_label_volume(tmp_path / f"{name}{suffix}")
+    assert read_label_volume(tmp_path / f"{name}{suffix}", "qform").affine[0, 3] == pytest.approx(33.0)
+
+
+def test_an_image_that_lacks_its_other_file_or_its_end_is_named(tmp_path, labels):
+    image = saved(tmp_path / "a.img", np.tile(labels, (2, 2, 2)))
+    image.write_bytes(image.read_bytes()[:-400])
+    with pytest.raises(InputError, match=r"a\.img: is shorter than its header says"):
+        read_label_volume(tmp_path / "a.hdr")
+    image.unlink()
+    with pytest.raises(InputError, match=r"a\.img: no such file"):
+        read_label_volume(tmp_path / "a.hdr")
+
+
+@pytest.mark.parametrize("kind", [nib.AnalyzeImage, nib.Spm99AnalyzeImage, nib.Spm2AnalyzeImage])
+def test_analyze_is_refused_for_it_has_no_orientation(tmp_path, labels, kind):
+    nib.save(kind(labels, None), tmp_path / "a.img")
+    for name in ("a.img", "a.hdr"):
+        with pytest.raises(InputError, match=r"a\.\w+: is in the Analyze format.*left and right are unknown"):
+            read_label_volume(tmp_path / name)
 
 
 def test_singleton_axis_and_whole_floats_are_accepted(tmp_path, labels):

@@ -114,6 +114,36 @@ def test_what_cannot_be_scored_is_said() -> None:
     assert np.isnan(few["centile"])
 
 
+def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
+    weeks = np.arange(21.0, 29.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("half", 25.0, 125.0), ("all", 25.0, 250.0))
+    sides = [
+        metrics.assign(hemisphere=side, value=metrics["value"] / share)[rows]
+        for side, share, rows in (
+            ("whole", 1.0, metrics["run"] != ""),
+            ("left", 2.0, metrics["run"] != "half"),
+            ("right", 2.0, metrics["run"] != "half"),
+            ("left", 1.0, metrics["run"] == "half"),
+        )
+    ]
+    found = measured_scores(pd.concat(sides, ignore_index=True), reference).set_index(["run", "hemisphere"])
+    assert found.loc[("all", "whole"), "flag"] == "one brain a week"
+    for side in ("whole", "left"):
+        assert found.loc[("half", side), "flag"] == "other hemispheres"
+        assert found.loc[("half", side), ["z", "centile", "expected"]].isna().all()
+        assert found.loc[("half", side), "brains"] == 0
+
+
+def test_one_hemisphere_is_not_scored_by_volumes_of_both() -> None:
+    norms = published_norms(yaml.safe_load((NORMS / "svrtk-volumes.yaml").read_text()))
+    volumes = {"cortex": 20.0, "left_lateral_ventricle": 2.3, "right_lateral_ventricle": 2.3}
+    found = published_scores(volumes, 29.0, norms, sides=("left",)).set_index("structure")
+    assert found["flag"].tolist() == ["one hemisphere", "ok", "one hemisphere"]
+    assert found.loc["cortex", ["expected", "sd", "z", "centile"]].isna().all()
+    assert found.loc["left_lateral_ventricle", "z"] == pytest.approx(0.0, abs=0.1)
+    assert (published_scores(volumes, 29.0, norms)["flag"] == "ok").all()
+
+
 def test_structures_of_the_norms_scheme_and_of_others() -> None:
     norms = published_norms(yaml.safe_load((NORMS / "svrtk-volumes.yaml").read_text()))
     own, others = structure_volumes({3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}, SCHEMES["dhcp-19"], norms)

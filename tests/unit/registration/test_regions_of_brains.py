@@ -42,13 +42,36 @@ def test_vertices_take_the_region_of_the_nearest_voxel_in_reach():
     # a shell of cortex, in front of y = 0 one region, behind it another, none far below
     shell = (radius > 0.85) & (radius < 1.0) & (points[:, 2] > -6.0)
     regions = np.where(shell, np.where(points[:, 1] > 0, 1, 2), 0).reshape(50, 40, 40)
-    found = regions_from_volume(BRAIN.vertices, regions, affine)
+    found = regions_from_volume({"left": BRAIN.vertices}, regions, affine)["left"]
     y, z = BRAIN.vertices[:, 1:].T
     clear = (np.abs(y) > 1.0) & (z > -5.0)
     np.testing.assert_array_equal(found[clear], np.where(y[clear] > 0, 1, 2))
     assert (found[z < -12.0] == 0).all()
     with pytest.raises(InputError, match="no region is near"):
-        regions_from_volume(BRAIN.vertices + 500.0, regions, affine)
+        regions_from_volume({"left": BRAIN.vertices, "right": BRAIN.vertices + 500.0}, regions, affine)
+
+
+def test_regions_beside_the_surface_are_refused_few_regions_are_not(caplog):
+    affine = np.diag([1.0, 1.0, 1.0, 1.0])
+    affine[:3, 3] = -30.0
+    centres = transform_points(np.indices((60, 60, 60)).reshape(3, -1).T, affine)
+    radius = np.linalg.norm(centres / [16.0, 22.0, 14.0], axis=1)
+    shell = ((radius > 0.85) & (radius < 1.0)).reshape(60, 60, 60).astype(int)
+    frontal = shell * (centres[:, 1] > 16.0).reshape(60, 60, 60)
+    sides = BRAIN.vertices[:, 0] < 0
+
+    def found(regions, shift):
+        points = BRAIN.vertices + [0.0, shift, 0.0]
+        return regions_from_volume({"left": points[sides], "right": points[~sides]}, regions, affine)
+
+    assert (found(shell, 0.0)["right"] == 1).all()
+    # a sixth of the vertices has this region
+    assert 0.05 < (found(frontal, 0.0)["left"] == 1).mean() < 0.3
+    assert caplog.text == ""
+    with pytest.raises(InputError, match=r"do not lie along the pial surface; found 24 % within 4 mm.*mris_convert"):
+        found(shell, 25.0)
+    assert found(shell, 12.0)
+    assert "are they of one space?" in caplog.text
 
 
 def test_another_mesh_of_the_surface_has_the_same_regions_and_no_other():

@@ -10,11 +10,13 @@ from gyriflow.parameters.schemes import SCHEMES
 from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
+from gyriflow.surface.file_poses import volume_pose
 from gyriflow.surface.from_labels import from_labels, hemisphere_from_labels
 from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres
 from gyriflow.surface.white import thickness_from_white
 
 QUICK = {"week": 24.0, "edge_length_mm": 2.0}
+DHCP = SCHEMES["dhcp-19"]
 
 
 @pytest.fixture(scope="module")
@@ -63,18 +65,38 @@ def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
 def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
     labels, affine = pathologies.add_sides(*brain), brain[1]
     left = pathologies.one_hemisphere(labels, affine, "left")
-    surface = hemisphere_from_labels(left, affine, SCHEMES["dhcp-19"], "left", **QUICK)
+    surface = hemisphere_from_labels(left, affine, DHCP, "left", **QUICK)
     assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5
     assert surface.report["volume_mL"] == pytest.approx(surface.report["mask_volume_mL"], rel=0.01)
     with pytest.raises(InputError, match="holds labels of another hemisphere than the right one"):
-        hemisphere_from_labels(left, affine, SCHEMES["dhcp-19"], "right", **QUICK)
+        hemisphere_from_labels(left, affine, DHCP, "right", **QUICK)
     with pytest.raises(
         InputError, match=r"one hemisphere only; found labels of the left.*Give a volume with both hemispheres"
     ):
-        from_labels(left, affine, SCHEMES["dhcp-19"], **QUICK)
+        from_labels(left, affine, DHCP, **QUICK)
     unsided = pathologies.one_hemisphere(*brain, "left")
     with pytest.raises(InputError, match=r"seems to hold one hemisphere only"):
         from_labels(unsided, affine, SCHEMES["spina-bifida-atlas"], **QUICK)
+
+
+def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_told_so(brain):
+    labels, affine = pathologies.add_sides(*brain), brain[1]
+    left, right = DHCP.cortex
+    for kept, lost, side in ((left, right, "left"), (right, left, "right")):
+        merged = np.where(labels == lost, kept, labels)
+        with pytest.raises(InputError, match=f"a whole brain has labels of the {side} hemisphere only.*scheme without"):
+            from_labels(merged, affine, DHCP, **QUICK)
+
+
+def test_volumes_of_a_hemisphere_whose_affine_is_lps_are_turned_as_its_labels(brain):
+    left = pathologies.one_hemisphere(pathologies.add_sides(*brain), brain[1], "left")
+    affine = turned(0, 0, 180) @ brain[1]
+    surface = hemisphere_from_labels(left, affine, DHCP, "left", **QUICK)
+    assert "the shape says that the coordinates are LPS" in surface.report["warnings"]
+    world = volume_pose(surface.report, "a.nii") @ affine
+    voxels = np.argwhere(np.isin(left, DHCP.cerebrum)) @ world[:3, :3].T + world[:3, 3]
+    for end in (np.min, np.max):
+        assert end(surface.whole.vertices, axis=0) == pytest.approx(end(voxels, axis=0), abs=2.0)
 
 
 def inner(mesh, depth_mm):
