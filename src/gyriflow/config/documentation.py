@@ -17,9 +17,8 @@ INTRODUCTION = """\
 # Configuration
 
 `config.yaml` is the demo, with the commonest keys explained in place; this page has all of them; `examples/` has
-configurations for real data. Your own is
-given with `./run snakemake --cores 2 --configfile my.yaml` and replaces the demo as a whole. Single values can be
-changed on the command line: `--config 'folding={end_week: 26}'`.
+configurations for real data. Your own is given with `./run snakemake --cores 2 --configfile my.yaml` and replaces the
+demo as a whole. Single values can be changed on the command line: `--config 'folding={end_week: 26}'`.
 
 All problems of a configuration are reported at once, before any job starts; unknown keys are problems. Paths are
 relative to the configuration file or, if no such file is there, to the working directory. The keys of `folding` are
