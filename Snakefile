@@ -2,6 +2,7 @@
 import sys
 from pathlib import Path
 
+from snakemake.io import strip_wildcard_constraints
 from snakemake.utils import min_version
 
 min_version("9.0")
@@ -11,7 +12,7 @@ SOURCE = (
     f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 )
 sys.path.insert(0, SOURCE)
-from gyriflow.provenance import code_hash
+from gyriflow.io.sources import code_hash
 
 # a configuration given on the command line replaces the demo instead of being mixed with it
 if not workflow.overwrite_configfiles:
@@ -19,9 +20,6 @@ if not workflow.overwrite_configfiles:
     demo = own.resolve() if own.is_file() else Path(workflow.basedir, own)
 
     configfile: demo
-
-
-report: "workflow/report/workflow.rst"
 
 
 include: "workflow/rules/common.smk"
@@ -35,14 +33,10 @@ include: "workflow/rules/folding.smk"
 include: "workflow/rules/metrics.smk"
 include: "workflow/rules/regions.smk"
 include: "workflow/rules/validation.smk"
-include: "workflow/rules/onset.smk"
-include: "workflow/rules/validation_figures.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/studies.smk"
 include: "workflow/rules/calibration.smk"
-include: "workflow/rules/run_figures.smk"
-include: "workflow/rules/influence_figures.smk"
-include: "workflow/rules/study_figures.smk"
+include: "workflow/rules/figures.smk"
 include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
 
@@ -61,8 +55,19 @@ rule all:
         rules.report.input,
 
 
-# a change of the code reruns what depends on it: a hash of the modules that a script imports is a parameter of its rule
+# What all rules share. The log and the benchmark lie beside the results. A change of the code reruns what depends on it:
+# a hash of the modules that a script imports is a parameter of its rule.
 for job in workflow.rules:
-    if job.script:
+    if not job.norun:
+        job.log_modifier = job.benchmark_modifier = job.output_modifier
+        output = strip_wildcard_constraints(next(iter(job.output), ""))
+        log, benchmark = job_files(job.name, output)
+        if not job.log:
+            job.set_log(log)
+        # a download's time is the network's, and figures take little
+        if job.name not in ("atlas_file", *(row.name for row in FIGURES.drawn)):
+            job.benchmark = job.benchmark or benchmark
+        job.conda_env = f"{workflow.basedir}/envs/gyriflow.yaml"
+    if job.script and "code" not in job.params.keys():
         source = job.basedir.join(job.script).get_path_or_uri(secret_free=False)
         job.set_params(code=code_hash(Path(source)))

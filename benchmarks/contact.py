@@ -1,6 +1,6 @@
 """Folding with and without contact: what crosses what, week by week, and what it costs.
 
-    ./run python benchmarks/contact.py results/brains/week21/mesh/brain.xdmf --out contact --figure contact.png
+    ./run python benchmarks/contact.py results/brains/week21/mesh/brain.xdmf --out contact
 
 Each kind of contact folds the mesh with the reference parameters from `--start` to `--end`, on `--ranks` ranks, into a
 folder of its own; a run that is there already, complete or not, is gone on with. For each week the crossing faces of
@@ -30,8 +30,6 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--ranks", type=int, default=2)
     parser.add_argument("--params", type=Path, help="parameters (YAML) that replace reference values")
     parser.add_argument("--out", type=Path, required=True, help="folder of the runs")
-    parser.add_argument("--figure", type=Path, help="pictures of the surfaces (PNG), one for each kind")
-    parser.add_argument("--weeks", type=int, nargs="+", default=[24, 28, 30, 32, 34, 36], help="shown there")
     return parser.parse_args()
 
 
@@ -60,29 +58,26 @@ def fold(arguments: argparse.Namespace, kind: str) -> Path:
 
 
 def weekly(out: Path):
-    """Returns the surfaces of a run by week, and a table with a row for each."""
-    from gyriflow.geometry.crossings import crossing_faces
+    """Returns what there is to say of a run, a row a week."""
+    from gyriflow.geometry.matching import crossing_faces
     from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
     from gyriflow.geometry.triangles import area, signed_volume
     from gyriflow.io.frames import read_positions, read_tets, read_weeks
-    from gyriflow.metrics.depth import convex_hull
-    from gyriflow.metrics.gyrification import envelope, gyrification_index, pieces_over
+    from gyriflow.metrics.gyrification import convex_hull, envelope, gyrification_index, pieces_over
 
     tets, steps = read_tets(out / "frames.h5"), pd.read_csv(out / "steps.csv")
-    surfaces, rows = {}, []
+    rows = []
     for before, week in zip([0.0, *read_weeks(out / "frames.h5")], read_weeks(out / "frames.h5"), strict=False):
         brain = TetrahedralMesh(read_positions(out / "frames.h5", week), tets)
-        surfaces[week], _ = boundary_surface(brain)
+        surface, _ = boundary_surface(brain)
         during = steps[(steps["week"] > before + 1e-6) & (steps["week"] <= week + 1e-6)]
         row = {
             "week": week,
-            "area_cm2": area(surfaces[week]) / 100,
-            "volume_mL": signed_volume(surfaces[week]) / 1000,
-            "gi_hull": gyrification_index([surfaces[week]], [pieces_over(convex_hull(surfaces[week]), surfaces[week])]),
-            "gi_envelope": gyrification_index(
-                [surfaces[week]], [pieces_over(envelope(surfaces[week]), surfaces[week])]
-            ),
-            "crossing_faces": crossing_faces(surfaces[week]),
+            "area_cm2": area(surface) / 100,
+            "volume_mL": signed_volume(surface) / 1000,
+            "gi_hull": gyrification_index([surface], [pieces_over(convex_hull(surface), surface)]),
+            "gi_envelope": gyrification_index([surface], [pieces_over(envelope(surface), surface)]),
+            "crossing_faces": crossing_faces(surface),
             "inverted": int((signed_volumes(brain) <= 0).sum()),
             "seconds": during["seconds"].sum(),
             "newton": during["newton"].mean(),
@@ -91,22 +86,18 @@ def weekly(out: Path):
         if "min_distance_mm" in during:
             row |= {"min_distance_mm": during["min_distance_mm"].min(), "pairs": during["contact_pairs"].max()}
         rows.append(row)
-    return surfaces, pd.DataFrame(rows)
+    return pd.DataFrame(rows)
 
 
 def main() -> None:
     from gyriflow.io.files import read_json
 
     arguments, found = parse(), {}
-    if arguments.figure:
-        arguments.figure.parent.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work
-    shown = {}
     for kind in arguments.kinds:
         out = fold(arguments, kind)
-        surfaces, table = weekly(out)
+        table = weekly(out)
         print(f"contact {kind}\n{table.to_string(index=False, float_format='%.3g')}", flush=True)
         summary = read_json(out / "summary.json")
-        shown[kind] = {week: surfaces[week] for week in arguments.weeks if week in surfaces}
         crossing = table.loc[table["crossing_faces"] > 0, "week"]
         found[kind] = {
             "tets": summary["tets"],
@@ -123,12 +114,6 @@ def main() -> None:
         }
         if "min_distance_mm" in table:
             found[kind]["min_distance_mm"] = float(np.round(table["min_distance_mm"].min(), 4))
-    if arguments.figure:
-        from gyriflow.report.renders import runs_by_week
-
-        for kind, surfaces in shown.items():
-            figure = runs_by_week({"simulated": surfaces}, {})
-            figure.savefig(arguments.figure.with_stem(f"{arguments.figure.stem}-{kind}"), dpi=150)
     print(json.dumps(found), flush=True)
 
 

@@ -3,7 +3,7 @@
 Times are of one core: what a job kept busy. Each rule has a constant and a part that grows with its brain: faces of the
 surface, nodes of the mesh, nodes times steps of a folding. The error is that of studies left out: a fit to the others,
 with sizes predicted from the configuration alone, against what was measured. It writes
-`src/gyriflow/cost/measured.json`, which the terminal and `gyriflow check` read.
+`src/gyriflow/shell/measured.json`, which the terminal and `gyriflow check` read.
 """
 
 import argparse
@@ -18,14 +18,12 @@ from scipy.optimize import nnls
 
 from gyriflow.config import load
 from gyriflow.config.root import Config
-from gyriflow.cost import MEASURED
-from gyriflow.cost.prediction import Job, predict, rule_key, work_of
-from gyriflow.cost.sizes import Size, cubes
 from gyriflow.folding.predicted_memory import predicted_memory_mib
-from gyriflow.io.benchmarks import read_benchmarks
 from gyriflow.io.files import read_json, write_json
+from gyriflow.io.jobs import read_benchmarks
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.resources import busy_seconds
+from gyriflow.shell.cost import MEASURED, Job, Size, cubes, predict, rule_key, work_of
 
 MIB = 2**20
 PLACES = re.compile(r"results/(?:runs/(?P<run>[^/]+)/(?P<brain>[^/]+)|brains/(?P<measured>[^/]+)|[^/]+)/.*")

@@ -14,6 +14,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,12 +61,12 @@ def measure(arguments: argparse.Namespace) -> None:
     from petsc4py import PETSc
 
     from gyriflow.folding.checkpoint import State
+    from gyriflow.folding.checks import refuse_impossible
     from gyriflow.folding.output import peak_memory_mib
     from gyriflow.folding.simulation import Folding
-    from gyriflow.folding.zone_checks import refuse_impossible
     from gyriflow.folding.zones import zones_of_run
     from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-    from gyriflow.parameters.reading import parameters_from
+    from gyriflow.parameters.folding import parameters_from
     from gyriflow.units import M_PER_MM, MM_PER_M
 
     comm = MPI.COMM_WORLD
@@ -102,7 +103,7 @@ def measure(arguments: argparse.Namespace) -> None:
     for step in range(min(arguments.paper_steps, arguments.steps) + 1):
         comm.barrier()
         began = time.perf_counter()
-        paper.set_layers(states[len(paper_seconds)].time_s, p.step_s)
+        paper.begin(replace(states[len(paper_seconds)], positions=domain.positions), p.step_s)
         iterations = relaxed_lu_step(paper.problem, solver, residual, direction, start)
         start = paper.problem.displacement.copy()
         domain.place(domain.positions + domain.gathered(start[: domain.owned]))

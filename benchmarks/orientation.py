@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyriflow.errors import GyriflowError, InputError
+from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, signed_volume
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_hemispheres, read_surface
-from gyriflow.surface.from_surfaces import from_hemispheres, hemisphere
-from gyriflow.surface.hemisphere_pose import Pair
-from gyriflow.surface.repair import pieces
-from gyriflow.surface.size import expected_volume_ml
-from gyriflow.surface.study_poses import Poses, pairs_by_shape, poses
+from gyriflow.surface.pial import from_hemispheres
+from gyriflow.surface.plausible import expected_volume_ml
+from gyriflow.surface.pose import Pair, pairs_by_shape, poses
+from gyriflow.surface.repair import pieces, sound_pieces
 
 Floats = NDArray[np.float64]
 Files = tuple[Path, Path]
@@ -58,7 +58,7 @@ def pairs_of_files(folder: Path) -> list[Files]:
     return found
 
 
-def posed(files: list[Files]) -> tuple[dict[Files, Poses], list[str]]:
+def posed(files: list[Files]) -> tuple[dict[Files, Pose], list[str]]:
     """Returns the poses of the brains, and what was refused."""
     brains: dict[Files, tuple[TriangleMesh, TriangleMesh]] = {}
     named: dict[Files, bool] = {}
@@ -66,7 +66,7 @@ def posed(files: list[Files]) -> tuple[dict[Files, Poses], list[str]]:
     for brain in files:
         try:
             *read, named[brain] = read_hemispheres(*brain)
-            left, right = (hemisphere(side, MAX_HOLE_MM)[0] for side in read)
+            left, right = (sound_pieces(side, MAX_HOLE_MM, one=True).mesh for side in read)
             brains[brain] = left, right
         except GyriflowError as error:
             refused.append(f"{brain[0].name}: {error}")
@@ -80,7 +80,7 @@ def posed(files: list[Files]) -> tuple[dict[Files, Poses], list[str]]:
     return dict(zip(pairs, posed_as, strict=True)), refused
 
 
-def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:
+def errors(found: dict[Files, Pose], truth: dict) -> dict[str, float]:
     """Returns the worst errors once one rotation, the same for all, has been taken off.
 
     Pitch, about x, and tilt, about the other axes, are the parts of the angles. Offset and gap are the places of left
@@ -89,7 +89,7 @@ def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:
     """
     motions, centres = [], []
     for brain, pose in found.items():
-        for path, motion in zip(brain, (pose.left, pose.right), strict=True):
+        for path, motion in zip(brain, (pose.files[side] for side in SIDES), strict=True):
             true = np.array(truth[path.name]["to_ras"])
             motions.append(motion @ np.linalg.inv(true))
             centres.append(true[:3, :3] @ read_surface(path).vertices.mean(axis=0) + true[:3, 3])
@@ -112,7 +112,7 @@ def errors(found: dict[Files, Poses], truth: dict) -> dict[str, float]:
     }
 
 
-def surfaces(found: dict[Files, Poses], truth: dict) -> tuple[dict[str, int], list[str]]:
+def surfaces(found: dict[Files, Pose], truth: dict) -> tuple[dict[str, int], list[str]]:
     """Returns how many files were recognised as inside out or not, how many brains closed, and what failed."""
     right, closed, failed = 0, 0, []
     for brain, pose in found.items():
@@ -120,9 +120,7 @@ def surfaces(found: dict[Files, Poses], truth: dict) -> tuple[dict[str, int], li
         size = (abs(signed_volume(left))) ** (1 / 3)
         edge = max(1.2, size / 25)
         try:
-            surface = from_hemispheres(
-                left, other, pose.report, week=_week(left), coordinates="auto", edge_length_mm=edge
-            )
+            surface = from_hemispheres(left, other, pose, week=_week(left), coordinates="auto", edge_length_mm=edge)
         except GyriflowError as error:
             failed.append(f"{brain[0].name}: {error}")
             continue

@@ -17,8 +17,8 @@ import time
 from pathlib import Path
 
 from gyriflow.errors import InputError
-from gyriflow.io.benchmarks import read_stages
 from gyriflow.io.files import read_json, read_table
+from gyriflow.io.jobs import read_stages
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 def command(arguments: argparse.Namespace) -> list[str]:
     """Returns the command that is measured, as `./run snakemake` runs it."""
     return [
-        *(sys.executable, "-m", "gyriflow.launch", "--cores", str(arguments.cores), arguments.target),
+        *(sys.executable, "-m", "gyriflow.shell.launch", "--cores", str(arguments.cores), arguments.target),
         *("--snakefile", str(ROOT / "Snakefile"), "--configfile", str(arguments.configfile.resolve())),
         *("--directory", str(arguments.folder)),
     ]

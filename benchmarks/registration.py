@@ -17,17 +17,18 @@ import numpy as np
 import pandas as pd
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, connected_parts, grid, volumes_between
+from gyriflow.growth.carrying import carry_over_weeks
+from gyriflow.growth.channels import Channels, channels
+from gyriflow.growth.diffeomorphic import register
+from gyriflow.growth.local import local_growth
+from gyriflow.growth.registration_quality import judge, require_good
 from gyriflow.io.registrations import read_deformation, write_deformation
+from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import read_label_volume, read_values
-from gyriflow.registration.carrying import carry_over_weeks
-from gyriflow.registration.channels import Channels, channels
-from gyriflow.registration.diffeomorphic import register
-from gyriflow.registration.growth import local_growth, weekly_displacements
-from gyriflow.registration.quality import judge, require_good
-from gyriflow.surface.labels import SCHEMES
 
 POPULATIONS = {
     "unoperated": {week: f"week{week}" for week in range(21, 26)},
@@ -103,7 +104,8 @@ def main() -> None:
             sd = np.sqrt(np.average((rates - whole[:, None]) ** 2, axis=1, weights=sizes))
             for week, rate, spread in zip(weeks[:-1], np.diff(np.log(volumes.sum(axis=1))), sd, strict=True):
                 growth.append({"population": population, "week": week, "sigma_mm": sigma, "rate": rate, "sd": spread})
-        moves = np.linalg.norm(weekly_displacements(positions, weeks, sizes), axis=2)
+        pairs_of = (positions[i : i + 2] for i in range(len(deformations)))
+        moves = [np.linalg.norm(without_rigid_motion(*pair, sizes), axis=1).mean() for pair in pairs_of]
         true = [np.count_nonzero(brain.tissue & 1) * brain.voxel_mm**3 for brain in brains.values()]
         summary[population] = {
             "pairs": len(deformations),
@@ -111,7 +113,7 @@ def main() -> None:
             "tets": len(mesh.tets),
             "inverted_at_end": int(np.count_nonzero(volumes[-1] <= 0)),
             "volume_growth_kept": float(volumes[-1].sum() / volumes[0].sum() / (true[-1] / true[0])),
-            "mean_displacement_mm_per_week": moves.mean(axis=1).round(3).tolist(),
+            "mean_displacement_mm_per_week": (moves / np.diff(weeks)).round(3).tolist(),
         }
     table, spread = pd.DataFrame(pairs), pd.DataFrame(growth)
     shown = ["population", "from", "to", "dice_cerebrum", "dice_cortex", "least_determinant", "folded_share"]

@@ -1,6 +1,6 @@
 """Time per step and memory of the folding solve against the size of the mesh, on one rank and on two.
 
-    ./run python benchmarks/scaling.py --figure docs/images/scaling.png
+    ./run python benchmarks/scaling.py
 
 The meshes are of one synthetic brain (`graded_brain.py`), so that they differ by their resolution only; the model is
 the reference model with a cortex that the coarsest mesh resolves. Size by size, the same steps are done on each number
@@ -59,14 +59,13 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--steps", type=positive, default=6, help="counted steps")
     parser.add_argument("--ranks", type=positive, nargs="+", default=[1, 2], help="numbers of MPI ranks")
     parser.add_argument("--repeats", type=positive, default=2, help="runs of each size on each number of ranks")
-    parser.add_argument("--figure", type=Path, help="picture to be made (PNG)")
     parser.add_argument("--inside-mpi", type=Path, metavar="MESH", help=argparse.SUPPRESS)
     return parser.parse_args()
 
 
 def reference_parameters():
     """Returns the paper's parameters for the synthetic brain."""
-    from gyriflow.parameters.reading import parameters_from
+    from gyriflow.parameters.folding import parameters_from
 
     values = {"start_week": 21.0, "end_week": 36.0, "output_weeks": [21.0, 36.0], "fissure_x_mm": 0.0}
     contact = {"kind": "planes", "gap_mm": CONTACT_GAP_MM}
@@ -131,7 +130,7 @@ def summary(runs: list[dict], mesh: dict, ranks: int) -> dict:
 
 def rows_of_size(tets: int, arguments: argparse.Namespace) -> list[dict]:
     """Returns a row of the table for each number of ranks, after the runs on a mesh of about `tets` elements."""
-    from gyriflow.folding.zone_checks import refuse_impossible, zone_report
+    from gyriflow.folding.checks import refuse_impossible, zone_report
     from gyriflow.folding.zones import zones_of_run
     from gyriflow.io.tetmeshes import write_tetrahedral_mesh
     from gyriflow.mesh.quality import radius_ratios
@@ -190,48 +189,13 @@ def result(rows: list[dict], arguments: argparse.Namespace) -> dict:
     return found
 
 
-def draw(rows: list[dict], file: Path) -> None:
-    """Writes a picture of time per step and memory against the number of unknowns."""
-    from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter, NullLocator
-
-    from gyriflow.report.style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, light_grid, new_figure, style
-
-    by_ranks = {count: [row for row in rows if row["ranks"] == count] for count in {row["ranks"]: None for row in rows}}
-    with style():
-        figure = new_figure(FULL_WIDTH_IN, 2.9, synthetic=False)
-        panels = {"seconds": "time per step (s)", "memory_MiB": "peak memory of all ranks (MiB)"}
-        for axes, (name, label) in zip(figure.subplots(1, 2), panels.items(), strict=True):
-            for i, (count, own) in enumerate(by_ranks.items()):
-                unknowns, measured = np.array([(row["unknowns"], row[name]) for row in own]).T
-                ranks = f"{count} rank{'s' if count > 1 else ''}"
-                axes.plot(unknowns, measured, "os^Dv"[i % 5] + "-", color=RUN_COLOURS[i % 7], label=ranks)
-            for own in by_ranks.values():
-                ideal = [own[0][name] * row["unknowns"] / own[0]["unknowns"] for row in own]
-                axes.plot(unknowns, ideal, ":", color=MUTED_COLOUR, zorder=1)
-            axes.plot([], [], ":", color=MUTED_COLOUR, label="in proportion to size")
-            axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel=label)
-            axes.set_xticks(unknowns, minor=False)
-            axes.xaxis.set_major_formatter(EngFormatter(places=0))
-            axes.xaxis.set_minor_locator(NullLocator())
-            axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            axes.yaxis.set_major_formatter("{x:g}")
-            axes.yaxis.set_minor_formatter(NullFormatter())
-            light_grid(axes, "both")
-            axes.legend(loc="upper left")
-        figure.savefig(file, dpi=200)
-
-
 def main(arguments: argparse.Namespace) -> None:
-    if arguments.figure:
-        arguments.figure.parent.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work
     print("  ".join(heading for heading, _, _ in COLUMNS), flush=True)
     rows: list[dict] = []
     for tets in sorted(arguments.sizes):
         rows += (new := rows_of_size(tets, arguments))
         for row in new:
             print("  ".join(f"{row[name]:{len(heading)}{form}}" for heading, name, form in COLUMNS), flush=True)
-    if arguments.figure:
-        draw(rows, arguments.figure)
     print(json.dumps(result(rows, arguments)), flush=True)
 
 

@@ -16,10 +16,9 @@ from pathlib import Path
 
 import pandas as pd
 
+from gyriflow.comparison.validation import over_starts, summary
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_table
-from gyriflow.validation.horizon import over_starts
-from gyriflow.validation.tables import summary
 
 
 def tables(folder: Path) -> Path:

@@ -252,7 +252,7 @@ def main(arguments: argparse.Namespace) -> None:
     from verification_cases.figures import draw
     from verification_cases.summary import rounded, summary
 
-    from gyriflow.config.mesh import MeshSettings
+    from gyriflow.config.stages import MeshSettings
 
     if arguments.figures:
         arguments.figures.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work

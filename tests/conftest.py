@@ -1,10 +1,32 @@
-"""What all tests share."""
+"""What all tests share, and how they are dealt out to workers."""
 
+import os
 from pathlib import Path
 
 # pymeshlab brings libraries that keep PETSc from loading after it; in this order both work
 import petsc4py.PETSc  # noqa: F401
+import pytest
 from reliability import Collector
+from xdist.scheduler import LoadScopeScheduling
+
+LONGEST_FIRST = ("tests/mpi/", "tests/workflow/", "tests/")
+MOST_WORKERS = 8
+"""Some tests start three ranks, or a workflow of two cores, of their own."""
+
+
+class Sets(LoadScopeScheduling):
+    """Deals out files, whose tests share what takes long to set up, and what else is not to be parted."""
+
+    def _split_scope(self, nodeid):
+        file, _, case = nodeid.partition("::")
+        if file == "tests/mpi/test_ranks.py":
+            # the cases of a file; the first number of ranks compiles the forms
+            return case.rpartition("-")[0]
+        # both look at the one finished study
+        if file in ("tests/workflow/test_dag.py", "tests/workflow/test_rerun.py"):
+            return "finished"
+        # these compile forms of their own: two should not fill one cache at once
+        return "tests/unit/folding" if file.startswith("tests/unit/folding/") else file
 
 
 def pytest_addoption(parser):
@@ -16,3 +38,18 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     page = config.getoption("--reliability")
     config.pluginmanager.register(Collector(Path(page) if page else None), "reliability")
+
+
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: next(n for n, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_xdist_auto_num_workers(config):
+    """Returns a worker a core; none for a single file, which takes less long than workers to start."""
+    single = len(config.args) == 1 and Path(config.args[0].partition("::")[0]).is_file()
+    return 0 if single else min(len(os.sched_getaffinity(0)), MOST_WORKERS)
+
+
+def pytest_xdist_make_scheduler(config, log):
+    return Sets(config, log)

@@ -67,52 +67,51 @@ class Collector:
             if self.tests[kind, number][name] != "failed":
                 self.tests[kind, number][name] = outcome
 
-    def pytest_sessionfinish(self):
-        if self.page is not None:
+    def pytest_sessionfinish(self, session):
+        if hasattr(session.config, "workeroutput"):
+            session.config.workeroutput["tried"] = dict(self.tests)
+        elif self.page is not None:
             self.page.write_text(page_of(self.tests), encoding="utf-8")
+
+    def pytest_testnodedown(self, node):
+        """Adds what a worker has tried; each has collected all tests."""
+        for tried, outcomes in getattr(node, "workeroutput", {}).get("tried", {}).items():
+            for name, outcome in outcomes.items():
+                if outcome != "not run" and self.tests[tried].get(name) != "failed":
+                    self.tests[tried][name] = outcome
+                self.tests[tried].setdefault(name, outcome)
 
 
 def page_of(tests):
-    """Returns the page of all faults and promises with the tests of each and their outcomes."""
+    """Returns the page of all faults and promises with the worst outcome of the tests of each."""
     known = listed()
     outcomes = [outcome for found in tests.values() for outcome in found.values()]
     counts = ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in WORST_FIRST[::-1])
     lines = [
         "# Reliability",
         "",
-        "What goes wrong, what a user then gets, and the tests that try it. Messages name the file, what was found,",
-        "what was expected and what to do; the exit codes are under [Questions](questions.md). This page",
-        "is written by a run of the tests, `./run pytest",
-        "--reliability=docs/reliability.md`, from `tests/faults.yaml`.",
+        "What goes wrong, and what a user then gets. Messages name the file, what was found, what was expected and",
+        "what to do; the exit codes are under [Questions](questions.md). Each row is tried by tests; an outcome is",
+        "given where not all of them passed.",
+        "`./run pytest --reliability=docs/reliability.md` writes this page from `tests/faults.yaml`.",
         "",
         f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
     ]
     section = None
     for number, (of, fault, gets) in known["fault"].items():
         if of != section:
-            lines += [
-                "",
-                f"## {of}",
-                "",
-                "| | fault | what the user gets | tests | |",
-                "| --- | --- | --- | --- | --- |",
-            ]
+            lines += ["", f"## {of}", "", "| | fault | what the user gets |", "| --- | --- | --- |"]
             section = of
         lines.append(_row(number, (fault, gets), tests.get(("fault", number), {})))
-    lines += ["", "## Promises", "", "| | what holds | tests | |", "| --- | --- | --- | --- |"]
+    lines += ["", "## Promises", "", "| | what holds |", "| --- | --- |"]
     lines += [_row(number, texts, tests.get(("promise", number), {})) for number, texts in known["promise"].items()]
     return "\n".join(lines) + "\n"
 
 
 def _row(number, texts, found):
-    by_file = defaultdict(list)
-    for test in sorted(found):
-        path, _, name = test.partition("::")
-        by_file[path.removeprefix("tests/")].append(f"`{name.removeprefix('test_')}`")
-    tests = "<br>".join(f"{path}: {', '.join(names)}" for path, names in by_file.items()) or "none"
     outcome = next((word for word in WORST_FIRST if word in found.values()), "not run")
-    cells = [str(number), *(_plain(text) for text in texts), tests, outcome]
-    return f"| {' | '.join(cells)} |"
+    cells = [str(number), *(_plain(text) for text in texts)]
+    return f"| {' | '.join(cells)}{'' if outcome == 'passed' else f' (**{outcome}**)'} |"
 
 
 def _plain(text):

@@ -1,15 +1,99 @@
-"""Small meshes and surfaces whose geometry is known."""
+"""Small meshes, surfaces and brains whose geometry is known: the one factory of all tests."""
+
+from functools import cache
 
 import nibabel as nib
 import numpy as np
 import trimesh
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
+from scipy.spatial.transform import Rotation
 
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
 from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.phantom.pathologies import CEREBRUM, positions
+from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 
 HALF_AXES = np.array([11.0, 24.0, 16.0])
 """Semi-axes in mm of an ellipsoid as large as a small hemisphere of week 21."""
+
+LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""The motion from LPS to RAS coordinates, and back."""
+PAD = 4
+
+
+def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
+    """Returns the (4, 4) motion of turns about x, y and z in turn, in degrees, and a shift in mm."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_euler("xyz", degrees or (0.0, 0.0, 0.0), degrees=True).as_matrix()
+    matrix[:3, 3] = shift
+    return matrix
+
+
+def moved(mesh: TriangleMesh, *shift: float) -> TriangleMesh:
+    """Returns a surface shifted by mm along x, or x, y and z."""
+    return TriangleMesh(mesh.vertices + [*shift, 0.0, 0.0][:3], mesh.faces)
+
+
+def sphere(radius: float = 10.0, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> TriangleMesh:
+    """Returns an icosphere, its radius in mm."""
+    return ellipsoid((radius,) * 3, subdivisions, centre)
+
+
+def ellipsoid(half_axes, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> TriangleMesh:
+    """Returns an icosphere drawn out to semi-axes in mm."""
+    vertices, faces = _icosphere(subdivisions)
+    return TriangleMesh(vertices * np.asarray(half_axes) + np.asarray(centre), faces)
+
+
+@cache
+def _icosphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    return np.array(ball.vertices), np.array(ball.faces)
+
+
+def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:
+    """Returns a box's surface, 12 triangles, each divided in four some times."""
+    shape = trimesh.creation.box(size)
+    for _ in range(subdivisions):
+        shape = shape.subdivide()
+    return TriangleMesh(shape.vertices + np.asarray(centre), shape.faces)
+
+
+def torus(ring: float, tube: float, around: int = 32, across: int = 32) -> TriangleMesh:
+    """Returns a torus about z: the radii in mm of its ring and its tube, and the faces along both."""
+    shape = trimesh.creation.torus(ring, tube, major_sections=around, minor_sections=across)
+    return TriangleMesh(shape.vertices, shape.faces)
+
+
+@cache
+def phantom(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the labels of a synthetic brain and their affine, which are not to be changed."""
+    labels, affine = phantom_labels(week, voxel_mm=voxel_mm)
+    labels.flags.writeable = affine.flags.writeable = False
+    return labels, affine
+
+
+def mask_surface(mask: np.ndarray, affine: np.ndarray) -> TriangleMesh:
+    """Returns the closed surface of the smoothed main parts of a mask of voxels, without handles."""
+    field, _ = make_simple(smooth_mask(np.pad(mask, PAD), 1.0))
+    return isosurface(field, shifted_affine(affine, np.full(3, -PAD)))
+
+
+def cerebrum_surface(labels: np.ndarray, affine: np.ndarray) -> TriangleMesh:
+    """Returns the closed surface around the cerebrum of a phantom's labels."""
+    return mask_surface(np.isin(labels, CEREBRUM), affine)
+
+
+@cache
+def phantom_halves(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[TriangleMesh, TriangleMesh]:
+    """Returns a phantom's left and right hemisphere as closed surfaces 1.2 mm apart, the fissure at x = 0, in RAS+."""
+    labels, affine = phantom(week, voxel_mm)
+    centred = affine.copy()
+    centred[:3, 3] -= CENTRE_MM
+    x, _, _ = positions(labels, affine)
+    left, right = (mask_surface(np.isin(labels, CEREBRUM) & side, centred) for side in (x < -0.6, x > 0.6))
+    return left, right
 
 
 def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetrahedralMesh:
@@ -31,14 +115,22 @@ def ellipsoid_mesh(cells: int, semi_axes: tuple[float, float, float]) -> Tetrahe
 
 def hemisphere(side: int) -> TriangleMesh:
     """Returns an ellipsoid in place of a hemisphere, on the left (-1) or the right (1) of a gap of 3 mm at x = 0."""
-    ball = trimesh.creation.icosphere(subdivisions=4)
-    return TriangleMesh(ball.vertices * HALF_AXES + [12.5 * side, 0.0, 0.0], ball.faces)
+    return ellipsoid(HALF_AXES, centre=(12.5 * side, 0.0, 0.0))
 
 
-def save_gifti(path, mesh: TriangleMesh, matrix: np.ndarray | None = None) -> None:
-    """Writes a GIFTI surface as it is, whatever is wrong with it, with a coordinate-system matrix if one is given."""
+def save_labels(path, labels: np.ndarray, affine: np.ndarray) -> None:
+    """Writes labels as NIfTI in mm, as programs other than this one do."""
+    image = nib.Nifti1Image(labels.astype(np.int16), affine)
+    image.header.set_xyzt_units("mm")
+    nib.save(image, path)
+
+
+def save_gifti(
+    path, mesh: TriangleMesh, matrix: np.ndarray | None = None, data: str = "UNKNOWN", to: str = "SCANNER_ANAT"
+) -> None:
+    """Writes a GIFTI surface as it is, whatever is wrong with it, with a matrix from one space to another if given."""
     points = GiftiDataArray(mesh.vertices.astype(np.float32), intent="NIFTI_INTENT_POINTSET")
     if matrix is not None:
-        points.coordsys = GiftiCoordSystem("NIFTI_XFORM_UNKNOWN", "NIFTI_XFORM_SCANNER_ANAT", matrix)
+        points.coordsys = GiftiCoordSystem(f"NIFTI_XFORM_{data}", f"NIFTI_XFORM_{to}", matrix)
     triangles = GiftiDataArray(mesh.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE")
     nib.save(GiftiImage(darrays=[points, triangles]), path)

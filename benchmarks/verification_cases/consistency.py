@@ -7,6 +7,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from gyriflow.folding.domain import Domain
+from gyriflow.folding.growth import layered_inverse
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
@@ -46,7 +47,12 @@ def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> Problem:
     problem = Problem(domain, zones, NeoHookean(0.45), penalty_pa_per_m=5e5, remembers_stress=True)
     x = 0 if uniform else domain.local(domain.positions)[:, 2] / (SIDE_MM * 1e-3)
     ones, cells = np.ones(len(domain.vertex_of_node)), len(domain.cells)
-    problem.set_layers(1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones, np.tile([1 / 3, 2 / 3, 2 / 3], (cells, 1)))
+    mu, dg, dr = (
+        nodal[domain.cells] @ problem.points.smooth.T for nodal in (1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones)
+    )
+    normals = np.tile([1 / 3, 2 / 3, 2 / 3], (*mu.shape, 1))
+    problem.set_shear_modulus(mu)
+    problem.set_growth(layered_inverse(dg, dr, np.ones(cells, bool), normals))
     problem.set_stretch(np.tile(STRETCH, (cells, len(problem.points.weights), 1, 1)))
     return problem
 

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.folding.domain import Domain
+from gyriflow.folding.growth import layered_inverse
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
@@ -127,7 +128,9 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
     mu, dg, dr = (np.broadcast_to(values, len(nodes)) for values in layers(case, nodes.T, np.sin)[:3])
     angle = np.broadcast_to(layers(case, np.moveaxis(points, 2, 0), np.sin)[3], points.shape[:2])
     normals = np.stack([0.6 * np.cos(angle), 0.6 * np.sin(angle), np.full(angle.shape, 0.8)], axis=2)
-    problem.set_layers_at_points(*(values[domain.cells] @ to_points for values in (mu, dg, dr)), normals)
+    mu, dg, dr = (values[domain.cells] @ to_points for values in (mu, dg, dr))
+    problem.set_shear_modulus(mu)
+    problem.set_growth(layered_inverse(dg, dr, np.ones(len(mu), bool), normals))
     if kept:
         problem.set_stretch(np.tile(STRETCH, (*points.shape[:2], 1, 1)))
 

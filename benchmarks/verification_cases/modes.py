@@ -19,8 +19,6 @@ from scipy.linalg import LinAlgError, cholesky_banded, solve_banded
 
 Floats = NDArray[np.float64]
 
-SHORT = 1e-7
-"""Growth that stands for an infinitesimal one."""
 TINY = 1e-30
 """The complex step: its error is of the square."""
 ENTRIES = ((0, 0), (0, 2), (2, 0), (2, 2))
@@ -240,36 +238,13 @@ def relaxed_stretch(Fe: NDArray, part: float) -> tuple[Floats, Floats]:
     return power, divided * (Fe @ np.swapaxes(Fe, -1, -2)).imag / TINY
 
 
-def velocity(slab: Slab, waves: Waves) -> tuple[Floats, Floats]:
-    """Returns how fast the flat slab rises, (n + 1,), and the waves change, (k, n + 1, 2), by growth.
-
-    For stress that is forgotten: the limit of short steps.
-    """
-    after = step(slab, waves, SHORT)
-    return (after.z - waves.z) / SHORT, (after.moved - waves.moved) / SHORT
-
-
-def amplifications(slab: Slab, wavenumber: Floats, growth: float, steps: int, scheme: str = "implicit") -> Floats:
-    """Returns the (steps + 1, k) heights of waves over those at the start, after equal steps of a `time_scheme`."""
+def amplifications(slab: Slab, wavenumber: Floats, growth: float, steps: int) -> Floats:
+    """Returns the (steps + 1, k) heights of waves over those at the start, after equal steps."""
     waves, heights = at_start(slab, wavenumber), [np.ones(len(wavenumber))]
-    before: tuple[Floats, Floats] | None = None
     for _ in range(steps):
-        if scheme == "implicit":
-            waves = step(slab, waves, growth)
-        else:
-            rates = velocity(slab, waves)
-            if before is None or scheme == "midpoint":
-                wanted = velocity(slab, moved_on(waves, rates, growth / 2))
-            else:
-                wanted = (1.5 * rates[0] - 0.5 * before[0], 1.5 * rates[1] - 0.5 * before[1])
-            waves, before = moved_on(waves, wanted, growth), rates
+        waves = step(slab, waves, growth)
         heights.append(waves.height)
     return np.array(heights)
-
-
-def moved_on(waves: Waves, rates: tuple[Floats, Floats], growth: float) -> Waves:
-    """Returns the waves after some growth at given rates."""
-    return replace(waves, z=waves.z + growth * rates[0], moved=waves.moved + growth * rates[1])
 
 
 def growth_rates(slab: Slab, wavenumber: Floats, growth: float = 1e-6) -> Floats:

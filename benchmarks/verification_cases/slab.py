@@ -17,8 +17,7 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
-from gyriflow.parameters.folding import FoldingParameters, Solver
-from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.folding import FoldingParameters, Solver, parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 from .modes import Slab, amplifications
@@ -52,7 +51,6 @@ class Waved:
     growth: float
     steps: int
     memory: float = 0.0
-    scheme: str = "implicit"
     poisson_ratio: float = 0.45
     order: int = 1
 
@@ -71,7 +69,7 @@ class Waved:
 
     def expected(self) -> Floats:
         """Returns the (steps + 1, waves) heights over those at the start, from `modes`."""
-        return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps, self.scheme)
+        return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps)
 
     def parameters(self) -> FoldingParameters:
         """Returns the parameters of the run."""
@@ -89,7 +87,6 @@ class Waved:
             "growth_rate_per_s": RATE_PER_S,
             "step_s": self.growth / RATE_PER_S,
             "stress_memory_gw": "infinite" if np.isinf(memory_gw) else memory_gw,
-            "time_scheme": self.scheme,
             "support": "box",
             "contact": {"kind": "none"},
             "no_growth": {"kind": "none"},

@@ -4,19 +4,7 @@ from os import PathLike
 
 
 class GyriflowError(Exception):
-    """An error with a message that names what was found, what was expected and what to do.
-
-    Parameters
-    ----------
-    problem
-        What is wrong, as a short clause.
-    path
-        File or folder concerned.
-    found, expected
-        What was there, and what should have been.
-    remedy
-        What the user can do.
-    """
+    """An error: a problem, as a short clause, with the path concerned, what was found and expected, and what to do."""
 
     exit_code = 1
 
@@ -29,15 +17,10 @@ class GyriflowError(Exception):
         expected: object = None,
         remedy: str | None = None,
     ) -> None:
-        parts = [f"{path}: {problem}" if path is not None else problem]
-        if found is not None:
-            parts.append(f"found {found}")
-        if expected is not None:
-            parts.append(f"expected {expected}")
-        message = "; ".join(parts)
-        if remedy is not None:
-            message = f"{message}. {remedy}"
-        super().__init__(message)
+        message = f"{path}: {problem}" if path is not None else problem
+        message += f"; found {found}" if found is not None else ""
+        message += f"; expected {expected}" if expected is not None else ""
+        super().__init__(message + (f". {remedy}" if remedy is not None else ""))
         self.names_file = path is not None
 
     def __reduce__(self) -> tuple:

@@ -1,4 +1,4 @@
-"""Where the workflow, atlases, norms and configurations lie that come with the package: in a checkout or installed."""
+"""Where the data and the workflow that come with the package lie: in a checkout, or installed."""
 
 from pathlib import Path
 
@@ -6,4 +6,4 @@ PACKAGE = Path(__file__).resolve().parent
 INSTALLED = PACKAGE / "shipped"
 """The folder in a wheel that holds what stands beside `src` in a checkout."""
 SHIPPED = INSTALLED if INSTALLED.is_dir() else PACKAGE.parents[1]
-"""The folder with the Snakefile, `workflow`, `atlases`, `norms`, `config` and `profiles`."""
+"""The folder with the Snakefile, `workflow`, `atlases`, `schemes`, `norms`, `config` and `profiles`."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from .errors import GyriflowError
 
 EXIT_FILE = "GYRIFLOW_EXIT_FILE"
-"""Environment variable with the file in which `gyriflow.launch` looks for the exit code of the first failed step."""
+"""Environment variable with the file in which `gyriflow.shell.launch` finds the first failed step's exit code."""
 INTERRUPTED = 130
 KILLED = 137
 

@@ -13,6 +13,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 LOOK_EVERY_S = 1.0
+OPTION = {"env_var": False, "required": False}
 NOTHING_TO_DO = "Nothing to be done"
 INTERRUPTED = ("Terminating processes on user request", "Cancelling snakemake on user request")
 OF_FAILED_JOBS = (
@@ -30,13 +31,9 @@ class LogHandlerSettings(LogHandlerSettingsBase):
     """The plugin's options, `--logger-gyriflow-details FILE` and `--logger-gyriflow-plan FILE`."""
 
     details: str = field(
-        default="",
-        metadata={"help": "File for all that Snakemake says, besides its own log", "env_var": False, "required": False},
+        default="", metadata=OPTION | {"help": "File for all that Snakemake says, besides its own log"}
     )
-    plan: str = field(
-        default="",
-        metadata={"help": "File for the jobs of a dry run, as JSON", "env_var": False, "required": False},
-    )
+    plan: str = field(default="", metadata=OPTION | {"help": "File for the jobs of a dry run, as JSON"})
 
 
 class LogHandler(LogHandlerBase):
@@ -46,24 +43,19 @@ class LogHandler(LogHandlerBase):
         # every job's process imports this module, and few need more of it
         from snakemake.logging import DefaultFormatter
 
-        from gyriflow.cost import typical_seconds
+        from gyriflow.shell.cost import typical_seconds
+        from gyriflow.shell.terminal import STATE, RunDisplay, stages
         from gyriflow.shipped import SHIPPED
-        from gyriflow.terminal.display import STATE, RunDisplay
-        from gyriflow.terminal.stages import stages
 
         settings = self.settings if isinstance(self.settings, LogHandlerSettings) else LogHandlerSettings()
         details = settings.details
         self.plan_file = settings.plan
-        self.planned: dict[int, dict[str, Any]] = {}
+        self.planned: list[dict[str, Any]] = []
         self.file = logging.FileHandler(details) if details else None
         if self.file:
             self.file.setFormatter(DefaultFormatter(self.common_settings.quiet, show_failed_logs=True))
-        self.display = RunDisplay(
-            stream=sys.stderr,
-            stage_of=stages(SHIPPED / "workflow" / "rules"),
-            typical_s=typical_seconds(),
-            details=details or None,
-        )
+        stage_of = stages(SHIPPED / "workflow" / "rules")
+        self.display = RunDisplay(sys.stderr, stage_of, typical_seconds(), details or None)
         # the details are in .snakemake/log of the working directory, which is not the current one yet
         self.state_file = Path(details).parents[2] / STATE if details else None
         self.cores: int | None = None
@@ -98,29 +90,21 @@ class LogHandler(LogHandlerBase):
 
     def _tell(self, record: logging.LogRecord) -> None:
         said: dict[str, Any] = vars(record)
+        if self.plan_file:
+            if said.get("event") == LogEvent.JOB_INFO:
+                job = {name: said[name] for name in ("threads", "reason")}
+                wildcards, output = dict(said["wildcards"] or {}), list(said["output"])
+                self.planned.append(job | {"rule": said["rule_name"], "wildcards": wildcards, "output": output})
+            return
         match said.get("event"):
             case LogEvent.RESOURCES_INFO if said.get("cores"):
                 self.cores = int(said["cores"])
-            case LogEvent.JOB_INFO if self.plan_file:
-                self.planned[said["jobid"]] = {
-                    "rule": said["rule_name"],
-                    "wildcards": dict(said["wildcards"] or {}),
-                    "threads": said["threads"],
-                    "output": list(said["output"]),
-                    "reason": said["reason"],
-                }
-            case LogEvent.RUN_INFO if not self.plan_file:
-                jobs = dict(said.get("stats") or {})
-                jobs.pop("total", None)
-                self.display.plan(jobs, self.cores)
+            case LogEvent.RUN_INFO:
+                jobs = said.get("stats") or {}
+                self.display.plan({rule: count for rule, count in jobs.items() if rule != "total"}, self.cores)
             case LogEvent.JOB_INFO:
-                self.display.job_begins(
-                    said["jobid"],
-                    said["rule_name"],
-                    said["wildcards"] or {},
-                    said["output"],
-                    next(iter(said["log"]), None),
-                )
+                log = next(iter(said["log"]), None)
+                self.display.job_begins(said["jobid"], said["rule_name"], said["wildcards"] or {}, said["output"], log)
             case LogEvent.JOB_FINISHED:
                 self.display.job_ends(said["job_id"])
             case LogEvent.JOB_ERROR:
@@ -134,7 +118,7 @@ class LogHandler(LogHandlerBase):
         """Passes warnings and errors on; those of failed jobs are kept for the case that no job is named."""
         text = record.getMessage().strip()
         if text.startswith(NOTHING_TO_DO):
-            self.display.up_to_date = not self.plan_file
+            self.display.up_to_date = True
         elif text.startswith(INTERRUPTED):
             self.display.interrupted = True
         elif record.levelno >= logging.WARNING and text:
@@ -147,11 +131,11 @@ class LogHandler(LogHandlerBase):
         """Says how the run ended."""
         if not self.ended.is_set():
             self.ended.set()
-            # a terminal that is gone has nobody who reads
             if self.plan_file:
                 from gyriflow.io.files import write_json
 
-                write_json(self.plan_file, list(self.planned.values()))
+                write_json(self.plan_file, self.planned)
+            # a terminal that is gone has nobody who reads
             with suppress(OSError, ValueError):
                 if not self.display.failed and not self.display.interrupted:
                     for text in self.of_failed_jobs:
@@ -164,25 +148,9 @@ class LogHandler(LogHandlerBase):
 
     @property
     def writes_to_stream(self) -> bool:
-        """It takes the place of Snakemake's own messages on the terminal."""
-        return True
+        """It takes the place of Snakemake's own messages on the terminal, but for those of a dry run."""
+        return not self.plan_file
 
-    @property
-    def writes_to_file(self) -> bool:
-        """The file is not one of Snakemake's logs."""
-        return False
-
-    @property
-    def has_filter(self) -> bool:
-        """It chooses by itself."""
-        return True
-
-    @property
-    def has_formatter(self) -> bool:
-        """It writes its own lines."""
-        return True
-
-    @property
-    def needs_rulegraph(self) -> bool:
-        """The graph of rules is not shown."""
-        return False
+    # it chooses by itself, writes its own lines, and its file is none of Snakemake's logs
+    has_filter = has_formatter = True
+    writes_to_file = needs_rulegraph = False

@@ -1,10 +1,13 @@
 """Small folding problems for the tests under MPI."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from mpi4py import MPI
 from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
+from gyriflow.folding.growth import Growth, layered_inverse
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import boundary_faces
@@ -38,9 +41,54 @@ def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=No
     return Zones(facets, zone, np.ones(len(mesh.vertices)), 0.0, planes)
 
 
-def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=1):
+def set_layers(problem, mu, dg, dr, normals):
+    """Sets shear modulus in Pa and growth increments (k,) at the local nodes, with unit normals (c, 3) of the cells."""
+    points = problem.points
+    mu, dg, dr = (nodal[problem.domain.cells] @ points.smooth.T for nodal in (mu, dg, dr))
+    repeated = np.repeat(normals[:, None], len(points.weights), axis=1)
+    problem.set_shear_modulus(mu)
+    problem.set_growth(layered_inverse(dg, dr, np.ones(len(mu), bool), repeated))
+
+
+@dataclass(frozen=True, eq=False)
+class EvenGrowth(Growth):
+    """Growth by the same part in all directions everywhere, and the model of it."""
+
+    by: float
+
+    def growth(self, start):
+        return replace(self, start=start)
+
+    def inverse(self, tissue):
+        cells, points = len(tissue.cells), len(tissue.points.weights)
+        return np.tile(np.eye(3) / (1 + self.by), (cells, points, 1, 1))
+
+
+def taylor_errors(problem, u, v):
+    """Returns what energy and forces at u + h v miss of their expansions at u, for two h, (2, 2), and |J h v|.
+
+    The part v of the displacement is zero where that is fixed.
+    """
+    residual, other, direction, change = (problem.new_vector() for _ in range(4))
+    direction.array[:] = v[: problem.domain.owned].ravel()
+    problem.set_displacement(u)
+    energy = problem.energy()
+    problem.residual(residual)
+    problem.tangent().whole().mult(direction, change)
+    errors = []
+    for h in (0.2, 0.1):
+        problem.set_displacement(u + h * v)
+        first = abs(problem.energy() - energy - h * residual.dot(direction))
+        problem.residual(other)
+        other.axpy(-1.0, residual)
+        other.axpy(-h, change)
+        errors.append((first, other.norm()))
+    return np.array(errors), h * change.norm()
+
+
+def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None, comm=COMM):
     """Returns a problem with layers that are uniform, or nodal functions of the position in m."""
-    domain = Domain(COMM, mesh)
+    domain = Domain(comm, mesh)
     problem = Problem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M, quadrature_degree=degree)
     x = domain.local(domain.positions)
 
@@ -49,7 +97,7 @@ def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=1):
 
     centres = x[domain.cells].mean(axis=1)
     normal = np.tile([0.0, 0.0, 1.0], (len(centres), 1)) if normals is None else normals(centres)
-    problem.set_layers(nodal(mu), nodal(dg), nodal(dr), normal)
+    set_layers(problem, nodal(mu), nodal(dg), nodal(dr), normal)
     return problem
 
 

@@ -1,7 +1,7 @@
 """Bodies that come into contact with each other or with themselves."""
 
 import numpy as np
-from boxes import COMM, MATERIAL, smooth_displacement
+from boxes import COMM, MATERIAL, set_layers, smooth_displacement
 from shapes import box_mesh
 
 from gyriflow.folding.checkpoint import State
@@ -11,7 +11,7 @@ from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
-from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.folding import parameters_from
 from gyriflow.parameters.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
 from gyriflow.units import M_PER_MM
 
@@ -43,7 +43,7 @@ def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z
     problem = Problem(domain, zones, MATERIAL)
     nodes, cells = len(domain.vertex_of_node), len(domain.cells)
     normal = np.tile([0.0, 0.0, 1.0], (cells, 1))
-    problem.set_layers(np.full(nodes, MU), np.zeros(nodes), np.full(nodes, growth_along_z), normal)
+    set_layers(problem, np.full(nodes, MU), np.zeros(nodes), np.full(nodes, growth_along_z), normal)
     contact = SelfContact(domain, problem.displacement, zones.facets, ContactSettings(stiffness, distance))
     problem.contributions.append(contact)
     return problem, contact

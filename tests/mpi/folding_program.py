@@ -24,6 +24,7 @@ def command(mesh, out, ranks=1, **changes):
     params = out.parent / f"{out.name}.yaml"
     params.write_text(yaml.safe_dump(WEEK | changes))
     program = [sys.executable, "-m", "gyriflow.folding", str(mesh), "--params", str(params), "--out", str(out)]
+    program += ["--progress", str(out.with_suffix(".jsonl"))]
     return ["mpiexec", "-n", str(ranks), *program]
 
 

@@ -9,12 +9,11 @@ from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
 from gyriflow.folding.checkpoint import State
-from gyriflow.folding.following import missed_curves, size_of
-from gyriflow.folding.free_growth import Tissue
+from gyriflow.folding.growth import GrowthInputs
 from gyriflow.folding.simulation import Folding
+from gyriflow.folding.steering import missed_curves
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.parameters.folding import VENTRICLES
-from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.folding import VENTRICLES, parameters_from
 from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
 
 COMM = MPI.COMM_WORLD
@@ -28,7 +27,7 @@ def following(growth, **changes):
     known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
     settings = {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
     plain = parameters_from(known | settings)
-    start = size_of(mesh.vertices, Tissue.of(mesh, zones_of_run(mesh, plain), {}))
+    start = GrowthInputs.of(mesh, zones_of_run(mesh, plain), {}).size(mesh.vertices)
     sizes = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
     curves = {
         name: {21.0: size, 23.0: size * math.exp(2 * rate)}
@@ -45,35 +44,21 @@ def grown(folding, state, steps):
     return state
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "adams-bashforth"])
 @pytest.mark.parametrize("growth", [(0.10, 0.15), (0.02, 0.03)])
-def test_area_and_volume_meet_their_curves_after_a_week(growth, scheme):
-    folding, state = following(growth, time_scheme=scheme)
+def test_area_and_volume_meet_their_curves_after_a_week(growth):
+    folding, state = following(growth)
     state = grown(folding, state, 10)
     row = state.rows[-1]
     # at every step, from the first one on
     for each in state.rows:
         assert each["area_cm2"] == pytest.approx(each["area_aim_cm2"], rel=1.5e-3)
         assert each["volume_ml"] == pytest.approx(each["volume_aim_ml"], rel=1.5e-3)
-    found = size_of(state.positions * MM_PER_M, Tissue.of(ellipsoid_mesh(8, AXES), folding.zones, {}))
+    found = folding.inputs.size(state.positions * MM_PER_M)
     assert row["area_cm2"] == pytest.approx(found.area_mm2 * CM2_PER_MM2, rel=1e-12)
     # the aim is the curve itself
     weeks = 10 / 7
     start = folding.parameters.follow.area_cm2[21.0]
     assert row["area_aim_cm2"] == pytest.approx(start * math.exp(growth[0] * weeks), rel=1e-9)
-
-
-def test_rates_do_not_swing_where_a_step_counts_the_rate_of_the_one_before():
-    folding, state = following((0.10, 0.15), time_scheme="adams-bashforth")
-    rows = grown(folding, state, 8).rows
-    for name in ("growth_rate_per_s", "core_growth_rate_per_s"):
-        changes = np.diff([row[name] for row in rows])[2:]
-        # towards rates that last, in one direction
-        assert (np.sign(changes) == np.sign(changes[0])).all() or np.abs(changes).max() < 1e-9
-        assert np.abs(changes[-1]) < np.abs(changes).max()
-    last, before = rows[-1], rows[-2]
-    over_step = 1.5 * last["growth_rate_at_start_per_s"] - 0.5 * before["growth_rate_at_start_per_s"]
-    assert over_step == pytest.approx(last["growth_rate_per_s"], rel=1e-9)
 
 
 def test_a_brain_that_shrinks_is_followed_where_that_is_allowed():
@@ -87,12 +72,11 @@ def test_a_brain_that_shrinks_is_followed_where_that_is_allowed():
     assert (row["growth_rate_per_s"], row["core_growth_rate_per_s"], row["growth_limited"]) == (0.0, 0.0, 1)
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "adams-bashforth"])
-def test_what_was_learnt_of_growth_goes_on_from_the_step_table(scheme):
-    folding, state = following((0.10, 0.15), time_scheme=scheme)
+def test_what_was_learnt_of_growth_goes_on_from_the_step_table():
+    folding, state = following((0.10, 0.15))
     middle = grown(folding, state, 3)
     whole = grown(folding, middle, 2)
-    again, _ = following((0.10, 0.15), time_scheme=scheme)
+    again, _ = following((0.10, 0.15))
     resumed = grown(again, middle, 2)
     assert resumed.learnt == pytest.approx(whole.learnt, rel=1e-6)
     assert resumed.rows[-1]["growth_rate_per_s"] == pytest.approx(whole.rows[-1]["growth_rate_per_s"], rel=1e-6)
@@ -128,11 +112,10 @@ def test_growth_goes_in_measured_directions_and_still_meets_its_curves():
     assert after.rows[-1]["volume_ml"] == pytest.approx(after.rows[-1]["volume_aim_ml"], rel=1e-3)
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "adams-bashforth"])
 @pytest.mark.parametrize(("growth", "negative"), [(0.3, False), (0.05, True)])
-def test_ventricles_follow_a_curve_of_their_own_beside_the_brain(scheme, growth, negative):
-    folding, state = following((0.10, 0.15), time_scheme=scheme, allow_negative_growth=negative)
-    tissue, start, after = with_ventricles(folding, state, growth)
+def test_ventricles_follow_a_curve_of_their_own_beside_the_brain(growth, negative):
+    folding, state = following((0.10, 0.15), allow_negative_growth=negative)
+    inputs, start, after = with_ventricles(folding, state, growth)
     row = after.rows[-1]
     # after a week; what a first step does not know of their surroundings is learnt by then
     assert row["ventricles_ml"] == pytest.approx(row["ventricles_aim_ml"], rel=5e-3)
@@ -142,7 +125,7 @@ def test_ventricles_follow_a_curve_of_their_own_beside_the_brain(scheme, growth,
         assert each["area_cm2"] == pytest.approx(each["area_aim_cm2"], rel=1.5e-3)
         assert each["volume_ml"] == pytest.approx(each["volume_aim_ml"], rel=1.5e-3)
     # with the core's rate they would be far from it
-    alike = tissue.ventricles_mm3(grown(folding, state, 7).positions * MM_PER_M)
+    alike = inputs.size(grown(folding, state, 7).positions * MM_PER_M).ventricles_mm3
     assert abs(math.log(alike / start) - growth) > 0.05
 
 
@@ -156,12 +139,12 @@ def test_ventricles_whose_rate_may_not_be_negative_are_taken_along_and_told_of()
 
 
 def with_ventricles(folding, state, growth):
-    """Returns the tissue with a ball of ventricles, their volume in mm³, and the state after a week of their growth."""
+    """Returns the inputs with a ball of ventricles, their volume in mm³, and the state after a week of their growth."""
     mesh = ellipsoid_mesh(8, AXES)
     maps = {VENTRICLES: (np.linalg.norm(mesh.vertices, axis=1) < 10).astype(float)}
-    tissue = Tissue.of(mesh, folding.zones, maps)
-    start = tissue.ventricles_mm3(mesh.vertices)
+    inputs = GrowthInputs.of(mesh, folding.zones, maps)
+    start = inputs.size(mesh.vertices).ventricles_mm3
     values = folding.parameters.model_dump(mode="json")
     values["follow"] |= {"ventricles_ml": {21.0: start * ML_PER_MM3, 23.0: start * ML_PER_MM3 * math.exp(2 * growth)}}
     own = Folding(COMM, mesh, folding.zones, parameters_from(values), maps)
-    return tissue, start, grown(own, state, 7)
+    return inputs, start, grown(own, state, 7)

@@ -4,20 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import COMM, MATERIAL, distorted_box, everywhere_known, zones_of
+from boxes import COMM, MATERIAL, EvenGrowth, distorted_box, everywhere_known, set_layers, zones_of
 from shapes import box_mesh
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.memory import packed, unpacked
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
+from gyriflow.folding.stress import packed, unpacked
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
-from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import M_PER_MM, SECONDS_PER_GW
 
 RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0]}
+EVEN = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0}
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
 STRETCH = np.array([[1.1, 0.03, 0.0], [0.03, 0.95, -0.02], [0.0, -0.02, 1.02]])
 
@@ -32,7 +33,7 @@ def stretched_problem(zones, mesh):
     problem = Problem(domain, zones, MATERIAL, remembers_stress=True)
     nodes, cells = len(domain.vertex_of_node), len(domain.cells)
     uniform = np.ones(nodes)
-    problem.set_layers(1000.0 * uniform, 0.0 * uniform, 0.0 * uniform, np.tile([0.0, 0.0, 1.0], (cells, 1)))
+    set_layers(problem, 1000.0 * uniform, 0.0 * uniform, 0.0 * uniform, np.tile([0.0, 0.0, 1.0], (cells, 1)))
     problem.set_stretch(np.tile(STRETCH, (cells, 1, 1)))
     return problem
 
@@ -70,10 +71,8 @@ def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(memor
     # uniform isotropic growth of a body whose whole surface is fixed: nothing moves, and ln V adds up and decays
     mesh = distorted_box()
     zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
-    folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw)
-    nodes, cells = np.ones(len(folding.domain.vertex_of_node)), len(folding.domain.cells)
-    uniform = (300.0 * nodes, 0.01 * nodes, 0.01 * nodes, np.tile([0.0, 0.0, 1.0], (cells, 1)))
-    folding.set_layers = lambda *_: folding.problem.set_layers(*uniform)
+    folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw, **EVEN)
+    folding.model = EvenGrowth(folding.parameters, None, 0.01)
     for _ in range(5):
         state = folding.step(state, 43200.0)
     kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
@@ -114,7 +113,7 @@ def test_a_free_body_grows_without_drifting():
     zones = replace(zones_of(mesh), free=True)
     folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"})
     # growth on one side only, which would turn a body that is only extrapolated
-    folding._growth = (folding.domain.local(folding.domain.positions)[:, 0] > 0).astype(float)
+    folding._growing = (folding.domain.local(folding.domain.positions)[:, 0] > 0).astype(float)
     for _ in range(6):
         before, state = state.positions, folding.step(state, 43200.0)
         u, x = state.last, before - before.mean(axis=0)

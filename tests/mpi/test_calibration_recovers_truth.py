@@ -6,14 +6,14 @@ import pytest
 from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
+from gyriflow.comparison.design import calibrated_parameters, sobol_design
+from gyriflow.comparison.scores import size_score
+from gyriflow.comparison.surrogate import fit, optimum, propose
 from gyriflow.folding.run import run
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.frames import read_positions
-from gyriflow.parameters.reading import parameters_from
-from gyriflow.study.design import calibrated_parameters, sobol_design
-from gyriflow.study.surrogate import fit, optimum, propose
-from gyriflow.validation.scores import size_score
+from gyriflow.parameters.folding import parameters_from
 
 pytestmark = pytest.mark.slow
 

@@ -16,9 +16,10 @@ from gyriflow.errors import StorageError
 from gyriflow.folding.__main__ import require_space
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
+from gyriflow.io.jobs import events_in
 from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
-from gyriflow.parameters.reading import parameters_from
+from gyriflow.parameters.folding import parameters_from
 
 pytestmark = pytest.mark.slow
 
@@ -91,6 +92,15 @@ def test_memory_and_a_shortened_step_are_said_before_the_solve(default_run):
     before, _, _ = default_run[1].partition("step    1")
     assert "3072 elements, 2187 unknowns, 2 ranks, about 516 MiB" in before
     assert "step_s 43200 does not divide the time from GW 21 to 21.25: the last step there is shortened" in before
+
+
+def test_the_progress_is_told_as_json(default_run):
+    size, *steps, end = events_in(default_run[0].with_suffix(".jsonl").read_text())
+    assert (size["event"], size["elements"], size["ranks"], size["memory_mib"]) == ("size", 3072, 2, 516)
+    steps = [event for event in steps if event["event"] == "step"]
+    assert [step["step"] for step in steps] == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert (steps[-1]["week"], steps[-1]["end_week"], steps[-1]["left_s"]) == (pytest.approx(21.5), 21.5, 0.0)
+    assert (end["event"], end["week"], end["error"]) == ("end", 21.5, None)
 
 
 @pytest.mark.fault(29)

@@ -13,19 +13,8 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize("cases", sorted(path.name for path in Path(__file__).parent.glob("*_cases.py")))
 def test_cases_hold_on(ranks, cases):
     path = Path(__file__).with_name(cases)
-    command = [
-        "mpiexec",
-        "-n",
-        str(ranks),
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-x",
-        "-p",
-        "no:cacheprovider",
-        str(path),
-    ]
+    program = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", str(path)]
+    command = ["mpiexec", "-n", str(ranks), *program]
     done = subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == ranks, done.stdout

@@ -7,13 +7,12 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 import yaml
 from shapes import ellipsoid_mesh, hemisphere
 
-from gyriflow.io.files import write_json
+from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
@@ -27,6 +26,47 @@ SMALL_STUDY = {
     "folding": {"end_week": 22},
     "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
 }
+COARSE = {
+    "order": 1,
+    "mesher": "tetgen",
+    "surface_edge_mm": 3.0,
+    "core_edge_mm": 5.0,
+    "max_surface_distance_mm": 1.0,
+}
+"""A mesh that is made in a second."""
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """What the surface stage has made of all brains of a study, or said of them."""
+
+    directory: Path
+    outcome: subprocess.CompletedProcess[str]
+
+    @property
+    def results(self) -> Path:
+        return self.directory / "results" / "brains"
+
+    def report(self, brain: str) -> dict:
+        """Returns the report on a brain's surface."""
+        return read_json(self.results / brain / "surface" / "surface.json")
+
+    def log(self, brain: str, rule: str = "pial_from_*") -> str:
+        """Returns what the step that made a brain's surface, or refused to, has said."""
+        (log,) = (self.results / brain / "logs").glob(f"{rule}.log")
+        return log.read_text()
+
+    def require_refused(self, brain: str, *said: str) -> None:
+        """Checks that a brain was refused with messages, in its log and on the terminal, and that nothing is left."""
+        for text in said:
+            assert text in self.log(brain)
+            assert text in self.outcome.stderr
+        assert not [path for path in (self.results / brain / "surface").rglob("*") if path.is_file()]
+
+    def require_exit_code(self, code: int) -> None:
+        """Checks how the run ended, and that it showed no traceback."""
+        assert self.outcome.returncode == code, self.outcome.stderr
+        assert "Traceback" not in self.outcome.stderr
 
 
 @dataclass(frozen=True)
@@ -39,7 +79,7 @@ class Workflow:
 
     def command(self, *arguments: str) -> list[str]:
         """Returns the command that `./run snakemake` runs."""
-        return [sys.executable, "-m", "gyriflow.launch", *arguments]
+        return [sys.executable, "-m", "gyriflow.shell.launch", *arguments]
 
     @property
     def environment(self) -> dict[str, str]:
@@ -102,18 +142,18 @@ class Workflow:
         write_tetrahedral_mesh(brain / "mesh" / "brain.xdmf", ellipsoid_mesh(cells, (20.0, 26.0, 18.0)))
         self.count_as_made(*arguments)
 
-    def surfaces(self, config: dict) -> SimpleNamespace:
-        """Makes the pial surfaces of all brains of a configuration, and their thickness, as far as that goes."""
+    def surfaces(self, config: dict, *more: str) -> Surfaces:
+        """Makes the pial surfaces of all brains of a configuration, and more targets, as far as that goes."""
         name = self.write("study.yaml", config)
         targets = [f"results/brains/{brain['id']}/surface/pial.surf.gii" for brain in config["brains"]]
-        outcome = self.run("surface", *targets, "--cores", "2", "--keep-going", "--configfile", name)
-        return SimpleNamespace(directory=self.directory, outcome=outcome, results=self.directory / "results" / "brains")
+        outcome = self.run(*more, *targets, "--cores", "2", "--keep-going", "--configfile", name, timeout_s=900)
+        return Surfaces(self.directory, outcome)
 
 
 @pytest.fixture(scope="session")
 def checkout_copy(tmp_path_factory):
     copy = tmp_path_factory.mktemp("checkout")
-    for name in ("src", "workflow", "config", "profiles", "envs", "atlases", "norms"):
+    for name in ("src", "workflow", "config", "profiles", "envs", "atlases", "schemes", "norms"):
         shutil.copytree(CHECKOUT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(CHECKOUT / "Snakefile", copy)
     return copy

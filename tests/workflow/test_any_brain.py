@@ -16,47 +16,32 @@ By what may be odd about a brain:
 12. A cohort: test_cohort.py.
 """
 
-from types import SimpleNamespace
-
 import nibabel as nib
 import numpy as np
 import pandas as pd
 import pytest
 import pyvista as pv
 from nibabel.freesurfer.io import write_geometry
-from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
 from reliability import trying
-from scipy.spatial.transform import Rotation
+from shapes import cerebrum_surface, phantom, rigid, save_gifti, save_labels
 
+from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed, vertex_normals
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface
 from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
+from gyriflow.phantom.brain import CENTRE_MM
+from gyriflow.surface.extraction import isosurface, smooth_mask
 from gyriflow.surface.repair import pieces
 
 from .conftest import Workflow
 
 pytestmark = pytest.mark.slow
 
-LABELS, AFFINE = phantom_labels(24.0, voxel_mm=2.0)
+LABELS, AFFINE = phantom(voxel_mm=2.0)
+WHOLE = cerebrum_surface(LABELS, AFFINE)
 APART = pathologies.apart(LABELS, AFFINE)
-
-
-def motion(*degrees, shift=(0.0, 0.0, 0.0)):
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix().round(12)
-    matrix[:3, 3] = shift
-    return matrix
-
-
-def surface_of(labels):
-    mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
-    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(AFFINE, np.full(3, -4)))
-
-
-LEFT, RIGHT = sorted(pieces(surface_of(APART)), key=lambda piece: piece.vertices[:, 0].mean())
+LEFT, RIGHT = sorted(pieces(cerebrum_surface(APART, AFFINE)), key=lambda piece: piece.vertices[:, 0].mean())
 
 
 def inner(mesh, depth_mm):
@@ -82,9 +67,7 @@ def labelled(change=lambda labels, affine: labels, scheme="spina-bifida-atlas", 
     def made(folder, name):
         labels = change(LABELS, AFFINE)
         labels, affine = labels if isinstance(labels, tuple) else (labels, AFFINE)
-        image = nib.Nifti1Image(labels.astype(np.int16), (np.eye(4) if turn is None else turn) @ affine)
-        image.header.set_xyzt_units("mm")
-        nib.save(image, folder / f"{name}.nii.gz")
+        save_labels(folder / f"{name}.nii.gz", labels, affine if turn is None else turn @ affine)
         return {"labels": f"{name}.nii.gz", "scheme": scheme}
 
     return made
@@ -135,13 +118,7 @@ def with_matrix(mesh, data, to, matrix):
     """Writes a surface whose file has a matrix from one space to another."""
 
     def made(folder, name):
-        points = GiftiDataArray(
-            mesh.vertices.astype(np.float32),
-            intent="NIFTI_INTENT_POINTSET",
-            coordsys=GiftiCoordSystem(f"NIFTI_XFORM_{data}", f"NIFTI_XFORM_{to}", matrix),
-        )
-        faces = GiftiDataArray(mesh.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE")
-        nib.save(GiftiImage(darrays=[points, faces]), folder / f"{name}.surf.gii")
+        save_gifti(folder / f"{name}.surf.gii", mesh, matrix, data, to)
         return {"pial": f"{name}.surf.gii"}
 
     return made
@@ -170,16 +147,16 @@ GOOD = {
     "shifted": labelled(pathologies.shifted_midline),
     "hemimegalencephaly": lambda folder, name: {"phantom": {"voxel_mm": 2.0, "pathology": name}},
     "cropped": labelled(pathologies.crop),
-    "upside_down": labelled(turn=motion(180, 0, 0)),
-    "backwards": labelled(pathologies.add_sides, "dhcp-19", motion(0, 0, 180)),
-    "pial_backwards": whole(transformed(merged(LEFT, RIGHT), motion(0, 0, 180))),
-    "pial_vtk": whole(with_polyp(surface_of(LABELS)), "vtk"),
+    "upside_down": labelled(turn=rigid(180, 0, 0)),
+    "backwards": labelled(pathologies.add_sides, "dhcp-19", rigid(0, 0, 180)),
+    "pial_backwards": whole(transformed(merged(LEFT, RIGHT), rigid(0, 0, 180))),
+    "pial_vtk": whole(with_polyp(WHOLE), "vtk"),
     "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
     "unequal": both_sides(LEFT, LARGER),
-    "bent": whole(surface_of(pathologies.bent_midline(APART, AFFINE))),
-    "talairach": with_matrix(surface_of(LABELS), "UNKNOWN", "TALAIRACH", np.diag([1.16, 1.16, 1.16, 1.0])),
-    "scanner_to_tkr": with_matrix(surface_of(LABELS), "SCANNER_ANAT", "UNKNOWN", motion(0, 0, 0, shift=(5, -20, 13))),
-    "sideways": labelled(turn=motion(90, 0, 0)),
+    "bent": whole(cerebrum_surface(pathologies.bent_midline(APART, AFFINE), AFFINE)),
+    "talairach": with_matrix(WHOLE, "UNKNOWN", "TALAIRACH", np.diag([1.16, 1.16, 1.16, 1.0])),
+    "scanner_to_tkr": with_matrix(WHOLE, "SCANNER_ANAT", "UNKNOWN", rigid(shift=(5, -20, 13))),
+    "sideways": labelled(turn=rigid(90, 0, 0)),
     "mgz": as_mgz,
 }
 BAD = {
@@ -208,7 +185,7 @@ CROSSING = both_sides(LEFT, RIGHT, white_mm=-1.5)
 
 @pytest.fixture(scope="module")
 def study(checkout_copy, tmp_path_factory):
-    """One run of the surface stage over all of them, and of the metrics of pathologies."""
+    """One run of the surface stage over all of them."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("any"))
     makers = GOOD | {name: make for name, (make, _) in BAD.items()} | {"crossing": CROSSING}
     makers["hemispherectomy"] = HEMISPHERECTOMY
@@ -216,46 +193,29 @@ def study(checkout_copy, tmp_path_factory):
     surface = {"edge_length_mm": 2.5, "max_hemisphere_ratio": 1.4, "max_asymmetry": 0.05}
     metrics = {"curvature_radius_mm": 7.0, "spangy_modes": 50}
     config = {"brains": brains, "start": "plain", "surface": surface, "metrics": metrics, "folding": {"end_week": 25}}
-    name = workflow.write("study.yaml", config)
-    targets = [f"results/brains/{brain['id']}/surface/pial.surf.gii" for brain in brains]
-    targets += [f"results/brains/{name}/surface/thickness.shape.gii" for name in ("freesurfer", "crossing")]
-    # in parts: one call has five minutes
-    calls = [
-        workflow.run(*targets[first::4], "--cores", "2", "--keep-going", "--configfile", name) for first in range(4)
-    ]
-    measured = [f"results/brains/{name}/metrics/metrics.csv" for name in ("plain", *NAMED)]
-    measuring = workflow.run(*measured, "--cores", "2", "--configfile", name, timeout_s=600)
-    said = "".join(call.stderr for call in calls)
-    codes = [call.returncode for call in calls]
-    return SimpleNamespace(
-        codes=codes, stderr=said, measuring=measuring, results=workflow.directory / "results" / "brains"
-    )
+    thickness = [f"results/brains/{name}/surface/thickness.shape.gii" for name in ("freesurfer", "crossing")]
+    return workflow.surfaces(config, *thickness)
 
 
-def report(study, name):
-    return read_json(study.results / name / "surface" / "surface.json")
-
-
-def log_of(study, name):
-    """Returns what the step that made a brain's surface, or refused to, has said."""
-    (log,) = (study.results / name / "logs").glob("pial_from_*.log")
-    return log.read_text()
+@pytest.fixture(scope="module")
+def measuring(checkout_copy, study):
+    """The metrics of pathologies."""
+    tables = [f"results/brains/{name}/metrics/metrics.csv" for name in ("plain", *NAMED)]
+    run = Workflow(checkout_copy, study.directory).run
+    return run(*tables, "--cores", "2", "--configfile", "study.yaml", timeout_s=600)
 
 
 def warned(study, name, text):
-    return any(text in warning for warning in report(study, name)["warnings"]) and text in log_of(study, name)
+    return any(text in warning for warning in study.report(name)["warnings"]) and text in study.log(name)
 
 
 def test_the_run_ends_in_2_without_a_traceback(study):
-    assert set(study.codes) == {2}
-    assert "Traceback" not in study.stderr
+    study.require_exit_code(2)
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_be_used_is_refused_with_its_cause_and_nothing_is_left(study, name):
-    assert BAD[name][1] in log_of(study, name)
-    assert BAD[name][1] in study.stderr
-    assert not [path for path in (study.results / name / "surface").rglob("*") if path.is_file()]
+    study.require_refused(name, BAD[name][1])
 
 
 @pytest.mark.parametrize("name", GOOD)
@@ -263,12 +223,12 @@ def test_each_hemisphere_is_one_piece_on_its_side(study, name):
     folder = study.results / name / "surface"
     left, right = (read_surface(folder / f"{side}.pial.surf.gii") for side in ("left", "right"))
     assert len(pieces(left)) == len(pieces(right)) == 1
-    assert left.vertices[:, 0].mean() < report(study, name)["fissure_x_mm"] < right.vertices[:, 0].mean()
+    assert left.vertices[:, 0].mean() < study.report(name)["fissure_x_mm"] < right.vertices[:, 0].mean()
 
 
 @pytest.mark.fault(46)
 def test_a_fourth_ventricle_below_the_brain_is_left_out_and_told(study):
-    polyp, plain = report(study, "polyp"), report(study, "plain")
+    polyp, plain = study.report("polyp"), study.report("plain")
     assert polyp["outside"]["ventricles_mL"] > 0.4
     assert polyp["volume_mL"] == pytest.approx(plain["volume_mL"], rel=0.005)
     assert polyp["extents_mm"][2] == pytest.approx(plain["extents_mm"][2], abs=1.0)
@@ -276,7 +236,7 @@ def test_a_fourth_ventricle_below_the_brain_is_left_out_and_told(study):
 
 
 def test_tissues_and_ventricles_are_told_apart(study):
-    volumes = report(study, "plain")["label_volumes_mL"]
+    volumes = study.report("plain")["label_volumes_mL"]
     assert volumes["cerebrum"] == pytest.approx(volumes["tissue"] + volumes["ventricles"])
     assert volumes["tissue"] == pytest.approx(volumes["cortex"] + volumes["inside_cortex"])
     voxel_ml = 2.0**3 / 1e3
@@ -285,14 +245,14 @@ def test_tissues_and_ventricles_are_told_apart(study):
 
 @pytest.mark.fault(46)
 def test_a_polyp_of_a_surface_is_cut_and_told(study):
-    assert len(report(study, "pial_vtk")["stalks"]) == 1
+    assert len(study.report("pial_vtk")["stalks"]) == 1
     assert warned(study, "pial_vtk", "hung on a stalk")
 
 
 @pytest.mark.fault(47)
 def test_missing_tissues_are_named_and_not_required(study):
-    assert report(study, "agenesis")["missing_tissues"] == ["8 corpus callosum"]
-    assert report(study, "agenesis")["pieces"] == 1
+    assert study.report("agenesis")["missing_tissues"] == ["8 corpus callosum"]
+    assert study.report("agenesis")["pieces"] == 1
 
 
 def cerebrum_ml(labels):
@@ -301,7 +261,7 @@ def cerebrum_ml(labels):
 
 @pytest.mark.fault(47)
 def test_a_brain_without_a_fissure_in_front_is_cut_in_halves(study):
-    found, plain = report(study, "holoprosencephaly"), report(study, "plain")
+    found, plain = study.report("holoprosencephaly"), study.report("plain")
     assert found["volume_mL"] == pytest.approx(cerebrum_ml(pathologies.holoprosencephaly(LABELS, AFFINE)), rel=0.01)
     area = found["area_cm2"]
     assert area["left"] == pytest.approx(area["right"], rel=0.03)
@@ -312,7 +272,7 @@ def test_a_brain_without_a_fissure_in_front_is_cut_in_halves(study):
 
 @pytest.mark.fault(52)
 def test_a_wide_ventricle_counts_as_brain_and_its_side_is_doubted(study):
-    found = report(study, "wide")
+    found = study.report("wide")
     labels = pathologies.wide_hemisphere(LABELS, AFFINE, ventricle=True)
     assert found["volume_mL"] == pytest.approx(cerebrum_ml(labels), rel=0.01)
     assert found["label_volumes_mL"]["ventricles"] == pytest.approx((labels == 2).sum() * 2.0**3 / 1e3)
@@ -323,21 +283,21 @@ def test_a_wide_ventricle_counts_as_brain_and_its_side_is_doubted(study):
 @pytest.mark.fault(48)
 def test_a_field_of_view_that_cuts_the_brain_is_warned_of(study):
     assert warned(study, "cropped", "the cerebrum touches the border of the volume")
-    cropped, plain = report(study, "cropped"), report(study, "plain")
+    cropped, plain = study.report("cropped"), study.report("plain")
     assert cropped["volume_mL"] == pytest.approx(cerebrum_ml(pathologies.crop(LABELS, AFFINE)[0]), rel=0.01)
     assert cropped["volume_mL"] / plain["volume_mL"] == pytest.approx(0.81, abs=0.02)
     # a third of the height is lost
     assert cropped["extents_mm"][2] / plain["extents_mm"][2] == pytest.approx(0.68, abs=0.03)
-    assert not any("border" in warning for warning in report(study, "plain")["warnings"])
+    assert not any("border" in warning for warning in study.report("plain")["warnings"])
 
 
 @pytest.mark.fault(49)
 @pytest.mark.parametrize("name", ["upside_down", "sideways", "backwards"])
 def test_turned_volumes_are_turned_back(study, name):
     surface, plain = (read_surface(study.results / n / "surface" / "pial.surf.gii") for n in (name, "plain"))
-    turned, middle = np.array(report(study, name)["pose"])[:3, :3], plain.vertices.mean(axis=0)
-    expected = {"upside_down": motion(180, 0, 0), "sideways": motion(90, 0, 0), "backwards": motion(0, 0, 180)}[name]
-    assert np.degrees(Rotation.from_matrix(turned @ expected[:3, :3]).magnitude()) < 2.0
+    turned, middle = np.array(study.report(name)["pose"]["world"])[:3, :3], plain.vertices.mean(axis=0)
+    expected = {"upside_down": rigid(180, 0, 0), "sideways": rigid(90, 0, 0), "backwards": rigid(0, 0, 180)}[name]
+    assert angle_deg(turned @ expected[:3, :3]) < 2.0
     for end in (np.min, np.max):
         there = end(surface.vertices - surface.vertices.mean(axis=0), axis=0)
         np.testing.assert_allclose(there, end(plain.vertices - middle, axis=0), atol=1.5)
@@ -348,27 +308,27 @@ def test_turned_volumes_are_turned_back(study, name):
 @pytest.mark.fault(10)
 def test_a_pial_surface_in_lps_is_recognised(study):
     assert warned(study, "pial_backwards", "the shape says that the coordinates are LPS")
-    assert report(study, "pial_backwards")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0], abs=0.5)
+    assert study.report("pial_backwards")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0], abs=0.5)
 
 
 @pytest.mark.fault(50)
 @pytest.mark.parametrize("name", ["talairach", "scanner_to_tkr"])
 def test_matrices_that_lead_away_from_the_subject_are_not_applied_and_told(study, name):
-    plain = report(study, "plain")
-    assert report(study, name)["volume_mL"] == pytest.approx(plain["volume_mL"], rel=0.03)
-    assert report(study, name)["fissure_x_mm"] == pytest.approx(plain["fissure_x_mm"], abs=0.5)
-    assert "was not applied" in log_of(study, name)
+    plain = study.report("plain")
+    assert study.report(name)["volume_mL"] == pytest.approx(plain["volume_mL"], rel=0.03)
+    assert study.report(name)["fissure_x_mm"] == pytest.approx(plain["fissure_x_mm"], abs=0.5)
+    assert "was not applied" in study.log(name)
 
 
 @pytest.mark.fault(51)
 def test_a_midline_that_bends_leaves_closed_hemispheres_whole(study):
-    area = report(study, "bent")["area_cm2"]
+    area = study.report("bent")["area_cm2"]
     assert area["left"] == pytest.approx(area["right"], rel=0.1)
 
 
 @pytest.mark.fault(53)
 def test_a_volume_of_freesurfers_is_the_same_brain(study):
-    assert report(study, "mgz")["volume_mL"] == pytest.approx(report(study, "plain")["volume_mL"], rel=1e-6)
+    assert study.report("mgz")["volume_mL"] == pytest.approx(study.report("plain")["volume_mL"], rel=1e-6)
 
 
 @pytest.mark.fault(53)
@@ -376,14 +336,14 @@ def test_thickness_is_the_distance_to_white_surfaces(study):
     found = read_json(study.results / "freesurfer" / "surface" / "thickness.json")
     assert found["mean_mm"] == pytest.approx(1.5, abs=0.15)
     (values,) = read_vertex_maps(study.results / "freesurfer" / "surface" / "thickness.shape.gii").values()
-    assert len(values) == report(study, "freesurfer")["vertices"]
+    assert len(values) == study.report("freesurfer")["vertices"]
 
 
 @pytest.mark.fault(45)
 def test_white_surfaces_outside_the_pial_ones_are_refused(study):
     folder = study.results / "crossing"
-    assert "crosses the pial one" in (folder / "logs" / "thickness_from_white.log").read_text()
-    assert "crosses the pial one" in study.stderr
+    assert "crosses the pial one" in study.log("crossing", "thickness_from_white")
+    assert "crosses the pial one" in study.outcome.stderr
     assert not list((folder / "surface").glob("*thickness*"))
 
 
@@ -395,20 +355,20 @@ def test_unequal_hemispheres_within_the_limits_asked_for_are_doubted(study):
 @pytest.mark.fault(52)
 def test_a_small_hemisphere_that_labels_name_is_kept_and_doubted(study):
     assert warned(study, "hypoplasia", "the hemispheres' areas differ by")
-    area = report(study, "hypoplasia")["area_cm2"]
+    area = study.report("hypoplasia")["area_cm2"]
     assert 0.1 < area["right"] / area["left"] < 0.4
 
 
 @pytest.mark.fault(51)
 def test_a_shifted_midline_is_followed(study):
-    area = report(study, "shifted")["area_cm2"]
+    area = study.report("shifted")["area_cm2"]
     assert area["left"] > 1.2 * area["right"]
-    assert report(study, "shifted")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0] + 8.0, abs=2.5)
+    assert study.report("shifted")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0] + 8.0, abs=2.5)
 
 
 @pytest.mark.parametrize("name", NAMED)
-def test_pathologies_go_through_to_metrics(study, name):
-    assert study.measuring.returncode == 0, study.measuring.stderr
+def test_pathologies_go_through_to_metrics(study, measuring, name):
+    assert measuring.returncode == 0, measuring.stderr
     tables = [pd.read_csv(study.results / brain / "metrics" / "metrics.csv") for brain in (name, "plain")]
     found, plain = (table.set_index(["hemisphere", "metric"])["value"] for table in tables)
     sides = {"whole", "left"} if name == "hemispherectomy" else {"whole", "left", "right"}
@@ -416,8 +376,8 @@ def test_pathologies_go_through_to_metrics(study, name):
     # so few modes complete no relative power, and no band beyond B2
     measured = ~found.index.get_level_values("metric").str.startswith("spangy")
     assert np.isfinite(found[measured]).all()
-    assert found["whole", "volume"] == pytest.approx(report(study, name)["volume_mL"], rel=1e-6)
-    assert found["whole", "area"] == pytest.approx(report(study, name)["area_cm2"]["whole"], rel=1e-6)
+    assert found["whole", "volume"] == pytest.approx(study.report(name)["volume_mL"], rel=1e-6)
+    assert found["whole", "area"] == pytest.approx(study.report(name)["area_cm2"]["whole"], rel=1e-6)
     assert found["whole", "crossing_faces"] == 0
     ratio = {"hypoplasia": 0.51, "hemispherectomy": 0.49, "wide": 1.16, "hemimegalencephaly": 1.16}.get(name, 1.0)
     assert found["whole", "volume"] / plain["whole", "volume"] == pytest.approx(ratio, abs=0.04)

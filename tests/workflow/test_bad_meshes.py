@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapes import HALF_AXES, hemisphere
+from shapes import HALF_AXES, hemisphere, moved
 
-from gyriflow.geometry.triangles import merged, transformed
+from gyriflow.geometry.triangles import merged
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
@@ -37,10 +37,6 @@ QUALITY = "results/brains/apart/figures/mesh_quality.png"
 REFUSED = "results/brains/apart/mesh/refused"
 
 
-def moved(x):
-    return merged(LEFT, transformed(RIGHT, [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
-
-
 @pytest.fixture(scope="module")
 def workflow(checkout_copy, tmp_path_factory):
     """Two brains whose surfaces count as made, and the mesh of the one whose hemispheres are apart."""
@@ -48,7 +44,9 @@ def workflow(checkout_copy, tmp_path_factory):
     config = workflow.write("study.yaml", STUDY)
     workflow.lay_out("surface", "--configfile", config)
     for name, gap in (("apart", GAP_MM), ("tangled", -OVERLAP_MM)):
-        write_surface(workflow.directory / f"results/brains/{name}/surface/pial.surf.gii", moved(gap - 3.0))
+        write_surface(
+            workflow.directory / f"results/brains/{name}/surface/pial.surf.gii", merged(LEFT, moved(RIGHT, gap - 3.0))
+        )
     workflow.count_as_made("surface", "--configfile", config)
     outcome = workflow.run(MESH, QUALITY, "--cores", "2", "--configfile", config)
     assert outcome.returncode == 0, outcome.stderr

@@ -2,18 +2,15 @@
 
 from types import SimpleNamespace
 
-import nibabel as nib
-import numpy as np
 import pandas as pd
 import pytest
+from shapes import cerebrum_surface, phantom, save_labels
 
 from gyriflow.geometry.triangles import area
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import phantom_labels
-from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 
 from .conftest import Workflow
 
@@ -30,7 +27,7 @@ ROWS = (
 
 
 def left_half(week):
-    labels, affine = phantom_labels(week, voxel_mm=2.0)
+    labels, affine = phantom(week, 2.0)
     return pathologies.one_hemisphere(labels, affine, "left"), affine
 
 
@@ -38,14 +35,8 @@ def left_half(week):
 def cohort(checkout_copy, tmp_path_factory):
     """One call for surfaces, mesh, folding, metrics, pages and some figures."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("cohort"))
-    labels, affine = left_half(22.0)
-    mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
-    pial = isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
-    write_surface(workflow.directory / "surface.surf.gii", pial)
-    labels, affine = left_half(23.0)
-    image = nib.Nifti1Image(labels.astype(np.int16), affine)
-    image.header.set_xyzt_units("mm")
-    nib.save(image, workflow.directory / "labels.nii.gz")
+    write_surface(workflow.directory / "surface.surf.gii", cerebrum_surface(*left_half(22.0)))
+    save_labels(workflow.directory / "labels.nii.gz", *left_half(23.0))
     whole = (workflow.directory / "labels.nii.gz").read_bytes()
     (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
     table = "\n".join("\t".join(row) for row in ROWS)

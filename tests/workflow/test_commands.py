@@ -11,7 +11,7 @@ from .conftest import SMALL_STUDY
 
 def gyriflow(workflow, *arguments):
     return subprocess.run(
-        [sys.executable, "-m", "gyriflow.cli", *arguments],
+        [sys.executable, "-m", "gyriflow.shell", *arguments],
         cwd=workflow.directory, env=workflow.environment, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
 
@@ -25,7 +25,7 @@ def test_help_names_every_command_and_how_a_study_goes(workflow):
 
 @pytest.mark.fault(27)
 def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflow):
-    name = workflow.write("bad.yaml", SMALL_STUDY | {"folding": {"end_week": 20, "poisson_ratio": 0.5}})
+    name = workflow.write("bad.yaml", SMALL_STUDY | {"folding": {"end_week": 50, "poisson_ratio": 0.5}})
     outcome = gyriflow(workflow, "check", name)
     assert outcome.returncode == 2
     assert "the configuration has 2 problems" in outcome.stderr

@@ -1,7 +1,6 @@
 """Which jobs the workflow plans, for whole studies and after one parameter changed."""
 
 import copy
-import re
 
 import pytest
 import yaml
@@ -62,17 +61,6 @@ def test_the_paper_is_planned_with_each_equal_run_once(workflow):
     assert jobs["measure"] == 2
 
 
-@pytest.mark.parametrize(
-    "atlas", ["[{name: dhcp-volume, accept_licence: true}, {name: dhcp-surface}]", "{name: crl, accept_licence: true}"]
-)
-def test_the_paper_is_planned_of_another_atlas_by_one_line(workflow, atlas):
-    lines = (workflow.checkout / "config" / "examples" / "paper.yaml").read_text().splitlines()
-    lines = [f"atlas: {atlas}" if line.startswith("atlas:") else line for line in lines]
-    (workflow.directory / "other.yaml").write_text("\n".join(lines))
-    jobs = workflow.jobs("paper", "--configfile", "other.yaml")
-    assert (jobs["simulate"], jobs["simulate_member"]) == (2, 9)
-
-
 def test_a_calibration_is_planned_round_by_round(workflow):
     example = str(workflow.checkout / "config" / "examples" / "calibration.yaml")
     jobs = workflow.jobs("calibrate", "--configfile", example)
@@ -109,74 +97,18 @@ def test_the_example_of_labels_and_hemispheres_is_planned_once_these_are_made(wo
     assert jobs["atlas_file"] == jobs["overlay_figure"] == 5
 
 
-def test_runs_are_compared_with_the_population_of_their_start_only(workflow):
-    # both populations have a brain of 25 weeks; that of the other one stands first
-    atlas = {"name": "spina-bifida", "series": ["operated", "unoperated"]}
-    study = {"atlas": atlas, "start": "spina-bifida-unoperated-24", "folding": {"end_week": 25}}
-    named = ("--configfile", workflow.write("two.yaml", study))
-    shown = workflow.run("-n", "metrics", "figures", *named).stdout
-    for output in ("similarity.spina-bifida-", "figures/weekly.png", "metrics/validation.csv"):
-        (files,) = re.findall(rf"input: (.*)\n +output: \S*{output}", shown)
-        assert "brains/spina-bifida-unoperated-25/surface/pial.surf.gii" in files
-        assert "brains/spina-bifida-operated-25/surface/pial.surf.gii" not in files
-
-
-def test_one_brain_alone_is_folded_without_growth_rates(workflow):
-    alone = SMALL_STUDY | {"brains": SMALL_STUDY["brains"][:1]}
-    jobs = workflow.jobs("--configfile", workflow.write("alone.yaml", alone))
-    assert jobs["simulate"] == 2
-    assert not {"growth_rates", "similarity"} & set(jobs)
-
-
-def test_ages_are_told_where_brains_of_five_weeks_are_the_reference(workflow):
-    five = [{"id": f"p{week}", "week": week, "phantom": {}} for week in range(21, 26)]
-    study = {"brains": five, "start": "p21", "folding": {"end_week": 22}}
-    jobs = workflow.jobs("--configfile", workflow.write("five.yaml", study))
-    assert (jobs["age_profile"], jobs["age_profile_figure"]) == (1, 1)
-    fewer = workflow.write("four.yaml", study | {"brains": five[:4]})
-    assert not {"age_profile", "age_profile_figure"} & set(workflow.jobs("--configfile", fewer))
-
-
-def test_maps_are_planned_for_the_runs_that_have_any(workflow):
-    for name in ("left.gii", "right.gii", "soft.nii.gz"):
+def test_the_solver_is_told_of_the_maps_of_a_run(workflow):
+    for name in ("left.gii", "right.gii"):
         (workflow.directory / name).touch()
     pair = ["left.gii", "right.gii"]
     runs = {"plain": {}, "thick": {"thickness_mm": {"map": pair, "surface": pair}}}
     with_maps = workflow.write("maps.yaml", SMALL_STUDY | {"runs": runs})
-    jobs = workflow.jobs("folding", "--configfile", with_maps)
-    assert (jobs["parameter_maps"], jobs["simulate"]) == (1, 2)
-    runs["plain"] = {"shear_modulus_core_pa": {"map": "soft.nii.gz"}}
-    assert (
-        workflow.jobs("--configfile", workflow.write("both.yaml", SMALL_STUDY | {"runs": runs}))["parameter_maps"] == 2
-    )
-    assert "parameter_maps" not in workflow.jobs("--configfile", workflow.write("none.yaml", SMALL_STUDY))
     shown = workflow.run("-n", "folding", "--printshellcmds", "--configfile", with_maps).stdout
     commands = [line for line in shown.splitlines() if "gyriflow.folding" in line]
     assert sorted("--maps results/runs/thick/a/folding/maps.h5 --out" in command for command in commands) == [
         False,
         True,
     ]
-
-
-def test_growth_is_estimated_before_a_folding_that_asks_for_it(workflow):
-    target = "results/runs/reference/a/params.yaml"
-    growth = SMALL_STUDY["folding"] | {"growth_rate_per_s": "estimated"}
-    asked = workflow.write("asked.yaml", SMALL_STUDY | {"folding": growth})
-    assert workflow.jobs(target, "--configfile", asked) == {
-        "phantom": 2,
-        "pial_from_labels": 2,
-        "growth_rates": 1,
-        "parameters": 1,
-    }
-    plain = workflow.write("plain.yaml", SMALL_STUDY)
-    assert workflow.jobs(target, "--configfile", plain) == {"phantom": 1, "pial_from_labels": 1, "parameters": 1}
-
-
-def test_growth_comes_from_the_brains_that_are_named(workflow):
-    third = {"id": "c", "week": 23, "phantom": {"voxel_mm": 1.5}}
-    study = SMALL_STUDY | {"brains": [*SMALL_STUDY["brains"], third], "growth": {"brains": ["a", "c"]}}
-    jobs = workflow.jobs("growth", "--configfile", workflow.write("some.yaml", study))
-    assert (jobs["pial_from_labels"], jobs["growth_rates"]) == (2, 1)
 
 
 def test_only_a_common_number_of_modes_ties_measured_brains_to_simulated_ones(workflow):
@@ -195,17 +127,6 @@ def changed(section, **values):
     return study
 
 
-def test_runs_that_write_contact_pressure_have_a_figure_of_it(workflow):
-    for fields, kind, expected in (
-        (["displacement", "contact_pressure"], "global", 2),
-        (["displacement", "contact_pressure"], "planes", 0),
-        (["displacement"], "global", 0),
-    ):
-        study = changed("folding", fields=fields, contact={"kind": kind})
-        jobs = workflow.jobs("--configfile", workflow.write("pressed.yaml", study))
-        assert jobs.get("contact_maps", 0) == expected
-
-
 @pytest.mark.promise(6)
 @pytest.mark.slow
 def test_nothing_is_to_be_done_after_all_was_made(finished):
@@ -219,15 +140,17 @@ NEW_RESULTS = RESOURCES | {"study_warnings": 1}
 CONFIGURATION = {"report_config": 1}
 SHAPE = NEW_RESULTS | {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1, "asymmetry": 1, "centiles": 1,
-    "group_tables": 1, "norms_figure": 1, "report_provenance": 1, "view_surfaces": 1,
+    "group_tables": 1, "norms_figure": 1, "report_provenance": 1, "view_surfaces": 1, "metrics_table": 1,
+    "centiles_table": 1,
 }  # fmt: skip
 ONE_RUN = SHAPE | {
     "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "displacement": 1,
     "similarity": 1, "study_table": 4, "study_runs": 1, "zones_figure": 1, "steps_figure": 1, "weekly_figure": 1,
     "displacement_maps": 1, "shape_maps": 4, "displacement_figure": 1, "runs_figure": 1, "growth_zone_figure": 1,
-    "layers_figure": 1, "normals_figure": 1, "mesh_figure": 1, "contact_scheme": 1, "outlines_figure": 1,
+    "displacement_table": 1, "layers_figure": 1, "normals_figure": 1, "mesh_figure": 1, "contact_scheme": 1,
+    "outlines_figure": 1,
 }  # fmt: skip
-OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "runs_figure"}
+OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "displacement_table", "runs_figure"}
 BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count in ONE_RUN.items()}
 MESH = {"tetrahedralise": 1, "quality_figure": 1}
 FIGURES = {
@@ -263,6 +186,7 @@ FIGURES = {
                 "measure": 6,
                 "growth_rates": 1,
                 "growth_figure": 1,
+                "growth_table": 1,
                 "inputs_figure": 1,
                 "quality_page": 2,
                 "quality_table": 1,

@@ -57,21 +57,38 @@ def test_a_configuration_that_is_shown_is_one(block, tmp_path):
     assert load(completed(block), tmp_path).runs
 
 
-COMMANDS = [
-    pytest.param(page, line, id=f"{page.stem}: {line[:60]}")
+def test_functions_that_the_api_lists_exist():
+    named = re.findall(r"^::: ([\w.]+)\.(\w+)$", (CHECKOUT / "docs" / "api.md").read_text(), flags=re.MULTILINE)
+    sources = {module: CHECKOUT / "src" / f"{module.replace('.', '/')}.py" for module, _ in named}
+    missing = [
+        f"{module}.{name}"
+        for module, name in named
+        if not sources[module].exists()
+        or not re.search(rf"^(def|class) {name}\b", sources[module].read_text(), flags=re.MULTILINE)
+    ]
+    assert len(named) > 5
+    assert missing == []
+
+
+# a command that several pages show is tried once, one with a page's own study on each page
+COMMANDS = {
+    (page if "my.yaml" in line else None, " ".join(shlex.split(line, comments=True)[2:])): page
     for page in PAGES
     for block in blocks(page, "")
     for line in block.splitlines()
     if line.strip().startswith("./run snakemake") and "{" not in line and "BRAIN" not in line
-]
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("page", "line"), COMMANDS)
-def test_a_command_that_is_shown_has_work_to_do(page, line, workflow):
-    if "my.yaml" in line:
+@pytest.mark.parametrize(
+    ("page", "options"),
+    [pytest.param(page, options, id=f"{page.stem}: {options[:60]}") for (_, options), page in COMMANDS.items()],
+)
+def test_a_command_that_is_shown_has_work_to_do(page, options, workflow):
+    if "my.yaml" in options:
         (workflow.directory / "my.yaml").write_text(yaml.safe_dump(study_of(page)))
-    assert workflow.jobs(*shlex.split(line.split("#")[0])[2:])
+    assert workflow.jobs(*options.split())
 
 
 @pytest.mark.slow

@@ -5,7 +5,8 @@ import subprocess
 import pytest
 
 from gyriflow.errors import StorageError
-from gyriflow.launch import add_snakefile, clear_stale_lock, hold_lock, value_of
+from gyriflow.io.files import write_json
+from gyriflow.shell.launch import add_snakefile, clear_stale_lock, hold_lock, value_of
 
 from .conftest import SMALL_STUDY
 
@@ -17,28 +18,44 @@ def message(outcome):
 
 @pytest.mark.fault(27, 28)
 def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
-    study = SMALL_STUDY | {"folding": {"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}}
+    study = SMALL_STUDY | {"folding": {"end_week": 50, "poisson_ratio": 0.5, "thicknes_mm": 2}}
     outcome = workflow.run("-n", "--configfile", workflow.write("study.yaml", study))
     assert outcome.returncode == 2
     said = message(outcome)
     assert "the configuration has 3 problems" in said
     assert "folding.poisson_ratio: found 0.5; it should be less than 0.5" in said
     assert "folding.thicknes_mm: unknown key; did you mean thickness_mm?" in said
-    assert "folding.end_week: found 20; it should be above 21, the week of the start brain a" in said
+    assert "folding.end_week: found 50; it should be less than or equal to 45" in said
+    study = SMALL_STUDY | {"folding": {"end_week": 20}}
+    outcome = workflow.run("-n", "--configfile", workflow.write("study.yaml", study))
+    assert "folding.end_week: found 20; it should be above 21, the week of the start brain a" in message(outcome)
 
 
 @pytest.mark.fault(31)
-def test_two_runs_of_one_name_are_refused(workflow):
-    (workflow.directory / "twice.yaml").write_text("runs:\n  x: {}\n  x: {}\n")
-    outcome = workflow.run("-n", "--configfile", "twice.yaml")
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("runs:\n  x: {}\n  x: {}\n", "line 3: the key 'x' of line 2 is there again"),
+        (None, "study.yaml: cannot be read"),
+    ],
+)
+def test_a_file_that_is_no_configuration_ends_in_2(workflow, content, said):
+    if content:
+        (workflow.directory / "study.yaml").write_text(content)
+    outcome = workflow.run("-n", "--configfile", "study.yaml")
     assert outcome.returncode == 2
-    assert "line 3: the key 'x' of line 2 is there again" in message(outcome)
+    assert said in message(outcome)
 
 
-def test_a_configuration_that_is_not_there_is_named(workflow):
-    outcome = workflow.run("-n", "--configfile", "none.yaml")
+def test_the_results_of_another_study_are_not_mixed_with_this_ones(workflow):
+    name = workflow.write("study.yaml", SMALL_STUDY)
+    (workflow.directory / "results" / "brains" / "x").mkdir(parents=True)
+    other = {"configuration": ["/elsewhere/other.yaml"], "brains": [["x", 25, "labels", "x.nii.gz"]]}
+    write_json(workflow.directory / "results" / "study" / "study.json", other)
+    outcome = workflow.run("--cores", "1", "surface", "--configfile", name)
     assert outcome.returncode == 2
-    assert "none.yaml: cannot be read" in message(outcome)
+    assert "the results here are those of another study; found x of /elsewhere/other.yaml" in message(outcome)
+    assert workflow.run("-n", "surface", "--configfile", name, "--directory", "own").returncode == 0
 
 
 def test_a_given_configuration_replaces_the_demo_and_its_files_are_beside_it(workflow, tmp_path):
@@ -70,20 +87,6 @@ def test_a_table_of_participants_is_found_beside_its_configuration(workflow):
     assert "of-elsewhere" not in said
 
 
-def test_the_code_of_the_first_failed_step_is_handed_on(workflow):
-    (workflow.directory / "labels.nii.gz").write_bytes(b"not an image")
-    brains = [{"id": "x", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"}]
-    name = workflow.write("study.yaml", SMALL_STUDY | {"brains": brains, "start": "x"})
-    outcome = workflow.run("--cores", "1", "surface", "--configfile", name)
-    assert outcome.returncode == 2
-    assert "labels.nii.gz" in message(outcome)
-    assert (
-        "labels.nii.gz"
-        in (workflow.directory / "results" / "brains" / "x" / "logs" / "pial_from_labels.log").read_text()
-    )
-    assert not list((workflow.directory / ".snakemake").glob("gyriflow-exit-*"))
-
-
 def stale(directory):
     lock = directory / ".snakemake" / "locks" / "0.output.lock"
     lock.parent.mkdir(parents=True)
@@ -112,7 +115,7 @@ def test_a_live_lock_is_not_cleared_but_refused(tmp_path):
 @pytest.mark.promise(10)
 def test_a_run_beside_a_live_one_is_refused_with_5_but_may_look(workflow):
     holder = subprocess.Popen(
-        [*workflow.command()[:1], "-c", "from gyriflow.launch import hold_lock; from pathlib import Path;"
+        [*workflow.command()[:1], "-c", "from gyriflow.shell.launch import hold_lock; from pathlib import Path;"
          "lock = hold_lock(Path('.')); print('held', flush=True); input()"],
         cwd=workflow.directory, env=workflow.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip

@@ -4,21 +4,22 @@ import re
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from shapes import LPS, cerebrum_surface, phantom, rigid
 
+from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.motion import without_rigid_motion
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_json
+from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.parameters.terms import SIDES
 from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import phantom_labels
-from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 from gyriflow.surface.repair import pieces
+
+from .conftest import COARSE
 
 WEEKS = (21, 22, 23)
 SMOOTHING_MM = 3.0
@@ -27,26 +28,18 @@ FASTER_PER_MM = 0.002
 STUDY = {
     "start": "b21",
     "surface": {"edge_length_mm": 2.5},
-    "mesh": {
-        "order": 1,
-        "mesher": "tetgen",
-        "surface_edge_mm": 2.5,
-        "core_edge_mm": 5.0,
-        "max_surface_distance_mm": 1.0,
-    },
+    "mesh": COARSE | {"surface_edge_mm": 2.5},
     "folding": {
         "end_week": 23,
         "thickness_mm": 4.0,
         "step_s": 302400,
         "preset": "measured",
-        "follow": {"regional": 1.0, "directional": 1.0, "smoothing_mm": SMOOTHING_MM},
+        "follow": {"loop": "open", "regional": 1.0, "directional": 1.0, "smoothing_mm": SMOOTHING_MM},
     },
     "metrics": {"curvature_radius_mm": 6, "spangy_modes": 60},
 }
 # files of one study are in unlike poses, as those of some programs are
-POSES = {21: np.eye(4), 22: np.diag([-1.0, -1.0, 1.0, 1.0]), 23: np.eye(4)}
-POSES[23][:3, :3] = Rotation.from_euler("xyz", [4, -3, 5], degrees=True).as_matrix()
-POSES[23][:3, 3] = 30.0, -20.0, 10.0
+POSES = {21: np.eye(4), 22: LPS, 23: rigid(4, -3, 5, shift=(30.0, -20.0, 10.0))}
 
 
 def grown(points: np.ndarray, week: int) -> np.ndarray:
@@ -66,9 +59,8 @@ def growth_of_volume(points: np.ndarray, first: int) -> np.ndarray:
 @pytest.fixture(scope="module")
 def hemispheres() -> dict[str, TriangleMesh]:
     """Closed hemispheres of a phantom of week 21, about its centre."""
-    labels, affine = phantom_labels(21, voxel_mm=2.0)
-    mask = np.pad(np.isin(pathologies.apart(labels, affine), pathologies.CEREBRUM), 4)
-    brain = isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+    labels, affine = phantom(21.0, 2.0)
+    brain = cerebrum_surface(pathologies.apart(labels, affine), affine)
     centre = brain.vertices.mean(axis=0)
     sides = sorted(pieces(brain), key=lambda piece: piece.vertices[:, 0].mean())
     return {side: TriangleMesh(mesh.vertices - centre, mesh.faces) for side, mesh in zip(SIDES, sides, strict=True)}
@@ -97,10 +89,10 @@ def write_study(workflow, hemispheres, kind="hemispheres", shuffled=None, thinne
 
 def in_week_21(results, points: np.ndarray) -> np.ndarray:
     """Returns the places of mesh points in the files of week 21, by the motion of their hemisphere."""
-    report = read_json(results / "brains/b21/surface/surface.json")
-    motions = report.get("motions", dict.fromkeys(SIDES, report["pose"]))
-    left, right = (transform_points(points, np.linalg.inv(motions[side])) for side in SIDES)
-    return np.where(points[:, :1] < report["fissure_x_mm"], left, right)
+    path = results / "brains/b21/surface/surface.json"
+    pose = read_pose(path)
+    left, right = (transform_points(points, np.linalg.inv(pose.of_file(side))) for side in SIDES)
+    return np.where(points[:, :1] < read_json(path)["fissure_x_mm"], left, right)
 
 
 @pytest.mark.slow
@@ -140,7 +132,7 @@ def test_matched_vertices_take_the_place_of_registration(workflow, hemispheres):
 
 
 def test_other_vertices_tell_of_no_growth_and_say_why(workflow, hemispheres):
-    uniform = {"folding": STUDY["folding"] | {"follow": {"regional": 0.0, "directional": 0.0}}}
+    uniform = {"folding": STUDY["folding"] | {"follow": {"loop": "open"}}}
     name = write_study(workflow, hemispheres, thinned=23, **uniform)
     planned = workflow.run("-n", "all", "validate", "--configfile", name)
     assert planned.returncode == 0, planned.stderr[-2000:]

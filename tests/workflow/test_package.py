@@ -44,7 +44,8 @@ def installed(wheel, tmp_path_factory):
 def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     tracked = subprocess.run(
-        ["git", "-C", CHECKOUT, "ls-files", "Snakefile", "workflow", "atlases", "norms", "config", "profiles", "envs"],
+        ["git", "-C", CHECKOUT, "ls-files", "Snakefile", "workflow", "atlases", "schemes", "norms", "config",
+         "profiles", "envs"],
         capture_output=True, text=True, check=True,
     ).stdout.split()  # fmt: skip
     assert {f"gyriflow/shipped/{name}" for name in tracked} <= names

@@ -3,16 +3,16 @@
 import numpy as np
 import pandas as pd
 import pytest
-from shapes import hemisphere, save_gifti
+from shapes import LPS, hemisphere, save_gifti
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.io.files import read_json
-from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
-from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.poses import read_pose
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_surface, write_vertex_labels
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
 from gyriflow.phantom.brain import CORTEX, phantom_labels
-from gyriflow.surface.file_poses import LPS_TO_RAS
+
+from .conftest import COARSE
 
 VOXEL_MM = 2.0
 STUDY = {
@@ -21,13 +21,7 @@ STUDY = {
     ],
     "start": "p21",
     "surface": {"edge_length_mm": 2.5},
-    "mesh": {
-        "order": 1,
-        "mesher": "tetgen",
-        "surface_edge_mm": 3.0,
-        "core_edge_mm": 5.0,
-        "max_surface_distance_mm": 1.0,
-    },
+    "mesh": COARSE,
     "folding": {"end_week": 22, "thickness_mm": 4.0, "step_s": 302400},
     "metrics": {
         "curvature_radius_mm": 6,
@@ -58,25 +52,6 @@ def write_regions(path) -> None:
     regions = np.zeros_like(labels)
     regions[tuple(cortex.T)] = np.where(points[:, 1] > middle(points), 1, 3) + (points[:, 0] > points[:, 0].mean())
     write_label_volume(path, LabelVolume(regions, affine))
-
-
-def plan(workflow, study) -> dict[str, int]:
-    write_regions(workflow.directory / "regions.nii.gz")
-    return workflow.jobs("metrics", "--configfile", workflow.write("study.yaml", study))
-
-
-def test_each_brain_and_each_run_gets_regions(workflow):
-    jobs = plan(workflow, STUDY)
-    rules = ("given_regions", "carried_regions", "register", "simulated_regions", "region_metrics", "surface_mask")
-    assert [jobs.get(rule, 0) for rule in rules] == [1, 1, 1, 1, 4, 0]
-
-
-def test_brains_without_labels_are_registered_by_the_masks_of_their_surfaces(workflow):
-    (workflow.directory / "a.stl").touch()
-    other = {"id": "s23", "week": 23, "pial": "a.stl"}
-    jobs = plan(workflow, STUDY | {"brains": [*STUDY["brains"], other]})
-    rules = ("carried_regions", "register", "surface_mask")
-    assert [jobs.get(rule, 0) for rule in rules] == [2, 2, 1]
 
 
 @pytest.mark.slow
@@ -141,7 +116,7 @@ def test_labels_of_surfaces_are_given_as_well(workflow):
     made = workflow.run("results/brains/p22/surface/pial.surf.gii", "--cores", "2", "--configfile", name)
     assert made.returncode == 0, made.stderr[-2000:]
     folder, given = workflow.directory / "results/brains/p22/surface", {}
-    back = np.linalg.inv(read_json(folder / "surface.json")["pose"])
+    back = read_pose(folder / "surface.json").inverse
     for side in SIDES:
         posed = read_surface(folder / f"{side}.pial.surf.gii")
         vertices, surface = posed.vertices, workflow.directory / f"{side}.surf.gii"
@@ -170,7 +145,7 @@ def test_a_volume_of_regions_fits_a_pial_surface_in_lps(workflow):
     halves, world = [hemisphere(side) for side in (-1, 1)], np.array([0.0, 6.0, 3.0])
     points = np.concatenate([half.vertices for half in halves]) + world
     brain = TriangleMesh(points, np.concatenate([halves[0].faces, halves[1].faces + len(halves[0].vertices)]))
-    save_gifti(workflow.directory / "lps.surf.gii", transformed(brain, LPS_TO_RAS))
+    save_gifti(workflow.directory / "lps.surf.gii", transformed(brain, LPS))
     affine = np.eye(4)
     affine[:3, 3] = np.floor(points.min(axis=0)) - 2
     index = np.ceil(points.max(axis=0) - affine[:3, 3]).astype(int) + 2

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from .conftest import SMALL_STUDY
-from .test_dag import BOTH_RUNS, CONFIGURATION, NEW_RESULTS, ONE_RUN, SHAPE
+from .test_dag import BOTH_RUNS, CONFIGURATION, NEW_RESULTS, ONE_RUN, RESOURCES, SHAPE
 
 pytestmark = pytest.mark.slow
 
@@ -32,12 +32,13 @@ def changed_files(root, *names, content=OTHER):
 
 # what is made of the surface of a measured brain that starts no run: its own, and what compares others with it
 OF_THE_OTHER_BRAIN = SHAPE | {
-    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 5, "similarity": 2,
+    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "growth_table": 1, "measure": 1, "study_table": 5,
+    "similarity": 2,
     "weekly_figure": 2, "shape_maps": 8, "runs_figure": 1, "pial_from_labels": 1, "label_volumes": 1,
     "quality_page": 1, "quality_table": 1, "inputs_figure": 1, "outlines_figure": 2,
 }  # fmt: skip
 # a table of the study is shown by the report
-NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "view_surfaces": 1}
+NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1}
 OF_THE_SOLVER = {
     rule: count
     for rule, count in BOTH_RUNS.items()
@@ -49,13 +50,13 @@ OF_THE_SOLVER = {
 @pytest.mark.parametrize(
     ("names", "expected"),
     [
-        (["src/gyriflow/metrics/similarity.py"], NEW_TABLE | {"similarity": 2}),
-        (["src/gyriflow/report/spectra.py"], NEW_RESULTS | {"spectra_figure": 1, "bands_figure": 1}),
+        (["src/gyriflow/metrics/similarity.py"], NEW_TABLE | {"similarity": 2, "outlines_figure": 2}),
+        (["src/gyriflow/report/growth.py"], NEW_RESULTS | {"growth_figure": 1, "growth_table": 1}),
         (["src/gyriflow/folding/contact.py"], OF_THE_SOLVER),
-        (["workflow/scripts/steps_figure.py"], NEW_RESULTS | {"steps_figure": 2}),
+        (["workflow/scripts/quality_table.py"], RESOURCES | {"quality_table": 1, "study_warnings": 1}),
         # what the terminal says, the command line, comments in rules and the environment make no result
         (
-            ["src/gyriflow/terminal/display.py", "src/gyriflow/cli/commands.py", "src/gyriflow/launch.py"]
+            ["src/gyriflow/shell/terminal.py", "src/gyriflow/shell/commands.py", "src/gyriflow/shell/launch.py"]
             + ["workflow/rules/metrics.smk", "profiles/default/config.yaml", "envs/gyriflow.yaml"],
             {},
         ),
@@ -91,7 +92,14 @@ def with_later_end(study):
             with_brain,
             SHAPE
             | {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 4}
-            | {"growth_rates": 1, "growth_figure": 1, "label_volumes": 1, "quality_page": 1, "quality_table": 1}
+            | {
+                "growth_rates": 1,
+                "growth_figure": 1,
+                "growth_table": 1,
+                "label_volumes": 1,
+                "quality_page": 1,
+                "quality_table": 1,
+            }
             | {"inputs_figure": 1},
         ),
         (with_run, ONE_RUN),

@@ -29,6 +29,7 @@ case "$*" in
         mkdir -p "$2/bin"
         touch "$2/half"
         sleep "${SECONDS_TO_CREATE:-0}"
+        while [ -e "$RECORD.wait" ]; do sleep 0.05; done
         rm "$2/half"
         printf '#!/bin/sh\necho "from the environment: $*"\n' > "$2/bin/tool"
         chmod +x "$2/bin/tool" ;;
@@ -65,6 +66,10 @@ def outside(tmp_path):
         "RECORD": str(tmp_path / "record"),
     }
     return env
+
+
+OWN = f"9{os.getpid()}.25"
+"""Seconds to sleep by which the processes of these tests are told from all others."""
 
 
 def run(*command, env=None, **options):
@@ -231,38 +236,45 @@ def test_folder_that_cannot_be_made(outside, tmp_path):
 
 
 def test_two_at_once_make_one_environment(outside, tmp_path):
-    slow = outside | {"SECONDS_TO_CREATE": "2"}
-    first = start("tool", "first", env=slow)
+    held = tmp_path / "record.wait"
+    held.touch()
+    first = start("tool", "first", env=outside)
     assert wait_until((tmp_path / "record").exists)
-    second = start("tool", "second", env=slow)
+    second = start("tool", "second", env=outside)
+    waiting = second.stderr.readline()
+    held.unlink()
     results = [process.communicate(timeout=30) for process in (first, second)]
     assert [out for out, _ in results] == ["from the environment: first\n", "from the environment: second\n"]
-    assert "waiting for it" in results[1][1]
+    assert "waiting for it" in waiting
     assert sum("create" in line for line in (tmp_path / "record").read_text().splitlines()) == 1
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
 def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_path, number, code):
-    process = start("tool", "first", env=outside | {"SECONDS_TO_CREATE": "987.25"})
-    assert wait_until(lambda: running("987.25"))
+    process = start("tool", "first", env=outside | {"SECONDS_TO_CREATE": OWN})
+    assert wait_until(lambda: running(OWN))
     process.send_signal(number)
     assert process.wait(20) == code
     if number != signal.SIGKILL:
         assert "the same command goes on" in process.stderr.read()
-        assert not running("987.25")
+        assert not running(OWN)
     # after SIGKILL the stand-in is gone, yet not what it had started: the next run waits for that
-    for orphan in running("987.25"):
+    for orphan in running(OWN):
         os.kill(int(orphan), signal.SIGTERM)
     assert run("tool", "again", env=outside).stdout == "from the environment: again\n"
 
 
 def test_interrupted_while_waiting_for_another(outside, tmp_path):
-    first = start("tool", "first", env=outside | {"SECONDS_TO_CREATE": "3"})
+    held = tmp_path / "record.wait"
+    held.touch()
+    first = start("tool", "first", env=outside)
     assert wait_until((tmp_path / "record").exists)
     second = start("tool", "second", env=outside)
     assert "waiting" in second.stderr.readline()
     second.send_signal(signal.SIGINT)
-    assert second.wait(2) == 130
+    assert second.wait(20) == 130
+    assert first.poll() is None
+    held.unlink()
     assert first.communicate(timeout=30)[0] == "from the environment: first\n"
 
 
@@ -325,11 +337,11 @@ def test_tree_hands_on_signals(tree, number):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_tree_leaves_nothing_behind(tree, number):
-    process = start("bash", "-c", "sleep 976.25 & echo up; wait", env=tree)
+    process = start("bash", "-c", f"sleep {OWN} & echo up; wait", env=tree)
     assert process.stdout.readline() == "up\n"
     process.send_signal(number)
     assert process.wait(20) == (-9 if number == signal.SIGKILL else 128 + number)
-    assert wait_until(lambda: not running("976.25"), 5)
+    assert wait_until(lambda: not running(OWN))
 
 
 def test_two_mpi_runs_in_trees_do_not_meet(tree):

@@ -3,6 +3,8 @@
 import pandas as pd
 import pytest
 
+from .conftest import COARSE
+
 ELLIPSOID = {"kind": "ellipsoid", "semi_axes_mm": [20, 26, 18]}
 STUDY = {
     "brains": [
@@ -11,13 +13,7 @@ STUDY = {
     ],
     "start": "first",
     "surface": {"edge_length_mm": 3.0},
-    "mesh": {
-        "order": 1,
-        "mesher": "tetgen",
-        "surface_edge_mm": 3.0,
-        "core_edge_mm": 5.0,
-        "max_surface_distance_mm": 0.6,
-    },
+    "mesh": COARSE | {"max_surface_distance_mm": 0.6},
     "metrics": {"spangy_modes": 60, "curvature_radius_mm": 7.0},
     "folding": {"end_week": 22, "step_s": 86400, "ranks": 1, "thickness_mm": 3.0, "contact": {"kind": "planes"}},
     "studies": {

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gyriflow.io.files import read_json
-from gyriflow.terminal.display import STATE
+from gyriflow.shell.terminal import STATE
 
 from .conftest import SMALL_STUDY
 
@@ -65,6 +65,9 @@ def test_a_failure_is_told_by_its_cause_once_and_first(workflow):
     assert lines[first + 1].endswith("log: results/brains/x/logs/pial_from_labels.log")
     assert outcome.stderr.count("cannot be read as an image") == 1
     assert "CalledProcessError" not in outcome.stderr
+    assert "Traceback" not in outcome.stderr
+    assert "labels.nii.gz" in (workflow.directory / "results/brains/x/logs/pial_from_labels.log").read_text()
+    assert not list((workflow.directory / ".snakemake").glob("gyriflow-exit-*"))
     assert [failure["what"] for failure in read_json(workflow.directory / STATE)["failed"]] == ["surface, brain x"]
 
 

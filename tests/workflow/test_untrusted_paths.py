@@ -1,10 +1,7 @@
 """Folders and files whose names a shell could take apart, through the real program: they are names and nothing else."""
 
-import nibabel as nib
-import numpy as np
 import pytest
-
-from gyriflow.phantom.brain import phantom_labels
+from shapes import phantom, save_labels
 
 from .conftest import Workflow
 
@@ -17,10 +14,7 @@ FILE = "$(touch pwned) 'x' \"y\"; touch pwned & -é.nii.gz"
 def test_brains_in_a_folder_of_any_name_are_segmented_and_have_surfaces(checkout_copy, tmp_path):
     folder = tmp_path / FOLDER
     folder.mkdir()
-    labels, affine = phantom_labels(21.0, voxel_mm=2.0)
-    image = nib.Nifti1Image(labels.astype(np.int16), affine)
-    image.header.set_xyzt_units("mm")
-    nib.save(image, folder / "plain.nii.gz")
+    save_labels(folder / "plain.nii.gz", *phantom(21.0, 2.0))
     (folder / "plain.nii.gz").rename(folder / FILE)
     scheme = {"week": 21, "scheme": "spina-bifida-atlas"}
     brains = [
@@ -28,7 +22,7 @@ def test_brains_in_a_folder_of_any_name_are_segmented_and_have_surfaces(checkout
         {"id": "made", "image": FILE, "segmentation": {"command": "cp -- {image} {labels}"}} | scheme,
     ]
     config = {"brains": brains, "start": "given", "surface": {"edge_length_mm": 3.0}, "folding": {"end_week": 22}}
-    study = Workflow(checkout_copy, folder).surfaces(config)
+    study = Workflow(checkout_copy, folder).surfaces(config, "surface")
     assert study.outcome.returncode == 0, study.outcome.stderr
     for brain in ("given", "made"):
         assert (study.results / brain / "surface" / "pial.surf.gii").stat().st_size > 0

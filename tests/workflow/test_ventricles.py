@@ -8,17 +8,13 @@ from gyriflow.geometry.tetrahedra import linear_pieces, volumes_between
 from gyriflow.io.maps import read_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 
+from .conftest import COARSE
+
 STUDY = {
     "brains": [{"id": f"p{week}", "week": week, "phantom": {"voxel_mm": 2.0}} for week in (21, 22)],
     "start": "p21",
     "surface": {"edge_length_mm": 2.5},
-    "mesh": {
-        "order": 1,
-        "mesher": "tetgen",
-        "surface_edge_mm": 3.0,
-        "core_edge_mm": 5.0,
-        "max_surface_distance_mm": 1.5,
-    },
+    "mesh": COARSE | {"max_surface_distance_mm": 1.5},
     "folding": {
         "end_week": 22,
         "thickness_mm": 4.0,
@@ -32,11 +28,6 @@ STUDY = {
     },
     "runs": {"reference": {}, "alike": {"follow": {"ventricles_ml": None}}},
 }
-
-
-def test_labels_are_read_only_where_ventricles_have_their_own_curve(workflow):
-    jobs = workflow.jobs("folding", "--configfile", workflow.write("study.yaml", STUDY))
-    assert (jobs["parameter_maps"], jobs["growth_curves"], jobs["simulate"]) == (1, 1, 2)
 
 
 @pytest.mark.slow

@@ -19,11 +19,9 @@ rule atlas_file:
         # a file that appeared meanwhile is not deleted before the job, but checked by it
         update("/{file}"),
     log:
-        "results/study/logs/atlas_file/{file}.log",
+        f"{STUDY}/logs/atlas_file/{{file}}.log",
     wildcard_constraints:
         file=one_of(ATLAS_FILES),
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=500,
         runtime=60,

@@ -1,92 +1,13 @@
 # What simulations are worth: each simulated brain beside the real one of its week, with the scaled start as baseline.
-def compared_with(run, brain):
-    """Returns, by week after the start, the real brain that a run is compared with; none where the start is synthetic."""
-    if CONFIG.brain(brain).synthetic:
-        return {}
-    real = {
-        week: [name for name in brains if not CONFIG.brain(name).synthetic]
-        for week, brains in measured_after_start(run, brain).items()
-    }
-    return {week: brains[0] for week, brains in real.items() if brains}
-
-
-def week_before(brain, week):
-    """Returns the real brain of the latest week before one that a start brain may be compared with."""
-    known = {
-        other.week: other.id
-        for other in reversed(comparable(brain))
-        if other.week < float(week) and not other.synthetic
-    }
-    return known[max(known)]
-
-
-VALIDATED = [pair for pair in FOLDED if compared_with(*pair)]
-
-
-# what all runs from a start brain are compared with in a week: surfaces that are ready, with their curvature
-READY = {
-    f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/week-{{week}}/{name}{ending}.gii"
-    for name in ("real", "start", "adjacent")
-    for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
-}
-COMPARED_IN = {
-    (brain, week): real
-    for run, brain in VALIDATED
-    for week, real in compared_with(run, brain).items()
-}
-
-
-def of_compared_weeks(pattern):
-    """Returns an input function: the files of a pattern for every week that a run is compared in."""
-    return lambda wildcards: [
-        pattern.format(run=wildcards.run, brain=wildcards.brain, week=week)
-        for week in compared_with(wildcards.run, wildcards.brain)
-    ]
-
-
-def kinds(run, brain):
-    """Returns by compared week whether growth taken from the brains of that week explains it, or the run predicts it."""
-    follow = CONFIG.run(run).follow
-    measured = regional(run) or (
-        follow is not None and "measured" in (follow.area_cm2, follow.volume_ml)
-    )
-    explains = measured or "estimated" in CONFIG.parameters(run).values()
-    until = None if follow is None else follow.known_until_gw
-    return {
-        float(week): (
-            "explained"
-            if explains and (until is None or float(week) <= until)
-            else "predicted"
-        )
-        for week in compared_with(run, brain)
-    }
-
-
-def seed_of(run):
-    """Returns the seed of the randomness in a run's growth, 0 where there is none."""
-    follow = CONFIG.run(run).follow
-    return 0 if follow is None else follow.seed
-
-
 rule ready_surfaces:
     input:
-        real=lambda wildcards: PIAL["whole"].format(
-            brain=COMPARED_IN[wildcards.brain, wildcards.week]
-        ),
-        adjacent=lambda wildcards: PIAL["whole"].format(
-            brain=week_before(wildcards.brain, wildcards.week)
-        ),
+        real=of(PLAN.validating.real_surface),
+        adjacent=of(PLAN.validating.adjacent_surface),
         start=PIAL["whole"],
     output:
         **READY,
-    log:
-        f"{STUDY}/validation/logs/{{brain}}.week-{{week}}.log",
-    benchmark:
-        f"{STUDY}/validation/benchmarks/{{brain}}.week-{{week}}.tsv"
     wildcard_constraints:
-        brain=one_of({brain for brain, _ in COMPARED_IN}),
-    conda:
-        ENVIRONMENT
+        brain=one_of(PLAN.validating.starts),
     resources:
         mem_mb=4000,
         runtime=30,
@@ -98,87 +19,61 @@ rule ready_surfaces:
 
 rule validation:
     input:
-        **{name: of_compared_weeks(pattern) for name, pattern in READY.items()},
-        simulated=of_compared_weeks(f"{RUN}/surfaces/week-{{week}}/pial.surf.gii"),
-        whole=lambda wildcards: [
-            PIAL["whole"].format(brain=brain)
-            for brain in compared_with(wildcards.run, wildcards.brain).values()
-        ],
-        params=rules.parameters.output[0],
+        unpack(of(PLAN.validating.validated)),
+        params=PARAMETERS,
         # what the errors of runs that follow no curve are errors against
-        curves=lambda wildcards: (
-            rules.growth_curves.output.curves
-            if CONFIG.estimated_from(wildcards.brain)
-            else []
-        ),
+        curves=of(PLAN.validating.curves),
     output:
-        f"{RUN}/metrics/validation.csv",
-    log:
-        f"{RUN}/logs/validation.log",
-    benchmark:
-        f"{RUN}/benchmarks/validation.tsv"
-    conda:
-        ENVIRONMENT
+        VALIDATION,
     resources:
         mem_mb=4000,
         runtime=60,
     params:
-        start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
-        series=lambda wildcards: CONFIG.estimated_from(wildcards.brain),
-        kinds=lambda wildcards: kinds(wildcards.run, wildcards.brain),
-        seed=lambda wildcards: seed_of(wildcards.run),
+        start_week=of(PLAN.brains.week),
+        series=of(CONFIG.estimated_from),
+        kinds=of(PLAN.validating.kinds),
+        seed=of(PLAN.runs.seed),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/validation.py"
 
 
-def carried_weeks(brain):
-    """Returns the compared weeks, as in file names, of the real brains that a start brain's mesh is carried to."""
-    later = [CONFIG.brain(name) for name in later_brains(brain)[1:]]
-    return (
-        {week_tag(other.week): other.id for other in later} if brain in CARRIED else {}
-    )
-
-
-rule registration_ceiling:
+rule prediction:
     input:
-        **{
-            name: lambda wildcards, pattern=pattern: [
-                pattern.format(brain=wildcards.brain, week=week)
-                for week in carried_weeks(wildcards.brain)
-                if (wildcards.brain, week) in COMPARED_IN
-            ]
-            for name, pattern in READY.items()
-        },
-        whole=lambda wildcards: [
-            PIAL["whole"].format(brain=COMPARED_IN[wildcards.brain, week])
-            for week in carried_weeks(wildcards.brain)
-            if (wildcards.brain, week) in COMPARED_IN
-        ],
-        mesh=rules.tetrahedralise.output.mesh,
-        data=rules.tetrahedralise.output.data,
-        report=PIAL["report"],
-        carried=rules.carried_mesh.output[0],
+        unpack(of(PLAN.validating.prediction)),
+        mesh=MESH["mesh"],
+        data=MESH["data"],
+        targets=TARGETS.format(brain="{brain}", whose="another"),
     output:
-        f"{STUDY}/validation/{{brain}}/registration.csv",
-    log:
-        f"{STUDY}/validation/logs/{{brain}}.registration.log",
-    benchmark:
-        f"{STUDY}/validation/benchmarks/{{brain}}.registration.tsv"
-    wildcard_constraints:
-        brain=one_of(CARRIED),
-    conda:
-        ENVIRONMENT
+        PREDICTION,
     resources:
         mem_mb=4000,
         runtime=60,
     params:
-        start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
-        weeks=lambda wildcards: [
-            float(week)
-            for week in carried_weeks(wildcards.brain)
-            if (wildcards.brain, week) in COMPARED_IN
-        ],
+        start_week=of(PLAN.brains.week),
+        weeks=of(PLAN.validating.atlas_weeks),
+        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+    script:
+        "../scripts/prediction.py"
+
+
+rule registration_ceiling:
+    input:
+        unpack(of(PLAN.validating.ceiling)),
+        mesh=MESH["mesh"],
+        data=MESH["data"],
+        report=PIAL["report"],
+        carried=CARRIED_MESH,
+    output:
+        CEILING,
+    wildcard_constraints:
+        brain=one_of(PLAN.chains.carried),
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        start_week=of(PLAN.brains.week),
+        weeks=of(PLAN.validating.ceiling_weeks),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/registration_ceiling.py"
@@ -186,79 +81,76 @@ rule registration_ceiling:
 
 rule displacement_agreement:
     input:
-        frames=rules.simulate.output.frames,
-        carried=rules.carried_mesh.output[0],
+        frames=FOLDING["frames"],
+        carried=CARRIED_MESH,
     output:
-        f"{RUN}/metrics/displacement_agreement.csv",
-    log:
-        f"{RUN}/logs/displacement_agreement.log",
-    benchmark:
-        f"{RUN}/benchmarks/displacement_agreement.tsv"
+        AGREEMENT,
     wildcard_constraints:
-        brain=one_of(CARRIED),
-    conda:
-        ENVIRONMENT
+        brain=one_of(PLAN.chains.carried),
     params:
         labels=lambda wildcards: {
             "run": wildcards.run,
             "start_week": CONFIG.brain(wildcards.brain).week,
-            "seed": seed_of(wildcards.run),
+            "seed": PLAN.runs.seed(wildcards.run),
         },
     script:
         "../scripts/displacement_agreement.py"
 
 
-rule validation_table:
+# the weeks in which sulci begin, in a simulated brain and in the real ones that follow its start
+rule onset:
+    input:
+        unpack(of(PLAN.validating.onset)),
+    output:
+        ONSET,
+    wildcard_constraints:
+        brain=one_of(PLAN.chains.carried),
+    params:
+        **of_brain("sides"),
+        radius_mm=CONFIG.metrics.curvature_radius_mm,
+        run=lambda wildcards: wildcards.run,
+        subject=lambda wildcards: wildcards.brain,
+        run_weeks=of(CONFIG.weeks),
+        real_weeks=of(PLAN.chains.later_weeks),
+    script:
+        "../scripts/onset.py"
+
+
+rule folding_agreement:
+    input:
+        metrics=f"{STUDY}/metrics.csv",
+        spectra=f"{STUDY}/spectra.csv",
+    output:
+        f"{STUDY}/folding_agreement.csv",
+    params:
+        pairs=PLAN.validating.week_pairs,
+    script:
+        "../scripts/folding_agreement.py"
+
+
+rule horizon:
+    input:
+        validation=f"{STUDY}/validation.csv",
+        displacement=(
+            f"{STUDY}/displacement_agreement.csv" if PLAN.validating.carried else []
+        ),
+    output:
+        f"{STUDY}/horizon.csv",
+    params:
+        models=PLAN.validating.models,
+        known_until_gw={
+            run: PLAN.runs.followed(run, "known_until_gw") for run in CONFIG.runs
+        },
+    script:
+        "../scripts/horizon.py"
+
+
+rule validate:
     input:
         [
-            f"results/runs/{run}/{brain}/metrics/validation.csv"
-            for run, brain in VALIDATED
+            f"{STUDY}/{name}.csv"
+            for name, files in PLAN.validating.tables.items()
+            if files
         ],
-    output:
-        f"{STUDY}/validation.csv",
-    log:
-        f"{STUDY}/logs/validation_table.log",
-    benchmark:
-        f"{STUDY}/benchmarks/validation_table.tsv"
-    conda:
-        ENVIRONMENT
-    script:
-        "../scripts/join_tables.py"
-
-
-rule displacement_agreement_table:
-    input:
-        [
-            f"results/runs/{run}/{brain}/metrics/displacement_agreement.csv"
-            for run, brain in VALIDATED
-            if brain in CARRIED
-        ],
-    output:
-        f"{STUDY}/displacement_agreement.csv",
-    log:
-        f"{STUDY}/logs/displacement_agreement_table.log",
-    benchmark:
-        f"{STUDY}/benchmarks/displacement_agreement_table.tsv"
-    conda:
-        ENVIRONMENT
-    script:
-        "../scripts/join_tables.py"
-
-
-rule registration_ceiling_table:
-    input:
-        [
-            f"{STUDY}/validation/{brain}/registration.csv"
-            for brain in CARRIED
-            if any(start == brain for start, _ in COMPARED_IN)
-        ],
-    output:
-        f"{STUDY}/registration_ceiling.csv",
-    log:
-        f"{STUDY}/logs/registration_ceiling_table.log",
-    benchmark:
-        f"{STUDY}/benchmarks/registration_ceiling_table.tsv"
-    conda:
-        ENVIRONMENT
-    script:
-        "../scripts/join_tables.py"
+        rules.horizon.output if PLAN.validating.pairs else [],
+        PLAN.figures.target("validate"),

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from gyriflow.io.files import read_table, write_table
-from gyriflow.metrics.regions import asymmetry
+from gyriflow.metrics.tables import asymmetry
 from gyriflow.step import step
 
 files = snakemake.input

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
+from gyriflow.comparison.design import sobol_design
+from gyriflow.comparison.surrogate import fit, propose
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
-from gyriflow.study.design import sobol_design
-from gyriflow.study.surrogate import fit, propose
 
 params, earlier = snakemake.params, snakemake.input.scores
 with step(snakemake.log[0]):

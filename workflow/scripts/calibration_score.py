@@ -3,13 +3,13 @@
 import numpy as np
 import pandas as pd
 
+from gyriflow.comparison.scores import shape_scores, size_score
+from gyriflow.comparison.shapes import Shape, ready
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.similarity import surface_distance
 from gyriflow.step import step
-from gyriflow.validation.scores import shape_scores, size_score
-from gyriflow.validation.shapes import Shape, ready
 
 files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
 

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
+from gyriflow.comparison.surrogate import fit, optimum, profiles, sensitivities
+from gyriflow.io.figures import write_printed
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.printed_tables import write_printed
 from gyriflow.step import step
-from gyriflow.study.surrogate import fit, optimum, profiles, sensitivities
 
 params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):

@@ -4,19 +4,19 @@ import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, linear_pieces
-from gyriflow.io.files import read_json
+from gyriflow.growth.carrying import carry_mesh
+from gyriflow.growth.local import local_growth, local_strain
+from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import CarriedMesh, read_correspondence, write_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.registration.carrying import carry_mesh
-from gyriflow.registration.growth import local_growth, local_strain
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
-    pose = np.array(read_json(files.report)["pose"])
+    pose = read_pose(files.report)
     # the files' world, in which brains correspond, is not the pose of the mesh
-    start = TetrahedralMesh(transform_points(mesh.vertices, np.linalg.inv(pose)), mesh.tets)
+    start = TetrahedralMesh(transform_points(mesh.vertices, pose.inverse), mesh.tets)
     maps = [[read_correspondence(path) for path in paths] for paths in (files.earlier, files.later)]
     positions = carry_mesh(start, *maps)
     cells = {"volume": linear_pieces(mesh), "area": boundary_faces(mesh)[0]}
@@ -29,7 +29,7 @@ with step(snakemake.log[0]):
     }
     if params.strain:
         # directions are those of the mesh's pose
-        turned = positions @ pose[:3, :3].T
+        turned = positions @ pose.world[:3, :3].T
         for length, kinds in growth.items():
             kinds["strain"] = local_strain(turned, cells["volume"], params.weeks, length, own=len(maps[0]))
     write_carried_mesh(snakemake.output[0], CarriedMesh(np.array(params.weeks), positions, growth))

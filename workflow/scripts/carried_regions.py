@@ -3,19 +3,18 @@
 import numpy as np
 
 from gyriflow.geometry.triangles import transformed
-from gyriflow.io.files import read_json
-from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
+from gyriflow.growth.carrying import carry_regions
+from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_correspondence
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_vertex_labels
 from gyriflow.parameters.terms import SIDES, STRUCTURES
-from gyriflow.registration.carrying import carry_regions
 from gyriflow.step import step
 
 files, reports = snakemake.input, (snakemake.input.given_report, snakemake.input.report)
 with step(snakemake.log[0]):
     # brains correspond in the world of their files
     back = [
-        np.eye(4) if posed else np.linalg.inv(read_json(report)["pose"])
+        np.eye(4) if posed else read_pose(report).inverse
         for report, posed in zip(reports, snakemake.params.posed, strict=True)
     ]
     between = read_correspondence(files.correspondence)

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
+from gyriflow.comparison.members import COLUMNS, distances_to
 from gyriflow.io.files import read_table, write_table
-from gyriflow.metrics.spectral_distance import spectral_distances
+from gyriflow.metrics.spangy import spectral_distances
 from gyriflow.step import step
-from gyriflow.study.comparison import COLUMNS, distances_to
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 LABELS = ("subject", "run", "real", "real_population", "same_population")

@@ -1,18 +1,17 @@
 """Cortical thickness at the vertices of a brain's pial surface, from the labels of its cortex."""
 
-import numpy as np
-
-from gyriflow.io.files import read_json, write_json
+from gyriflow.io.files import write_json
+from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import read_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.from_labels import thickness_from_labels
+from gyriflow.surface.thickness import thickness_from_labels
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], files.labels):
     scheme, volume = LabelScheme(**params.scheme), read_label_volume(files.labels, affine_from=params.affine_from)
-    surface, pose = read_surface(files.surface), np.array(read_json(files.report)["pose"])
+    surface, pose = read_surface(files.surface), read_pose(files.report)
     thickness = thickness_from_labels(volume.labels, volume.affine, scheme, surface, pose, **params.settings)
     write_vertex_maps(snakemake.output.thickness, {"cortical thickness (mm)": thickness.values_mm})
     write_vertex_maps(snakemake.output.measured, {"thickness_mm": thickness.measured_mm})

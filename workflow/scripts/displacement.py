@@ -3,7 +3,7 @@
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.files import write_table
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
-from gyriflow.metrics.displacement import weekly_norms
+from gyriflow.metrics.tables import weekly_norms
 from gyriflow.step import step
 
 frames, labels = snakemake.input[0], snakemake.params.labels

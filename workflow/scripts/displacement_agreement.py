@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from gyriflow.comparison.validation import displacement_table
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.files import write_table
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.step import step
-from gyriflow.validation.displacement import displacement_table
 
 files, labels = snakemake.input, snakemake.params.labels
 with step(snakemake.log[0]):

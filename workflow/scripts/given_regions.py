@@ -4,25 +4,23 @@ import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import transformed
-from gyriflow.io.files import read_json
-from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
-from gyriflow.io.surfaces import read_surface
+from gyriflow.growth.carried_regions import number_regions, regions_from_surface, regions_from_volume, renumber
+from gyriflow.io.poses import read_pose
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_vertex_labels
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.terms import SIDES, STRUCTURES
-from gyriflow.registration.regions import number_regions, regions_from_surface, regions_from_volume, renumber
 from gyriflow.step import step
-from gyriflow.surface.file_poses import volume_pose
 
 files, params = snakemake.input, snakemake.params
 given = [file for name in ("volume", "left_labels", "right_labels") if (file := files.get(name))]
 with step(snakemake.log[0], *given):
-    report = read_json(files.report)
+    pose = read_pose(files.report)
     meshes = {side: read_surface(files[side]) for side in SIDES}
     if files.get("volume"):
         volume = read_label_volume(files.volume, affine_from=params.affine_from)
         numbers = number_regions(params.names)
         regions = renumber(volume.labels, params.names, numbers)
-        back = np.linalg.inv(volume_pose(report, files.volume))
+        back = np.linalg.inv(pose.of_volume(files.volume))
         points = {side: transform_points(mesh.vertices, back) for side, mesh in meshes.items()}
         found = regions_from_volume(points, regions, volume.affine)
     else:
@@ -30,8 +28,7 @@ with step(snakemake.log[0], *given):
         tables = {side: params.names or names for side, (_, names) in read.items()}
         numbers, found = number_regions(*tables.values()), {}
         for side, (labels, _) in read.items():
-            motion = np.array(report.get("motions", {}).get(side, report["pose"]))
-            posed = transformed(read_surface(files[f"{side}_surface"]), motion)
+            posed = transformed(read_surface(files[f"{side}_surface"]), pose.of_file(side))
             found[side] = regions_from_surface(meshes[side], posed, renumber(labels, tables[side], numbers))
     names = {number: name for name, number in numbers.items()}
     for side, values in found.items():

@@ -1,7 +1,7 @@
 """All metrics of a study in two tables, a row per number and a row per brain, and change between scans of a subject."""
 
 from gyriflow.io.files import read_table, write_table
-from gyriflow.metrics.change import change_between_scans, long_table, wide_table
+from gyriflow.metrics.tables import change_between_scans, long_table, wide_table
 from gyriflow.step import step
 
 output = snakemake.output

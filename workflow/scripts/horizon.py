@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from gyriflow.comparison.validation import horizon_table
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
-from gyriflow.validation.horizon import horizon_table
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):

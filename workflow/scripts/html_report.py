@@ -1,10 +1,9 @@
 """The report: one HTML page that needs nothing else."""
 
+from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_text
-from gyriflow.io.pictures import picture_addresses, read_body
 from gyriflow.io.yaml_files import yaml_text
-from gyriflow.report.assembly import Results, assemble
-from gyriflow.report.page import Shown, picture, render_caption, report_page
+from gyriflow.report.page import Results, Shown, assemble, hide_paths, picture, report_page
 from gyriflow.step import step
 
 PARTS = ("style", "three", "notice", "controls", "viewer")
@@ -17,7 +16,7 @@ with step(snakemake.log[0]):
             entry["section"],
             entry["title"],
             picture(addresses[path], entry["title"]) if path in addresses else read_body(path),
-            render_caption(read_text(entry["caption"]), entry["values"]),
+            entry["caption"],
             first=path == params.first,
         )
         for path, entry in ((entry["file"], entry) for entry in params.entries)
@@ -28,7 +27,7 @@ with step(snakemake.log[0]):
         runs=read_table(files.runs),
         provenance=read_json(files.provenance),
         metrics=params.metrics,
-        configuration=yaml_text(params.config),
+        configuration=yaml_text(params.config if params.paths else hide_paths(params.config)),
         **{
             name: read_table(files[name])
             for name in ("validation", "displacement", "quality", "warnings")

@@ -1,19 +1,17 @@
 """Where the vertices of a brain's surface are in another brain whose surface has the same ones."""
 
-import numpy as np
-
 from gyriflow.geometry.deformations import MatchedSurfaces, transform_points
 from gyriflow.geometry.triangles import transformed
-from gyriflow.io.files import read_json
+from gyriflow.growth.matched_surfaces import match_surfaces
+from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import write_matched_surfaces
 from gyriflow.io.surfaces import read_surface
-from gyriflow.registration.matched_surfaces import match_surfaces
 from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0], files.earlier, files.later):
     found, report = match_surfaces(read_surface(files.earlier), read_surface(files.later))
     # correspondences are between the brains' own worlds, as registrations are
-    first, second = (np.linalg.inv(read_json(path)["pose"]) for path in (files.earlier_report, files.later_report))
+    first, second = (read_pose(path).inverse for path in (files.earlier_report, files.later_report))
     own = MatchedSurfaces(transformed(found.first, first), transform_points(found.second, second))
     write_matched_surfaces(snakemake.output[0], own, report)

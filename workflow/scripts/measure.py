@@ -3,7 +3,7 @@
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.metrics.measure import measure_brain
-from gyriflow.metrics.mode_numbers import common_modes
+from gyriflow.metrics.spangy import common_modes
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 

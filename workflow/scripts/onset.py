@@ -1,32 +1,31 @@
 """In which week each sulcus of the last real brain appears: in the real brains, and in a run."""
 
-import numpy as np
 import pandas as pd
 
+from gyriflow.comparison.onset import named, onset, regions_on, relief, sulcal_regions
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import transformed
-from gyriflow.io.files import read_json, write_table
-from gyriflow.io.label_files import read_vertex_labels
+from gyriflow.growth.carrying import carry_surface
+from gyriflow.io.files import write_table
+from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_correspondence
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_surface, read_vertex_labels
 from gyriflow.metrics.curvature import curvature
-from gyriflow.metrics.depth import convex_hull, sulcal_depth
-from gyriflow.registration.carrying import carry_surface
+from gyriflow.metrics.gyrification import convex_hull, sulcal_depth
 from gyriflow.step import step
-from gyriflow.validation.onset import named, onset_on_surfaces, regions_on, sulcal_regions
 
 files, params, tables = snakemake.input, snakemake.params, []
 
 
 def places(mesh, index):
     """Returns the last brain's sulci on a surface in the pose of the brain of an index."""
-    points = carry_surface(transformed(mesh, np.linalg.inv(poses[index])), between[index:])
-    return regions_on(mesh, transform_points(points, poses[-1]), real[-1], last)
+    points = carry_surface(transformed(mesh, poses[index].inverse), between[index:])
+    return regions_on(mesh, transform_points(points, poses[-1].world), real[-1], last)
 
 
 with step(snakemake.log[0]):
     between = [read_correspondence(path) for path in files.correspondences]
-    poses = [np.array(read_json(path)["pose"]) for path in files.reports]
+    poses = [read_pose(path) for path in files.reports]
     for side in params.sides:
         real, run = ([read_surface(path) for path in files[f"{who}_{side}"]] for who in ("real", "run"))
         deep = [[sulcal_depth(mesh, convex_hull(mesh)) for mesh in meshes] for meshes in (real, run)]
@@ -35,6 +34,7 @@ with step(snakemake.log[0]):
         last, names = named(real[-1], last, *regions, side)
         brains = {"real": (params.real_weeks, real, deep[0], [places(mesh, index) for index, mesh in enumerate(real)])}
         brains[params.run] = params.run_weeks, run, deep[1], [places(run[0], 0)] * len(run)
-        found = [onset_on_surfaces(*brain, names).assign(run=who) for who, brain in brains.items()]
-        tables += [table.assign(subject=params.subject, hemisphere=side) for table in found]
+        for who, brain in brains.items():
+            reliefs = {week: relief(*surface, names) for week, *surface in zip(*brain, strict=True)}
+            tables.append(onset(reliefs).assign(run=who, subject=params.subject, hemisphere=side))
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

@@ -2,8 +2,9 @@
 
 from gyriflow.growth.following import THICKNESS, followed_sizes
 from gyriflow.growth.rates import FOLDING_RATES, rate_curve
-from gyriflow.growth.regional import CORTEX, STRAIN, known_weeks, regional_map
+from gyriflow.growth.regional import map_names, target_map
 from gyriflow.io.files import read_json, read_table
+from gyriflow.io.registrations import read_targets
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.step import step
 
@@ -16,21 +17,22 @@ with step(snakemake.log[0]):
             rates = rates[rates["series"] == snakemake.params.estimated_from]
             curve = rate_curve(rates, column, allow_negative=allowed)
             settings[name] = {"weeks": dict(zip(*(numbers.tolist() for numbers in curve), strict=True))}
+    if files.targets:
+        targets = read_targets(files.targets)
+        at = targets.weeks.tolist()
+        settings["follow"] |= {
+            name: dict(zip(at, sizes.tolist(), strict=True)) for name, sizes in targets.sizes.items()
+        }
+        settings["targets"] = {week: target_map(week) for week in at[1:]}
     if settings["follow"] is not None:
         curves = read_table(files.curves) if files.curves else None
-        shrink = settings["allow_negative_growth"]
+        shrink = settings["allow_negative_growth"] or bool(files.targets)
         sizes = followed_sizes(settings["follow"], curves, snakemake.params.estimated_from, weeks, shrink)
         settings["follow"] = settings["follow"] | sizes
         if THICKNESS in sizes:
             settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}
         if snakemake.params.regional_weeks:
-            until = settings["follow"]["known_until_gw"]
-            known = known_weeks(snakemake.params.regional_weeks, until, snakemake.params.unmatched)
-            settings["regional_growth"] = {week: regional_map(week) for week in known}
-            if settings["follow"]["directional"] > 0:
-                settings["regional_strain"] = {week: regional_map(week, STRAIN) for week in known}
-            if settings["follow"]["cortex"] == "area":
-                settings["regional_growth_of_cortex"] = {week: regional_map(week, CORTEX) for week in known}
+            settings |= map_names(snakemake.params.regional_weeks, settings["follow"], snakemake.params.unmatched)
     surface = read_json(files.surface)
     start = {"start_week": weeks[0], "output_weeks": list(weeks), "fissure_x_mm": surface["fissure_x_mm"]}
     start["side"] = surface.get("side")

@@ -5,8 +5,7 @@ from gyriflow.io.surfaces import read_one_hemisphere, write_brain
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.from_labels import hemisphere_from_labels
-from gyriflow.surface.from_surfaces import from_hemisphere
+from gyriflow.surface.pial import from_labels, from_surface
 
 file, output, params = snakemake.input[0], snakemake.output, snakemake.params
 with step(snakemake.log[0], file):
@@ -14,9 +13,9 @@ with step(snakemake.log[0], file):
     if params.scheme:
         volume = read_label_volume(file, affine_from=params.affine_from)
         scheme = LabelScheme(**params.scheme)
-        surface = hemisphere_from_labels(volume.labels, volume.affine, scheme, **of_both, **params.of_labels)
+        surface = from_labels(volume.labels, volume.affine, scheme, **of_both, **params.of_labels)
     else:
         mesh = read_one_hemisphere(file, params.side)
-        surface = from_hemisphere(mesh, coordinates=params.coordinates, **of_both, **params.of_surfaces)
+        surface = from_surface(mesh, coordinates=params.coordinates, **of_both, **params.of_surfaces)
     write_brain(output, surface.whole, surface.left, surface.right)
     write_json(output.report, surface.report)

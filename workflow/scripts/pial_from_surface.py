@@ -1,12 +1,14 @@
 """The clean pial surface of a brain and of its hemispheres in RAS+ mm, from one closed surface."""
 
+from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_surface, write_brain
 from gyriflow.step import step
-from gyriflow.surface.from_surfaces import from_pial
+from gyriflow.surface.pial import from_surface
 
 file, output, params = snakemake.input[0], snakemake.output, snakemake.params
 with step(snakemake.log[0], file):
-    surface = from_pial(read_surface(file), week=params.week, coordinates=params.coordinates, **params.settings)
+    require_checksums(params.known)
+    surface = from_surface(read_surface(file), week=params.week, coordinates=params.coordinates, **params.settings)
     write_brain(output, surface.whole, surface.left, surface.right)
     write_json(output.report, surface.report)

@@ -9,9 +9,9 @@ from gyriflow.errors import InputError, MeshError
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres
 from gyriflow.step import step
-from gyriflow.surface.from_surfaces import hemisphere
-from gyriflow.surface.limits import Limits
-from gyriflow.surface.study_poses import pairs_by_shape, poses
+from gyriflow.surface.plausible import Limits
+from gyriflow.surface.pose import pairs_by_shape, poses
+from gyriflow.surface.repair import sound_pieces
 
 files, params = list(snakemake.input), snakemake.params
 with step(snakemake.log[0]):
@@ -20,14 +20,14 @@ with step(snakemake.log[0]):
     for path, sides in names.items():
         try:
             *surfaces, named[path] = read_hemispheres(*sides)
-            brains[path] = tuple(hemisphere(side, params.max_hole_mm)[0] for side in surfaces)
+            brains[path] = tuple(sound_pieces(side, params.max_hole_mm, one=True).mesh for side in surfaces)
         except (InputError, MeshError) as error:
             refused[path] = error
     pairs = dict(zip(brains, pairs_by_shape(list(brains.values()), Limits(**params.limits)), strict=True))
     refused |= {path: pair for path, pair in pairs.items() if isinstance(pair, InputError)}
     posed = {path: pair for path, pair in pairs.items() if path not in refused}
-    for path, found in zip(posed, poses(list(posed.values()), [named[path] for path in posed]), strict=True):
-        write_json(path, found.report)
+    for path, pose in zip(posed, poses(list(posed.values()), [named[path] for path in posed]), strict=True):
+        write_json(path, pose.plain())
     for path, error in refused.items():
         logging.error("%s: %s", ", ".join(names[path]), error)
         write_json(path, {"refused": str(error)})

@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from gyriflow.io.files import write_json
-from gyriflow.io.fingerprints import files_in, fingerprints
+from gyriflow.io.files import files_in, fingerprints, write_json
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.provenance import software
+from gyriflow.shell.provenance import software
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params

@@ -2,11 +2,11 @@
 
 import pandas as pd
 
+from gyriflow.comparison.published import cost_table, displacement_table, growth_table, parameters_table
+from gyriflow.io.figures import write_printed
 from gyriflow.io.files import read_json, read_table
-from gyriflow.io.printed_tables import write_printed
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
-from gyriflow.study.published import cost_table, displacement_table, growth_table, parameters_table
 
 files, folded = snakemake.input, snakemake.params.folded
 OTHER = "The paper's brains are those of a normal atlas (dHCP); here:"

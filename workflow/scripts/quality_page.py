@@ -1,40 +1,40 @@
 """The page of a brain for quality control before the solve, and what its row of the study's table says."""
 
-import numpy as np
-
+from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
-from gyriflow.io.logs import read_messages
+from gyriflow.io.jobs import read_messages
 from gyriflow.io.maps import read_volume_map
+from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.report.quality import Brain, Volume, quality_page, tissue_groups
-from gyriflow.report.quality_table import facts, quality_row
+from gyriflow.report.quality import Brain, Volume, facts, quality_page, quality_row, tissue_groups
 from gyriflow.step import step
-from gyriflow.surface.size import expected_volume_ml
-from gyriflow.surface.white import posed_whites
+from gyriflow.surface.plausible import expected_volume_ml
+from gyriflow.surface.thickness import posed_whites
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     surface, report = read_surface(files.surface), read_json(files.report)
-    volumes, pose, thickness = [], np.array(report["pose"]), None
+    volumes, pose, thickness = [], read_pose(files.report), None
     if files.image:
         image = read_volume_map(files.image, params.affine_from)
-        volumes.append(Volume(image.values, None, pose @ image.affine))
+        volumes.append(Volume(image.values, None, pose.world @ image.affine))
     if files.labels:
         labels = read_label_volume(files.labels, affine_from=params.affine_from)
         groups = tissue_groups(labels.labels, LabelScheme(**params.scheme))
-        volumes.append(Volume(None, groups, pose @ labels.affine))
+        volumes.append(Volume(None, groups, pose.world @ labels.affine))
     if files.thickness:
         (thickness,) = read_vertex_maps(files.thickness).values()
-    white = posed_whites(report, {side: read_surface(path) for side, path in params.white.items()})
+    white = posed_whites(pose, {side: read_surface(path) for side, path in params.white_files.items()})
     said = [message for log in params.logs for message in read_messages(log)]
     warnings = list(dict.fromkeys(message for level, message in said if level == "warning"))
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.labels, report, read_json(files.measured) if files.measured else {}, warnings, expected)
-    brain = Brain(surface, report["fissure_x_mm"], thickness, white, volumes)
-    shown = {"title": params.title, "verdict": row["verdict"], "facts": facts(row), "warnings": warnings}
+    brain = Brain(surface, report["fissure_x_mm"], thickness, merged(*white.values()) if white else None, volumes)
+    title = f"{snakemake.wildcards.brain}, {params.week:g} GW"
+    shown = {"title": title, "verdict": row["verdict"], "facts": facts(row), "warnings": warnings}
     figure = quality_page(brain, **shown, synthetic=params.synthetic)
     write_figure(output.png, output.pdf, figure, dpi=params.dpi)
     write_json(output.row, row)

@@ -2,7 +2,7 @@
 
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, write_table
-from gyriflow.report.quality_table import quality_table, shown_table
+from gyriflow.report.quality import quality_table, shown_table
 from gyriflow.report.tables import html_table
 from gyriflow.step import step
 

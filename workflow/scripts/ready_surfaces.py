@@ -1,9 +1,9 @@
 """The surfaces that all runs from a start brain are compared with in a week, ready and with their curvature."""
 
+from gyriflow.comparison.shapes import ready
 from gyriflow.io.surfaces import read_surface, write_surface, write_vertex_maps
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
-from gyriflow.validation.shapes import ready
 
 files, output = snakemake.input, snakemake.output
 with step(snakemake.log[0]):

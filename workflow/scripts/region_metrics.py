@@ -1,8 +1,7 @@
 """The metrics of a brain by region."""
 
 from gyriflow.io.files import write_table
-from gyriflow.io.label_files import read_vertex_labels
-from gyriflow.io.surfaces import read_surface, read_vertex_maps
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.metrics.regions import region_metrics
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step

@@ -2,22 +2,20 @@
 
 import numpy as np
 
-from gyriflow.folding.following import growing_at_start
-from gyriflow.folding.free_growth import Tissue
+from gyriflow.folding.checks import refuse_impossible
+from gyriflow.folding.growth import GrowthInputs
+from gyriflow.folding.growth_models import growth_at_start
 from gyriflow.folding.output import layer_fields
-from gyriflow.folding.regions import cell_tags, facet_tags
-from gyriflow.folding.zone_checks import refuse_impossible
-from gyriflow.folding.zones import zones_of_run
+from gyriflow.folding.zones import cell_tags, facet_tags, zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.maps import read_maps
-from gyriflow.io.regions import Regions, write_regions
 from gyriflow.io.surfaces import read_surface
-from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.io.tetmeshes import Regions, read_tetrahedral_mesh, write_regions
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.parameters.reading import parameters_from, require_maps
+from gyriflow.parameters.folding import parameters_from, require_maps
 from gyriflow.parameters.terms import REGION_FIELDS
 from gyriflow.step import step
-from gyriflow.surface.hemispheres import nearer_left
+from gyriflow.surface.fissure import nearer_left
 
 files = snakemake.input
 with step(snakemake.log[0]):
@@ -26,8 +24,8 @@ with step(snakemake.log[0]):
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    growing = growing_at_start(parameters, mesh.vertices, Tissue.of(mesh, zones, maps))
-    fields = layer_fields(mesh.vertices, zones, growing, maps, parameters.start_week, REGION_FIELDS)
+    growth = growth_at_start(parameters, GrowthInputs.of(mesh, zones, maps), mesh.vertices)
+    fields = layer_fields(mesh.vertices, zones, growth.parameters, maps, parameters.start_week, REGION_FIELDS)
     boundary = TriangleMesh(mesh.vertices, zones.facets)
     if parameters.side is None:
         on_left = nearer_left(boundary, *map(read_surface, files.sides))

@@ -2,21 +2,21 @@
 
 from dataclasses import asdict
 
+from gyriflow.growth.channels import channels
+from gyriflow.growth.diffeomorphic import register
+from gyriflow.growth.registration_quality import judge, require_good
 from gyriflow.io.registrations import write_deformation
 from gyriflow.io.volumes import read_label_volume, read_values
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.registration.channels import channels
-from gyriflow.registration.diffeomorphic import register
-from gyriflow.registration.quality import judge, require_good
 from gyriflow.step import step
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 with step(snakemake.log[0], files.earlier, files.later):
-    brains = []
-    given = zip((files.earlier, files.later), params.images, params.affine_from, params.schemes, strict=True)
-    for path, image, affine_from, fields in given:
-        volume, scheme = read_label_volume(path, affine_from=affine_from), LabelScheme(**fields)
-        intensity = read_values(image, affine_from, "grey values") if all(params.images) else None
+    brains, with_images = [], all(brain["image"] for brain in params.brains)
+    for path, given in zip((files.earlier, files.later), params.brains, strict=True):
+        affine_from, scheme = given["affine_from"], LabelScheme(**given["scheme"])
+        volume = read_label_volume(path, affine_from=affine_from)
+        intensity = read_values(given["image"], affine_from, "grey values") if with_images else None
         brains.append(
             channels(volume.labels, volume.affine, cerebrum=scheme.cerebrum, cortex=scheme.cortex, image=intensity)
         )

@@ -2,24 +2,25 @@
 
 import numpy as np
 
+from gyriflow.comparison.shapes import Shape, ready
+from gyriflow.comparison.validation import Comparison, ordered, validation_row
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.io.files import read_json, write_table
+from gyriflow.io.files import write_table
+from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
-from gyriflow.validation.shapes import Shape, ready
-from gyriflow.validation.tables import Comparison, ordered, validation_row
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     surface, pial = boundary_surface(read_tetrahedral_mesh(files.mesh))
-    pose, carried, rows = np.array(read_json(files.report)["pose"]), read_carried_mesh(files.carried), []
+    pose, carried, rows = read_pose(files.report), read_carried_mesh(files.carried), []
     for number, week in enumerate(params.weeks):
-        places = transform_points(carried.positions[np.isclose(carried.weeks, week).argmax()][pial], pose)
+        places = transform_points(carried.positions[np.isclose(carried.weeks, week).argmax()][pial], pose.world)
         moved, real = TriangleMesh(places, surface.faces), read_surface(files.whole[number])
         even = ready(moved, real)
         bend = curvature(even, radius_mm=params.curvature_radius_mm)

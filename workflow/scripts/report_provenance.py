@@ -2,7 +2,7 @@
 
 from gyriflow.io.downloads import sha256_of
 from gyriflow.io.files import write_json
-from gyriflow.provenance import software
+from gyriflow.shell.provenance import software
 from gyriflow.step import step
 
 params = snakemake.params

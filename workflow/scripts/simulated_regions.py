@@ -1,11 +1,10 @@
 """Regions at the vertices of a run's hemispheres: those of the start, which the tissue keeps."""
 
 from gyriflow.geometry.triangles import TriangleMesh, submesh
-from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
-from gyriflow.io.regions import read_regions
-from gyriflow.io.surfaces import read_surface
+from gyriflow.growth.carried_regions import regions_from_surface
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_vertex_labels
+from gyriflow.io.tetmeshes import read_regions
 from gyriflow.parameters.terms import LEFT, SIDES, STRUCTURES
-from gyriflow.registration.regions import regions_from_surface
 from gyriflow.step import step
 
 files = snakemake.input

@@ -1,7 +1,7 @@
 """How far the spectra of all brains are from those of the measured ones."""
 
 from gyriflow.io.files import read_table, write_table
-from gyriflow.metrics.spectral_distance import spectral_distances
+from gyriflow.metrics.spangy import spectral_distances
 from gyriflow.step import step
 
 with step(snakemake.log[0]):

@@ -1,10 +1,10 @@
 """Time, memory, energy and emissions of all jobs: a row per simulation and per rule, and as a table for the report."""
 
-from gyriflow.io.benchmarks import read_benchmarks
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.jobs import read_benchmarks
+from gyriflow.parameters.terms import run_names
 from gyriflow.report.resources import Power, resources_html, simulation, stage_resources
-from gyriflow.report.style import run_names
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params

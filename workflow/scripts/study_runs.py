@@ -5,8 +5,8 @@ import pandas as pd
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.report.resolution import resolution_over_steps
-from gyriflow.report.style import run_names
+from gyriflow.parameters.terms import run_names
+from gyriflow.report.solve import resolution_over_steps
 from gyriflow.report.tables import html_table, runs_table
 from gyriflow.step import step
 

@@ -2,12 +2,12 @@
 
 import pandas as pd
 
+from gyriflow.comparison.members import member_row, nearest, side_by_side
+from gyriflow.comparison.published import comparison_caption, with_published_nearest
+from gyriflow.io.figures import write_printed
 from gyriflow.io.files import read_json, read_table
-from gyriflow.io.printed_tables import write_printed
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
-from gyriflow.study.comparison import member_row, nearest, side_by_side
-from gyriflow.study.published import comparison_caption, with_published_nearest
 
 files, params, study = snakemake.input, snakemake.params, snakemake.wildcards.study
 
@@ -19,12 +19,10 @@ def paths(name):
 
 with step(snakemake.log[0]):
     rows = []
-    for labels, values, own, zones, summary in zip(
-        params.members, params.values, files.params, files.zones, files.summaries, strict=True
-    ):
-        labels = {"study": study, **labels, "compare_week": params.week}
-        rows.append(member_row(labels, values, read_yaml(own), read_json(zones), read_json(summary)))
-    members, varied = pd.DataFrame(rows), list(params.values[0])
+    for member, own, zones, summary in zip(params.members, files.params, files.zones, files.summaries, strict=True):
+        labels = {"study": study, "run": member["run"], "subject": member["subject"], "compare_week": params.week}
+        rows.append(member_row(labels, member["values"], read_yaml(own), read_json(zones), read_json(summary)))
+    members, varied = pd.DataFrame(rows), list(params.members[0]["values"])
     found = pd.concat(map(read_table, files.comparisons), ignore_index=True)
     comparison = members[["subject", "run", *varied, "resolution"]].merge(found, on=["subject", "run"])
     caption = comparison_caption(study, params.week, found)

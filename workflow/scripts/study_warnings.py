@@ -1,7 +1,7 @@
 """The warnings of all steps of the study."""
 
 from gyriflow.io.files import write_table
-from gyriflow.io.logs import gather_messages
+from gyriflow.io.jobs import gather_messages
 from gyriflow.step import step
 
 params = snakemake.params

@@ -6,10 +6,8 @@ from gyriflow.growth.following import stretch_of_surface
 from gyriflow.io.files import emptied, read_table, write_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
-from gyriflow.mesh.gates import refuse_bad_mesh
-from gyriflow.mesh.quality import quality_summary, radius_ratios
-from gyriflow.mesh.sizing import finer
-from gyriflow.mesh.tetrahedralisation import tetrahedralise
+from gyriflow.mesh.quality import quality_summary, radius_ratios, refuse_bad_mesh
+from gyriflow.mesh.tetrahedralisation import finer, tetrahedralise
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params

@@ -1,10 +1,11 @@
 """Cortical thickness at the vertices of a brain's pial surface: its distance from the white surfaces."""
 
 from gyriflow.io.files import read_json, write_json
+from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import read_one_hemisphere, read_surface, write_vertex_maps
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
-from gyriflow.surface.white import thickness_from_white
+from gyriflow.surface.thickness import thickness_from_white
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], *params.white.values()):
@@ -12,7 +13,8 @@ with step(snakemake.log[0], *params.white.values()):
         side: read_one_hemisphere(path, side) if side in SIDES else read_surface(path)
         for side, path in params.white.items()
     }
-    thickness = thickness_from_white(read_surface(files.surface), read_json(files.report), whites)
+    fissure_x = read_json(files.report)["fissure_x_mm"]
+    thickness = thickness_from_white(read_surface(files.surface), read_pose(files.report), fissure_x, whites)
     write_vertex_maps(snakemake.output.thickness, {"cortical thickness (mm)": thickness.values_mm})
     write_vertex_maps(snakemake.output.measured, {"thickness_mm": thickness.measured_mm})
     write_json(snakemake.output.report, thickness.report)

@@ -1,5 +1,7 @@
 """Each simulated brain of a run beside the real one of its week, and beside the start brain merely scaled up."""
 
+from gyriflow.comparison.shapes import Shape, ready
+from gyriflow.comparison.validation import Comparison, ordered, validation_row
 from gyriflow.growth.curves import value
 from gyriflow.growth.following import curves_of_run
 from gyriflow.io.files import read_table, write_table
@@ -8,8 +10,6 @@ from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
-from gyriflow.validation.shapes import Shape, ready
-from gyriflow.validation.tables import Comparison, ordered, validation_row
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 with step(snakemake.log[0]):

@@ -4,7 +4,7 @@ import pandas as pd
 
 from gyriflow.io.files import write_table
 from gyriflow.io.surfaces import read_surface
-from gyriflow.metrics.mode_numbers import weyl_numbers
+from gyriflow.metrics.spangy import weyl_numbers
 from gyriflow.step import step
 
 files, params = iter(snakemake.input), snakemake.params

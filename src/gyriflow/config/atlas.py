@@ -1,55 +1,202 @@
-"""Atlases in a study: series and weeks in use, the places of their files, and the brains that they become."""
+"""Atlases: what an `atlas.yaml` says, and how a study uses one: series and weeks, places of files, brains."""
 
-import difflib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from ..io.downloads import sha256_of
-from ..parameters.settings import Settings, setting
+from ..parameters.settings import Key, Settings, located, nearest, refused, setting
+from ..parameters.terms import AffineSource, Coordinates
 from ..parameters.varying import Week
-from .atlas_description import ATLASES, Atlas, AtlasFileRecord, FileKey, shipped_atlases
+from ..shipped import SHIPPED
+
+ATLASES = SHIPPED / "atlases"
+"""Folder of the atlases that come with gyriflow, each in a folder of its own."""
+
+FileKey = Literal["labels", "image", "left", "right", "pial"]
+
+SOURCES_OF_SERIES = ({"labels"}, {"left", "right"}, {"pial"})
+"""The keys of files that give a surface, of which a series has one set; `image` goes with labels."""
+
+WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
+"""How a week may be written in a file's name, as `05.2f`."""
+NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+
+
+def _names_weeks(pattern: str) -> bool:
+    """Returns whether the fields of a pattern are weeks, as plain numbers: what fills them out cannot be a path."""
+    try:
+        fields = [(name, kind, flag) for _, name, kind, flag in Formatter().parse(pattern) if name is not None]
+    except ValueError:
+        return False
+    return bool(fields) and all(
+        name == "week" and flag is None and re.fullmatch(WEEK_FORMAT, kind or "") for name, kind, flag in fields
+    )
+
+
+class AtlasLicence(Settings):
+    """Terms of use, shown before any file is fetched."""
+
+    name: str = setting(..., "", "Name of the licence, as `CC0 1.0`.")
+    terms: str = setting(..., "", "Summary in a sentence or two.")
+    url: str | None = setting(None, "", "Address of the full text.")
+    accept: bool = setting(False, "", "Whether users have to accept terms that are narrow or unclear.")
+
+
+class AtlasReference(Settings):
+    """What to cite."""
+
+    citation: str = setting(..., "", "Authors, title, journal and year.")
+    doi: str | None = setting(None, "", "Digital object identifier.")
+    url: str | None = setting(None, "", "Page of the atlas.")
+
+    @property
+    def text(self) -> str:
+        """The citation with its DOI or page."""
+        place = f"doi {self.doi}" if self.doi else self.url
+        return f"{self.citation}, {place}" if place else self.citation
+
+
+class AtlasFileRecord(Settings):
+    """Size and checksum of a file."""
+
+    bytes: int | None = setting(None, "", "Size of the file.", ge=1)
+    sha256: str | None = setting(
+        None, "", "SHA-256; `null`: unknown, the file only has to be readable.", pattern="^[0-9a-f]{64}$"
+    )
+
+
+class AtlasSeries(Settings):
+    """One population by week."""
+
+    population: str = setting(..., "", "Name of these brains in figures and tables.", min_length=1)
+    scheme: str | None = setting(None, "", "Meaning of the labels, as for `brains`; required with `labels`.")
+    affine_from: AffineSource = setting("auto", "", "As for `brains`, with `labels`.")
+    coordinates: Coordinates = setting("auto", "", "As for `brains`, with surfaces.")
+    matched: bool = setting(
+        False, "", "Whether surfaces of all weeks have the same vertices; believed until the files are there."
+    )
+    files: dict[FileKey, str] = setting(
+        ..., "",
+        "Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week: `labels` "
+        "and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one.",
+    )  # fmt: skip
+    weeks: dict[Week, dict[FileKey, AtlasFileRecord]] = setting(
+        ..., "GW", "The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files."
+    )
+
+    @field_validator("weeks", mode="before")
+    @classmethod
+    def _weeks_without_records(cls, value: Any) -> Any:
+        if isinstance(value, list):
+            if len({str(week) for week in value}) < len(value):
+                raise ValueError("name each week once")
+            return {week: {} for week in value}
+        if isinstance(value, dict):
+            return {week: records or {} for week, records in value.items()}
+        return value
+
+    @field_validator("weeks")
+    @classmethod
+    def _some_weeks(cls, weeks: dict[float, Any]) -> dict[float, Any]:
+        if not weeks:
+            raise ValueError("have one week or more")
+        return weeks
+
+    @field_validator("files")
+    @classmethod
+    def _paths_with_week(cls, files: dict[FileKey, str]) -> dict[FileKey, str]:
+        if set(files) - {"image"} not in SOURCES_OF_SERIES or ("image" in files and "labels" not in files):
+            raise ValueError("have labels (and perhaps image), or left and right, or pial")
+        for pattern in files.values():
+            if Path(pattern).is_absolute() or ".." in Path(pattern).parts or "\\" in pattern:
+                raise ValueError("be paths below the folder of the atlas")
+            if not _names_weeks(pattern):
+                raise ValueError("have {week} in each path, for the gestational week")
+        return files
+
+    @model_validator(mode="after")
+    def _keys_of_labels(self) -> "AtlasSeries":
+        if "labels" in self.files and self.scheme is None:
+            raise ValueError("have a `scheme`, which says what the labels mean")
+        if "labels" not in self.files and self.scheme is not None:
+            raise ValueError("have no `scheme` where it has no labels")
+        if self.matched and "labels" in self.files:
+            raise ValueError("have no `matched` with labels, which have no vertices")
+        return self
+
+    @property
+    def needed(self) -> list[FileKey]:
+        """The keys of the files that a week must have."""
+        return [key for key in self.files if key != "image"]
+
+
+class Atlas(Settings):
+    """The file `atlas.yaml` of an atlas: one in the folder `atlases`, or yours."""
+
+    name: str = setting(..., "", "Name, with which ids of its brains begin.", pattern=NAME)
+    title: str = setting(..., "", "What it is.")
+    licence: AtlasLicence = setting(..., "", "Terms of use.")
+    reference: AtlasReference | None = setting(None, "", "What to cite.")
+    url: str | None = setting(None, "", "Address of the files' root; `null`: not online.", pattern="^https?://")
+    folder: str | None = setting(None, "", "Folder with local files, relative to `atlas.yaml`.")
+    series: dict[Annotated[str, Field(pattern=NAME)], AtlasSeries] = setting(
+        ..., "", "Populations by name, each a series over the weeks.", min_length=1
+    )
+
+    def brain_id(self, series: str, week: float) -> str:
+        """Returns the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas has one series."""
+        return "-".join([self.name, *([series] if len(self.series) > 1 else []), f"{week:g}"])
+
+
+def shipped_atlases() -> list[str]:
+    """Returns the names of the atlases that come with gyriflow."""
+    return sorted(path.parent.name for path in ATLASES.glob("*/atlas.yaml"))
+
+
+# in a study
 
 DOWNLOADS = Path("resources", "atlases")
 """Folder in the working directory for the files of atlases whose section names no other."""
 
 
 class AtlasSettings(Settings):
-    """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` where it has one series).
+    """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` if it has one series).
 
-    `atlas: NAME` and `atlas: FILE.yaml` are short for a section with only `name` or `file`; several atlases are a list.
-    Missing files are fetched when a stage needs them, or all at once by `./run snakemake --cores 1 retrieve`. An
-    existing file is never replaced or deleted.
+    `atlas: NAME` and `atlas: FILE.yaml` are short for a section; several atlases are a list. Missing files are fetched
+    when a stage needs them, or by `./run snakemake --cores 1 retrieve`. An existing file is never replaced.
     """
 
     name: str | None = setting(None, "", "An atlas that comes with gyriflow: the name of a folder in `atlases`.")
-    file: str | None = setting(None, "", "The `atlas.yaml` of your own atlas, instead of `name`.")
+    file: str | None = setting(None, "", "Instead, the `atlas.yaml` of your own atlas.")
     series: str | tuple[str, ...] | None = setting(None, "", "Series to use; `null`: all.")
-    weeks: tuple[Week, ...] | None = setting(
-        None, "GW", "Weeks to use, exactly as in the file names; `null`: all weeks of the series."
-    )
-    images: bool = setting(False, "", "Whether to use T2-weighted volumes, shown with the surfaces' outlines.")
+    weeks: tuple[Week, ...] | None = setting(None, "GW", "Weeks to use, as in the file names; `null`: all.")
+    images: bool = setting(False, "", "Whether T2-weighted volumes are shown with the surfaces' outlines.")
     folder: str | None = setting(
         None, "",
-        "Folder with files of the atlas, found by name anywhere in it; missing files are put there. `null`: "
+        "Folder where files are found by name, at any depth, and missing ones are put; `null`: "
         "`resources/atlases/NAME` in the working directory.",
     )  # fmt: skip
-    url: str | None = setting(None, "", "A mirror with the same paths, instead of the atlas's own address.")
-    accept_licence: bool = setting(
-        False, "", "Whether you accept the licence; required if the `atlas.yaml` says so, as for research-only data."
-    )
+    url: str | None = setting(None, "", "A mirror with the same paths.")
+    accept_licence: bool = setting(False, "", "Whether you accept the licence, where the `atlas.yaml` asks for it.")
 
     @model_validator(mode="after")
     def _name_or_file(self) -> "AtlasSettings":
         if (self.name is None) == (self.file is None):
             raise ValueError("have either a `name` or a `file`")
         return self
+
+    @field_validator("name")
+    @classmethod
+    def _known_name(cls, name: str | None) -> str | None:
+        if name is not None and name not in (known := shipped_atlases()):
+            raise refused(f"found {name!r}; {nearest(name, known)} An atlas.yaml of your own goes under file")
+        return name
 
     @field_validator("weeks")
     @classmethod
@@ -74,14 +221,8 @@ class AtlasSettings(Settings):
 
     def located(self, base_dir: Path) -> "AtlasSettings":
         """Returns the section with `file` and `folder` as absolute paths."""
-
-        def absolute(path: str | None) -> str | None:
-            if path is None:
-                return None
-            places = [base_dir / Path(path).expanduser(), Path.cwd() / path]
-            return str(next((place for place in places if place.exists()), places[0]).resolve())
-
-        return self.model_copy(update={"file": absolute(self.file), "folder": absolute(self.folder)})
+        paths = {key: path for key in ("file", "folder") if (path := getattr(self, key)) is not None}
+        return self.model_copy(update={key: str(located(base_dir, path)) for key, path in paths.items()})
 
 
 @dataclass(frozen=True)
@@ -125,6 +266,12 @@ class UsedAtlas:
     def missing(self) -> list[AtlasFile]:
         """Those that are to be fetched."""
         return [file for file in self.files if not file.copies]
+
+    @property
+    def checksums(self) -> dict[str, tuple[str, str]]:
+        """The atlas and the SHA-256 of each file where it is known, by the file's path."""
+        known = {str(file.path): file.record.sha256 for file in self.files}
+        return {path: (self.atlas.name, sha256) for path, sha256 in known.items() if sha256 is not None}
 
     def _files_of(self, name: str) -> Iterator[AtlasFile]:
         series = self.atlas.series[name]
@@ -185,27 +332,14 @@ class UsedAtlas:
         return [place] if place.is_file() else []
 
 
-def atlas_sections(raw: Any) -> list[tuple[tuple[str | int, ...], Any]]:
+def atlas_sections(raw: Any) -> list[tuple[Key, Any]]:
     """Returns the entries of `atlas` as given (raw) with the keys that lead to them, names and files as sections."""
-    several = isinstance(raw, list | tuple)
-    entries = raw if several else [] if raw is None else [raw]
-    return [(("atlas", number) if several else ("atlas",), _section(entry)) for number, entry in enumerate(entries)]
-
-
-def _section(entry: Any) -> Any:
-    if isinstance(entry, str):
-        return {"file" if entry.endswith((".yaml", ".yml")) else "name": entry}
-    return entry
-
-
-def unknown_atlas(settings: AtlasSettings) -> str | None:
-    """Returns what is wrong with the name of an atlas, None where there is one of that name."""
-    known = shipped_atlases()
-    if settings.name is None or settings.name in known:
-        return None
-    nearest = difflib.get_close_matches(settings.name, known, n=1, cutoff=0.5)
-    hint = f"did you mean {nearest[0]}?" if nearest else f"known are {', '.join(known)}"
-    return f"name: found {settings.name!r}; {hint} An atlas.yaml of your own goes under file"
+    entries = [] if raw is None else [raw] if not isinstance(raw, list) else raw
+    sections = [
+        {"file" if entry.endswith((".yaml", ".yml")) else "name": entry} if isinstance(entry, str) else entry
+        for entry in entries
+    ]
+    return [(("atlas", number) if isinstance(raw, list) else ("atlas",), each) for number, each in enumerate(sections)]
 
 
 def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
@@ -248,11 +382,6 @@ def atlas_problems(used: UsedAtlas) -> Iterator[str]:
             yield f"folder: found {' and '.join(map(str, file.copies))}; keep one of them"
         elif not file.copies and file.url is None:
             yield f"weeks: {file.path} is missing and cannot be fetched, as {atlas.name} has no url for it"
-        elif file.copies and file.record.sha256 not in (None, sha256_of(file.path)):
-            yield (
-                f"folder: {file.path} is not the file of {atlas.name}: its SHA-256 is not {file.record.sha256}. Delete "
-                "it, and it is fetched; or give a changed file as a brain of your own under brains"
-            )
 
 
 def _week_problems(used: UsedAtlas) -> Iterator[str]:

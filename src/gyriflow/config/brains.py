@@ -1,27 +1,23 @@
-"""The brains of a study, and the data that their pial surfaces are made from."""
+"""The brains of a study: the data of their pial surfaces, tables of them, and regions given on them."""
 
-from collections.abc import Iterator
+import difflib
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
-from ..parameters.files import InputFile
-from ..parameters.schemes import SCHEMES
-from ..parameters.settings import NotValidError, Problem, Settings, check, setting
+from ..errors import InputError
+from ..io.files import read_tab_separated
+from ..parameters.schemes import Label
+from ..parameters.settings import InputFile, Problem, Settings, beside, check, located, setting
 from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
-from ..parameters.varying import Week
+from ..parameters.varying import WEEKS, Week
 
 SOURCES = ("labels", "segmentation", "hemispheres", "hemisphere", "pial", "phantom", "shape")
 """The keys of which a brain has exactly one."""
 
-KINDS = {
-    "labels": "volume",
-    "segmentation": "volume",
-    "phantom": "volume",
-    "hemispheres": "surface",
-    "hemisphere": "surface",
-    "pial": "surface",
-    "shape": "surface",
-}
-"""The kind of data behind each source: a label volume, or surfaces as they are given; a `hemisphere` may be either."""
 VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
 """How the names of volumes end."""
 
@@ -43,13 +39,12 @@ class SegmentationSettings(Settings):
 
     command: str = setting(
         ..., "",
-        "Shell command that reads the file {image} and writes the NIfTI file {labels}, of the same grid, with labels "
-        "of the brain's `scheme`.",
+        "Shell command that reads the file {image} and writes the labels of the brain's `scheme`, on the same grid, to "
+        "the NIfTI file {labels}.",
     )  # fmt: skip
     container: str | None = setting(
-        None, "",
-        "Image in which the command runs, with Apptainer, Singularity, Docker or Podman, whichever is there: "
-        "`docker://NAME` or a .sif file.",
+        None, "", "Image in which the command runs: `docker://NAME` or a .sif file. Apptainer, Singularity, Docker or "
+        "Podman is used.",
     )  # fmt: skip
 
     @check
@@ -61,97 +56,74 @@ class SegmentationSettings(Settings):
 
 
 class WhiteFiles(Settings):
-    """The white surfaces of one brain's hemispheres: the inner borders of the cortex."""
+    """The white surfaces of both hemispheres: the inner border of the cortex."""
 
     left: InputFile = setting(..., "", "File of the left hemisphere.")
     right: InputFile = setting(..., "", "File of the right hemisphere.")
 
 
 class HemisphereFiles(Settings):
-    """The pial surfaces of one brain's hemispheres."""
+    """The pial surfaces of both hemispheres: GIFTI, VTK, STL, PLY or FreeSurfer files."""
 
-    left: InputFile = setting(..., "", "GIFTI, VTK, STL, PLY or FreeSurfer file of the left hemisphere.")
-    right: InputFile = setting(..., "", "GIFTI, VTK, STL, PLY or FreeSurfer file of the right hemisphere.")
-    white: WhiteFiles | None = setting(
-        None, "", "White surfaces in the same coordinates; the distance to them is the cortical thickness."
-    )
+    left: InputFile = setting(..., "", "File of the left hemisphere.")
+    right: InputFile = setting(..., "", "File of the right hemisphere.")
+    white: WhiteFiles | None = setting(None, "", "White surfaces in the same coordinates, for the cortical thickness.")
 
 
 class OneHemisphere(Settings):
-    """The only hemisphere of a brain, after hemispherectomy or where the data has one side only."""
+    """The only hemisphere of a brain, after hemispherectomy or where the data has one side."""
 
     file: InputFile = setting(
         ..., "",
-        "Its closed pial surface (GIFTI, VTK, STL, PLY or FreeSurfer), or with the brain's `scheme` a label volume "
-        "that holds nothing of the other hemisphere's cortex.",
+        "Its closed pial surface or, with the brain's `scheme`, a label volume without cortex of the other hemisphere.",
     )  # fmt: skip
-    side: Side = setting(..., "", "`left` or `right`.")
-    white: InputFile | None = setting(
-        None, "", "With a pial surface, the white surface in the same coordinates, for the cortical thickness."
-    )
+    side: Side = setting(..., "", "Which hemisphere it is.")
+    white: InputFile | None = setting(None, "", "White surface in the same coordinates, for the cortical thickness.")
 
 
 class Brain(Settings):
-    """One brain. Exactly one of `labels`, `segmentation`, `hemispheres`, `hemisphere`, `pial`, `phantom`, `shape` is
-    its source.
-
-    Paths are relative to the configuration file or, if no such file is there, to the working directory.
+    """One brain, made from exactly one of `labels`, `segmentation`, `hemispheres`, `hemisphere`, `pial`, `phantom` and
+    `shape`.
     """
 
     id: str = setting(
-        ...,
-        "",
-        "Name in result paths and tables: letters, digits, - _ .",
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$",
-        max_length=LONGEST_NAME,
-    )
+        ..., "", "Name in paths and tables: letters, digits, - _ .",
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME,
+    )  # fmt: skip
     week: Week = setting(..., "GW", "Gestational age.")
     population: str | None = setting(
-        None, "",
-        "Name of the population in figures and tables, such as `spina bifida aperta, unoperated`; `null`: real brain.",
-        min_length=1,
-    )  # fmt: skip
+        None, "", "Population in figures and tables, such as `spina bifida aperta`; `null`: real brain.", min_length=1
+    )
     subject: str | None = setting(
         None, "",
-        "Subject that was scanned, where several brains are scans of one: change between them is then tabled, and "
-        "simulations from one are compared with the others first.",
-        min_length=1,
+        "Subject of whom several brains are scans. Change between scans is tabled, and simulations are compared with "
+        "scans of their subject first.", min_length=1,
     )  # fmt: skip
     labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI or MGZ).")
     image: InputFile | None = setting(
-        None, "", "T2-weighted volume (NIfTI): the input of `segmentation`; with `labels`, for a figure only."
+        None, "", "T2-weighted volume (NIfTI): input of `segmentation`, or with `labels` shown in a figure."
     )
-    segmentation: SegmentationSettings | None = setting(
-        None, "", "Your own program that makes the labels from `image`."
-    )
+    segmentation: SegmentationSettings | None = setting(None, "", "Your program that makes labels from `image`.")
     scheme: str | None = setting(
         None, "",
-        f"Meaning of the labels: {', '.join(f'`{name}`' for name in SCHEMES)}, or a name of `schemes`. Needed with "
-        "`labels` and `segmentation`.",
+        "What the labels mean: the name of a file in the folder `schemes`, such as `dhcp-19`, or of the key `schemes`. "
+        "Needed with `labels` and `segmentation`.",
     )  # fmt: skip
     affine_from: AffineSource = setting(
-        "auto", "", "Which NIfTI affine of `labels` and `image` is used; `auto` refuses two that disagree."
+        "auto", "", "NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."
     )
-    hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of the two hemispheres.")
+    hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of both hemispheres.")
     hemisphere: OneHemisphere | None = setting(None, "", "The only hemisphere, as a surface or as labels.")
-    pial: InputFile | None = setting(None, "", "Surface file of the whole brain, closed.")
-    white: InputFile | None = setting(
-        None, "", "White surface of `pial` in the same coordinates; the distance to it is the cortical thickness."
-    )
-    coordinates: Coordinates = setting(
-        "auto", "",
-        "Axes of the coordinates in surface files. `auto` finds the pose, whatever it is.",
-    )  # fmt: skip
+    pial: InputFile | None = setting(None, "", "Closed surface of the whole brain.")
+    white: InputFile | None = setting(None, "", "White surface of `pial`, for the cortical thickness.")
+    coordinates: Coordinates = setting("auto", "", "Axes of surface files; `auto` finds any pose.")
     phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
     shape: ShapeSettings | None = setting(None, "", "A simple geometry in place of a brain.")
 
     @property
     def source(self) -> str:
         """The key that the surface is made from."""
-        for name in SOURCES:
-            if self.gives(name):
-                return name
-        raise NotValidError("source")
+        return next(name for name in SOURCES if self.gives(name))
 
     @property
     def synthetic(self) -> bool:
@@ -162,13 +134,6 @@ class Brain(Settings):
     def sides(self) -> tuple[Side, ...]:
         """The hemispheres that the brain has."""
         return SIDES if self.hemisphere is None else (self.hemisphere.side,)
-
-    @property
-    def kind(self) -> str:
-        """The kind of data that the surface is made from, with the side of a hemisphere that is alone."""
-        if self.hemisphere is None:
-            return KINDS[self.source]
-        return f"{self.hemisphere.side} {'surface' if self.label_volume is None else 'volume'}"
 
     @property
     def label_volume(self) -> str | None:
@@ -204,9 +169,9 @@ class Brain(Settings):
         return sides if self.white is None else {"whole": self.white}
 
     @check
-    def _has_one_source(self) -> Iterator[Problem]:
+    def _keys_go_with_the_source(self) -> Iterator[Problem]:
         given = [key for key in SOURCES if self.gives(key)]
-        if not given and self.gives("image"):
+        if not given and self.image is not None:
             yield Problem(
                 "gyriflow does not segment images; give a label volume under labels, or under segmentation your own "
                 "command that makes one from the image",
@@ -219,34 +184,257 @@ class Brain(Settings):
             for key, sources in MEANINGS.items():
                 if key in self.model_fields_set and given[0] not in sources:
                     yield Problem(f"has no meaning with {given[0]}; only with {' or '.join(sources)}", (key,))
-
-    @check
-    def _labels_have_a_scheme(self) -> Iterator[Problem]:
-        if any(self.gives(key) for key in VOLUMES) and not self.gives("scheme"):
+        if set(given) & set(VOLUMES) and self.scheme is None:
             yield Problem("is missing; it says what the labels mean", ("scheme",))
+        if self.segmentation is not None and self.image is None:
+            yield Problem("has no image to work on; give one under image", ("segmentation",))
+        first, last = PHANTOM_WEEKS
+        if self.phantom is not None and not first <= self.week <= last:
+            yield Problem(f"found {self.week:g}; a phantom's should be {first:g} to {last:g}", ("week",))
 
     @check
     def _a_hemisphere_is_labels_or_surface(self) -> Iterator[Problem]:
-        if self.hemisphere is None or not self.hemisphere.has("file"):
+        if self.hemisphere is None:
             return
         volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
-        if volume and not self.gives("scheme"):
+        if volume and self.scheme is None:
             yield Problem("is missing; it says what the labels of the hemisphere mean", ("scheme",))
         if volume and "coordinates" in self.model_fields_set:
             yield Problem("has no meaning with a label volume, whose affine says them", ("coordinates",))
-        if volume and self.hemisphere.gives("white"):
+        if volume and self.hemisphere.white is not None:
             yield Problem("has no meaning with a label volume", ("hemisphere", "white"))
         for key in () if volume else ("scheme", "image", "affine_from"):
             if key in self.model_fields_set:
                 yield Problem("has no meaning with a surface; only with labels", (key,))
 
-    @check
-    def _segmentation_has_an_image(self) -> Iterator[Problem]:
-        if self.gives("segmentation") and not self.gives("image"):
-            yield Problem("has no image to work on; give one under image", ("segmentation",))
+
+# tables of brains
+
+IDS = ("participant_id", "id")
+AGE = "age"
+"""The one name of the column with the gestational age that is the mother's, or that after birth, in many tables."""
+SURE_AGES = ("gestational_age", "week")
+"""Names of that column which are believed whatever others are there."""
+AGES = (
+    *(*SURE_AGES, "ga", "ga_weeks", "gestational_weeks", "gestational_age_weeks", "scan_age", "weeks", "age_at_scan"),
+    AGE,
+)
+"""All names of that column, in small letters or capitals."""
+FILES = ("file", "files")
+SIDE = "side"
+NESTED: Mapping[str, tuple[str, ...]] = {
+    "hemispheres": (*(f"hemispheres.{key}" for key in HemisphereFiles.model_fields if key != "white"),
+                    *(f"hemispheres.white.{key}" for key in WhiteFiles.model_fields)),
+    "hemisphere": tuple(f"hemisphere.{key}" for key in OneHemisphere.model_fields),
+    "segmentation": tuple(f"segmentation.{key}" for key in SegmentationSettings.model_fields),
+}  # fmt: skip
+COLUMNS = (
+    *(key for key in Brain.model_fields if key not in (*NESTED, "phantom", "shape", "id")),
+    *(column for columns in NESTED.values() for column in columns),
+)
+"""The columns that are keys of brains; any others are left alone, as BIDS allows."""
+PATHS = ("labels", "image", "pial", "white", *NESTED["hemispheres"], "hemisphere.file", "hemisphere.white")
+NOTHING = frozenset(("", "n/a"))
+"""What stands for no value in BIDS."""
+ALMOST = 0.85
+"""How like the name of a key an unknown column has to be to be taken for a mistyped one."""
+
+
+class ParticipantsSettings(Settings):
+    """A table with a brain a row. `participants: FILE` is short for a section.
+
+    Columns are `participant_id` (or `id`); the gestational age in weeks, `gestational_age` (or `week`, or another usual
+    name); and keys of brains, inner ones with a dot (`hemispheres.left`). Instead of keys, `files` may name labels, a
+    pial surface, or left and right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is no value.
+    Other columns are ignored.
+    """
+
+    file: str = setting(..., "", "Tab-separated file; paths in it are relative to it.")
+    columns: dict[str, str] = setting(
+        {}, "",
+        "Columns that the table lacks, with one value for all rows, in which `{id}` is the row's id: `{labels: "
+        "'{id}/anat/{id}_dseg.nii.gz', scheme: feta-7}`.",
+    )  # fmt: skip
+
+
+def participants_brains(
+    settings: ParticipantsSettings, folder: Path
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], list[str]]:
+    """Returns the entries of `brains` that a table stands for, by id the rows that can't be used, and problems.
+
+    Of the rows, `week` is the age if it is known, and `cause` what is missing. Problems are those that can't be left
+    out with a row: a row that can't be used has the id of another one. `folder` is that of the configuration.
+    InputError where the table cannot be read or lacks what every row needs.
+    """
+    path = located(folder, settings.file)
+    rows = read_tab_separated(path)
+    columns = [*rows[0], *settings.columns] if rows else []
+    _require_columns(path, columns)
+    id_column = next(name for name in IDS if name in columns)
+    age_column = _age_column(path, [settings.columns | row for row in rows])
+    counts = Counter(row[id_column] for row in rows)
+    entries: list[dict[str, Any]] = []
+    refused: dict[str, dict[str, Any]] = {}
+    problems: list[str] = []
+    for row in rows:
+        name = row[id_column]
+        known = {key: value.replace("{id}", name) for key, value in settings.columns.items()} | row
+        values = {key: value for key, value in known.items() if value not in NOTHING}
+        week, cause = _week(values.get(age_column), age_column)
+        entry, problem = _entry(values, path.parent)
+        text = f"{path}: {name}: {cause or problem}"
+        if not (cause or problem):
+            entries.append({"id": name, "week": week} | entry)
+        elif counts[name] > 1 and name not in NOTHING:
+            problems.append(f"{text} (the id is that of {counts[name]} rows; ids are unique)")
+        else:
+            refused[name] = {"week": week, "cause": text}
+    return entries, refused, problems
+
+
+def _require_columns(path: Path, columns: list[str]) -> None:
+    ages = {name.lower() for name in columns}
+    for names, there, what in ((IDS, set(columns), "ids"), (AGES, ages, "gestational ages")):
+        if not set(names) & there:
+            raise InputError(
+                f"has no column of {what}",
+                path=path,
+                found=", ".join(columns) or "no rows",
+                expected=" or ".join(names),
+            )
+    known = {*IDS, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS}
+    for column in {name for name in columns if name.lower() not in AGES} - known:
+        nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
+        if nearest:
+            raise InputError(
+                "has a column that seems mistyped",
+                path=path,
+                found=column,
+                expected=nearest[0],
+                remedy="Rename it; columns with quite other names are left alone.",
+            )
+
+
+def _age_column(path: Path, rows: Sequence[Mapping[str, str]]) -> str:
+    """Returns the column with the gestational age; InputError where several may be it that do not say the same."""
+    columns = list(rows[0])
+    found = [name for name in SURE_AGES if name in columns][:1] or [
+        column for name in AGES for column in columns if column.lower() == name
+    ]
+    ages = [[_week(row[column], column)[0] for row in rows] for column in found]
+    if any(other != ages[0] for other in ages[1:]):
+        raise InputError(
+            "has several columns that may be the gestational age, which differ",
+            path=path,
+            found=" and ".join(found),
+            expected="one of them",
+            remedy=f"Call that of the gestational age in weeks {SURE_AGES[0]}; it is taken whatever others are there.",
+        )
+    return found[0]
+
+
+def _week(text: str | None, column: str) -> tuple[float | None, str]:
+    """Returns the age and what is wrong with it, empty where nothing is."""
+    try:
+        week = float(text or "")
+    except ValueError:
+        return None, f"{column}: found {text or 'n/a'}; expected the gestational age in weeks"
+    first, last = WEEKS
+    if not first <= week <= last:
+        return None, f"{column}: found {text}; expected gestational weeks, {first:g} to {last:g} (not days or years)"
+    return week, ""
+
+
+def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str]:
+    """Returns the entry of a row without id and week, and what it lacks, empty where nothing is missing."""
+    values = dict(values)
+    files = next((values[name] for name in FILES if name in values), None)
+    if files is not None:
+        parts, side = [part.strip() for part in files.split(";")], values.get(SIDE)
+        most, expected = (2, "a left and a right hemisphere at most") if side is None else (1, "the one of its side")
+        if len(parts) > most:
+            return {}, f"files: found {len(parts)}, {'; '.join(parts)}; expected {expected}"
+        values |= _of_files(parts, side)
+    entry: dict[str, Any] = {}
+    for column in COLUMNS:
+        if column not in values or column == "week":
+            continue
+        value = values[column]
+        if column in PATHS:
+            place = beside(folder, value).resolve()
+            if not place.is_file():
+                return {}, f"{column}: no such file: {place}"
+            value = str(place)
+        *outer, last = column.split(".")
+        section = entry
+        for key in outer:
+            section = section.setdefault(key, {})
+        section[last] = value
+    if not set(SOURCES) & set(entry):
+        return {}, f"found no data; expected files, or one of {', '.join(key for key in COLUMNS if key in PATHS)}"
+    return entry, ""
+
+
+def _of_files(files: list[str], side: str | None) -> dict[str, str]:
+    """Returns the columns that files stand for, by their number and kind."""
+    if side is not None:
+        return {"hemisphere.file": files[0], "hemisphere.side": side}
+    if len(files) == 2:
+        left, right = files
+        if re.search(r"\bright\b|\brh\b|hemi-R", left) and re.search(r"\bleft\b|\blh\b|hemi-L", right):
+            left, right = right, left
+        return {"hemispheres.left": left, "hemispheres.right": right}
+    return {"labels" if files[0].lower().endswith(VOLUME_SUFFIXES) else "pial": files[0]}
+
+
+# regions
+
+
+class SurfaceRegions(Settings):
+    """Regions at the vertices of a hemisphere's surface."""
+
+    labels: InputFile = setting(..., "", "GIFTI label file (.label.gii), a label for each vertex.")
+    surface: InputFile = setting(..., "", "The surface, in the coordinates of the brain's own files.")
+
+
+class GivenRegions(Settings):
+    """Regions of a brain, from a label volume or from labels of both hemispheres' surfaces.
+
+    Left and right regions of one name are compared. Other brains get the regions of the brain nearest in week.
+    """
+
+    volume: InputFile | None = setting(
+        None, "", "Label volume (NIfTI) in the space of the brain's `labels`, with regions along the cortex."
+    )
+    left: SurfaceRegions | None = setting(None, "", "Instead of a volume, labels of the left hemisphere.")
+    right: SurfaceRegions | None = setting(None, "", "Labels of the right hemisphere.")
+    names: dict[Label, str] = setting(
+        {}, "",
+        "Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name are one region, "
+        "unnamed ones none. Needed with a volume; else the label files' names count.",
+    )  # fmt: skip
 
     @check
-    def _phantoms_have_weeks(self) -> Iterator[Problem]:
-        first, last = PHANTOM_WEEKS
-        if self.gives("phantom") and not first <= self.week <= last:
-            yield Problem(f"found {self.week:g}; a phantom's should be {first:g} to {last:g}", ("week",))
+    def _one_source(self) -> Iterator[Problem]:
+        sides = [side for side in SIDES if self.gives(side)]
+        if (self.volume is not None) == bool(sides):
+            found = "both" if sides else "neither"
+            yield Problem(f"found {found}; expected volume, or left and right")
+        elif len(sides) == 1:
+            missing = "right" if sides == ["left"] else "left"
+            yield Problem("is missing; both hemispheres need labels", (missing,))
+        if self.volume is not None and not self.names:
+            yield Problem("is missing; it names the regions of the volume", ("names",))
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The files by what they are."""
+        if self.volume is not None:
+            return {"volume": self.volume}
+        pairs = {"left": self.left, "right": self.right}
+        return {
+            f"{side}_{kind}": getattr(pair, kind)
+            for side, pair in pairs.items()
+            if pair is not None
+            for kind in ("labels", "surface")
+        }

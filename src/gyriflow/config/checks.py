@@ -1,34 +1,61 @@
-"""Checks across sections: brains, starts, runs, growth and metrics against each other, on what is valid of each."""
+"""Checks across sections that are valid each: names, starts, runs, growth, metrics, studies, calibration."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
+from ..io.schemes import SCHEMES
 from ..parameters.folding import GROWTH_RATES, VARYING, value_problems
-from ..parameters.messages import nearest
-from ..parameters.schemes import SCHEMES, SchemeSettings
-from ..parameters.settings import Problem
+from ..parameters.settings import Key, Problem, messages, nearest
 from ..parameters.synthetic import PhantomSettings
-from ..parameters.terms import LONGEST_NAME
+from ..parameters.terms import AMPLITUDE, LONGEST_NAME, STIFFNESS_RATIO
 from ..parameters.varying import Varying
 from .brains import Brain
-from .growth import GrowthSettings, estimated_from, growth_series
-from .metrics import LEAST_AGE_WEEKS, MetricsSettings
-from .runs import ALL, FIRST, Run, Start, start_ids
+from .runs import (
+    ALL,
+    CURVES,
+    FIRST,
+    NOT_VARIED,
+    Compared,
+    Run,
+    Start,
+    Study,
+    changed,
+    variants,
+)
+
+if TYPE_CHECKING:
+    from .root import Config
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Names that stand for something else in results, tables and settings."""
 RESERVED_RUNS = ("real",)
 """What stands for the run in tables of measured brains."""
+RESERVED_STUDIES = ("benchmarks", "calibration", "figures", "growth", "logs", "registration", "tables")
+"""Folders of the study's results that are no studies."""
 
 
-def ids_of(brains: Sequence[Brain]) -> list[str]:
-    """Returns the ids of the brains, each once; wrong ones are left out."""
-    return list(dict.fromkeys(brain.id for brain in brains if brain.has("id")))
+def _place(run: str, key: Key, config: "Config") -> Key:
+    """Returns the path of a run's key: that of `folding` where all runs share the value."""
+    values = [getattr(settings, str(key[0])) for settings in config.runs.values()]
+    return ("folding", *key) if all(value == values[0] for value in values) else ("runs", run, *key)
 
 
-def name_problems(brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[Problem]:
-    """Yields what is wrong with the names of brains and runs, which are folders of the results."""
-    counts = Counter(brain.id for brain in brains if brain.has("id"))
+def _unknown(names: Iterable[str], known: Sequence[str], key: Key) -> Iterator[Problem]:
+    if unknown := [name for name in names if name not in known]:
+        yield Problem(f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}", key)
+
+
+def names(config: "Config") -> Iterator[Problem]:
+    """Yields what is wrong with the names of brains, runs and schemes, of which the first are folders of the results.
+
+    A study without brains is told here, too.
+    """
+    if not config.brains and not config.atlas:
+        yield Problem("found nothing; expected a list of brains, each with id, week and a source", ("brains",))
+    counts = Counter(brain.id for brain in config.brains)
     for name, count in counts.items():
         if count > 1:
             yield Problem(f"{count} brains have the id {name}; ids are unique", ("brains",))
@@ -36,179 +63,138 @@ def name_problems(brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[
             yield Problem(f"the id {name} is reserved; choose another", ("brains",))
     for first, second in _equal_but_for_case(counts):
         yield Problem(f"the ids {first} and {second} are the same folder on some disks; rename one", ("brains",))
-    for name in runs:
-        if name in RESERVED_RUNS:
-            yield Problem("the name is reserved; choose another", ("runs", name))
-        elif not name or not all(char.isalnum() or char in "-_." for char in name) or not name[0].isalnum():
-            text = "a run's name has letters, digits, - _ . only and begins with a letter or digit"
-            yield Problem(text, ("runs", name))
-        elif len(name) > LONGEST_NAME:
-            text = f"a run's name has {LONGEST_NAME} characters at most"
-            yield Problem(text, ("runs", name))
-    for first, second in _equal_but_for_case(runs):
-        yield Problem(f"is the same folder as that of the run {first} on some disks; rename one", ("runs", second))
-
-
-def _equal_but_for_case(names: Mapping[str, object]) -> Iterator[tuple[str, str]]:
-    first: dict[str, str] = {}
-    for name in names:
-        if (other := first.setdefault(name.lower(), name)) != name:
-            yield other, name
-
-
-def scheme_problems(brains: Sequence[Brain], schemes: Mapping[str, object]) -> Iterator[Problem]:
-    """Yields names of schemes that are taken, and those of brains that are unknown."""
-    for name in schemes:
+    for name in config.runs:
+        yield from _name_problems("run", name, "-_.", RESERVED_RUNS, ("runs", name))
+    for first, second in _equal_but_for_case(config.runs):
+        text = f"is the same folder as that of the run {first} on some disks; rename one"
+        yield Problem(text, ("runs", second))
+    for name in config.schemes:
         if name in SCHEMES:
             yield Problem("the name is that of a scheme of gyriflow; choose another", ("schemes", name))
-    known = dict.fromkeys([*SCHEMES, *schemes])
-    for number, brain in enumerate(brains):
-        if brain.has("scheme") and brain.scheme is not None and brain.scheme not in known:
+    known = dict.fromkeys([*SCHEMES, *config.schemes])
+    for number, brain in enumerate(config.brains):
+        if brain.scheme not in (None, *known):
             expected = f"expected one of {', '.join(known)}, or a name of schemes"
             yield Problem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
 
 
-def start_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[Problem]:
+def _name_problems(what: str, name: str, marks: str, reserved: Sequence[str], key: Key) -> Iterator[Problem]:
+    if name in reserved:
+        yield Problem("the name is reserved; choose another", key)
+    elif not name or not all(char.isalnum() or char in marks for char in name) or not name[0].isalnum():
+        allowed = f"letters, digits, {' '.join(marks)} only"
+        yield Problem(f"a {what}'s name has {allowed} and begins with a letter or digit", key)
+    elif len(name) > LONGEST_NAME:
+        yield Problem(f"a {what}'s name has {LONGEST_NAME} characters at most", key)
+
+
+def _equal_but_for_case(given: Iterable[str]) -> Iterator[tuple[str, str]]:
+    first: dict[str, str] = {}
+    for name in given:
+        if (other := first.setdefault(name.lower(), name)) != name:
+            yield other, name
+
+
+def starts(config: "Config") -> Iterator[Problem]:
     """Yields what is wrong with the start brains of the study and of its runs."""
-    known = ids_of(brains)
-    yield from _id_problems(start, known, ("start",))
-    for name, run in runs.items():
-        if run.has("start") and run.start is not None:
-            yield from _id_problems(run.start, known, ("runs", name, "start"))
-    without = [name for name, run in runs.items() if run.has("start") and run.start is None]
-    if start is None and without:
+    known = [brain.id for brain in config.brains]
+    yield from _id_problems(config.start, known, ("start",))
+    for name, run in config.runs.items():
+        yield from _id_problems(run.start, known, ("runs", name, "start"))
+    if config.start is None and any(run.start is None for run in config.runs.values()):
         yield Problem("is missing; it is the id of the brain that is folded, a list of ids, or all", ("start",))
 
 
-def _id_problems(start: Start | None, known: Sequence[str], key: tuple[str, ...]) -> Iterator[Problem]:
+def _id_problems(start: Start | None, known: Sequence[str], key: Key) -> Iterator[Problem]:
     if start is None or start in (ALL, FIRST) or not known:
         return
-    names = [start] if isinstance(start, str) else list(start)
-    if not names:
+    ids = [start] if isinstance(start, str) else list(start)
+    if not ids:
         yield Problem("found no ids; expected one or more", key)
-    if twice := [name for name, count in Counter(names).items() if count > 1]:
+    if twice := [name for name, count in Counter(ids).items() if count > 1]:
         yield Problem(f"found {', '.join(twice)} more than once", key)
-    for name in dict.fromkeys(names):
+    for name in dict.fromkeys(ids):
         if name not in known:
-            expected = f"expected the id of a brain: {', '.join(known)}"
             hint = nearest(name, known) if len(known) > 1 else ""
             hint = f"; {hint}" if hint.startswith("did you") else ""
-            yield Problem(f"found {name!r}; {expected}{hint}", key)
+            yield Problem(f"found {name!r}; expected the id of a brain: {', '.join(known)}{hint}", key)
 
 
-def run_problems(start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]) -> Iterator[Problem]:
+def runs(config: "Config") -> Iterator[Problem]:
     """Yields what is wrong between the settings of each run and its start brains."""
-    weeks = {brain.id: brain.week for brain in brains if brain.has("id", "week")}
-    for name, run in runs.items():
-        ids = start_ids(run.start if run.has("start") and run.start is not None else start, ids_of(brains))
-        starts = [(weeks[brain], f"the week of the start brain {brain}") for brain in ids if brain in weeks]
+    for name, run in config.runs.items():
+        brains = [config.brain(brain) for brain in config.starts(name)]
+        weeks = [(brain.week, f"the week of the start brain {brain.id}") for brain in brains]
         # without a start, what holds at the end is checked
-        for week, called in starts or ([(run.end_week - 1e-9, "the start")] if run.has("end_week") else []):
+        for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
             for problem in value_problems(run, week, {}, called):
-                yield Problem(problem.text, _place(name, problem.key, runs))
-        for key in VARYING if len(ids) > 1 else ():
-            value = getattr(run, key, None)
+                yield Problem(problem.text, _place(name, problem.key, config))
+        for key in VARYING if len(brains) > 1 else ():
+            value = getattr(run, key)
             if isinstance(value, Varying) and value.surface is not None:
-                text = f"has a map on a surface, which belongs to one brain; the run starts from {', '.join(ids)}"
-                yield Problem(text, _place(name, (key,), runs))
-
-
-def ventricle_problems(
-    start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run], schemes: Mapping[str, SchemeSettings]
-) -> Iterator[Problem]:
-    """Yields the runs whose ventricles are to grow by a curve of their own, from brains whose labels know none."""
-    for name, run in runs.items():
-        follow = run.follow if run.has("follow") else None
-        if follow is None or not follow.has("ventricles_ml") or follow.ventricles_ml is None:
-            continue
-        ids = start_ids(run.start if run.has("start") and run.start is not None else start, ids_of(brains))
-        for brain in brains:
-            if brain.has("id", "source") and brain.id in ids and (cause := _no_ventricles(brain, schemes)):
+                ids = ", ".join(brain.id for brain in brains)
+                text = f"has a map on a surface, which belongs to one brain; the run starts from {ids}"
+                yield Problem(text, _place(name, (key,), config))
+        if run.follow is not None and run.follow.ventricles_ml is not None:
+            for cause in filter(None, (_no_ventricles(brain, config) for brain in brains)):
                 text = f"needs a start brain whose labels know ventricles; {cause}"
-                yield Problem(text, _place(name, ("follow", "ventricles_ml"), runs))
+                yield Problem(text, _place(name, ("follow", "ventricles_ml"), config))
 
 
-def _no_ventricles(brain: Brain, schemes: Mapping[str, SchemeSettings]) -> str:
+def _no_ventricles(brain: Brain, config: "Config") -> str:
     """Returns why the labels of a brain know no ventricles; empty where they do, or their scheme is unknown."""
     if not brain.has_labels:
         return f"{brain.id} has no labels"
-    if not brain.has("scheme", "phantom"):
-        return ""
     scheme = brain.scheme or (brain.phantom or PhantomSettings()).scheme
-    found = schemes.get(scheme, SCHEMES.get(scheme))
+    found = config.schemes.get(scheme) or SCHEMES.get(scheme)
     return "" if found is None or found.ventricles else f"{scheme}, the scheme of {brain.id}, names none"
 
 
-def _place(run: str, key: tuple[str | int, ...], runs: Mapping[str, Run]) -> tuple[str | int, ...]:
-    """Returns the path of a run's key: that of `folding` where all runs share the value."""
-    values = [getattr(settings, str(key[0]), None) for settings in runs.values()]
-    return ("folding", *key) if all(value == values[0] for value in values) else ("runs", run, *key)
-
-
-def growth_problems(
-    growth: GrowthSettings, start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]
-) -> Iterator[Problem]:
+def growth(config: "Config") -> Iterator[Problem]:
     """Yields what is wrong between the brains, the series that growth rates are estimated from, and the runs."""
-    given = growth.brains
+    given, brains = config.growth.brains, {brain.id: brain for brain in config.brains}
     lists = dict(given) if isinstance(given, Mapping) else {"": given} if given is not None else {}
     paths = {name: ("growth", "brains", *([name] if name else [])) for name in lists}
-    known = ids_of(brains)
-    unknown = {name: [brain for brain in ids if brain not in known] for name, ids in lists.items()}
-    for name, ids in unknown.items():
-        if ids:
-            yield Problem(f"found {', '.join(ids)}; expected ids of brains: {', '.join(known)}", paths[name])
-    if any(unknown.values()) or not all(brain.has("id", "week", "source") for brain in brains):
+    unknown = [problem for name, ids in lists.items() for problem in _unknown(ids, list(brains), paths[name])]
+    yield from unknown
+    if unknown:
         return
-    weeks = {brain.id: brain.week for brain in brains}
-    for name, chosen in lists.items():
-        if (reason := _too_few_weeks(chosen, weeks)) is not None:
+    for name, ids in lists.items():
+        if reason := _too_few_weeks([brains[brain] for brain in ids]):
             yield Problem(reason, paths[name])
-    populations = {brain.id: brain.population if brain.has("population") else None for brain in brains}
-    for name, chosen in lists.items() if isinstance(given, Mapping) else ():
-        mixed = sorted({populations[brain] or "of no known population" for brain in chosen})
-        if len(mixed) > 1:
+        mixed = sorted({brains[brain].population or "of no known population" for brain in ids})
+        if isinstance(given, Mapping) and len(mixed) > 1:
             yield Problem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", paths[name])
-    series = growth_series({brain.id: brain.kind for brain in brains}, weeks, given, populations)
-    wanted = growth.estimated_from if growth.has("estimated_from") else None
+    series, wanted = config.growth_series, config.growth.estimated_from
     if wanted is not None and series and wanted not in series:
         yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))
-    reason = _too_few_weeks([brain for ids in lists.values() for brain in ids] if lists else list(weeks), weeks)
-    for name, run in runs.items():
+    used = {name for ids in lists.values() for name in ids} if lists else brains
+    reason = _too_few_weeks([brains[name] for name in used])
+    for run_name, run in config.runs.items():
+        found, without = reason, [name for name in config.starts(run_name) if config.estimated_from(name) is None]
+        if not found and without and wanted is None:
+            plural = f"the start brain{'s' if len(without) > 1 else ''} {', '.join(without)}"
+            found = (
+                f"{plural} {'are' if len(without) > 1 else 'is'} in none of the series {', '.join(series)}; name "
+                "one under growth.estimated_from"
+            )
         for key in GROWTH_RATES:
-            if getattr(run, key, None) != "estimated":
-                continue
-            ids = start_ids(run.start if run.has("start") and run.start is not None else start, known)
-            without = [brain for brain in ids if wanted is None and estimated_from(series, None, brain) is None]
-            found = reason
-            if found is None and without:
-                plural = f"the start brain{'s' if len(without) > 1 else ''} {', '.join(without)}"
-                found = (
-                    f"{plural} {'are' if len(without) > 1 else 'is'} in none of the series {', '.join(series)}; name "
-                    "one under growth.estimated_from"
-                )
-            if found is not None:
-                yield Problem(f"can't be estimated: {found}", _place(name, (key,), runs))
+            if found and getattr(run, key) == "estimated":
+                yield Problem(f"can't be estimated: {found}", _place(run_name, (key,), config))
 
 
-def mesh_size_problems(
-    growth: GrowthSettings, start: Start | None, brains: Sequence[Brain], runs: Mapping[str, Run]
-) -> Iterator[Problem]:
-    """Yields what is wrong where meshes are made for the end of the runs, by what measured brains are stretched."""
-    if not all(brain.has("id", "week", "source") for brain in brains):
-        return
-    known = ids_of(brains)
-    series = growth_series(
-        {brain.id: brain.kind for brain in brains},
-        {brain.id: brain.week for brain in brains},
-        growth.brains,
-        {brain.id: brain.population if brain.has("population") else None for brain in brains},
+def _too_few_weeks(brains: Sequence[Brain]) -> str:
+    """Returns what is wrong with the weeks of brains that are to give growth rates, empty where nothing is."""
+    found = len({brain.week for brain in brains})
+    return (
+        "" if found > 1 else f"found brains of {found} week{'s' if not found else ''}; a growth rate needs two or more"
     )
-    wanted = growth.estimated_from if growth.has("estimated_from") else None
-    started = {
-        brain for run in runs.values() for brain in start_ids(run.start if run.start is not None else start, known)
-    }
-    without = sorted(brain for brain in started if estimated_from(series, wanted, brain) is None)
-    if without:
+
+
+def mesh_sizes(config: "Config") -> Iterator[Problem]:
+    """Yields what is wrong where meshes are made for the end of the runs, by what measured brains are stretched."""
+    without = sorted(brain for brain in config.start_brains if config.estimated_from(brain) is None)
+    if config.mesh.sized_for == "end" and without:
         text = (
             f"`end` needs brains of other weeks that belong with {', '.join(without)}, which tell how far the surface "
             "is stretched; list them, or give a smaller surface_edge_mm"
@@ -216,43 +202,122 @@ def mesh_size_problems(
         yield Problem(text, ("mesh", "sized_for"))
 
 
-def _too_few_weeks(brains: Sequence[str], weeks: Mapping[str, float]) -> str | None:
-    """Returns what is wrong with the weeks of brains that are to give growth rates, None where nothing is."""
-    found = len({weeks[brain] for brain in brains})
-    if found > 1:
-        return None
-    return f"found brains of {found} week{'' if found == 1 else 's'}; a growth rate needs two or more"
-
-
-def age_reference_problems(brains: Sequence[Brain], given: Sequence[str] | None) -> Iterator[Problem]:
-    """Yields what is wrong with the brains from which apparent ages are estimated."""
-    if given is None:
-        return
-    known, key = ids_of(brains), ("metrics", "age_reference")
-    if unknown := [name for name in given if name not in known]:
-        yield Problem(f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}", key)
-    elif all(brain.has("week") for brain in brains):
-        found = len({brain.week for brain in brains if brain.id in given})
-        if found < LEAST_AGE_WEEKS:
-            plural = "" if found == 1 else "s"
-            yield Problem(f"found brains of {found} week{plural}; it should have {LEAST_AGE_WEEKS} or more", key)
-
-
-def metrics_problems(brains: Sequence[Brain], metrics: MetricsSettings) -> Iterator[Problem]:
+def metrics(config: "Config") -> Iterator[Problem]:
     """Yields brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
-    known = ids_of(brains)
-    named = {"norm_reference": metrics.norm_reference or (), "regions": tuple(metrics.regions)}
-    for key, ids in named.items():
-        if unknown := [name for name in ids if name not in known]:
-            text = f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}"
-            yield Problem(text, ("metrics", key))
+    given, known = config.metrics, [brain.id for brain in config.brains]
+    yield from _unknown(given.norm_reference or (), known, ("metrics", "norm_reference"))
+    yield from _unknown(given.regions, known, ("metrics", "regions"))
     # the carrying of regions and their asymmetry are of both sides
-    alone = [brain.id for brain in brains if brain.has("id", "hemisphere") and brain.hemisphere is not None]
-    if wrong := [name for name in metrics.regions if name in alone]:
+    if wrong := [brain.id for brain in config.brains if brain.id in given.regions and brain.hemisphere is not None]:
         yield Problem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
-    scans: dict[tuple[str, float], int] = Counter(
-        (brain.subject, brain.week) for brain in brains if brain.has("subject", "week") and brain.subject is not None
-    )
+    scans = Counter((brain.subject, brain.week) for brain in config.brains if brain.subject is not None)
     for (subject, week), count in scans.items():
         if count > 1:
             yield Problem(f"{count} scans of the subject {subject} are of week {week:g}; expected one", ("brains",))
+
+
+def studies(config: "Config") -> Iterator[Problem]:
+    """Yields what is wrong between the studies, the runs and the brains."""
+    weeks = {brain.id: brain.week for brain in config.brains}
+    own: dict[str, str] = {}
+    for name, study in config.studies.items():
+        here = ("studies", name)
+        yield from _name_problems("study", name, "-_", RESERVED_STUDIES, here)
+        if study.base not in config.runs:
+            yield Problem(f"found {study.base!r}; expected a run: {', '.join(config.runs)}", (*here, "base"))
+        else:
+            yield from _member_problems(name, study, config.runs[study.base], own)
+        yield from _comparison_problems(study, weeks, here)
+    for run, study_name in own.items():
+        if run in config.runs:
+            text = f"has a run of the name {run}, which stands under runs too; rename one"
+            yield Problem(text, ("studies", study_name))
+
+
+def _member_problems(name: str, study: Study, base: Run, names: dict[str, str]) -> Iterator[Problem]:
+    here = ("studies", name)
+    if not study.vary:
+        yield Problem("found nothing; expected keys of folding with lists of values", (*here, "vary"))
+    for section, keys in (("vary", study.vary), ("fixed", study.fixed)):
+        for key in keys:
+            if key in NOT_VARIED:
+                yield Problem("cannot differ within a study; choose another base", (*here, section, key))
+                return
+    for key, listed in study.vary.items():
+        if not listed or len(set(listed)) < len(listed):
+            yield Problem(f"found {list(listed)}; expected one or more values, each once", (*here, "vary", key))
+    for own, values in variants(name, study):
+        try:
+            settings = changed(base, study.fixed | values | {"end_week": study.compare_week})
+        except KeyError as error:
+            section = "vary" if error.args[0] in study.vary else "fixed"
+            yield Problem("there is no such key of folding", (*here, section, error.args[0]))
+            return
+        except ValidationError as error:
+            for path, text in messages(error, Run):
+                key = ".".join(map(str, path))
+                yield Problem(text, (*here, "vary" if key in study.vary else "fixed", key))
+            continue
+        if names.setdefault(own, name) != name:
+            yield Problem(f"has a run of the name {own}, as the study {names[own]} has; rename one", here)
+        for problem in value_problems(settings, settings.end_week - 1e-9, {}):
+            yield Problem(problem.text, (*here, "vary", *problem.key))
+
+
+def _comparison_problems(compared: Compared, weeks: Mapping[str, float], here: Key) -> Iterator[Problem]:
+    """Yields what is wrong with the brains to compare with, among brains of known `weeks`."""
+    known, week = sorted(set(weeks.values())), compared.compare_week
+    for brain in compared.compare_with or ():
+        if weeks.get(brain) != week:
+            found = f"of {weeks[brain]:g} GW" if brain in weeks else "which is no brain"
+            yield Problem(f"found {brain}, {found}; expected brains of {week:g} GW", (*here, "compare_with"))
+    if compared.compare_with is None and week not in known:
+        listed = ", ".join(f"{other:g}" for other in known)
+        text = f"found {week:g}; there are brains of {listed} GW to compare with"
+        yield Problem(text, (*here, "compare_week"))
+
+
+def calibration(config: "Config") -> Iterator[Problem]:
+    """Yields what is wrong between the calibration, the runs and the brains."""
+    found, here = config.calibrate, ("calibrate",)
+    if found is None:
+        return
+    weeks = {brain.id: brain.week for brain in config.brains}
+    yield from _comparison_problems(found, weeks, here)
+    for name in found.runs:
+        if name in config.runs:
+            yield Problem("the name is that of a run of the calibration; choose another", ("runs", name))
+    if found.base not in config.runs:
+        yield Problem(f"found {found.base!r}; expected a run: {', '.join(config.runs)}", (*here, "base"))
+        return
+    for key, bounds in found.parameters.items():
+        for text in _parameter_problems(key, bounds, config.runs[found.base]):
+            yield Problem(text, (*here, "parameters", key))
+
+
+def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterator[str]:
+    scale = key == STIFFNESS_RATIO or key.endswith(AMPLITUDE)
+    if key == STIFFNESS_RATIO and isinstance(base.shear_modulus_core_pa, Varying):
+        yield "the core's shear modulus varies in the base run; expected a number"
+    elif scale and min(bounds) <= 0:
+        yield f"found {min(bounds):g}; it should be above 0"
+    if key.endswith(AMPLITUDE):
+        curve = key.removesuffix(AMPLITUDE)
+        value = getattr(base, curve) if curve in VARYING else None
+        if curve in CURVES and base.follow is None:
+            yield "the base run follows no curve"
+        elif curve not in CURVES and value != "estimated" and not (isinstance(value, Varying) and value.weeks):
+            yield f"{curve} is no curve in the base run"
+    elif key in NOT_VARIED:
+        yield "cannot be calibrated"
+    for bound in () if scale or key in NOT_VARIED else bounds:
+        try:
+            changed(base, {key: bound})
+        except KeyError:
+            yield "there is no such key of folding"
+            return
+        except ValidationError as error:
+            yield from dict.fromkeys(text for _, text in messages(error, Run))
+
+
+CHECKS = (names, starts, runs, growth, mesh_sizes, studies, calibration, metrics)

@@ -1,4 +1,4 @@
-"""The description of all keys, made from the models."""
+"""The page and the JSON schema of all keys, made from the models."""
 
 from collections.abc import Iterator
 from types import UnionType
@@ -6,46 +6,46 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from ..parameters.settings import Settings
 from ..parameters.varying import Varying
-from .atlas_description import Atlas
+from .atlas import Atlas
 from .root import Config
 
 INTRODUCTION = """\
 # Configuration
 
-`config.yaml` is the demo, with the commonest keys explained in place; this page has all of them; `examples/` has
-configurations for real data. Your own is given with `./run snakemake --cores 2 --configfile my.yaml` and replaces the
-demo as a whole. Single values can be changed on the command line: `--config 'folding={end_week: 26}'`.
+`config.yaml` is the demo, with the commonest keys explained in place; `examples/` has configurations for real data.
+`./run snakemake --cores 2 --configfile my.yaml` takes yours instead of the demo; `--config 'folding={end_week: 26}'`
+changes single values. All problems are reported before any job starts: first those of keys, then those between keys.
+Unknown keys are problems. Paths are relative to the configuration file or else to the working directory.
 
-All problems of a configuration are reported at once, before any job starts; unknown keys are problems. Paths are
-relative to the configuration file or, if no such file is there, to the working directory. The keys of `folding` are
-the base of every run; each entry of `runs` has a name, the brain or brains that it folds, and what differs from
-`folding`:
+Each entry of `runs` has a name, the brains that it folds, and what differs from `folding`:
 
 ```yaml
 start: week21                                     # the id of a brain, a list of ids, or all
 runs:
   reference: {}                                   # from the `start` above
-  thick: {thickness_mm: 2.5}
   cohort: {start: [case1, case2], end_week: 32}   # each of them is folded
   stiff: {start: all, shear_modulus_cortex_pa: 3000, solver: {max_newton: 30}}
 ```
 
-This page is made from the models in `src/gyriflow/parameters` and `src/gyriflow/config` by
-`./run python -m gyriflow.config`.
+Below stand all keys: `key = default`, what else it may be, unit, and range; `(0, 5]` is above 0 and at most 5. Without
+a default it is `null`. Editors check keys by `schema.json`; `./run python -m gyriflow.config`
+writes both.
 """
-
-BOUNDS = {"gt": "> {}", "ge": "≥ {}", "lt": "< {}", "le": "≤ {}"}
+BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+PLAIN = ("number", "whole number", "text", "table", "`true` or `false`")
+NAMES = {float: "number", int: "whole number", str: "text", bool: "`true` or `false`", Varying: "`varying`"}
 
 
 def documentation() -> str:
     """Returns the page config/README.md."""
-    sections = [_section(name, model) for name, model in _sections(Config, "")]
-    described = [_section(name, model) for name, model in _sections(Atlas, "atlas.yaml")]
-    return "\n".join([INTRODUCTION, *sections, _section("varying", Varying), *described])
+    sections: dict[type[BaseModel], str] = {}
+    for path, model in [*_sections(Config, ""), *_sections(Varying, "varying"), *_sections(Atlas, "atlas.yaml")]:
+        # what has the keys of another section is described there
+        sections.setdefault(model, path)
+    return "\n".join([INTRODUCTION, *(_section(path, model) for model, path in sections.items())])
 
 
 def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -54,90 +54,9 @@ def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[Bas
     for name, field in model.model_fields.items():
         # runs have the keys of `folding`
         if name != "runs":
+            several = "[]" if get_origin(field.annotation) is tuple else ""
             for inner in (model for model in _models(field.annotation) if model is not Varying):
-                yield from _sections(inner, f"{path}.{name}".lstrip(".") + ("[]" if _is_list(field) else ""))
-
-
-def _section(path: str, model: type[BaseModel]) -> str:
-    title = f"## `{path}`" if path else "## Sections"
-    rows = [_row(name, field) for name, field in model.model_fields.items()]
-    return "\n".join(
-        [
-            f"{title}\n",
-            f"{_one_line(model.__doc__)}\n",
-            "| key | type | unit | default | bounds | description |",
-            "| --- | --- | --- | --- | --- | --- |",
-            *rows,
-            "",
-        ]
-    )
-
-
-def _row(name: str, field: FieldInfo) -> str:
-    extra = field.json_schema_extra
-    unit = str(extra["unit"]) if isinstance(extra, dict) else ""
-    word = f" or `{extra['word']}`" if isinstance(extra, dict) and "word" in extra else ""
-    held: Any = extra.get("bounds", {}) if isinstance(extra, dict) else {}
-    bounds = [text.format(_number(held[key])) for key, text in BOUNDS.items() if key in held] + [
-        text.format(_number(getattr(bound, key)))
-        for bound in field.metadata
-        for key, text in BOUNDS.items()
-        if getattr(bound, key, None) is not None
-    ]
-    cells = [
-        f"`{name}`",
-        _type_name(field.annotation) + word,
-        unit,
-        _default(field),
-        ", ".join(bounds),
-        field.description or "",
-    ]
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-
-def _default(field: FieldInfo) -> str:
-    value = field.default
-    if field.is_required() or value is PydanticUndefined:
-        return "required"
-    if isinstance(value, Settings):
-        return "as below"
-    if value is None:
-        return "`null`"
-    if isinstance(value, bool):
-        return f"`{str(value).lower()}`"
-    if isinstance(value, tuple):
-        return "`[" + ", ".join(map(_number, value)) + "]`"
-    return f"`{_number(value)}`"
-
-
-def _number(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _type_name(annotation: Any) -> str:
-    origin, parts = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        return _type_name(parts[0])
-    if origin is Literal:
-        return " or ".join(f"`{part}`" for part in parts)
-    if origin in (Union, UnionType):
-        kinds = ["`null`" if part is type(None) else _type_name(part) for part in parts]
-        return " or ".join(dict.fromkeys(kinds))
-    if origin is tuple:
-        return "list of " + _type_name(parts[0])
-    if origin is dict:
-        if get_origin(parts[1]) is tuple:
-            return "names with lists"
-        plain = parts[1] in (str, float, int) or get_origin(parts[1]) is Annotated
-        return "names with values" if plain else "names with settings"
-    if annotation is Varying:
-        return "varying"
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return "section"
-    if origin is not None:
-        return _type_name(parts[0])
-    names = {"float": "number", "int": "whole number", "str": "text", "bool": "`true` or `false`"}
-    return names[annotation.__name__]
+                yield from _sections(inner, f"{path}.{name}".lstrip(".") + several)
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
@@ -146,9 +65,121 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     return [model for part in get_args(annotation) for model in _models(part)]
 
 
-def _is_list(field: FieldInfo) -> bool:
-    return get_origin(field.annotation) is tuple
+def _section(path: str, model: type[BaseModel]) -> str:
+    title = f"## `{path}`" if path else "## Sections"
+    text = " ".join((model.__doc__ or "").split())
+    return "\n".join([f"{title}\n\n{text}\n", *(_line(*item) for item in model.model_fields.items()), ""])
 
 
-def _one_line(text: str | None) -> str:
-    return " ".join((text or "").split())
+def _line(name: str, field: FieldInfo) -> str:
+    """Returns a key with its default or that it is required, what else it may be, unit, range and meaning."""
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    held: Any = extra.get("bounds", {})
+    default, kinds = _default(field), list(dict.fromkeys(_type_names(field.annotation)))
+    kinds += [f"`{extra['word']}`"] if "word" in extra else []
+    # words that are explained need no list, and of which kind a default is shows by itself
+    kinds = [kind for kind in kinds if not (kind.startswith("`") and kind in str(field.description))]
+    if default:
+        kinds = [kind for kind in kinds if kind != default and kind not in PLAIN and not kind.startswith("list")]
+    given = " or ".join(part for part in (default, ", ".join(kinds)) if part)
+    value = (
+        f" = {given}" if default else "".join(f", {part}" for part in ("required" * field.is_required(), given) if part)
+    )
+    limits = _range({key: bound for part in _metadata(field) for key, bound in _bounds_in(part).items()} | held)
+    return (
+        " ".join(part for part in (f"- `{name}`{value}", str(extra["unit"]), limits) if part) + f": {field.description}"
+    )
+
+
+def _metadata(field: FieldInfo) -> list[Any]:
+    """Returns what bounds a value, or each of a list."""
+
+    def of(annotation: Any) -> list[Any]:
+        inner = [] if get_origin(annotation) is dict else get_args(annotation)
+        own = [part for found in getattr(annotation, "__metadata__", ()) for part in getattr(found, "metadata", ())]
+        return [*own, *(part for other in inner for part in of(other))]
+
+    return [*of(field.annotation), *field.metadata]
+
+
+def _bounds_in(metadata: object) -> dict[str, Any]:
+    return {key: getattr(metadata, key) for key in BOUNDS if getattr(metadata, key, None) is not None}
+
+
+def _range(bounds: dict[str, Any]) -> str:
+    low = next((_number(bounds[key]) for key in ("gt", "ge") if key in bounds), None)
+    high = next((_number(bounds[key]) for key in ("lt", "le") if key in bounds), None)
+    if low is not None and high is not None:
+        return f"{'(' if 'gt' in bounds else '['}{low}, {high}{')' if 'lt' in bounds else ']'}"
+    return f"{'>' if 'gt' in bounds else '≥'} {low}" if low is not None else ""
+
+
+def _default(field: FieldInfo) -> str:
+    """Returns the default as it is written; empty for required keys, for null, and for sections."""
+    value = field.default
+    if field.is_required() or value is None or isinstance(value, Settings):
+        return ""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    return "`[" + ", ".join(map(_number, value)) + "]`" if isinstance(value, tuple) else f"`{_number(value)}`"
+
+
+def _number(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _type_names(annotation: Any) -> list[str]:
+    """Returns what values of a type are called, without null, which is then the default."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return [f"`{part}`" for part in parts]
+    if origin in (Union, UnionType):
+        return [name for part in parts if part is not type(None) for name in _type_names(part)]
+    if origin is tuple:
+        return [f"list of {_type_names(parts[0])[0]}s".replace("texts", "text")]
+    if origin is dict:
+        return ["table"]
+    if origin is Annotated:
+        return _type_names(parts[0])
+    return [NAMES.get(annotation, "section")]
+
+
+# the schema
+
+NULL = {"type": "null"}
+
+
+def schema() -> dict[str, Any]:
+    """Returns the JSON schema of a configuration as it is written, for editors: config/schema.json."""
+    found = _for_editors(Config.model_json_schema())
+    # runs need only what differs from `folding`
+    found["$defs"]["Run"].pop("required")
+    keys = found["properties"]
+    # short forms, for a section with one key
+    either = {"anyOf": [{"type": "string"}, {"$ref": "#/$defs/AtlasSettings"}]}
+    keys["atlas"] = {"anyOf": [*either["anyOf"], keys["atlas"] | {"items": either}]}
+    keys["participants"] = {"anyOf": [{"type": "string"}, keys["participants"]]}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found
+
+
+def _for_editors(node: Any) -> Any:
+    """Returns a part of pydantic's schema with units in the descriptions and all bounds; sections may be empty."""
+    if isinstance(node, list):
+        return [_for_editors(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    own = {key: value for key, value in node.items() if key not in ("unit", "bounds", "word")}
+    if isinstance(own.get("title"), str):
+        del own["title"]
+    if node.get("unit"):
+        own["description"] += f" [{node['unit']}]"
+    if "bounds" in node:
+        limits = {BOUNDS[key]: value for key, value in node["bounds"].items()}
+        own["oneOf"] = [kind | limits if kind.get("type") == "number" else kind for kind in own["oneOf"]]
+    if "word" in node:
+        own["anyOf"] = [{"type": own.pop("type")}, {"const": node["word"]}]
+    if "$ref" in own and "description" in own:
+        own = {"anyOf": [{"$ref": own["$ref"]}, NULL], "description": own["description"]}
+    if "$ref" in (inner := own.get("additionalProperties") or {}):
+        own["additionalProperties"] = {"anyOf": [inner, NULL]}
+    return {key: _for_editors(value) for key, value in own.items()}

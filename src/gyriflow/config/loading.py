@@ -1,4 +1,4 @@
-"""Validates a configuration from plain dictionaries and reports all problems at once."""
+"""Validates a configuration from plain dictionaries and reports its problems together."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,12 +9,11 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.yaml_files import read_yaml
 from ..parameters.folding import VARYING
-from ..parameters.messages import dotted, line, messages
-from ..parameters.presets import PRESETS
-from .atlas import AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections, unknown_atlas
-from .atlas_description import Atlas
-from .participants import ParticipantsSettings, participants_brains, participants_section
+from ..parameters.settings import PROBLEM, dotted, line, messages
+from .atlas import Atlas, AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections
+from .brains import ParticipantsSettings, participants_brains
 from .root import Config
+from .runs import PRESETS
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
 
@@ -35,30 +34,34 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     Raises
     ------
     InputError
-        Naming all problems at once, each with its key, what was found and what is allowed.
+        Naming all problems of keys at once, or where each key is valid all problems between keys, each with its key,
+        what was found and what is allowed.
     """
     plain = {"folding": {}} | _plain(raw)
     plain["runs"] = _complete_runs(plain.get("runs"), plain.get("folding"))
     if isinstance(plain["folding"], dict):
         plain["folding"] = _with_preset(plain["folding"], {})
-    plain["atlas"], of_atlas, problems = _atlases(plain.get("atlas"), Path(base_dir))
-    if of_atlas:
-        plain["brains"] = [*(plain.get("brains") or ()), *of_atlas]
+    atlases, problems = _atlases(plain.get("atlas"), Path(base_dir))
+    # an invalid value tells the checks that not all ids of brains are known
+    plain["atlas"] = None if problems else [used.settings for used in atlases]
     of_table, left_out = _participants(plain, Path(base_dir), problems)
-    if of_table:
-        plain["brains"] = [*(plain.get("brains") or ()), *of_table]
+    if further := [*(entry for used in atlases for entry in atlas_brains(used)), *of_table]:
+        plain["brains"] = [*(plain.get("brains") or ()), *further]
     if not (keep_going and plain.get("brains")):
         problems += [row["cause"] for row in left_out.values()]
-    awaited = [path for entry in of_atlas for path in _texts(entry)]
+    awaited = [str(file.path) for used in atlases for file in used.files]
+    waiting = False
     try:
         config = Config.model_validate(plain, context={"folder": str(base_dir), "awaited": awaited})
     except ValidationError as error:
+        waiting = any(details["type"] != PROBLEM for details in error.errors())
         problems += _lines(error)
     if problems:
         raise InputError(
             f"the configuration has {len(problems)} problem{'s' if len(problems) > 1 else ''}:\n  "
             + "\n  ".join(problems)
             + "\nAll keys are explained in config/README.md"
+            + ("; once each key is valid, they are checked against each other" if waiting else "")
             + ("; with --keep-going, rows that can't be used are left out" if left_out and not keep_going else "")
         )
     return config.leave_out(left_out)
@@ -70,7 +73,8 @@ def _participants(
     """Returns the brains of `participants` and its rows that can't be used, or adds what is wrong to `problems`."""
     if plain.get("participants") is None:
         return [], {}
-    plain["participants"] = participants_section(plain["participants"])
+    if isinstance(plain["participants"], str):
+        plain["participants"] = {"file": plain["participants"]}
     try:
         settings = ParticipantsSettings.model_validate(plain["participants"])
         entries, left_out, found = participants_brains(settings, base_dir)
@@ -123,13 +127,9 @@ def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
     return both
 
 
-def _atlases(raw: Any, base_dir: Path) -> tuple[Any, list[dict[str, Any]], list[str]]:
-    """Returns the sections of `atlas` with absolute paths, the brains that they stand for, and problems.
-
-    Where one is wrong, so that its brains are not known, there are no sections (None).
-    """
-    sections: list[AtlasSettings] = []
-    entries: list[dict[str, Any]] = []
+def _atlases(raw: Any, base_dir: Path) -> tuple[list[UsedAtlas], list[str]]:
+    """Returns the atlases that can be used, and what is wrong with others and their sections."""
+    atlases: list[UsedAtlas] = []
     problems: list[str] = []
     for path, section in atlas_sections(raw):
         where = dotted(path)
@@ -138,38 +138,17 @@ def _atlases(raw: Any, base_dir: Path) -> tuple[Any, list[dict[str, Any]], list[
         except ValidationError as error:
             problems += [line((*path, *place), text) for place, text in messages(error, AtlasSettings)]
             continue
-        atlas = _description(settings, where, problems)
-        if atlas is None:
-            continue
-        used = UsedAtlas(settings, atlas)
-        found = [f"{where}.{problem}" for problem in atlas_problems(used)]
-        problems += found
-        if not found:
-            sections.append(settings)
-            entries += atlas_brains(used)
-    # an invalid value tells the checks that not all ids of brains are known
-    return None if problems else sections, entries, problems
-
-
-def _description(settings: AtlasSettings, where: str, problems: list[str]) -> Atlas | None:
-    """Returns what the `atlas.yaml` of a section says, or adds what is wrong with it to `problems`."""
-    if (unknown := unknown_atlas(settings)) is not None:
-        problems.append(f"{where}.{unknown}")
-        return None
-    try:
-        return Atlas.model_validate(read_yaml(settings.description))
-    except InputError as error:
-        problems.append(f"{where}.file: {error}")
-    except ValidationError as error:
-        problems += [f"{settings.description}: {line(place, text)}" for place, text in messages(error, Atlas)]
-    return None
-
-
-def _texts(value: Any) -> list[str]:
-    """Returns all texts in an entry of `brains`, files among them."""
-    if isinstance(value, dict):
-        return [text for item in value.values() for text in _texts(item)]
-    return [value] if isinstance(value, str) else []
+        try:
+            used = UsedAtlas(settings, Atlas.model_validate(read_yaml(settings.description)))
+        except InputError as error:
+            problems.append(f"{where}.file: {error}")
+        except ValidationError as error:
+            problems += [f"{settings.description}: {line(place, text)}" for place, text in messages(error, Atlas)]
+        else:
+            found = [f"{where}.{problem}" for problem in atlas_problems(used)]
+            problems += found
+            atlases += [] if found else [used]
+    return atlases, problems
 
 
 def _lines(error: ValidationError) -> list[str]:

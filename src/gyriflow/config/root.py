@@ -1,71 +1,70 @@
 """The whole configuration."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar
 
 from pydantic import PrivateAttr, field_validator
 
+from ..errors import InputError
+from ..io.schemes import SCHEMES
 from ..io.yaml_files import read_yaml
-from ..parameters.folding import VARYING, FoldingSettings, bounds_of, output_weeks
-from ..parameters.schemes import SCHEMES, LabelScheme, SchemeSettings
-from ..parameters.settings import Problem, Settings, check, refused, setting
+from ..parameters.folding import VARYING, FoldingSettings, output_weeks
+from ..parameters.schemes import LabelScheme, SchemeSettings
+from ..parameters.settings import Settings, refused, setting
 from ..parameters.synthetic import PhantomSettings
 from ..parameters.varying import Varying, files_of
-from . import checks
-from .atlas import AtlasSettings, UsedAtlas
-from .atlas_description import Atlas
-from .brains import Brain
-from .calibration import Calibration, calibration_problems
-from .growth import GrowthSettings, estimated_from, growth_series
-from .matching import believed_files, why_unmatched
-from .mesh import MeshSettings
-from .metrics import MetricsSettings, age_reference, reference_brains
-from .participants import ParticipantsSettings
-from .regions import nearest_given
-from .report import ReportSettings
-from .runs import Run, Start, start_ids
-from .studies import Compared, Member, Study, members_of, real_brains, study_problems
-from .surface import SurfaceSettings
+from .atlas import Atlas, AtlasSettings, UsedAtlas
+from .brains import Brain, ParticipantsSettings
+from .checks import CHECKS
+from .runs import (
+    ALL,
+    FIRST,
+    Calibration,
+    Compared,
+    GrowthSettings,
+    Member,
+    Run,
+    Start,
+    Study,
+    estimated_from,
+    growth_series,
+    members_of,
+)
+from .stages import MeshSettings, MetricsSettings, ReportSettings, SurfaceSettings
 
 REAL_BRAIN = "real brain"
 """Name of a measured brain of unknown population."""
 
 
 class Config(Settings):
-    """A validated configuration. `folding` is the base of every run, `runs` holds the runs' complete settings."""
+    """All keys stand in these sections; `folding` is the base of every run."""
+
+    further_checks: ClassVar = CHECKS
 
     brains: tuple[Brain, ...] = setting(
-        (), "", "The brains: those to fold, and others to compare with and to estimate growth from. Required without "
-        "`atlas` and `participants`.",
-    )  # fmt: skip
+        (), "", "The brains: those to fold, and others to compare with and to estimate growth from."
+    )
     atlas: tuple[AtlasSettings, ...] = setting(
-        (), "",
-        "An atlas whose weeks are brains: its name, the `atlas.yaml` of one of your own, a section, or a list of "
-        "these.",
-    )  # fmt: skip
+        (), "", "Atlases whose weeks are brains: a name, the `atlas.yaml` of your own, a section, or a list of these."
+    )
     participants: ParticipantsSettings | None = setting(
         None, "", "A table of brains, such as the `participants.tsv` of BIDS."
     )
     schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
     start: Start | None = setting(
-        None,
-        "",
-        "Id of the brain to fold, a list of ids, `first` (of the list of brains, of an atlas the earliest) or `all`; "
-        "required if a run has no `start` of its own.",
+        None, "", "Id of the brain to fold, a list of ids, `first` (of the list, of an atlas the earliest) or `all`."
     )
     surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
     mesh: MeshSettings = setting(MeshSettings(), "", "Tetrahedral mesh.")
     growth: GrowthSettings = setting(GrowthSettings(), "", "Growth rates.")
     folding: FoldingSettings = setting(..., "", "Folding simulation.")
     runs: dict[str, Run] = setting(
-        {}, "",
-        "Runs by name, each with its `start` and what differs from `folding`; without any, one run named `reference`.",
-    )  # fmt: skip
+        {}, "", "Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."
+    )
     studies: dict[str, Study] = setting(
-        {},
-        "",
-        "Studies by name: runs that differ from one in a few parameters, compared with the real brains of a week.",
+        {}, "", "Studies by name: runs that differ in a few parameters, compared with real brains."
     )
     calibrate: Calibration | None = setting(None, "", "A search for the parameters that meet a real brain best.")
     metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")
@@ -85,64 +84,6 @@ class Config(Settings):
         if not isinstance(value, dict):
             raise refused(f"found {value!r}; expected names, each with the settings that differ from folding")
         return value
-
-    @check
-    def _some_brains(self) -> Iterator[Problem]:
-        if not self.brains and self.has("atlas") and not self.atlas:
-            text = "found nothing; expected a list of brains, each with id, week and a source"
-            yield Problem(text, ("brains",))
-
-    @check
-    def _names(self) -> Iterator[Problem]:
-        yield from checks.name_problems(self.brains, self.runs)
-
-    @check
-    def _schemes(self) -> Iterator[Problem]:
-        yield from checks.scheme_problems(self.brains, self.schemes)
-
-    # the ids of an atlas section that is wrong are not known: these checks ask for `atlas` first
-
-    @check
-    def _starts(self) -> Iterator[Problem]:
-        if self.has("atlas"):
-            yield from checks.start_problems(self.start, self.brains, self.runs)
-
-    @check
-    def _runs(self) -> Iterator[Problem]:
-        start = self.start if self.has("start") else None
-        yield from checks.run_problems(start, self.brains, self.runs)
-        yield from checks.ventricle_problems(start, self.brains, self.runs, self.schemes)
-
-    @check
-    def _growth(self) -> Iterator[Problem]:
-        if self.has("atlas"):
-            start = self.start if self.has("start") else None
-            yield from checks.growth_problems(self.growth, start, self.brains, self.runs)
-
-    @check
-    def _mesh(self) -> Iterator[Problem]:
-        if self.has("atlas", "mesh", "start") and self.mesh.sized_for == "end":
-            yield from checks.mesh_size_problems(self.growth, self.start, self.brains, self.runs)
-
-    @check
-    def _studies(self) -> Iterator[Problem]:
-        if self.has("atlas", "brains", "runs"):
-            yield from study_problems(self.studies, self.runs, self.brains)
-
-    @check
-    def _calibrate(self) -> Iterator[Problem]:
-        if self.has("atlas", "brains", "runs"):
-            yield from calibration_problems(self.calibrate, self.runs, self.brains)
-
-    @check
-    def _age_reference(self) -> Iterator[Problem]:
-        if self.has("atlas"):
-            yield from checks.age_reference_problems(self.brains, self.metrics.age_reference)
-
-    @check
-    def _brains_of_metrics(self) -> Iterator[Problem]:
-        if self.has("atlas"):
-            yield from checks.metrics_problems(self.brains, self.metrics)
 
     def brain(self, name: str) -> Brain:
         """Returns the brain of an id; KeyError if there is none."""
@@ -198,6 +139,11 @@ class Config(Settings):
         """The atlases with what their descriptions say, as the files lie at this moment."""
         return [UsedAtlas(section, Atlas(**read_yaml(section.description))) for section in self.atlas]
 
+    @cached_property
+    def known_files(self) -> dict[str, tuple[str, str]]:
+        """The atlas and the SHA-256 of each file of an atlas where it is known, by the file's path."""
+        return {path: known for used in self.atlases for path, known in used.checksums.items()}
+
     def run(self, name: str) -> Run:
         """Returns the complete settings of a run, of one of a study too."""
         return self.runs[name] if name in self.runs else self.study_runs[name]
@@ -217,12 +163,20 @@ class Config(Settings):
 
     def compared_with(self, compared: Compared, brain: str) -> list[str]:
         """Returns the ids of the brains that the runs of a study or a calibration from a brain are compared with."""
-        return real_brains(compared, self.brain(brain), self.brains)
+        if compared.compare_with is not None:
+            return list(compared.compare_with)
+        of_week = [other for other in self.brains if other.week == compared.compare_week]
+        own = [other for other in of_week if other.population == self.brain(brain).population]
+        return [other.id for other in own or of_week]
 
     def starts(self, run: str) -> list[str]:
         """Returns the ids of the brains that a run folds, in the order of `brains`."""
-        own = self.run(run).start
-        return start_ids(self.start if own is None else own, [brain.id for brain in self.brains])
+        brains, own = [brain.id for brain in self.brains], self.run(run).start
+        start = self.start if own is None else own
+        if start == FIRST:
+            return brains[:1]
+        named = brains if start == ALL else [start] if isinstance(start, str) else start or ()
+        return [brain for brain in brains if brain in named]
 
     @property
     def folded(self) -> list[tuple[str, str]]:
@@ -255,17 +209,17 @@ class Config(Settings):
     @property
     def growth_series(self) -> dict[str, list[str]]:
         """The ids of the brains of each series of growth rates, by its name; none where they are all of one week."""
-        kinds = {brain.id: brain.kind for brain in self.brains}
-        populations = {brain.id: brain.population for brain in self.brains}
-        weeks = {brain.id: brain.week for brain in self.brains}
-        return growth_series(kinds, weeks, self.growth.brains, populations)
+        return growth_series(self.brains, self.growth.brains)
 
     @cached_property
     def unmatched_surfaces(self) -> dict[str, str]:
-        """Why the vertices of the brains in a growth series of surfaces are not matched, by the series' name."""
+        """Why the vertices of the brains in a growth series of surfaces are not matched, by the series' name.
+
+        The surfaces are read for this, but for files of an atlas that are missing still: its description is believed.
+        """
         if not self.growth.matched_surfaces:
             return dict.fromkeys(self._surface_series, "growth.matched_surfaces is false")
-        believed = believed_files(self.atlases)
+        believed = {str(f.path) for used in self.atlases for f in used.missing if used.atlas.series[f.series].matched}
         causes = {name: why_unmatched(brains, believed) for name, brains in self._surface_series.items()}
         return {name: cause for name, cause in causes.items() if cause is not None}
 
@@ -290,31 +244,46 @@ class Config(Settings):
         """Returns the series that `estimated` rates are taken from where a brain is the start; None without one."""
         return estimated_from(self.growth_series, self.growth.estimated_from, brain)
 
-    @property
-    def age_reference(self) -> list[str]:
-        """The ids of the brains from which apparent ages are estimated; none where they are of too few weeks."""
-        if not self.start_brains:
-            return []
-        start = self.brain(self.start_brains[0])
-        return age_reference(self._with_sides_of(start), self.metrics.age_reference, start.population)
+    def another_series(self, brain: str) -> str | None:
+        """Returns the growth series of another population than a start brain's: that of `growth.estimated_from`, or
+        the only one; None where there is none or more than one."""
+        start = self.brain(brain)
+        own = start.population
+        others = [
+            name
+            for name, ids in self.growth_series.items()
+            if brain not in ids
+            and all(own is None or self.brain(other).population != own for other in ids)
+            and all(self.brain(other).sides == start.sides for other in ids)
+        ]
+        named = self.growth.estimated_from
+        return named if named in others else others[0] if len(others) == 1 else None
 
     @property
     def norm_reference(self) -> list[str]:
-        """The ids of the measured brains that centiles are of."""
+        """The ids of the measured brains that others are compared with: the given ones, or else all real ones.
+
+        They have the hemispheres of the first start brain: half a brain is no measure of whole ones. If none are given
+        and the real ones are of several populations, those of the start's are used; phantoms where no brain is real.
+        """
         if not self.start_brains:
             return []
-        start = self.brain(self.start_brains[0])
-        return reference_brains(self._with_sides_of(start), self.metrics.norm_reference, start.population)
-
-    def _with_sides_of(self, start: Brain) -> list[Brain]:
-        """Returns the brains that have the hemispheres of a start brain: half a brain is no measure of whole ones."""
-        return [brain for brain in self.brains if brain.sides == start.sides]
+        start, given = self.brain(self.start_brains[0]), self.metrics.norm_reference
+        brains = [brain for brain in self.brains if brain.sides == start.sides]
+        real = [brain for brain in brains if not brain.synthetic] or [b for b in brains if b.source == "phantom"]
+        if len({brain.population for brain in real}) > 1:
+            real = [brain for brain in real if brain.population == start.population]
+        chosen = real if given is None else [brain for brain in brains if brain.id in given]
+        return [brain.id for brain in chosen]
 
     def regions_from(self, brain: str) -> str | None:
         """Returns the brain whose regions a brain gets; None where no regions are given, or it has one side only."""
         if len(self.brain(brain).sides) == 1:
             return None
-        return nearest_given(brain, self.metrics.regions, {brain.id: brain.week for brain in self.brains})
+        given, week = self.metrics.regions, self.brain(brain).week
+        return (
+            brain if brain in given else min(given, key=lambda other: abs(self.brain(other).week - week), default=None)
+        )
 
     @property
     def scans(self) -> dict[str, list[str]]:
@@ -324,15 +293,6 @@ class Config(Settings):
             name: sorted((b for b in self.brains if b.subject == name), key=lambda b: b.week) for name in sorted(named)
         }
         return {name: [brain.id for brain in brains] for name, brains in found.items() if len(brains) > 1}
-
-    def followed(self, run: str) -> list[str]:
-        """Returns the metrics that the growth of a run was made to follow, or was estimated from."""
-        settings = self.runs[run]
-        put_in = {
-            "area": settings.follow is not None or settings.growth_rate_per_s == "estimated",
-            "volume": settings.follow is not None or settings.core_growth_rate_per_s == "estimated",
-        }
-        return [metric for metric, used in put_in.items() if used]
 
     def parameters(self, run: str) -> dict[str, Any]:
         """Returns the settings of a run for its `params.yaml`, where a map goes by the name of its parameter.
@@ -344,10 +304,6 @@ class Config(Settings):
             curve = {"weeks": value.weeks} if value.weeks else {}
             settings[name] = curve | ({"map": name} if value.map is not None else {})
         return settings
-
-    def bounds(self, parameter: str) -> dict[str, float]:
-        """Returns the bounds (gt, ge, le) of a parameter of the folding that may vary."""
-        return bounds_of(parameter)
 
     def maps(self, run: str) -> dict[str, dict[str, list[str]]]:
         """Returns for each parameter of a run that has a map its files under "map" and "surface", none for volumes."""
@@ -366,3 +322,33 @@ class Config(Settings):
 def _span(weeks: list[float]) -> str:
     first, last = min(weeks), max(weeks)
     return f"{first:g}" if first == last else f"{first:g}–{last:g}"
+
+
+def why_unmatched(brains: Sequence[Brain], believed: Collection[str] = ()) -> str | None:
+    """Returns why the surfaces of brains are not matched by their vertices; None where they are.
+
+    They are where all brains are given by surface files of one kind, with as many vertices and the same triangles for
+    each hemisphere. Files that are `believed` to be so need not be there.
+    """
+    # files are looked at where growth by vertices is planned, which few configurations ask for
+    from ..io.surfaces import connectivity
+
+    first = brains[0]
+    for brain in brains:
+        if brain.source != first.source:
+            return f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
+    known: list[tuple[str, list[tuple[int, int, str]]]] = []
+    for brain in brains:
+        if believed and all(path in believed for path in brain.files):
+            continue
+        try:
+            known.append((brain.id, [connectivity(Path(path)) for path in brain.files]))
+        except InputError as error:
+            return str(error)
+        (name, expected), (other, found) = known[0], known[-1]
+        for one, two in zip(expected, found, strict=True):
+            if one[:2] != two[:2]:
+                return f"{other} has {two[0]} vertices and {two[1]} triangles where {name} has {one[0]} and {one[1]}"
+            if one != two:
+                return f"{other} has other triangles than {name}"
+    return None

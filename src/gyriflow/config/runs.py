@@ -1,12 +1,16 @@
-"""The runs of a study: their settings, and the brains that each of them folds."""
+"""Runs, and what differs between them: growth's series of brains, studies, calibration."""
 
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Annotated, Any
 
-from pydantic import Discriminator, Tag
+from pydantic import Discriminator, Field, Tag
 
 from ..parameters.folding import FoldingSettings
-from ..parameters.settings import setting
+from ..parameters.settings import Problem, Settings, check, setting
+from ..parameters.terms import SCORES, Score
+from .brains import Brain
 
 ALL = "all"
 """The word for all brains in `start`."""
@@ -20,6 +24,51 @@ Start = Annotated[
 """The id of a brain, a list of ids, `first` or `all`."""
 
 
+FREE_GROWTH: dict[str, Any] = {
+    "step_s": 86_400.0,
+    "stress_memory_gw": 0.0,
+    "shear_modulus_cortex_pa": 300.0,
+    "shear_modulus_core_pa": 300.0,
+    "support": "free",
+    "contact": {"kind": "global"},
+    "no_growth": {"kind": "none"},
+}
+"""Everything grows and nothing is held; with a cortex as stiff as the core, growth makes the folds, not buckling."""
+
+PRESETS: dict[str, dict[str, Any]] = {
+    # the paper's model, whatever the defaults become; its linear elements are `order: 1` of the mesh
+    "fetalfoldsim": {
+        "step_s": 43_200.0,
+        "follow": None,
+        "allow_negative_growth": False,
+        "thickness_mm": 1.5,
+        "thickness_growth_mm_per_gw": 0.0,
+        "shear_modulus_cortex_pa": 1500.0,
+        "shear_modulus_core_pa": 300.0,
+        "material": "neo-hookean",
+        "poisson_ratio": 0.45,
+        "growth_rate_per_s": 2.0e-7,
+        "radial_growth_rate_per_s": 0.0,
+        "core_growth_rate_per_s": 0.0,
+        "stress_memory_gw": 0.0,
+        "support": "ellipsoid",
+        "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5, "gap_mm": 2.5},
+        "no_growth": {"kind": "ellipsoid", "shift_y": 0.05, "shift_z": -0.15, "semi_axes": [0.35, 0.40, 0.50]},
+    },
+    # growth that takes the brain to its measured shapes
+    "measured": {
+        **FREE_GROWTH,
+        "follow": {"loop": "closed", "smoothing_mm": 1.5},
+    },
+    # the brain as it is to be expected: as `measured`, towards where the growth of another population would take it
+    "expected": {
+        **FREE_GROWTH,
+        "follow": {"loop": "closed", "growth_of": "another", "smoothing_mm": 1.5},
+    },
+}
+"""Sets of parameters by name, from which a configuration starts; its own keys come on top."""
+
+
 class Run(FoldingSettings):
     """The complete settings of a run: those of `folding` with the run's own on top."""
 
@@ -28,9 +77,241 @@ class Run(FoldingSettings):
     )
 
 
-def start_ids(start: Start | None, brains: Sequence[str]) -> list[str]:
-    """Returns the ids of the brains that `start` names, in the order of `brains`; unknown ones are left out."""
-    if start == FIRST:
-        return list(brains[:1])
-    named = brains if start == ALL else [start] if isinstance(start, str) else start or ()
-    return [brain for brain in brains if brain in named]
+# growth
+
+Names = tuple[str, ...]
+Series = Annotated[
+    Annotated[Names, Tag("(list)")] | Annotated[dict[str, Names], Tag("(table)")],
+    Discriminator(lambda value: "(table)" if isinstance(value, dict) else "(list)"),
+]
+
+
+class GrowthSettings(Settings):
+    """Which brains the growth rates are estimated from."""
+
+    brains: Series | None = setting(
+        None, "",
+        "Ids of the brains whose areas and volumes are used, of at least two weeks; or several such lists by name, as "
+        "`{surface: [...], volume: [...]}`. `null`: all brains. Each population is then a series of its own, as are "
+        "surfaces (`surface`) and label volumes (`volume`) if both have two weeks.",
+    )  # fmt: skip
+    estimated_from: str | None = setting(
+        None, "", "Series that gives the `estimated` rates of the folding; `null`: the start brain's."
+    )
+    matched_surfaces: bool = setting(
+        True, "",
+        "Whether equal vertices and triangles of a series' surfaces mean equal places, so that local growth comes from "
+        "them without registration.",
+    )  # fmt: skip
+
+
+def growth_series(
+    brains: Sequence[Brain], given: Sequence[str] | Mapping[str, Sequence[str]] | None
+) -> dict[str, list[str]]:
+    """Returns the ids of the brains of each series of growth rates, without series of fewer than two weeks.
+
+    `given` is the setting `brains`, whose ids must be known. Only a series that it names may mix populations. A
+    hemisphere that is alone shares none with whole brains or with the other one.
+    """
+    series: dict[str, Sequence[Brain]] = {}
+    if isinstance(given, Mapping):
+        series = {name: [brain for brain in brains if brain.id in ids] for name, ids in given.items()}
+    else:
+        groups: dict[tuple[str | None, str], list[Brain]] = {}
+        for brain in brains:
+            if given is None or brain.id in given:
+                side = f"{brain.sides[0]} hemisphere" if len(brain.sides) == 1 else ""
+                groups.setdefault((brain.population, side), []).append(brain)
+        for (population, side), members in groups.items():
+            by_kind = _series_by_kind(members)
+            for kind, chosen in by_kind.items():
+                parts = [population or "", side, kind if len(by_kind) > 1 or not population else ""]
+                series[", ".join(part for part in parts if part) if len(groups) > 1 else kind] = chosen
+    return {name: [brain.id for brain in members] for name, members in series.items() if _ages(members) > 1}
+
+
+def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
+    """Returns brains by kind of data, or all together if one kind has fewer than two ages."""
+    volumes = [brain for brain in brains if brain.has_labels]
+    surfaces = [brain for brain in brains if not brain.has_labels]
+    by_kind: dict[str, Sequence[Brain]] = {"surface": surfaces, "volume": volumes}
+    known = {kind: members for kind, members in by_kind.items() if members}
+    # a kind with a single age can only be compared across kinds
+    return known if len(known) == 1 or all(_ages(members) > 1 for members in known.values()) else {"all": brains}
+
+
+def estimated_from(series: Mapping[str, Sequence[str]], given: str | None, start: str) -> str | None:
+    """Returns the name of the series that gives the `estimated` rates; None if it is not determined.
+
+    It is the given one, or the only one, or the one with the start brain.
+    """
+    if given is not None:
+        return given if given in series else None
+    return next((name for name, ids in series.items() if len(series) == 1 or start in ids), None)
+
+
+def _ages(brains: Sequence[Brain]) -> int:
+    return len({brain.week for brain in brains})
+
+
+# studies and calibration
+
+Value = Annotated[
+    Annotated[float, Tag("(number)")] | Annotated[str, Tag("(text)")],
+    Discriminator(lambda value: "(text)" if isinstance(value, str) else "(number)"),
+]
+"""A value of a parameter that a study varies."""
+NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields")
+"""Keys of a run that say nothing of its model, or that the study sets."""
+
+
+CURVES = ("follow.area_cm2", "follow.volume_ml")
+"""Further curves than those of parameters that may vary."""
+MOST_PARAMETERS = 3
+MOST_RUNS = 40
+"""Of a calibration."""
+
+
+class Compared(Settings):
+    """What runs are compared with: real brains of a week."""
+
+    base: str = setting(..., "", "Name of the run that all others differ from.")
+    compare_week: float = setting(..., "GW", "Week of the comparison, at which the runs end.", gt=15, le=45)
+    compare_with: tuple[str, ...] | None = setting(
+        None, "",
+        "Ids of the real brains of that week to compare with; `null`: all of the start's population, or of any if "
+        "it has none.",
+    )  # fmt: skip
+
+
+class Study(Compared):
+    """A run for each combination of the varied values, compared with real brains of `compare_week`.
+
+    Equal runs are solved once. A run that diverges is reported in the study's tables, and the others go on.
+    """
+
+    vary: dict[str, tuple[Value, ...]] = setting(
+        ..., "",
+        "Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; inner keys with dots "
+        "(`contact.gap_mm`).",
+    )  # fmt: skip
+    fixed: dict[str, Value] = setting({}, "", "Keys of `folding` that differ from the base's in all runs.")
+
+
+class Calibration(Compared):
+    """A search for the parameters whose brain is nearest to the real one of a week.
+
+    The first runs are spread over the bounds (a scrambled Sobol sequence); rounds follow, of runs where a Gaussian
+    process through the scores expects the most. Runs that diverge count as worse than all others.
+    """
+
+    parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]] = setting(
+        ..., "",
+        "One to three keys of `folding` with their lowest and highest values, such as `{thickness_mm: [1, 3]}`; inner "
+        "keys with dots. `stiffness_ratio` is the cortex's shear modulus over the core's; `KEY.amplitude` scales the "
+        "base run's curve of KEY.",
+    )  # fmt: skip
+    score: dict[Score, Annotated[float, Field(gt=0)]] = setting(
+        ..., "",
+        "What is minimised: weights of " + ", ".join(f"`{name}`" for name in SCORES) + " (docs/metrics.md).",
+    )  # fmt: skip
+    first_runs: int = setting(12, "", "Runs of the first round.", ge=3, le=MOST_RUNS)
+    rounds: int = setting(3, "", "Rounds after the first.", ge=0, le=20)
+    runs_per_round: int = setting(4, "", "Runs of each of these rounds.", ge=1, le=MOST_RUNS)
+    seed: int = setting(0, "", "Seed of the sequence and of the Gaussian process.", ge=0)
+
+    @check
+    def _few_bounded_and_scored(self) -> Iterator[Problem]:
+        if not 1 <= len(self.parameters) <= MOST_PARAMETERS:
+            yield Problem(f"found {len(self.parameters)}; expected 1 to {MOST_PARAMETERS}", ("parameters",))
+        if (total := len(self.runs)) > MOST_RUNS:
+            yield Problem(f"first_runs and rounds make {total} runs; expected at most {MOST_RUNS}", ("rounds",))
+        for key, bounds in self.parameters.items():
+            if len(bounds) != 2 or not bounds[0] < bounds[1]:
+                yield Problem(f"found {list(bounds)}; expected the lowest and the highest value", ("parameters", key))
+        if not self.score:
+            yield Problem(f"found nothing; expected one or more of {', '.join(SCORES)}", ("score",))
+
+    @property
+    def runs(self) -> dict[str, int]:
+        """The round of each run by the run's name."""
+        sizes = [self.first_runs, *[self.runs_per_round] * self.rounds]
+        rounds = [number for number, size in enumerate(sizes) for _ in range(size)]
+        return {f"calibration-{index:02d}": number for index, number in enumerate(rounds)}
+
+
+@dataclass(frozen=True)
+class Member:
+    """A run of a study.
+
+    Attributes
+    ----------
+    run
+        Its name: that of an equal run of `runs` or of an earlier study, where there is one.
+    values
+        The varied values by their keys.
+    settings
+        Its complete settings, from its start to the week of comparison.
+    """
+
+    run: str
+    values: Mapping[str, Any]
+    settings: Run
+
+
+def changed(run: Run, changes: Mapping[str, Any]) -> Run:
+    """Returns a run with some settings changed, by keys with dots for inner ones.
+
+    ValidationError where they are not valid; KeyError where there is no such key.
+    """
+    raw = run.model_dump(mode="json")
+    for key, value in changes.items():
+        *outer, last = key.split(".")
+        place = raw
+        for name in outer:
+            place = place[name] if isinstance(place, dict) else {}
+        if not isinstance(place, dict) or last not in place:
+            raise KeyError(key)
+        place[last] = value
+    return type(run).model_validate(raw)
+
+
+def variants(name: str, study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yields the name and the varied values of each run of a study of a name, the last key varying fastest."""
+    for values in product(*study.vary.values()):
+        texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
+        yield "-".join([name, *texts]), dict(zip(study.vary, values, strict=True))
+
+
+def members_of(
+    studies: Mapping[str, Study], runs: Mapping[str, Run], passes: Callable[[str, float], bool]
+) -> dict[str, list[Member]]:
+    """Returns the members of each study; equal ones share a run, which ends at the latest of their weeks.
+
+    `passes` says whether a run of `runs`, by its name, has a given week among its output weeks.
+    """
+    wanted = [
+        (name, own, values, changed(runs[study.base], study.fixed | values | {"end_week": study.compare_week}))
+        for name, study in studies.items()
+        for own, values in variants(name, study)
+    ]
+    weeks: dict[str, set[float]] = {}
+    for *_, settings in wanted:
+        weeks.setdefault(_model(settings), set()).add(settings.end_week)
+    solved = {
+        _model(run): name
+        for name, run in reversed(list(runs.items()))
+        if all(passes(name, week) for week in weeks.get(_model(run), ()))
+    }
+    members: dict[str, list[Member]] = {name: [] for name in studies}
+    for name, own, values, settings in wanted:
+        model = _model(settings)
+        run = solved.setdefault(model, own)
+        complete = runs.get(run) or changed(settings, {"end_week": max(weeks[model])})
+        members[name].append(Member(run, values, complete))
+    return members
+
+
+def _model(run: Run) -> str:
+    """Returns what makes two runs the same but for their ends and what does not change their shapes."""
+    return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields"})

@@ -18,17 +18,15 @@ from ..io.files import write_json
 from ..io.maps import read_maps
 from ..io.tetmeshes import read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
-from ..parameters.folding import FoldingParameters
-from ..parameters.reading import parameters_from, require_maps
+from ..parameters.folding import FoldingParameters, parameters_from, require_maps
 from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..parameters.varying import Maps
 from ..step import record_exit_code
-from .output import ZONES, say
+from .checks import refuse_impossible, stiffness_warning, zone_report, zone_warnings
+from .output import ZONES, say, tell, warn, write_events
 from .points import IntegrationPoints
 from .predicted_memory import predicted_memory_mib
-from .resolution import stiffness_warning
 from .run import run
-from .zone_checks import refuse_impossible, zone_report, zone_warnings
 from .zones import zones_of_run
 
 
@@ -39,6 +37,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
     parser.add_argument("--maps", type=Path, help="maps of parameters at the mesh's vertices (HDF5)")
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument("--progress", type=Path, help="file that follows the run, a JSON object a line (.jsonl)")
     parser.add_argument(
         "--may-diverge",
         action="store_true",
@@ -83,9 +82,8 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     frame = per_vertex * len(mesh.vertices) + per_element * len(mesh.tets)
     points = len(IntegrationPoints.of_degree(mesh.order).weights)
     stretch = 8 * 6 * points * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
-    # positions and two displacements, and two velocities where steps are made of them
-    vectors = 3 if parameters.time_scheme == "implicit" else 5
-    checkpoint = 2 * (8 * 3 * vectors * len(mesh.vertices) + stretch)
+    # positions and two displacements
+    checkpoint = 2 * (8 * 3 * 3 * len(mesh.vertices) + stretch)
     needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 4 * mesh.tets.size
     free = shutil.disk_usage(out).free
     if free < needed:
@@ -108,7 +106,9 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         require_maps(parameters, maps, len(mesh.vertices))
         report = zone_report(mesh, zones, float(np.median(parameters.thickness_at(parameters.start_week, maps))))
         memory = predicted_memory_mib(len(mesh.tets), comm.size, parameters.contact.kind, mesh.order)
-        say(f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks, about {memory:.0f} MiB")
+        size = f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks"
+        facts = {"elements": len(mesh.tets), "unknowns": 3 * len(mesh.vertices), "ranks": comm.size}
+        say(f"{size}, about {memory:.0f} MiB", "size", **facts, memory_mib=round(memory))
         for name in ZONE_NAMES:
             zone = report["zones"][name]
             say(f"  {name}: {zone['facets']} facets, {zone['area_mm2']:.0f} mm2")
@@ -118,7 +118,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         say(f"  elements through the cortex: {through:.1f}")
         locking = stiffness_warning(parameters.poisson_ratio) if mesh.order == 1 else ""
         for warning in filter(None, (*zone_warnings(report), locking)):
-            say(f"warning: {warning}")
+            warn(warning)
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / ZONES, report)
@@ -131,11 +131,14 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     try:
         if comm.rank == 0:
             with locked(arguments.out):
+                if arguments.progress:
+                    write_events(arguments.progress)
                 main(comm, arguments)
         else:
             main(comm, arguments)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr, flush=True)
+        tell("end", error=str(error))
         code = error.exit_code
     except Exception:
         traceback.print_exc()

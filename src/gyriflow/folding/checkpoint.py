@@ -15,12 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..io.hdf5 import new_hdf5
+from ..io.files import new_hdf5
+from ..io.sources import modules_behind, room_of
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
 
 Floats = NDArray[np.float64]
-ARRAYS = ("positions", "last", "before_last", "stretch", "rate", "before_rate")
+ROOMS = ("folding", "mechanics", "geometry", "parameters", "units")
+"""Where the modules lie on which the course of a run depends."""
+ARRAYS = ("positions", "last", "before_last", "stretch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +47,6 @@ class State:
     stretch : (m, q, 6) float or None
         Elastic stretch at the integration points of the elements that the next step starts with, where stress is
         remembered (see `memory`).
-    rate, before_rate : (n, 3) float or None
-        Velocities in m/s at the start of the two last steps, without contact, where steps are made of velocities.
     learnt : sequence of float or None
         What growth that follows has learnt of the brain's response.
     rows : tuple of dict
@@ -61,8 +62,6 @@ class State:
     before_last_s: float = 0.0
     successes: int = 0
     stretch: Floats | None = None
-    rate: Floats | None = None
-    before_rate: Floats | None = None
     learnt: Sequence[float] | None = None
     rows: tuple[dict, ...] = field(default=())
 
@@ -81,27 +80,15 @@ class State:
         slope = (rate - self.before_last / self.before_last_s) / ((self.last_s + self.before_last_s) / 2)
         return (rate + slope * (self.last_s + step_s) / 2) * step_s
 
-    def predicted_rate(self) -> Floats:
-        """Returns the (n, 3) velocities in m/s to begin with at this state: those of the two last steps, extended."""
-        if self.rate is None:
-            return np.zeros_like(self.last)
-        if self.before_rate is None:
-            return self.rate
-        return self.rate + (self.rate - self.before_rate) * (self.last_s / self.before_last_s)
-
     def after(
         self,
         displacement: Floats,
         step_s: float,
         row: dict,
         stretch: Floats | None = None,
-        rate: Floats | None = None,
         learnt: Sequence[float] | None = None,
     ) -> "State":
-        """Returns the state after an accepted step with its (n, 3) displacement in m and the stretch it left.
-
-        `rate` is the velocity at its start, where it was made of velocities, and `learnt` what it taught.
-        """
+        """Returns the state after an accepted step with its (n, 3) displacement in m; what it left and taught."""
         return replace(
             self,
             positions=self.positions + displacement,
@@ -112,8 +99,6 @@ class State:
             before_last_s=self.last_s,
             successes=self.successes + 1,
             stretch=stretch,
-            rate=rate,
-            before_rate=self.rate,
             learnt=learnt,
             rows=(*self.rows, row),
         )
@@ -131,11 +116,8 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) ->
     for name in ("max_newton", "max_halvings"):
         del values["solver"][name]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
-    package = Path(__file__).parents[1]
-    rooms = [
-        path for room in ("folding", "mechanics", "geometry", "parameters") for path in package.glob(f"{room}/*.py")
-    ]
-    for source in sorted([*rooms, package / "units.py"]):
+    solver = modules_behind(Path(__file__).with_name("__main__.py"))
+    for source in sorted(module for module in solver if room_of(module) in ROOMS):
         digest.update(source.read_bytes())
     digest.update(mesh.vertices.tobytes())
     digest.update(mesh.tets.tobytes())

@@ -18,13 +18,13 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError
-from ..geometry.curved_faces import finer_surface
+from ..geometry.tetrahedra import finer_surface
 from ..geometry.triangles import TriangleMesh, edges, mean_length
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
-from .surface_parts import Held, SurfacePart, part_of_surface, shared_out
+from .surface_parts import SearchRange, SurfacePart, part_of_surface, shared_out
 
 Floats = NDArray[np.float64]
 DISTANCE_PER_EDGE = 0.2
@@ -38,7 +38,7 @@ EDGES_PER_SPACING = {1: 1, 2: 2}
 CLOSE, WIDE = 0.1, 0.75
 """Parts of the distance: where the smallest gap is below the first, the next step's barrier is twice as stiff, and half
 where it is above the second. Stress that is kept presses folds ever harder; a barrier that is too soft for it lets them
-so near that Newton's method creeps. A barrier that changes moves what it holds, so it does so where it must only."""
+so near that Newton's method creeps. A barrier that changes moves what it holds, so it changes only where it must."""
 STIFFEST = 1024.0
 """Most that the barrier is made stiffer by."""
 BESIDE = 0.999
@@ -48,6 +48,8 @@ MARGIN_MM = 0.05
 """How far the surface may move before pairs that can come near are looked for anew."""
 ROOM_MM = 1.0
 """How far it may move before each rank takes its part of the surface anew."""
+LONGEST_MM = 8.0
+"""Longest way of a vertex in one iteration: a solve that asks for more has gone astray."""
 CLOSED = 0.9
 """Part of a gap that a step may close."""
 SWEEP = ipctk.AdditiveCCD(conservative_rescaling=CLOSED)
@@ -78,15 +80,8 @@ def contact_settings(parameters: FoldingParameters, maps: Maps) -> ContactSettin
     return ContactSettings(given or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm, adaptive=not given)
 
 
-def new_pairs() -> ipctk.NormalCollisions:
-    """Returns a set of pairs whose energies are weighted by areas, still empty."""
-    pairs = ipctk.NormalCollisions()
-    pairs.use_area_weighting = True
-    return pairs
-
-
 @dataclass(frozen=True, eq=False)
-class Near:
+class ContactCache:
     """What is near at a displacement (s, 3) in m of the whole surface.
 
     That is this rank's part as the IPC Toolkit wants it, its (p, 3) positions in mm, and the pairs of it that are the
@@ -98,6 +93,13 @@ class Near:
     part: SurfacePart
     positions: Floats
     pairs: ipctk.NormalCollisions
+
+    @property
+    def gap(self) -> float:
+        """The smallest distance in mm between the rank's own pairs, infinite without any."""
+        if not len(self.pairs):
+            return np.inf
+        return float(np.sqrt(self.pairs.compute_minimum_distance(self.surface, self.positions)))
 
 
 class SelfContact:
@@ -137,12 +139,11 @@ class SelfContact:
         self._displacement = displacement
         self._vertices, faces = np.unique(facets, return_inverse=True)
         faces = faces.reshape(-1, 3)
-        self._finer: sparse.csr_array | None = None  # weights of the nodes at the vertices of the surface of contact
-        if domain.order == 2:
-            self._finer, faces = finer_surface(faces)
-        self._faces = faces
         # of the nodes at the vertices of the surface of contact
-        self._weights = (sparse.eye_array(len(self._vertices)) if self._finer is None else self._finer).tocsr()
+        self._weights = sparse.eye_array(len(self._vertices)).tocsr()
+        if domain.order == 2:
+            self._weights, faces = finer_surface(faces)
+        self._faces = faces
         owned = domain.vertex_of_node[: domain.owned]
         place = np.searchsorted(self._vertices, owned).clip(max=len(self._vertices) - 1)
         self._owned_nodes = np.flatnonzero(self._vertices[place] == owned)
@@ -157,8 +158,8 @@ class SelfContact:
         self._owner = domain.comm.bcast(shared_out(start, domain.comm.size), root=0)
         self._search = ipctk.LBVH()
         self._candidates = ipctk.Candidates()
-        self._part_held: Held | None = None
-        self._candidates_held: Held | None = None
+        self._part_range: SearchRange | None = None
+        self._candidates_range: SearchRange | None = None
         self._widest_mm = np.inf
         self.stiffness_pa = settings.stiffness_pa
         self.mesh_moved()
@@ -180,7 +181,7 @@ class SelfContact:
         self.distance_mm = self.settings.distance_mm or min(self._distance_of_edges(), self._widest_mm)
         self._barrier = ipctk.BarrierPotential(BARRIER, self.distance_mm, self.stiffness_pa, use_physical_barrier=True)
         self._surface: ipctk.CollisionMesh | None = None
-        self._known: Near | None = None
+        self._known: ContactCache | None = None
 
     def _distance_of_edges(self) -> float:
         """Returns the distance in mm that belongs to the present edges, the same whatever a rank's processor rounds."""
@@ -202,15 +203,8 @@ class SelfContact:
 
     def _smallest_gap(self) -> float:
         """Returns the smallest distance in mm at the step's start, infinite where no pair is within the present d̂."""
-        surface, part = self._surface_at(self._start)
-        pairs = self._pairs_near(self._start, self.distance_mm)
         # rounding must not make a pair of what is just at the limit
-        return BESIDE * self._nearest(pairs, surface, part.at(self._start))
-
-    def _nearest(self, pairs: ipctk.NormalCollisions, surface: ipctk.CollisionMesh, positions: Floats) -> float:
-        """Returns the smallest distance in mm between the pairs of all ranks, infinite without any."""
-        nearest = np.sqrt(pairs.compute_minimum_distance(surface, positions)) if len(pairs) else np.inf
-        return self.domain.comm.allreduce(float(nearest), op=MPI.MIN)
+        return BESIDE * self.domain.comm.allreduce(self._state_at(np.zeros_like(self._start)).gap, op=MPI.MIN)
 
     def _on_surface(self, local: Floats) -> Floats:
         """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""
@@ -222,60 +216,55 @@ class SelfContact:
 
     def _at_vertices(self, at_nodes: Floats) -> Floats:
         """Returns the (s, 3) values at the vertices of the surface of contact from those at the surface's nodes."""
-        return at_nodes if self._finer is None else np.asarray(self._finer @ at_nodes)
+        return np.asarray(self._weights @ at_nodes)
 
     def _surface_at(self, *places: Floats) -> tuple[ipctk.CollisionMesh, SurfacePart]:
         """Returns this rank's part of the surface, good for all that can be near at some (s, 3) positions in mm."""
-        if self._part_held is None or not self._part_held.at(self.distance_mm, *places):
+        if self._part_range is None or not self._part_range.at(self.distance_mm, *places):
             way = max(float(np.abs(place - places[0]).max()) for place in places)
-            # a single rank's part is all there is, wherever it goes
+            # a single rank's part is the whole surface, wherever it moves
             room = max(ROOM_MM, way) if self.domain.comm.size > 1 else np.inf
-            self._part_held = Held(places[0], self.distance_mm / 2 + room)
+            self._part_range = SearchRange(places[0], self.distance_mm / 2 + room)
             owned = self._owner == self.domain.comm.rank
-            self._part = part_of_surface(places[0], self._faces, owned, 2 * self._part_held.reach)
+            self._part = part_of_surface(places[0], self._faces, owned, 2 * self._part_range.reach)
             self._follow = self._weights[self._part.vertices]
-            # column by column as the stiffness is, from both sides: nothing has to be turned round for their product
+            # both stored by columns, as the stiffness is: their product needs no conversion
             follow = sparse.kron(self._follow, np.eye(3), format="csr")
             self._nodes_to_part, self._part_to_nodes = follow.tocsc(), follow.T
             # what is known goes by the numbers of the part before
-            self._surface, self._known, self._candidates_held = None, None, None
+            self._surface, self._known, self._candidates_range = None, None, None
         if self._surface is None:
             self._surface = ipctk.CollisionMesh(self._part.at(self._start), self._part.edges, self._part.faces)
         return self._surface, self._part
 
-    def _state(self) -> Near:
+    def _state(self) -> ContactCache:
         """Returns where this rank's part is at the present displacement, and its pairs within the distance."""
-        u = self._on_surface(self._displacement)
+        return self._state_at(self._on_surface(self._displacement))
+
+    def _state_at(self, u: Floats) -> ContactCache:
+        """Returns the same at a displacement (s, 3) in m of the whole surface."""
         if self._known is None or not np.array_equal(u, self._known.displacement):
             whole = self._start + u * MM_PER_M
             surface, part = self._surface_at(whole)
             positions = part.at(whole)
-            if self._candidates_held is None or not self._candidates_held.at(self.distance_mm, whole):
-                self._candidates_held = Held(whole, self.distance_mm / 2 + MARGIN_MM)
-                self._candidates.build(surface, positions, self._candidates_held.reach, self._search)
-            pairs = new_pairs()
+            if self._candidates_range is None or not self._candidates_range.at(self.distance_mm, whole):
+                self._candidates_range = SearchRange(whole, self.distance_mm / 2 + MARGIN_MM)
+                self._candidates.build(surface, positions, self._candidates_range.reach, self._search)
+            pairs = ipctk.NormalCollisions()
+            pairs.use_area_weighting = True
             pairs.build(self._candidates, surface, positions, self.distance_mm)
-            self._known = Near(u, surface, part, positions, part.of_own(pairs))
+            self._known = ContactCache(u, surface, part, positions, part.of_own(pairs))
         return self._known
-
-    def _pairs_near(self, positions: Floats, distance_mm: float) -> ipctk.NormalCollisions:
-        """Returns this rank's own pairs within a distance at (s, 3) positions in mm, found anew."""
-        surface, part = self._surface_at(positions)
-        pairs = new_pairs()
-        pairs.build(surface, part.at(positions), distance_mm, broad_phase=self._search)
-        return part.of_own(pairs)
 
     def joined(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
         """Returns the numbers (n,) of parts of the mesh, those of parts that touch at the step's start made one."""
         if part.max() == 0:
             return part
-        _, seen = self._surface_at(self._start)
-        pairs = self._pairs_near(self._start, self.distance_mm)
+        state = self._state_at(np.zeros_like(self._start))
+        seen, pairs = state.part, state.pairs
         near = [pairs[i].vertex_ids(seen.edges, seen.faces) for i in range(len(pairs))]
-        of_vertex = part[self._vertices]
-        if self._finer is not None:
-            of_vertex = of_vertex[np.asarray(self._finer.argmax(axis=1)).ravel()]
-        of_vertex = of_vertex[seen.vertices]
+        heaviest = np.asarray(self._weights.argmax(axis=1)).ravel()
+        of_vertex = part[self._vertices][heaviest][seen.vertices]
         # the numbers below 0 stand for no vertex
         ends = [of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in near]
         own = {(int(two.min()), int(two.max())) for two in ends}
@@ -295,7 +284,7 @@ class SelfContact:
         state = self._state()
         return self._summed(self._follow.T @ self._own_forces(state))
 
-    def _own_forces(self, state: Near) -> Floats:
+    def _own_forces(self, state: ContactCache) -> Floats:
         """Returns the (p, 3) derivative of the energy of this rank's pairs in N at its part's vertices."""
         if not len(state.pairs):
             return np.zeros_like(state.positions)
@@ -349,21 +338,21 @@ class SelfContact:
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements that can be added without any touch on the way."""
         way = self._on_surface(direction) * MM_PER_M
-        return self.domain.comm.allreduce(self._free_part(self._state(), way), op=MPI.MIN)
+        # what is near a longer way would fill the memory
+        part = LONGEST_MM / max(float(np.linalg.norm(way, axis=1).max()), LONGEST_MM)
+        return part * self.domain.comm.allreduce(self._free_part(self._state(), part * way), op=MPI.MIN)
 
-    def _free_part(self, state: Near, way: Floats) -> float:
-        """Returns the part of a way (s, 3) in mm on which nothing touches that this rank looks for."""
+    def _free_part(self, state: ContactCache, way: Floats) -> float:
+        """Returns the part of a way (s, 3) in mm before the first touch of this rank's pairs."""
         # what is no pair is farther apart than the distance
-        gap = self.distance_mm
-        if len(state.pairs):
-            gap = min(gap, float(np.sqrt(state.pairs.compute_minimum_distance(state.surface, state.positions))))
+        gap = min(self.distance_mm, state.gap)
         if 2 * float(np.linalg.norm(way, axis=1).max()) <= CLOSED * gap:
             return 1.0
         whole = self._start + state.displacement * MM_PER_M
         end = whole + way
         surface, part = self._surface_at(whole, end)
         ends = part.at(whole), part.at(end)
-        if self._candidates_held is not None and self._candidates_held.at(self.distance_mm, whole, end):
+        if self._candidates_range is not None and self._candidates_range.at(self.distance_mm, whole, end):
             return float(self._candidates.compute_collision_free_stepsize(surface, *ends, narrow_phase_ccd=SWEEP))
         return float(
             ipctk.compute_collision_free_stepsize(surface, *ends, broad_phase=self._search, narrow_phase_ccd=SWEEP)
@@ -371,8 +360,7 @@ class SelfContact:
 
     def smallest_distance_mm(self) -> float:
         """Returns the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""
-        state = self._state()
-        return self._nearest(state.pairs, state.surface, state.positions)
+        return self.domain.comm.allreduce(self._state().gap, op=MPI.MIN)
 
     def pair_count(self) -> int:
         """Returns the number of pairs within the distance."""

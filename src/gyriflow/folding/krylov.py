@@ -18,10 +18,10 @@ YARDSTICK = 5
 """Solves with a new preconditioner, about a step's, that tell what it can do."""
 
 
-class Wear:
-    """The wear of a preconditioner that is kept while the matrix changes.
+class PreconditionerLifetime:
+    """How long a preconditioner serves that is kept while the matrix changes.
 
-    It is stale once its solves have taken as many iterations too many as a new one costs. The first solves with it,
+    It is over once its solves have taken as many iterations too many as a new one costs. The first solves with it,
     easy and hard ones, are the yardstick.
     """
 
@@ -30,14 +30,9 @@ class Wear:
         self._excess = np.inf
 
     @property
-    def stale(self) -> bool:
+    def over(self) -> bool:
         """Whether a new preconditioner is due."""
         return self._excess >= SETUP
-
-    @property
-    def useless(self) -> bool:
-        """Whether it has failed, or has yet to be made."""
-        return bool(np.isinf(self._excess))
 
     def add(self, iterations: int, reduction: float) -> None:
         """Takes note of a solve that brought the residual down to a part of what it was."""
@@ -54,8 +49,8 @@ class Wear:
         self._solves, self._iterations, self._powers = 0, 0, 0.0
         self._excess = 0.0
 
-    def wear_out(self) -> None:
-        """Declares the preconditioner stale."""
+    def end(self) -> None:
+        """Ends it."""
         self._excess = np.inf
 
 
@@ -84,30 +79,25 @@ BY_ORDER = {
 """Options of multigrid from quadratic to linear elements, which are left to algebraic multigrid."""
 
 
-def new_krylov(
-    comm: MPI.Comm, method: str, preconditioner: str, max_iterations: int, hierarchy: OrderHierarchy | None = None
-) -> PETSc.KSP:
+def new_krylov(comm: MPI.Comm, method: str, max_iterations: int, hierarchy: OrderHierarchy | None = None) -> PETSc.KSP:
     """Returns a linear solver; options in PETSc's database go by the prefix `gyriflow_<method>_`.
 
-    The preconditioner "gamg" is multigrid: by order first where there is a hierarchy, algebraic below.
+    The preconditioner is multigrid: by order first where there is a hierarchy, algebraic below.
     """
     krylov = PETSc.KSP().create(comm)
     prefix = f"gyriflow_{method}_"
     options = PETSc.Options(prefix)
-    if preconditioner == "gamg":
-        for name, value in (ALGEBRAIC if hierarchy is None else BY_ORDER).items():
-            options[name] = value
+    for name, value in (ALGEBRAIC if hierarchy is None else BY_ORDER).items():
+        options[name] = value
     krylov.setOptionsPrefix(prefix)
     krylov.setType(method)
-    if preconditioner == "gamg" and hierarchy is not None:
-        hierarchy.attach(krylov.getPC())
+    if hierarchy is None:
+        krylov.getPC().setType("gamg")
     else:
-        krylov.getPC().setType(preconditioner)
+        hierarchy.attach(krylov.getPC())
     if method == "cg":
         # the norm that Newton's method is judged by
         krylov.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-    if preconditioner == "lu":
-        krylov.getPC().setFactorSolverType("mumps")
     krylov.setTolerances(atol=0.0, max_it=max_iterations)
     krylov.setFromOptions()
     return krylov

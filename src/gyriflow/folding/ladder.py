@@ -10,21 +10,18 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import SolverError
-from .krylov import Wear, estimate_bounds, keep_bounds, new_krylov, renew_bounds, smooth_with
+from .krylov import PreconditionerLifetime, estimate_bounds, keep_bounds, new_krylov, renew_bounds, smooth_with
 from .problem import Problem
 from .tangent import Tangent
 
-RUNGS = ("cg", "cg, preconditioner rebuilt", "cg, tangent shifted", "gmres", "mumps")
-KEPT, REBUILT, SHIFTED, GMRES, DIRECT = range(5)
+RUNGS = ("cg", "cg, preconditioner rebuilt", "cg, tangent shifted", "gmres")
+KEPT, REBUILT, SHIFTED, GMRES = range(4)
 INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
 """Parts of its diagonal that are added to a tangent until it is positive definite."""
-FREE_SHIFT = 1e-6
-"""The same for the factorisation of a free body's tangent, which is singular."""
 KEPT_SHIFT = 1e-4
-"""The same for the multigrid of a free body, well below the softest bending. Its coarsest matrix would be singular, and
-the rigid motions of the shape that it was made for are not those of those it is kept for: it would blow them up."""
-FALLBACKS = {GMRES: ("gmres", "gamg"), DIRECT: ("preonly", "lu")}
+"""The part added for the multigrid of a free body, well below the softest bending. Without it the coarsest matrix would
+be singular. The multigrid is kept for later shapes, whose rigid motions are others: it would blow them up."""
 
 
 class NotConvergedError(SolverError):
@@ -56,19 +53,19 @@ class LinearLadder:
     def __init__(self, problem: Problem, max_iterations: int) -> None:
         self.problem = problem
         self.max_iterations = max_iterations
-        self._cg = self._new_krylov("cg", "gamg")
-        self._fallbacks: dict[int, PETSc.KSP] = {}
-        self._wear = Wear()
+        self._cg = self._new_krylov("cg")
+        self._gmres: PETSc.KSP | None = None
+        self.lifetime = PreconditionerLifetime()
         self._doubtful = False  # whether the preconditioner was made of an indefinite tangent
         self._level = 0  # of the shift that the last tangent needed
 
-    def _new_krylov(self, method: str, preconditioner: str) -> PETSc.KSP:
-        return new_krylov(self.problem.domain.comm, method, preconditioner, self.max_iterations, self.problem.hierarchy)
+    def _new_krylov(self, method: str) -> PETSc.KSP:
+        return new_krylov(self.problem.domain.comm, method, self.max_iterations, self.problem.hierarchy)
 
     def renew_cg(self) -> None:
         """Makes conjugate gradients anew: set up again, PETSc 3.25's would keep some of the old smoother."""
         self._cg.destroy()
-        self._cg = self._new_krylov("cg", "gamg")
+        self._cg = self._new_krylov("cg")
 
     def solve(
         self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
@@ -78,13 +75,13 @@ class LinearLadder:
         Parameters
         ----------
         tangent
-            J; where contact makes it indefinite, it may be made convex.
+            J; where it is indefinite, it may be made convex.
         residual
             r.
         reduction
             Part of the right-hand side that may be left.
         convexify
-            Whether terms of contact may be made convex where conjugate gradients fail with the true ones.
+            Whether its further parts may be made convex where conjugate gradients fail with the true ones.
 
         Raises
         ------
@@ -93,10 +90,11 @@ class LinearLadder:
         """
         system = _System(self.problem, tangent, residual, direction, reduction)
         count = LinearCount()
-        if self.problem.contributions:
+        if not self.problem.convex:
             if self._solve_with_kept(system, count):
                 return count
-            # folds pressed together would rather slide aside: without that the tangent is rarely indefinite, but wrong
+            # parts that are pressed together tend to slide aside, which makes the tangent indefinite; made convex, it
+            # rarely is, but it is no longer exact
             if convexify:
                 self.problem.convexify(tangent)
         if self._solve_shifted(system, count):
@@ -105,18 +103,9 @@ class LinearLadder:
         self._fall_back(system, count)
         return count
 
-    @property
-    def _due(self) -> bool:
-        """Whether a new preconditioner is to be made of the present tangent.
-
-        One without contact makes the better one: where each step has such a solve, a worn one waits for it.
-        """
-        waits = self.problem.summed and self.problem.contributions
-        return self._wear.useless if waits else self._wear.stale
-
     def _solve_with_kept(self, system: "_System", count: LinearCount) -> bool:
         """Tries conjugate gradients with the kept preconditioner alone; returns whether the direction descends."""
-        if self._due:
+        if self.lifetime.over:
             return False
         reason, iterations = system.run(self._cg, reuse=True, fast=True)
         count.iterations += iterations
@@ -124,7 +113,7 @@ class LinearLadder:
             self._served(iterations, system.reduction, definite=True)
             return True
         if reason <= 0 and reason != INDEFINITE[0]:
-            self._wear.wear_out()
+            self.lifetime.end()
         return False
 
     def _solve_shifted(self, system: "_System", count: LinearCount) -> bool:
@@ -142,7 +131,7 @@ class LinearLadder:
 
     def _run_cg(self, system: "_System", count: LinearCount, *, shifted: bool) -> int:
         """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
-        if not self._due:
+        if not self.lifetime.over:
             reason, iterations = system.run(self._cg, reuse=True, fast=not shifted)
             count.iterations += iterations
             # a matrix that is not positive definite is no fault of the preconditioner
@@ -157,38 +146,33 @@ class LinearLadder:
             self.renew_cg()
             reason, iterations = system.run(self._cg, reuse=False, fast=not shifted)
         count.iterations += iterations
-        self._wear.renew()
+        self.lifetime.renew()
         self._doubtful = reason == INDEFINITE[0]
         if reason > 0:
-            self._wear.add(iterations, system.reduction)
+            self.lifetime.add(iterations, system.reduction)
         elif not self._doubtful:
-            self._wear.wear_out()
+            self.lifetime.end()
         return reason
 
     def _served(self, iterations: int, reduction: float, *, definite: bool) -> None:
         """Takes note of a solve with the kept preconditioner."""
-        self._wear.add(iterations, reduction)
+        self.lifetime.add(iterations, reduction)
         # one made of an indefinite tangent serves its shifts, and then gives way to a better one
         if self._doubtful and definite:
-            self._wear.wear_out()
+            self.lifetime.end()
 
     def _fall_back(self, system: "_System", count: LinearCount) -> None:
-        """Takes the solvers that need no positive definite tangent, one after the other."""
-        for rung, method in FALLBACKS.items():
-            # the operator of a free body is not its matrix, which is singular
-            singular = rung == DIRECT and self.problem.free
-            if rung not in self._fallbacks:
-                self._fallbacks[rung] = self._new_krylov("gmres" if singular else method[0], method[1])
-            with system.tangent.raised(FREE_SHIFT if singular else 0.0):
-                reason, iterations = system.run(self._fallbacks[rung], reuse=False)
-            count.iterations += iterations
-            count.rung = max(count.rung, rung)
-            slope = system.slope
-            if reason > 0 and slope != 0:
-                if slope > 0:  # the way to a saddle: the energy falls in the other direction
-                    system.direction.scale(-1.0)
-                return
-        raise NotConvergedError("no linear solver found a descent direction")
+        """Takes GMRES, which needs no positive definite tangent."""
+        if self._gmres is None:
+            self._gmres = self._new_krylov("gmres")
+        reason, iterations = system.run(self._gmres, reuse=False)
+        count.iterations += iterations
+        count.rung = GMRES
+        slope = system.slope
+        if reason <= 0 or slope == 0:
+            raise NotConvergedError("no linear solver found a descent direction")
+        if slope > 0:  # the way to a saddle: the energy falls in the other direction
+            system.direction.scale(-1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,9 +221,9 @@ class _System:
                 iterations += krylov.getIterationNumber()
             if fast:
                 keep_bounds(krylov)
-        except PETSc.Error:  # a factorisation that broke down
+        except PETSc.Error:  # a factorisation of the coarsest level that broke down
             return 0, 0
         self.direction.scale(-1.0)
-        self.problem.hold(self.direction)
+        self.problem.apply_boundary_conditions(self.direction)
         finite = bool(np.isfinite(self.direction.norm()))
         return krylov.getConvergedReason() if finite else 0, iterations

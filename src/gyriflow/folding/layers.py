@@ -1,9 +1,10 @@
-"""Cortex and core: distance to the pial surface, cortical weight, stiffness and growth of a step.
+"""Cortex and core: distance to the pial surface and its normals, cortical weight, stiffness.
 
 Plain NumPy on whole arrays. Every rank builds the same search structures from the same pial positions, so that fields
 do not depend on the number of ranks.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import igl
@@ -12,9 +13,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, unit, vertex_normals
-from ..mechanics.growth import growth_increments
-from ..parameters.folding import VENTRICLES, FoldingParameters
+from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_at
+from ..units import M_PER_MM, MM_PER_M
+from .points import IntegrationPoints
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,56 +32,10 @@ def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:
     return 1.0 / (1.0 + np.exp(np.minimum(10.0 * (distance / thickness - 1.0), 700.0)))
 
 
-@dataclass(frozen=True, eq=False)
-class Layers:
-    """Fields of a step at (n,) points.
-
-    Attributes
-    ----------
-    weight
-        Cortical weight w.
-    mu
-        Shear modulus in Pa.
-    dg, dr
-        Growth of the step along the pial surface and across it, as stretches less 1.
-    """
-
-    weight: Floats
-    mu: Floats
-    dg: Floats
-    dr: Floats
-
-
-def layers_at(
-    distance_mm: Floats, growth: Floats, parameters: FoldingParameters, maps: Maps, week: float, step_s: float
-) -> Layers:
-    """Returns the fields of a step around a week.
-
-    Parameters
-    ----------
-    distance_mm, growth
-        Distance to the pial surface, and 1 where tissue grows, at (n,) points.
-    maps
-        Parameters' maps at the same points.
-    """
-    p = parameters
-    w = cortical_weight(distance_mm, p.thickness_at(week, maps))
-    tangential, radial, core = (
-        value_at(rate, week, maps)
-        for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
-    )
-    if p.with_ventricles:
-        core = core + maps[VENTRICLES] * (p.ventricle_growth_rate_per_s - core)
-    # where directions are measured, the rates are those of volume
-    across = tangential if p.regional_strain else 0.0
-    dg, dr = growth_increments(w, growth, tangential, radial, core, step_s, across=across)
-    return Layers(
-        weight=w,
-        mu=value_at(p.shear_modulus_core_pa, week, maps) * (1 - w)
-        + value_at(p.shear_modulus_cortex_pa, week, maps) * w,
-        dg=dg,
-        dr=dr,
-    )
+def shear_modulus(p: FoldingParameters, w: Floats, maps: Maps, week: float) -> Floats:
+    """Returns the shear modulus (k,) in Pa at points of cortical weight w (k,), where maps have (k,) values."""
+    core, cortex = (value_at(value, week, maps) for value in (p.shear_modulus_core_pa, p.shear_modulus_cortex_pa))
+    return core * (1 - w) + cortex * w
 
 
 class PialSearch:
@@ -192,3 +148,98 @@ def normals_between(normals: Floats, smooth: Floats, bounded: Floats) -> Floats:
     length = np.linalg.norm(mean, axis=2, keepdims=True)
     heaviest = turned[:, bounded.argmax(axis=1)]
     return np.where(length > 0.1, mean / np.maximum(length, 0.1), heaviest)
+
+
+@dataclass(frozen=True, eq=False)
+class Tissue:
+    """The tissue of a rank's elements at a step's start: how deep it lies, whether it grows, and its maps.
+
+    Linear elements have it at their nodes, quadratic ones at their integration points, so that the cortical weight may
+    fall from 1 to 0 within an element. There the depth is quadratic between the nodes; what jumps between them, growth
+    and maps, is linear between them.
+
+    Attributes
+    ----------
+    cells : (c, 4) or (c, 10) int
+        Local nodes of the elements.
+    vertices : (k,) int
+        Numbers of the local nodes among the vertices of the whole mesh.
+    points
+        The integration points of an element.
+    nodes, depth : (k, 3) and (k,) float
+        Positions of the local nodes and their distances to the pial surface, in m.
+    pial
+        The pial surface.
+    nearest : (k,) int or (k, 3) float
+        The pial vertices nearest to the nodes of linear elements; normals at the nodes of quadratic ones.
+    weight, growing : float
+        Cortical weight, and 1 where tissue grows, else 0: (k,) at nodes or (c, q) at integration points.
+    maps
+        Parameters' maps, likewise.
+    """
+
+    cells: NDArray[np.integer]
+    vertices: NDArray[np.integer]
+    points: IntegrationPoints
+    nodes: Floats
+    depth: Floats
+    pial: PialSearch
+    nearest: NDArray
+    weight: Floats
+    growing: Floats
+    maps: Maps
+
+    @classmethod
+    def of(
+        cls,
+        cells: NDArray[np.integer],
+        vertices: NDArray[np.integer],
+        points: IntegrationPoints,
+        nodes: Floats,
+        pial: PialSearch,
+        growing: Floats,
+        maps: Maps,
+        thickness_mm: Callable[[Maps], float | Floats],
+        thickest_mm: float,
+    ) -> "Tissue":
+        """Returns the tissue from (k,) `growing` and maps at the nodes, other parameters as the attributes.
+
+        `thickness_mm` gives the cortex's where maps have their values, `thickest_mm` is its largest anywhere.
+        """
+        reach = WEIGHT_REACH * thickest_mm * M_PER_MM
+        nearest: NDArray
+        if points.order == 1:
+            to_vertex, nearest = pial.nearest(nodes)
+            depth = pial.distance(nodes, reach, to_vertex)
+            weight = cortical_weight(depth * MM_PER_M, thickness_mm(maps))
+        else:
+            depth, nearest = pial.distance_and_normals(nodes, reach)
+            growing, maps = (
+                growing[cells] @ points.bounded.T,
+                {name: values[cells] @ points.bounded.T for name, values in maps.items()},
+            )
+            within = np.maximum(depth[cells] @ points.smooth.T, 0.0)
+            weight = cortical_weight(within * MM_PER_M, thickness_mm(maps))
+        return cls(cells, vertices, points, nodes, depth, pial, nearest, weight, growing, maps)
+
+    def at_points(self, values: Floats) -> Floats:
+        """Returns (..., c, q) values at the integration points from those at the tissue's own places."""
+        return values[..., self.cells] @ self.points.smooth.T if self.points.order == 1 else values
+
+    def from_vertices(self, values: Floats) -> Floats:
+        """Returns (..., c, q) values at the integration points, linear between those (..., n) of the whole mesh."""
+        linear = self.points.smooth if self.points.order == 1 else self.points.bounded
+        return np.asarray(values[..., self.vertices[self.cells]] @ linear.T)
+
+    def normals(self, wanted: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
+        """Returns which elements (c,) hold a place where a normal is `wanted`, and their (w, q, 3) unit normals.
+
+        Linear elements have one normal each, that of the pial vertex nearest to their centres.
+        """
+        if self.points.order == 1:
+            chosen = np.asarray(wanted[self.cells].any(axis=1))
+            of_cells = self.cells[chosen]
+            normals = self.pial.normals_from(self.nodes[of_cells].mean(axis=1), self.nearest[of_cells])
+            return chosen, np.repeat(normals[:, None], len(self.points.weights), axis=1)
+        chosen = np.asarray(wanted.any(axis=1))
+        return chosen, normals_between(self.nearest[self.cells[chosen]], self.points.smooth, self.points.bounded)

@@ -64,6 +64,17 @@ class StepCount:
     residual: float = np.inf
     converged: bool = False
 
+    @classmethod
+    def of_all(cls, counts: Sequence["StepCount"]) -> "StepCount":
+        """Returns what several solves took together."""
+        return cls(
+            sum(count.newton for count in counts),
+            sum(count.krylov for count in counts),
+            max(count.rung for count in counts),
+            max(count.residual for count in counts),
+            all(count.converged for count in counts),
+        )
+
 
 @dataclass(frozen=True)
 class Iterate:
@@ -118,8 +129,8 @@ class NewtonSolver:
         self._first_left = 0.0  # part of the residual that the first iteration of the step before left
         self.inverting: NDArray[np.float64] | None = None
 
-    def solve(self, *guesses: NDArray[np.float64]) -> StepCount:
-        """Solves for the displacement from the best of some guesses (k, 3) in m; it is left in the problem.
+    def solve(self, guess: NDArray[np.float64]) -> StepCount:
+        """Solves for the displacement from a guess (k, 3) in m; it is left in the problem.
 
         Raises
         ------
@@ -132,7 +143,7 @@ class NewtonSolver:
         if not np.isfinite(at_rest):
             raise NotConvergedError("the forces without any displacement are not finite")
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
-        iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(guesses, at_rest, tolerance))
+        iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(guess, at_rest))
         tangent, before, stalled = None, np.inf, 0
         while iterate.norm > tolerance and not iterate.exhausted:
             norm = iterate.norm
@@ -177,29 +188,21 @@ class NewtonSolver:
         self.problem.set_displacement(displacement)
         return self.problem.residual(self._residual)
 
-    def _begin(self, guesses: Sequence[NDArray[np.float64]], at_rest: float, tolerance: float) -> float:
-        """Goes to the guess that leaves least, none included; returns the norm of the residual there."""
+    def _begin(self, guess: NDArray[np.float64], at_rest: float) -> float:
+        """Goes to the guess, or stays at rest where that leaves less; returns the norm of the residual there."""
         problem = self.problem
-        best, least = np.zeros_like(problem.displacement), at_rest
-        norm = np.nan
-        for guess in guesses:
-            if least <= tolerance:
-                break
-            guess = problem.admissible(guess)
-            problem.set_displacement(problem.largest_step(guess) * guess)
-            norm = problem.residual(self._residual) if problem.smallest_volume_ratio() > 0 else np.nan
-            if norm < least:  # not where it is not a number
-                best, least = problem.displacement.copy(), norm
-        return norm if norm == least else self._residual_at(best)
+        guess = problem.admissible(guess)
+        problem.set_displacement(problem.largest_step(guess) * guess)
+        norm = problem.residual(self._residual) if problem.smallest_volume_ratio() > 0 else np.nan
+        # false where the norm is not a number
+        return norm if norm < at_rest else self._residual_at(np.zeros_like(problem.displacement))
 
     def _reduction(self, norm: float, before: float, tolerance: float) -> float:
         """Returns the part of the residual that the linear solve may leave."""
         floor = self.settings.krylov_tolerance
         enough = 0.4 * tolerance / norm
-        if self.problem.quadratic:
-            return min(enough, floor)
-        if self.problem.contributions:
-            # while contact changes from one iterate to the next, a direction need not be better than the last was
+        if not self.problem.convex:
+            # while forces change abruptly from one iterate to the next, a direction need not be better than the last
             left = norm / before if np.isfinite(before) else self._first_left
             floor = max(floor, min(LOOSE, left**2))
         return enough if enough >= 0.1 * floor else floor
@@ -212,8 +215,8 @@ class NewtonSolver:
         problem, start, norm = self.problem, self.problem.displacement.copy(), iterate.norm
         slope = self._direction.dot(self._residual)
         before = None
-        if problem.contributions:
-            # what they add is not convex, so that the energy is asked where its sum can tell
+        if not problem.convex:
+            # so that the energy is asked where its sum can tell
             before = problem.energy() if iterate.energy is None else iterate.energy
             convex = convex and abs(slope) <= UNRESOLVED * abs(before)
         self._direction.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)

@@ -1,5 +1,7 @@
 """What a run leaves: progress lines, frames for ParaView, the step table, and a summary."""
 
+import json
+import logging
 import resource
 import sys
 from collections.abc import Iterable
@@ -9,14 +11,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..errors import StorageError
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, write_frame
 from ..mechanics.materials import MATERIALS
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
 from ..units import MM_PER_M, week_tag
-from .layers import PialSearch, layers_at
+from .growth import increments_at
+from .layers import PialSearch, cortical_weight, shear_modulus
 from .zones import Zones
+
+log = logging.getLogger(__name__)
 
 Floats = NDArray[np.float64]
 FRAMES = "frames.h5"
@@ -25,9 +31,38 @@ SUMMARY = "summary.json"
 ZONES = "zones.json"
 
 
-def say(text: str) -> None:
-    """Prints a line at once, so that a log follows the run."""
+def say(text: str, event: str = "", **facts: float | str | None) -> None:
+    """Prints a line at once, so that a log follows the run, and tells what has happened, if it is an event."""
     print(text, flush=True)
+    if event:
+        tell(event, **facts)
+
+
+def tell(event: str, **facts: float | str | None) -> None:
+    """Hands an event with its facts on to the file of `write_events`, where there is one."""
+    log.info(event, extra={"facts": facts})
+
+
+def warn(text: str) -> None:
+    """Prints a warning, which is an event too."""
+    say(f"warning: {text}", "warning", message=text)
+
+
+class _Events(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return json.dumps({"event": record.msg, **vars(record)["facts"]})
+
+
+def write_events(path: Path) -> None:
+    """Has all events written to a file from now on, each as a JSON object on a line of its own."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handler = logging.FileHandler(path, mode="w")
+    except OSError as error:
+        raise StorageError("cannot be written", path=path, found=error.strerror) from None
+    handler.setFormatter(_Events())
+    log.setLevel(logging.INFO)
+    log.addHandler(handler)
 
 
 def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
@@ -59,14 +94,16 @@ def layer_fields(
     """
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
-    layers = layers_at(distance, zones.growth, parameters, maps, week, parameters.step_s)
+    weight = cortical_weight(distance, parameters.thickness_at(week, maps))
+    along, across = increments_at(parameters, weight, zones.growth, maps, week, parameters.step_s)
+    mu = shear_modulus(parameters, weight, maps, week)
     material = MATERIALS[parameters.material](parameters.poisson_ratio)
     fields: dict[str, dict[str, NDArray]] = {
         "distance": {"distance_to_pial_mm": distance},
-        "cortex_weight": {"cortex_weight": layers.weight},
-        "growth": {"tangential_growth_per_step": layers.dg, "radial_growth_per_step": layers.dr},
-        "shear_modulus": {"shear_modulus_pa": layers.mu},
-        "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * layers.mu},
+        "cortex_weight": {"cortex_weight": weight},
+        "growth": {"tangential_growth_per_step": along, "radial_growth_per_step": across},
+        "shear_modulus": {"shear_modulus_pa": mu},
+        "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * mu},
         "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in wanted else {},
         "zones": {"zone": vertex_zones(zones, len(positions_mm)), "growing": zones.growth},
     }

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..mechanics.fissure import contact_energy_density
-from ..mechanics.growth import inverse_growth_tensor
 from ..mechanics.kinematics import deformation_gradient, elastic_deformation
 from ..mechanics.materials import Material
 from ..parameters.terms import LEFT_CONTACT, RIGHT_CONTACT
@@ -25,8 +24,8 @@ from .compilation import form_compiler
 from .domain import Domain
 from .multigrid import OrderHierarchy
 from .points import IntegrationPoints
-from .rigid import FreeOperator, RigidMotions
-from .tangent import NODES_PER_TERM, SumOperator, Tangent
+from .rigid import RigidMotions
+from .tangent import NODES_PER_TERM, KeptTangent, Operator, Tangent
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -79,14 +78,9 @@ class Problem:
         Whether the body is unconstrained.
     hierarchy : OrderHierarchy or None
         The linear level below quadratic elements for multigrid, None for linear ones.
-    kept_tangent : bool
-        Whether the elastic part of the last tangent is that of an earlier displacement.
     points : IntegrationPoints
-        Where stiffness, growth, normals and kept stretch are taken: q points in each element.
+        Where stiffness, growth and kept stretch are taken: q points in each element.
     """
-
-    summed = False
-    """Whether products are those of a sum also while there are no contributions."""
 
     def __init__(
         self,
@@ -105,8 +99,9 @@ class Problem:
         self.points = IntegrationPoints.of_degree(domain.order, quadrature_degree)
         # reference coordinates, and parts of the regular element's volume
         self._rule = self.points.places[:, 1:].copy(), self.points.weights / 6
-        self._mu, self._dg, self._dr = (self._field_at_points(()) for _ in range(3))
-        self._N = self._field_at_points((3,))
+        self._mu, self._G_inverse = self._field_at_points(()), self._field_at_points((3, 3))
+        undeformed = np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1))
+        set_at_points(self._G_inverse, undeformed)
 
         # constants, so that other values need no other forms
         ratio = dolfinx.fem.Constant(mesh, material.bulk_to_shear_ratio)
@@ -119,16 +114,16 @@ class Problem:
         dx = ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True)))
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
-        F, Fg_inverse = deformation_gradient(self.u), inverse_growth_tensor(self._dg, self._dr, self._N)
+        F = deformation_gradient(self.u)
         moduli = self._mu, ratio * self._mu
         if remembers_stress:
             self._V = self._field_at_points((3, 3))
-            self.set_stretch(np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1)))
-            Fe = elastic_deformation(F * self._V, Fg_inverse)
+            set_at_points(self._V, undeformed)
+            Fe = elastic_deformation(F * self._V, self._G_inverse)
             # counted per volume of the state without stress
             energy = material.energy_density(Fe, *moduli) / ufl.det(self._V) * dx
         else:
-            Fe = elastic_deformation(F, Fg_inverse)
+            Fe = elastic_deformation(F, self._G_inverse)
             energy = material.energy_density(Fe, *moduli) * dx
         self._outcomes = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
         self._evaluated: dict[str, dolfinx.fem.Expression] = {}
@@ -147,20 +142,15 @@ class Problem:
         self._fixed_owned = np.flatnonzero(fixed.ravel())
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
-        self._blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
+        blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
         self.hierarchy = OrderHierarchy(domain, fixed) if domain.order == 2 else None
-        self._sum: SumOperator | None = None
         self._present: Tangent | None = None
-        self.kept_tangent = False
-        self._elastic: tuple[PETSc.Mat, PETSc.Mat] | None = None  # its elastic part, as a whole and for products
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
-        # elastic forces last asked for; displacement and forces when the tangent was; for products
-        self._forces, self._known_u, self._known_forces, self._change, self._product = (
-            self.new_vector() for _ in range(5)
-        )
+        self._elastic = KeptTangent(blocks, self._tangent, self.vector)
         self._motions: RigidMotions | None = None
-        self._free_operator = FreeOperator(self.vector) if self.free else None
+        self._sum = Operator(self.vector)
+        self._free_operator = Operator(self.vector) if self.free else None
         self.mesh_moved(domain.part)
 
     def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
@@ -168,21 +158,16 @@ class Problem:
         element = basix.ufl.quadrature_element("tetrahedron", shape, points=self._rule[0], weights=self._rule[1])
         return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
 
-    @property
-    def quadratic(self) -> bool:
-        """Whether the energy is quadratic, so that a linear solve ends a step."""
-        return False
-
     def mesh_moved(self, part: NDArray[np.int64]) -> None:
         """Takes note of a mesh that has been placed anew.
 
         Where the body is unconstrained, its rigid motions are taken out of each of the parts that the (n,) numbers of
         all vertices name.
         """
-        self._elastic = None
+        self._elastic.forget()
         if self._free_operator is not None:
             self._motions = RigidMotions(self.domain, part)
-            self._free_operator.set_motions(self._motions)
+            self._free_operator.remove(self._motions)
 
     def admissible(self, values: Floats) -> Floats:
         """Returns (k, 3) displacements of the local nodes in m without the rigid motions of an unconstrained body."""
@@ -197,27 +182,25 @@ class Problem:
         """Returns the rigid motions of the present mesh as a whole."""
         return RigidMotions(self.domain, np.zeros_like(self.domain.part)).null_space(self.vector)
 
-    def set_layers(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
-        """Sets smooth layers: shear modulus (Pa) and growth (k,) at the local nodes, unit normals (c, 3) of cells."""
-        modulus, along, across = (nodal[self.domain.cells] @ self.points.smooth.T for nodal in (mu, dg, dr))
-        repeated = np.repeat(normals[:, None], len(self.points.weights), axis=1)
-        self.set_layers_at_points(modulus, along, across, repeated)
+    def set_shear_modulus(self, mu: Floats) -> None:
+        """Sets the shear modulus (c, q) in Pa at the integration points."""
+        self._elastic.forget()
+        set_at_points(self._mu, mu)
 
-    def set_layers_at_points(self, mu: Floats, dg: Floats, dr: Floats, normals: Floats) -> None:
-        """Sets shear modulus (Pa) and growth increments (c, q), and unit normals (c, q, 3), at integration points."""
-        self._elastic = None
-        for function, values in ((self._mu, mu), (self._dg, dg), (self._dr, dr), (self._N, normals)):
-            set_at_points(function, values)
+    def set_growth(self, G_inverse: Floats) -> None:
+        """Sets the inverse (c, q, 3, 3) of the step's growth tensor at the integration points."""
+        self._elastic.forget()
+        set_at_points(self._G_inverse, G_inverse)
 
     def set_stretch(self, V: Floats) -> None:
         """Sets the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
-        self._elastic = None
+        self._elastic.forget()
         set_at_points(self._V, V)
 
     def outcome(self, name: Literal["deformation", "elastic", "stress"]) -> Floats:
         """Returns the (c, q, 3, 3) tensors at the integration points of the local elements; all ranks have to ask.
 
-        `deformation` is the step's F and `elastic` its Fe = F·V·Fg⁻¹; `stress` is Cauchy's, in Pa, of the energy that
+        `deformation` is the step's F and `elastic` its Fe = F·V·G⁻¹; `stress` is Cauchy's, in Pa, of the energy that
         is minimised. They refer to the mesh before the step: while it has not been placed anew.
         """
         if name not in self._evaluated:
@@ -238,18 +221,17 @@ class Problem:
 
     def energy(self) -> float:
         """Returns the total energy in J, contact included."""
-        return self.elastic_energy() + sum(part.energy() for part in self.contributions)
-
-    def elastic_energy(self) -> float:
-        """Returns the energy in J of all but the contributions."""
-        local = dolfinx.fem.assemble_scalar(self._energy)
-        return float(np.real(self.domain.comm.allreduce(local)))
+        elastic = self.domain.comm.allreduce(dolfinx.fem.assemble_scalar(self._energy))
+        return float(np.real(elastic)) + sum(part.energy() for part in self.contributions)
 
     def residual(self, out: PETSc.Vec) -> float:
         """Assembles the residual in N into `out`, zero where the displacement is fixed, and returns its norm."""
-        self._elastic_residual(out)
+        with out.localForm() as local:
+            local.set(0.0)
+        dolfinx.fem.petsc.assemble_vector(out, self._residual)
+        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         out.array[self._fixed_owned] = 0.0
-        out.copy(self._forces)
+        self._elastic.note_forces(out)
         for part in self.contributions:
             part.add_residual(out)
         out.array[self._fixed_owned] = 0.0
@@ -257,57 +239,35 @@ class Problem:
             self._motions.remove(out.array_w)
         return out.norm()
 
-    def _elastic_residual(self, out: PETSc.Vec) -> None:
-        """Assembles the residual of all but the contributions."""
-        with out.localForm() as local:
-            local.set(0.0)
-        dolfinx.fem.petsc.assemble_vector(out, self._residual)
-        out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-
     def tangent(self, *, within: float = 0.0) -> Tangent:
         """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
 
-        Terms of the contributions are those of the present displacement. The elastic part may be that of an earlier
-        displacement in the same step, where it has foretold, but for a part `within`, how forces changed since it was
-        last asked for; with `within` above 0 the residual must have been asked for last where the tangent is.
+        Terms of the contributions are those of the present displacement. The elastic part may be a kept one where its
+        error is at most a part `within`, see `KeptTangent.at`; the residual must then have been assembled at this
+        displacement.
         """
         # petsc4py keeps what several ranks share until all of them agree to let go of it
         PETSc.garbage_cleanup(self.domain.comm)
         if self._present is not None:
             self._present.set_parts(())  # else its further blocks would stay on the diagonal
-        self.kept_tangent = self._elastic is not None and within > 0 and self._foretold(within)
-        if self._elastic is None or not self.kept_tangent:
-            self._elastic = self._elastic_tangent()
-        self.vector.copy(self._known_u)
-        self._forces.copy(self._known_forces)
-        matrix, products = self._elastic
-        if not (self.contributions or self.summed):
+        matrix, products = self._elastic.at(self.vector, within)
+        if not self.contributions:
             self._present = Tangent(matrix, products, ())
             return self._present
-        if self._sum is None:
-            # one object for all iterates, since multigrid keeps the first it is given
-            self._sum = SumOperator(products)
-            self._sum_matrix = self._sum.as_matrix()
+        self._sum.parts = (products,)
         parts = self._further_parts(convex=False)
-        self._present = Tangent(matrix, self._sum_matrix, parts, NODES_PER_TERM[self.domain.order])
+        self._present = Tangent(matrix, self._sum.matrix, parts, NODES_PER_TERM[self.domain.order])
         return self._present
 
-    def _foretold(self, within: float) -> bool:
-        """Returns whether the kept elastic tangent foretells, but for a part, the change of forces since last asked."""
-        assert self._elastic is not None
-        self._change.waxpy(-1.0, self._known_u, self.vector)
-        self._elastic[1].mult(self._change, self._product)
-        foretold = self._product.norm()
-        self._product.axpy(1.0, self._known_forces)
-        self._product.axpy(-1.0, self._forces)
-        return bool(self._product.norm() <= within * foretold)
+    @property
+    def kept_tangent(self) -> bool:
+        """Whether the elastic part of the last tangent is that of an earlier displacement."""
+        return self._elastic.kept
 
-    def _elastic_tangent(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Returns the tangent of all but the contributions, as a whole and for products."""
-        blocks = self._blocks.blocks
-        blocks.set_value(0.0)
-        dolfinx.fem.assemble_matrix(blocks, self._tangent)
-        return self._blocks.assembled(), self._blocks.for_products()
+    @property
+    def convex(self) -> bool:
+        """Whether the energy is convex but for what large rotations make of it: not with contributions."""
+        return not self.contributions
 
     def convexify(self, tangent: Tangent) -> None:
         """Makes the contributions' terms in the present tangent positive semidefinite."""
@@ -315,14 +275,13 @@ class Problem:
 
     def _further_parts(self, *, convex: bool) -> list[PETSc.Mat]:
         """Returns the contributions' tangents, without entries of fixed components, and has the products know them."""
-        assert self._sum is not None
         parts = [part for part in (part.stiffness(convex=convex) for part in self.contributions) if part is not None]
         for part in parts:
             part.zeroRowsColumns(self._fixed_global, diag=0.0)
-        self._sum.parts = parts
+        self._sum.parts = (self._sum.parts[0], *parts)
         return parts
 
-    def hold(self, direction: PETSc.Vec) -> None:
+    def apply_boundary_conditions(self, direction: PETSc.Vec) -> None:
         """Sets the fixed components of a direction to exactly 0, which preconditioners miss by their tolerance."""
         direction.array[self._fixed_owned] = 0.0
 
@@ -330,7 +289,8 @@ class Problem:
         """Returns what a tangent does to admissible displacements: for a free body, without rigid motions."""
         if self._free_operator is None:
             return tangent
-        self._free_operator.set_tangent(tangent)
+        self._free_operator.parts = (tangent,)
+        self._free_operator.matrix.stateIncrease()
         return self._free_operator.matrix
 
     def largest_step(self, direction: Floats) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh
@@ -16,10 +17,12 @@ from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .following import missed_curves
-from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say
+from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say, warn
 from .simulation import Folding, advance
+from .steering import missed_curves
 from .zones import Zones
+
+Floats = NDArray[np.float64]
 
 
 def run(
@@ -48,11 +51,16 @@ def run(
                 say(note)
     start = mesh.vertices * M_PER_MM
     weeks = parameters.output_weeks
+
+    def save(week: float, positions: Floats) -> None:
+        """Writes the frame of a week; all ranks have to take part."""
+        contact, elements = folding.fields.of_contact(parameters.fields), folding.fields.of_elements(parameters.fields)
+        if comm.rank == 0:
+            save_frame(folder, week, positions, start, zones, folding.growth.parameters, maps, contact, elements)
+
     if state is None:
         state = State.at_start(start, parameters.step_s)
-        contact, elements = folding.contact_fields(parameters.fields), folding.element_fields(parameters.fields)
-        if comm.rank == 0:
-            save_frame(folder, weeks[0], start, start, zones, folding.present, maps, contact, elements)
+        save(weeks[0], start)
     first, resumed, diverged = len(state.rows), time.monotonic(), None
     for before, week in pairwise(weeks):
         until = seconds_to(week, parameters)
@@ -65,17 +73,18 @@ def run(
                 diverged = str(error)
                 break
             arrived = until - state.time_s < 1e-9 * until
-            asked = parameters.fields if arrived else ()
-            contact, elements = folding.contact_fields(asked), folding.element_fields(asked)
+            if arrived:
+                save(week, state.positions)
             if comm.rank == 0:
                 if arrived:
                     for missed in missed_curves([row for row in state.rows if row["week"] > before + 1e-9]):
-                        say(f"warning: {missed}")
-                    save_frame(folder, week, state.positions, start, zones, folding.present, maps, contact, elements)
+                        warn(missed)
                 write_checkpoint(folder / "state.h5", key, state)
+                row, end_week = state.rows[-1], parameters.end_week
                 rate = (time.monotonic() - resumed) / (len(state.rows) - first)
-                steps_left = (parameters.end_week - state.rows[-1]["week"]) * SECONDS_PER_GW / state.step_s
-                say(progress_line(state.rows[-1], parameters.end_week, rate * steps_left))
+                left_s = rate * (end_week - row["week"]) * SECONDS_PER_GW / state.step_s
+                facts = {"week": row["week"], "end_week": end_week, "step": row["step"], "left_s": left_s}
+                say(progress_line(row, end_week, left_s), "step", **facts)
     memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
     processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
     if comm.rank == 0:
@@ -103,8 +112,9 @@ def run(
         finish(out, folder, mesh.tets, weeks, state.rows, summary)
         shutil.rmtree(folder)
         if diverged is not None:
-            say(f"warning: the run diverges and ends at GW {reached:.3f}: {diverged}")
-        say(f"folded to GW {reached:g} in {len(steps)} steps, {summary['seconds']:.0f} s")
+            warn(f"the run diverges and ends at GW {reached:.3f}: {diverged}")
+        ended = f"folded to GW {reached:g} in {len(steps)} steps, {summary['seconds']:.0f} s"
+        say(ended, "end", week=reached, error=diverged)
 
 
 def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:

@@ -1,4 +1,4 @@
-"""Measures of the deformation and stress of elements: plain NumPy on whole arrays.
+"""Measures of the deformation and stress of elements, and the stretch that is carried on: NumPy on whole arrays.
 
 The tensors of a step, elastic deformation and stress, come from the problem that was solved (`Problem.outcome`). Arrays
 of tensors are (c, 3, 3), of scalars (c,).
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.integer]
+UPPER = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
+"""Rows and columns of the six values that a symmetric tensor is kept as."""
 
 
 def deformation_gradients(before: Floats, after: Floats, cells: Ints, slopes: Floats) -> Floats:
@@ -35,12 +37,8 @@ def pressure(stress: Floats) -> Floats:
 
 def von_mises(stress: Floats) -> Floats:
     """Returns the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the stress."""
-    return np.sqrt(1.5) * np.linalg.norm(deviator(stress), axis=(1, 2))
-
-
-def deviator(tensors: Floats) -> Floats:
-    """Returns the (c, 3, 3) tensors less a third of their trace on the diagonal."""
-    return tensors - (np.trace(tensors, axis1=1, axis2=2) / 3)[:, None, None] * np.eye(3)
+    mean = (np.trace(stress, axis1=1, axis2=2) / 3)[:, None, None] * np.eye(3)
+    return np.sqrt(1.5) * np.linalg.norm(stress - mean, axis=(1, 2))
 
 
 def principal_stretches(F: Floats) -> Floats:
@@ -49,29 +47,18 @@ def principal_stretches(F: Floats) -> Floats:
     return np.sqrt(np.linalg.eigvalsh(F @ F.transpose(0, 2, 1)))
 
 
-def hencky_equivalent(stretches: Floats) -> Floats:
+def hencky_equivalent(F: Floats) -> Floats:
     """Returns the (c,) equivalent strains √(2/3 dev h : dev h) of the Hencky strain h = ln V.
 
     It is 0 where the shape is unchanged, and the logarithm of the stretch in a bar drawn out at constant volume.
-
-    Parameters
-    ----------
-    stretches : (c, 3) float
-        Principal stretches, positive.
     """
-    h = np.log(stretches)
+    h = np.log(principal_stretches(F))
     return np.sqrt(2 / 3) * np.linalg.norm(h - h.mean(axis=1, keepdims=True), axis=1)
 
 
-def green_lagrange_maximum(stretches: Floats) -> Floats:
-    """Returns the (c,) largest principal values of the Green-Lagrange strain (FᵀF − I)/2.
-
-    Parameters
-    ----------
-    stretches : (c, 3) float
-        Principal stretches, ascending.
-    """
-    return (stretches[:, -1] ** 2 - 1) / 2
+def green_lagrange_maximum(F: Floats) -> Floats:
+    """Returns the (c,) largest principal values of the Green-Lagrange strain (FᵀF − I)/2."""
+    return (principal_stretches(F)[:, -1] ** 2 - 1) / 2
 
 
 def areal_stretch(F: Floats, N: Floats) -> Floats:
@@ -80,43 +67,32 @@ def areal_stretch(F: Floats, N: Floats) -> Floats:
     return np.linalg.det(F) * np.linalg.norm(rows, axis=1)
 
 
-def stress_fields(stress: Floats) -> dict[str, Floats]:
-    """Returns the equivalent stress and the pressure per element, (c,), in Pa, of Cauchy stresses (c, 3, 3) in Pa."""
-    return {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
+def packed(tensors: Floats) -> Floats:
+    """Returns the (..., 6) values xx, yy, zz, xy, xz, yz of (..., 3, 3) symmetric tensors."""
+    return tensors[..., UPPER[0], UPPER[1]]
 
 
-def elastic_strain_fields(Fe: Floats) -> dict[str, Floats]:
-    """Returns measures per element, (c,), of elastic parts (c, 3, 3) of the deformation: what growth has not made.
-
-    `elastic_strain` is the equivalent Hencky strain, `elastic_volume_strain` ln Je.
-    """
-    return {
-        "elastic_strain": hencky_equivalent(principal_stretches(Fe)),
-        "elastic_volume_strain": np.log(np.linalg.det(Fe)),
-    }
+def unpacked(values: Floats) -> Floats:
+    """Returns the (..., 3, 3) symmetric tensors of (..., 6) values."""
+    tensors = np.empty((*values.shape[:-1], 3, 3))
+    tensors[..., UPPER[0], UPPER[1]] = values
+    tensors[..., UPPER[1], UPPER[0]] = values
+    return tensors
 
 
-def total_strain_fields(F_total: Floats, start_normals: Floats) -> dict[str, Floats]:
-    """Returns measures per element, (c,), of the deformation since the start, growth included.
-
-    Parameters
-    ----------
-    F_total
-        Deformation gradients from the start mesh to the present shape.
-    start_normals : (c, 3) float
-        Unit normals of the nearest pial surface in the start mesh.
-
-    Returns
-    -------
-    dict with
-        `total_strain` (largest principal value of the Green-Lagrange strain), `area_stretch` (along the pial surface)
-    """
-    return {
-        "total_strain": green_lagrange_maximum(principal_stretches(F_total)),
-        "area_stretch": areal_stretch(F_total, start_normals),
-    }
+def unstretched(cells: int, points: int) -> Floats:
+    """Returns the (c, q, 6) stretches of tissue without stress."""
+    return np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (cells, points, 1))
 
 
-def volume_ratio_fields(F_step: Floats, F_total: Floats) -> dict[str, Floats]:
-    """Returns the volumes per element, (c,), over those before the last step and over those of the start mesh."""
-    return {"volume_ratio_step": np.linalg.det(F_step), "volume_ratio": np.linalg.det(F_total)}
+def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
+    """Returns V^power (..., 3, 3) of Fe = V·R: the rotation R has no stress, and an isotropic material forgets it."""
+    squares, axes = np.linalg.eigh(Fe @ Fe.swapaxes(-1, -2))
+    return (axes * squares[..., None, :] ** (power / 2)) @ axes.swapaxes(-1, -2)
+
+
+def relaxed(V: Floats, step_gw: float, memory_gw: float) -> Floats:
+    """Returns (..., 3, 3) stretches after a time: the elastic strain ln V decays as exp(−t/τ), τ = `memory_gw`."""
+    if np.isinf(memory_gw):
+        return V
+    return left_stretch(V, float(np.exp(-step_gw / memory_gw)))

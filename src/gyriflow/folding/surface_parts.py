@@ -62,14 +62,14 @@ class SurfacePart:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """Where the surface was, (s, 3) in mm, when all was looked for that is within two times a reach of each other."""
+class SearchRange:
+    """A search for all pairs within twice a reach, and the positions (s, 3) in mm that the surface had at it."""
 
     centre: Floats
     reach: float
 
     def at(self, distance_mm: float, *places: Floats) -> bool:
-        """Returns whether all that is within a distance at some other positions was found."""
+        """Returns whether the search found all pairs that are within a distance at some other positions."""
         margin = self.reach - distance_mm / 2
         return all(bool(np.abs(place - self.centre).max() <= margin) for place in places)
 
@@ -109,7 +109,7 @@ def part_of_surface(
     owned : (n,) bool
         The vertices.
     reach
-        How far apart, along the axes, two things are at most that make a pair.
+        The largest distance, along the axes, between two things that make a pair.
     """
     if owned.all():
         near = np.ones(len(faces), dtype=bool)

@@ -7,9 +7,12 @@ nodes each time: it stays a small matrix of its own, and joins the other only wh
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+import dolfinx
 import numpy as np
 from petsc4py import PETSc
 
+from .block_matrix import BlockMatrix
+from .rigid import RigidMotions
 from .versions import keeps_old_inverses
 
 NODES_PER_TERM = {1: 4, 2: 12}
@@ -17,25 +20,107 @@ NODES_PER_TERM = {1: 4, 2: 12}
 edges, of which each vertex follows the six nodes of a curved face."""
 
 
-class SumOperator:
-    """The sum of a matrix and of further ones, which change, for a PETSc matrix of type python."""
+class Operator:
+    """The action of a sum of matrices, less the rigid part of the product where the body is unconstrained.
 
-    def __init__(self, matrix: PETSc.Mat) -> None:
-        self.matrix = matrix
+    Parameters
+    ----------
+    like
+        A vector of the matrices' layout.
+
+    Attributes
+    ----------
+    matrix : PETSc.Mat
+        What acts so, symmetric, of type python: one for all iterates, since multigrid keeps the first it is given.
+    parts
+        The matrices, which change; at least one.
+    """
+
+    def __init__(self, like: PETSc.Vec) -> None:
         self.parts: Sequence[PETSc.Mat] = ()
+        self._like = like
+        self._motions: RigidMotions | None = None
+        sizes = like.getSizes()
+        self.matrix = PETSc.Mat().createPython((sizes, sizes), context=self, comm=like.comm)
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self.matrix.setUp()
+
+    def remove(self, motions: RigidMotions) -> None:
+        """Has rigid motions taken out of all products from now on; they become the matrix' null space."""
+        self._motions = motions
+        self.matrix.setNullSpace(motions.null_space(self._like))
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Sets y to the product of the sum with x."""
-        self.matrix.mult(x, y)
-        for part in self.parts:
+        """Sets y to the product with x."""
+        self.parts[0].mult(x, y)
+        for part in self.parts[1:]:
             part.multAdd(x, y, y)
+        if self._motions is not None:
+            self._motions.remove(y.array_w)
 
-    def as_matrix(self) -> PETSc.Mat:
-        """Returns the PETSc matrix that acts like this, symmetric."""
-        matrix = PETSc.Mat().createPython(self.matrix.getSizes(), context=self, comm=self.matrix.comm)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setUp()
-        return matrix
+
+class KeptTangent:
+    """The elastic tangent of a step, kept from one displacement to the next while it predicts how forces change.
+
+    Parameters
+    ----------
+    blocks
+        The matrix that the tangent is assembled into.
+    form
+        The form of the tangent.
+    like
+        A vector of the displacement's layout.
+
+    Attributes
+    ----------
+    kept : bool
+        Whether the last one was that of an earlier displacement.
+    """
+
+    def __init__(self, blocks: BlockMatrix, form: dolfinx.fem.Form, like: PETSc.Vec) -> None:
+        self.kept = False
+        self._blocks, self._form = blocks, form
+        self._known: tuple[PETSc.Mat, PETSc.Mat] | None = None
+        # forces last noted; displacement and forces when the tangent was asked for; for products
+        self._forces, self._at_u, self._at_forces, self._change, self._product = (like.duplicate() for _ in range(5))
+
+    def forget(self) -> None:
+        """Takes note that mesh, stiffness, growth or kept stretch have changed: the next tangent is assembled."""
+        self._known = None
+
+    def note_forces(self, forces: PETSc.Vec) -> None:
+        """Takes note of the elastic forces at the present displacement."""
+        forces.copy(self._forces)
+
+    def at(self, displacement: PETSc.Vec, within: float) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Returns the tangent as a whole and for products: the kept one where that is good enough.
+
+        It is good enough where it predicts the change of the forces since the last call with an error of at most a part
+        `within`. If `within` is above 0, the forces at this displacement must have been noted last.
+        """
+        self.kept = self._known is not None and within > 0 and self.predicts(displacement, within)
+        if self._known is None or not self.kept:
+            self._known = self.assembled()
+        displacement.copy(self._at_u)
+        self._forces.copy(self._at_forces)
+        return self._known
+
+    def predicts(self, displacement: PETSc.Vec, within: float) -> bool:
+        """Returns whether the known tangent predicts the change of forces since the last call to within a part."""
+        if self._known is None:
+            return False
+        self._change.waxpy(-1.0, self._at_u, displacement)
+        self._known[1].mult(self._change, self._product)
+        predicted = self._product.norm()
+        self._product.axpy(1.0, self._at_forces)
+        self._product.axpy(-1.0, self._forces)
+        return bool(self._product.norm() <= within * predicted)
+
+    def assembled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Returns the tangent at the present displacement, as a whole and for products."""
+        self._blocks.blocks.set_value(0.0)
+        dolfinx.fem.assemble_matrix(self._blocks.blocks, self._form)
+        return self._blocks.assembled(), self._blocks.for_products()
 
 
 class Tangent:
@@ -121,8 +206,11 @@ class Tangent:
             self._whole = matrix
 
 
-def block_diagonal(matrix: PETSc.Mat) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the owned global nodes that have entries on their diagonal, (b,), and their (b, 3, 3) blocks."""
+def raising(matrix: PETSc.Mat, nodes_per_term: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns what is to be added to a block diagonal for a further matrix.
+
+    These are the owned global nodes with entries on its diagonal, (b,), and positive semidefinite (b, 3, 3) blocks.
+    """
     start, columns, values = matrix.getValuesCSR()
     first = matrix.getOwnershipRange()[0]
     rows = first + np.repeat(np.arange(len(start) - 1), np.diff(start))
@@ -130,15 +218,9 @@ def block_diagonal(matrix: PETSc.Mat) -> tuple[np.ndarray, np.ndarray]:
     nodes, place = np.unique(rows[own] // 3, return_inverse=True)
     blocks = np.zeros((len(nodes), 3, 3))
     blocks[place, rows[own] % 3, columns[own] % 3] = values[own]
-    return nodes.astype(PETSc.IntType), blocks
-
-
-def raising(matrix: PETSc.Mat, nodes_per_term: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns what is to be added to a block diagonal for a further matrix: nodes, and positive semidefinite blocks."""
-    nodes, blocks = block_diagonal(matrix)
     values, directions = np.linalg.eigh((blocks + blocks.swapaxes(1, 2)) / 2)
     positive = nodes_per_term * np.maximum(values, 0.0)
-    return nodes, np.einsum("bij,bj,bkj->bik", directions, positive, directions)
+    return nodes.astype(PETSc.IntType), np.einsum("bij,bj,bkj->bik", directions, positive, directions)
 
 
 def add_block_diagonal(matrix: PETSc.Mat, nodes: np.ndarray, blocks: np.ndarray) -> None:

@@ -10,15 +10,20 @@ from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
 from ..geometry.triangles import TriangleMesh, face_normals
-from ..parameters.folding import FoldingParameters
+from ..parameters.folding import FoldingParameters, NoGrowth
 from ..parameters.terms import (
     BASE,
     BETWEEN_PLANES,
+    BRIDGE,
     CLAMPED,
+    CORE,
+    CORTEX,
     FLAT_CUTS,
     FREE,
+    LEFT,
     LEFT_CONTACT,
     MEDIAL_WALL,
+    RIGHT,
     RIGHT_CONTACT,
     SHAPE_CUTS,
     SIDE_X,
@@ -27,6 +32,8 @@ from ..parameters.terms import (
 )
 from .layers import PialSearch
 
+Floats = NDArray[np.float64]
+Tags = dict[str, NDArray[np.int32]]
 FLAT = 0.01
 """Part of the extent within which vertices of a flat base or side lie."""
 WALL_MM, WALL_COSINE = 2.0, 0.7
@@ -137,21 +144,23 @@ def _wall_anchors(
     return wall[[middle, away]], np.array([[False, True, True], [False, False, True]])
 
 
-def inside_ellipsoid(
-    vertices: NDArray,
-    shift_y: float,
-    shift_z: float,
-    semi_axes: tuple[float, float, float],
-    side: Side | None = None,
-) -> NDArray[np.bool_]:
-    """Returns which vertices lie in the ellipsoid of no growth; all parameters are fractions of the extents.
+def no_growth_ellipsoid(vertices: Floats, parameters: FoldingParameters) -> tuple[Floats, Floats] | None:
+    """Returns centre and semi-axes, (3,) in mm, of the ellipsoid in which nothing grows; None where there is none."""
+    p = parameters.no_growth
+    if p.kind == "none":
+        return None
+    low, high = brain_box(vertices, parameters.side)
+    shift = np.array([0.0, p.shift_y, p.shift_z])
+    return (low + high) / 2 + shift * (high - low), np.array(p.semi_axes) * (high - low)
 
-    The extents of a brain of one hemisphere are those with its mirror image.
-    """
-    low, high = brain_box(vertices, side)
+
+def inside_ellipsoid(
+    vertices: NDArray, ellipsoid: NoGrowth, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Returns which vertices lie in the ellipsoid of no growth of a brain with (3,) ends `low` and `high`."""
     extent = high - low
-    centre = (low + high) / 2 + np.array([0.0, shift_y, shift_z]) * extent
-    return (((vertices - centre) / (np.array(semi_axes) * extent)) ** 2).sum(axis=1) <= 1
+    centre = (low + high) / 2 + np.array([0.0, ellipsoid.shift_y, ellipsoid.shift_z]) * extent
+    return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(axis=1) <= 1
 
 
 def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64], sides: bool) -> NDArray[np.int64]:
@@ -173,51 +182,26 @@ def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64], sides: bool) -> 
     return zone
 
 
-def find_zones(
-    mesh: TetrahedralMesh,
-    *,
-    fissure_x_mm: float,
-    gap_mm: float,
-    contact: bool,
-    shift_y: float,
-    shift_z: float,
-    semi_axes: tuple[float, float, float],
-    support: str = "ellipsoid",
-    grows_everywhere: bool = False,
-    side: Side | None = None,
-    wall_held: bool = False,
-) -> Zones:
-    """Returns the zones of a brain in RAS+ mm.
+def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
+    """Returns the zones of a brain in RAS+ mm for the parameters of a run.
 
-    Parameters
-    ----------
-    fissure_x_mm
-        Position of the interhemispheric fissure.
-    gap_mm
-        Width of the fissure; the planes stand a quarter of it to the left and to the right of its middle.
-    contact
-        Whether there is contact of any kind: facets near the fissure then are not clamped.
-    shift_y, shift_z, semi_axes
-        The ellipsoid of no growth, in fractions of the brain's extents (Tallinen et al. 2016).
-    support
-        "ellipsoid", "base", "box" or "free", as in `FoldingParameters`.
-    grows_everywhere
-        Whether all tissue grows, that in the ellipsoid and that between the planes too.
-    side
-        The only hemisphere that there is. Its wall towards the other one is MEDIAL_WALL, and the plane that it may not
-        pass is that of the wall.
-    wall_held
-        Whether that wall is clamped; else it slides in its plane.
+    The planes stand a quarter of `contact.gap_mm` to the left and to the right of the fissure's middle. With contact of
+    any kind, facets near the fissure are not clamped. The ellipsoid of no growth is in fractions of the brain's extents
+    (Tallinen et al. 2016). The wall of a hemisphere that is alone is MEDIAL_WALL, and the plane that it may not pass is
+    that of the wall.
     """
+    p = parameters
+    fissure_x_mm, support, side, wall_held = p.fissure_x_mm, p.support, p.side, p.medial_wall == "held"
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
-    left_plane, right_plane = fissure_x_mm - gap_mm / 4, fissure_x_mm + gap_mm / 4
+    left_plane, right_plane = fissure_x_mm - p.contact.gap_mm / 4, fissure_x_mm + p.contact.gap_mm / 4
     if side is not None:
         left_plane = right_plane = float(x.max() if side == "left" else x.min())
     low, high = brain_box(mesh.vertices, side)
     reach = (high - low)[0] / 8
     facet_x = x[facets]
-    still = inside_ellipsoid(mesh.vertices, shift_y, shift_z, semi_axes, side)
+    ellipsoid = p.no_growth
+    still = inside_ellipsoid(mesh.vertices, ellipsoid, low, high)
 
     def faces_where(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Returns the facets on faces of elements at all of whose vertices something holds."""
@@ -226,7 +210,7 @@ def find_zones(
     zone = np.full(len(facets), FREE)
     if support == "ellipsoid":
         zone[faces_where(still[facets])] = CLAMPED
-    if contact:
+    if p.contact.kind != "none":
         zone[faces_where((facet_x > left_plane) & (facet_x < right_plane))] = BETWEEN_PLANES
         zone[faces_where((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))] = LEFT_CONTACT
         zone[faces_where((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))] = RIGHT_CONTACT
@@ -241,7 +225,7 @@ def find_zones(
             anchors = _wall_anchors(mesh.vertices, wall)
 
     growth = np.ones(len(mesh.vertices))
-    if not grows_everywhere:
+    if ellipsoid.kind != "none":
         growth[still] = 0.0
         if side is None:
             growth[bridge_vertices(mesh, facets, left_plane, right_plane)] = 0.0
@@ -261,19 +245,33 @@ def bridge_vertices(
     return np.unique(mesh.tets[(bridging | ~innermost).all(axis=1)])
 
 
-def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
-    """Returns the zones of a brain in RAS+ mm for the parameters of a run."""
-    p = parameters
-    return find_zones(
-        mesh,
-        fissure_x_mm=p.fissure_x_mm,
-        gap_mm=p.contact.gap_mm,
-        contact=p.contact.kind != "none",
-        shift_y=p.no_growth.shift_y,
-        shift_z=p.no_growth.shift_z,
-        semi_axes=p.no_growth.semi_axes,
-        support=p.support,
-        grows_everywhere=p.no_growth.kind == "none",
-        side=p.side,
-        wall_held=p.medial_wall == "held",
-    )
+def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
+    """Returns the (m,) tags of the elements.
+
+    `hemisphere` is LEFT or RIGHT by the element's centroid, BRIDGE between the two contact planes. `growing` is 0
+    where the model lets none of an element's vertices grow, else 1. `layer` is CORTEX or CORE.
+
+    Parameters
+    ----------
+    weight : (n,) float
+        Cortical weight at the vertices; an element is cortex where its mean is above a half.
+    """
+    x = mesh.vertices[mesh.corners, 0].mean(axis=1)
+    left, right = zones.planes_mm
+    return {
+        "hemisphere": np.select([x <= left, x >= right], [LEFT, RIGHT], BRIDGE).astype(np.int32),
+        "growing": (zones.growth[mesh.tets].max(axis=1) > 0).astype(np.int32),
+        "layer": np.where(weight[mesh.tets].mean(axis=1) > 0.5, CORTEX, CORE).astype(np.int32),
+    }
+
+
+def facet_tags(zones: Zones, on_left: NDArray[np.bool_]) -> Tags:
+    """Returns the (f,) tags of `zones.facets`: `zone` as in `zones`, `hemisphere` LEFT or RIGHT.
+
+    Parameters
+    ----------
+    on_left : (f,) bool
+        Which facets belong to the left hemisphere. The fissure may be curved, so that no plane tells.
+    """
+    side = np.where(on_left, LEFT, RIGHT)
+    return {"zone": zones.facet_zone.astype(np.int32), "hemisphere": side.astype(np.int32)}

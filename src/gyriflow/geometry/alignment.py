@@ -1,36 +1,95 @@
-"""Rigid alignment of shapes from a start or from all sides, by steps towards planes."""
+"""Rigid motions: between matched points, and of a shape onto another by iterative closest points."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+import igl
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from .triangles import Floats
+from .triangles import Floats, TriangleMesh, face_normals
 
 CUBE_ROTATIONS: Floats = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
 """The 24 rotations of a cube, none first: no rotation is more than 63 degrees from all of them."""
 
+Planes = tuple[Floats, Floats, Floats, Floats | None]
+"""Points, unit normals of the planes that they are to reach, how far these are along them, and weights."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A rigid motion of one shape onto another, p → rotation p + shift.
-
-    Attributes
-    ----------
-    rotation, shift : (3, 3) and (3,) float
-    residual : float
-        Distance between the shapes that is left, in the unit of the shapes.
-    """
+    """A rigid motion p → rotation p + shift of one shape onto another, and the distance left, in the shapes' unit."""
 
     rotation: Floats
     shift: Floats
     residual: float
 
+    @property
+    def matrix(self) -> Floats:
+        """The (4, 4) motion."""
+        return motion(self.rotation, self.shift)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How an alignment of surfaces is found: points per surface, most rounds, and the moves in mm that end it."""
+
+    points: int
+    rounds: int
+    converged_mm: float
+
+
+CLOSE = Effort(4000, 60, 0.005)
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """A surface with its search tree and its faces' normals."""
+
+    mesh: TriangleMesh
+    tree: igl.AABB
+    normals: Floats
+
+    def nearest(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Returns per point the distance in mm, and the nearest point of the surface with the normal there."""
+        squared, face, on = self.tree.squared_distance(self.mesh.vertices, self.mesh.faces, points)
+        return np.sqrt(squared), on, self.normals[face]
+
+    def spread(self, count: int) -> Floats:
+        """Returns about `count` points spread over the surface, the same in every call."""
+        return self.mesh.vertices[:: max(1, len(self.mesh.vertices) // count)]
+
+
+def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) -> Floats:
+    """Returns the (4, 4) motion p → rotation p + shift; without one of the two, the identity in its place."""
+    matrix = np.eye(4)
+    if rotation is not None:
+        matrix[:3, :3] = rotation
+    if shift is not None:
+        matrix[:3, 3] = shift
+    return matrix
+
 
 def angle_deg(rotation: Floats) -> float:
     """Returns the angle of a (3, 3) rotation in degrees."""
     return float(np.degrees(Rotation.from_matrix(rotation).magnitude()))
+
+
+def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
+    """Returns the (4, 4) rigid motion of (n, 3) points onto matched ones by weighted least squares.
+
+    Kabsch 1976, doi 10.1107/S0567739476001873.
+    """
+    centre, other = (np.average(places, axis=0, weights=weights) for places in (points, onto))
+    turn, _ = Rotation.align_vectors(onto - other, points - centre, weights=weights)
+    return motion(turn.as_matrix(), other - turn.apply(centre))
+
+
+def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floats:
+    """Returns the (n, 3) displacement from `first` to `second`, the latter moved rigidly onto the former."""
+    back = rigid_fit(second, first, weights)
+    return np.asarray(second @ back[:3, :3].T + back[:3, 3] - first)
 
 
 def step_towards_planes(
@@ -41,14 +100,8 @@ def step_towards_planes(
     One step of the point-to-plane iteration (Chen and Medioni 1992): a turn w and a shift t move a point p by
     w × (p − c) + t. Directions in which nothing pulls, such as the turns of a sphere, stay.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float
-        Points, and the unit normals of the planes that they are to reach.
-    ahead : (n,) float
-        How far each plane is, along its normal.
-    weights : (n,) float or None
-        Of the squared distances.
+    The planes that (n, 3) points are to reach have unit `normals` and lie `ahead` (n,) along these; `weights` (n,) are
+    those of the squared distances.
     """
     centre = points.mean(axis=0)
     rows = np.hstack([np.cross(points - centre, normals), normals])
@@ -56,6 +109,82 @@ def step_towards_planes(
     turn, move = np.split(np.linalg.lstsq(rows * size[:, None], ahead * size, rcond=1e-6)[0], 2)
     rotation = Rotation.from_rotvec(turn).as_matrix()
     return rotation, centre + move - rotation @ centre
+
+
+def follow_planes(
+    rotation: Floats,
+    shift: Floats,
+    planes: Callable[[Floats, Floats], Planes],
+    rounds: int,
+    arrived: Callable[[Floats, Floats, Floats], bool],
+    as_matrices: bool = False,
+) -> tuple[Floats, Floats]:
+    """Returns the rotation and shift that iterative closest points lead to from given ones, in at most `rounds` steps.
+
+    `planes` leads from rotation and shift to the moved points and the planes that they are to reach, `arrived` from the
+    points of a step, its turn and its move to whether it is the last one. Steps are put together as (4, 4) matrices on
+    demand: round-off decides which of two equally near faces is taken, which changes results by thousandths.
+    """
+    for _ in range(rounds):
+        points, normals, ahead, weights = planes(rotation, shift)
+        turn, move = step_towards_planes(points, normals, ahead, weights)
+        if as_matrices:
+            whole = motion(turn, move) @ motion(rotation, shift)
+            rotation, shift = whole[:3, :3], whole[:3, 3]
+        else:
+            rotation, shift = turn @ rotation, turn @ shift + move
+        if arrived(points, turn, move):
+            break
+    return rotation, shift
+
+
+def searched(mesh: TriangleMesh) -> Searched:
+    """Returns a surface with its search tree."""
+    tree = igl.AABB()
+    tree.init(mesh.vertices, mesh.faces)
+    return Searched(mesh, tree, face_normals(mesh))
+
+
+def closest_points(a: Searched, b: Searched, start: Fit, effort: Effort, *, as_matrices: bool = False) -> Fit:
+    """Returns the motion of `a` onto `b` that closest points lead to from a motion.
+
+    Each round moves points of both surfaces towards the planes of their nearest faces on the other one. The residual
+    is the mean of the distances of the effort's points, over both directions. `as_matrices`: see `follow_planes`.
+    """
+    of_a, of_b = a.spread(effort.points), b.spread(effort.points)
+
+    def planes(rotation: Floats, shift: Floats) -> Planes:
+        moved = of_a @ rotation.T + shift
+        _, on_b, normals_b = b.nearest(moved)
+        # points of b are taken back to where a is given
+        _, on_a, normals_a = a.nearest((of_b - shift) @ rotation)
+        points = np.concatenate([moved, on_a @ rotation.T + shift])
+        normals = np.concatenate([normals_b, normals_a @ rotation.T])
+        return points, normals, np.einsum("ij,ij->i", np.concatenate([on_b, of_b]) - points, normals), None
+
+    def arrived(points: Floats, turn: Floats, move: Floats) -> bool:
+        moved = points[: len(of_a)]
+        return bool(np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < effort.converged_mm)
+
+    rotation, shift = follow_planes(start.rotation, start.shift, planes, effort.rounds, arrived, as_matrices)
+    return Fit(rotation, shift, mean_distance(a, b, rotation, shift, effort.points))
+
+
+def mean_distance(a: Searched, b: Searched, rotation: Floats, shift: Floats, count: int) -> float:
+    """Returns the mean over both directions of the distance in mm of points of one surface, moved, to the other."""
+    there, _, _ = b.nearest(a.spread(count) @ rotation.T + shift)
+    back, _, _ = a.nearest((b.spread(count) - shift) @ rotation)
+    return float(0.5 * (there.mean() + back.mean()))
+
+
+def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
+    """Returns the (4, 4) rigid motion of a surface onto another in nearly the same pose, by iterative closest points.
+
+    It begins with the surfaces as they are, centroids of the vertices together.
+    """
+    a, b = searched(mesh), searched(onto)
+    apart = b.spread(CLOSE.points).mean(axis=0) - a.spread(CLOSE.points).mean(axis=0)
+    return closest_points(a, b, Fit(np.eye(3), apart, np.inf), CLOSE, as_matrices=True).matrix
 
 
 def fits_from_all_sides(
@@ -69,14 +198,8 @@ def fits_from_all_sides(
 
     An iteration finds the nearest pose that fits, which need not be the best. It is therefore begun `roughly` from
     each of the (3, 3) rotations `starts`; the best few of the poses that differ, and that from the first start, are
-    made `better`, all alike, so that their residuals can be compared.
-
-    Parameters
-    ----------
-    candidates
-        How many poses are compared.
-    apart_deg
-        Rotations that differ by less are one pose.
+    made `better`, all alike, so that their residuals can be compared. `candidates` poses are; rotations that differ by
+    less than `apart_deg` are one pose.
     """
     rough = [roughly(start) for start in starts]
     apart: list[int] = []

@@ -16,14 +16,8 @@ INVERTED_MM = 1e-3
 class Deformation:
     """The map p → A(p + u(p)) from one brain's space to another's, both in RAS+ mm.
 
-    Attributes
-    ----------
-    matrix : (4, 4) float
-        The affine map A.
-    displacement : (i, j, k, 3) float
-        u in mm at the points of a grid in the first brain's space; in between linear, beyond the grid as at its rim.
-    affine : (4, 4) float
-        Index of the grid to RAS+ position in mm.
+    A is the affine (4, 4) `matrix`, u the (i, j, k, 3) `displacement` in mm at the points of a grid in the first
+    brain's space, whose index `affine` (4, 4) leads to RAS+ mm; in between it is linear, beyond the grid as at its rim.
     """
 
     matrix: Floats
@@ -41,12 +35,7 @@ class Deformation:
 class MatchedSurfaces:
     """Surfaces of two brains with the same triangles, whose vertices are the same places of the cortex.
 
-    Attributes
-    ----------
-    first
-        The first brain's surface, in mm.
-    second : (n, 3) float
-        Positions of its vertices in the second brain, in mm.
+    The first brain's surface in mm, and the (n, 3) positions of its vertices in the second brain.
     """
 
     first: TriangleMesh

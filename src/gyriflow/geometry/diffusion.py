@@ -26,29 +26,27 @@ def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
     return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
 
 
-def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:
+def diffuse(
+    vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float, *, steps: int = STEPS
+) -> Floats:
     """Returns (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
 
     Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2. The integral of
-    the values over the mesh stays as it is. 0 returns them as they are.
-
-    Parameters
-    ----------
-    vertices, cells
-        (n, 3) positions in mm, and (m, 3) triangles or (m, 4) tetrahedra, none inverted.
+    the values over the mesh stays as it is. 0 returns them as they are. `vertices` are (n, 3) in mm, `cells` (m, 3)
+    triangles or (m, 4) tetrahedra, none inverted. Fewer implicit `steps` make tails longer than a Gaussian's.
     """
     if sigma_mm == 0:
         return values.copy()
     mass = vertex_sizes(vertices, cells)
     used = mass > 0
-    step = sigma_mm**2 / 2 / STEPS
-    matrix = sparse.csr_matrix(sparse.diags(np.where(used, mass, 1.0)) + step * _stiffness(vertices, cells))
+    step = sigma_mm**2 / 2 / steps
+    matrix = sparse.csr_matrix(sparse.diags(np.where(used, mass, 1.0)) + step * stiffness_matrix(vertices, cells))
     inverse = 1.0 / matrix.diagonal()
     nearly = LinearOperator(matrix.shape, matvec=lambda x: inverse * x.ravel(), dtype=float)
     columns = values.reshape(len(values), -1).T.astype(float)
     smooth = []
     for column in columns:
-        for _ in range(STEPS):
+        for _ in range(steps):
             column, failed = cg(matrix, np.where(used, mass, 1.0) * column, x0=column, M=nearly, rtol=1e-8)
             if failed:
                 raise ValueError(f"diffusion by {sigma_mm:g} mm does not converge: the mesh has degenerate cells")
@@ -60,7 +58,7 @@ def continue_harmonically(
     vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats
 ) -> Floats:
     """Returns (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
-    stiffness = _stiffness(vertices, cells)
+    stiffness = stiffness_matrix(vertices, cells)
     unknown = np.setdiff1d(np.unique(cells), known)
     found = np.zeros((len(vertices), values.shape[1]))
     found[known] = values
@@ -75,7 +73,7 @@ def continue_harmonically(
     return found
 
 
-def _stiffness(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:
+def stiffness_matrix(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:
     """Returns the (n, n) stiffness matrix of linear finite elements, positive semidefinite."""
     cotangents = igl.cotmatrix(np.ascontiguousarray(vertices), np.ascontiguousarray(cells, dtype=np.int64))
     return sparse.csr_matrix(-cotangents)

@@ -1,11 +1,13 @@
-"""Nearest points of a surface whose normal agrees: not the other wall of a sulcus or fissure."""
+"""Where surfaces are near each other, match or cross, and values brought from one to another."""
 
 from dataclasses import dataclass
 
 import igl
+import igl.predicates
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from .triangles import Floats, Ints, TriangleMesh, corners, face_normals, vertex_normals
 
@@ -15,20 +17,14 @@ AGREEING = 0.5
 NEIGHBOURS = (16, 64, 256)
 """How many nearest vertices are looked through for an agreeing one, in turn."""
 
+MIRROR = np.diag([-1.0, 1.0, 1.0])
+
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Points of a surface that were found for n points.
+    """Points of a surface that were found for n points, by the vertices of their face and barycentric weights (n, 3).
 
-    Attributes
-    ----------
-    corners : (n, 3) int
-        Vertices of the face that the point lies on.
-    weights : (n, 3) float
-        Barycentric coordinates there.
-    distance_mm : (n,) float
-    agrees : (n,) bool
-        False where no normal near it agrees, and the nearest point of all was taken.
+    `agrees` (n,) is False where no normal near it agrees, and the nearest point of all was taken.
     """
 
     corners: Ints
@@ -37,16 +33,43 @@ class Match:
     agrees: NDArray[np.bool_]
 
 
+def nearest_on(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Floats]:
+    """Returns the (n,) distances of points from a surface, and the faces and (n, 3) positions of its nearest points."""
+    squared, face, place = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces)
+    return np.sqrt(squared), face.astype(np.int64), place
+
+
+def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
+    """Returns the (n,) thickness in mm at the vertices of the outer surface of the layer between two surfaces.
+
+    It is the mean of two distances: from the vertex to the nearest point of the inner surface, and from there to the
+    nearest point of the outer one (Fischl and Dale 2000, doi 10.1073/pnas.200033797).
+    """
+    there, _, nearest = nearest_on(outer.vertices, inner)
+    back, _, _ = nearest_on(nearest, outer)
+    return 0.5 * (there + back)
+
+
+def faces_that_cross(mesh: TriangleMesh) -> Ints:
+    """Returns the faces that cut other faces, ascending, found with exact predicates."""
+    _, pairs, _ = igl.predicates.find_self_intersections(mesh.vertices, mesh.faces)
+    return np.unique(pairs).astype(np.int64)
+
+
+def crossing_faces(mesh: TriangleMesh) -> int:
+    """Returns the number of faces that cut other faces."""
+    return len(faces_that_cross(mesh))
+
+
 def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
     """Returns for (n, 3) points with unit normals the nearest points of a surface whose normal agrees.
 
-    That is the nearest point of all where the face there agrees; else the nearest of the 256 nearest vertices that
-    does.
+    So the other wall of a sulcus or of the fissure is not taken. It is the nearest point of all where the face there
+    agrees; else the nearest of the 256 nearest vertices that does.
     """
-    squared, face, on = igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)
+    distance, face, on = nearest_on(points, mesh)
     found = mesh.faces[face].astype(np.int64)
-    weights = _barycentric(on, corners(mesh)[face])
-    distance = np.sqrt(squared)
+    weights = barycentric(on, corners(mesh)[face])
     agrees = np.einsum("ij,ij->i", normals, face_normals(mesh)[face]) >= AGREEING
     tree, directions = cKDTree(mesh.vertices), vertex_normals(mesh)
     for count in NEIGHBOURS:
@@ -78,7 +101,7 @@ def labels_at(match: Match, labels: NDArray[np.integer]) -> Ints:
     return np.asarray(labels[match.corners[np.arange(len(nearest)), nearest]], dtype=np.int64)
 
 
-def _barycentric(points: Floats, triangles: Floats) -> Floats:
+def barycentric(points: Floats, triangles: Floats) -> Floats:
     """Returns the (n, 3) coordinates of points in the planes of (n, 3, 3) triangles; flat triangles give a corner."""
     a, b, c = triangles.transpose(1, 0, 2)
     u, v, w = b - a, c - a, points - a
@@ -91,3 +114,26 @@ def _barycentric(points: Floats, triangles: Floats) -> Floats:
     third = np.where(flat, 0.0, (uu * wv - uv * wu) / size)
     weights = np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def spins(count: int, seed: int) -> Floats:
+    """Returns (count, 3, 3) rotations drawn evenly from all (Alexander-Bloch et al. 2018)."""
+    return np.asarray(Rotation.random(count, random_state=np.random.default_rng(seed)).as_matrix())
+
+
+def spun(points: Floats, values: NDArray, rotation: Floats, right: NDArray[np.bool_] | None = None) -> NDArray:
+    """Returns (n,) or (n, k) values at points of a surface or of a solid, rotated over it: a spin.
+
+    They keep their smoothness and lose their place. The points are taken into a ball: about their middle, each axis in
+    units of its half extent. Each takes the value of the point nearest to where the inverse rotation leads. Where the
+    (n,) mask `right` is given, either hemisphere is a ball of its own and the right one is rotated as in a mirror, so
+    that symmetric maps stay symmetric.
+    """
+    moved = np.array(values, copy=True)
+    sides = [np.ones(len(points), dtype=bool)] if right is None else [~right, right]
+    for side, turn in zip(sides, (rotation, MIRROR @ rotation @ MIRROR), strict=False):
+        low, high = points[side].min(axis=0), points[side].max(axis=0)
+        ball = (points[side] - (low + high) / 2) / ((high - low) / 2)
+        _, nearest = cKDTree(ball).query(ball @ turn)
+        moved[side] = values[side][nearest]
+    return moved

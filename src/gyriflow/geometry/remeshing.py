@@ -2,12 +2,20 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py.lib import ImportPETSc
 
-from .meshlab import pymeshlab
 from .triangles import TriangleMesh
+
+# Loaded, not initialised, which would start MPI. The wheel of pymeshlab brings libraries such as OpenSSL under the
+# names of the system's; where they come first, those that PETSc needs cannot be loaded any more.
+ImportPETSc()
+
+import pymeshlab  # noqa: E402
 
 REMESHING_ROUNDS = 5
 UNTANGLING_ROUNDS = 10
+# MeshLab's own
+SHARP_DEG = 30.0
 
 
 def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
@@ -17,11 +25,16 @@ def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
     return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
 
 
-def remesh(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
-    """Returns the surface with triangles close to equilateral, edges of about `edge_length_mm`."""
+def remesh(
+    mesh: TriangleMesh, edge_length_mm: float, rounds: int = REMESHING_ROUNDS, sharp_deg: float = SHARP_DEG
+) -> TriangleMesh:
+    """Returns the surface with triangles close to equilateral, edges of about `edge_length_mm`.
+
+    Edges at which faces meet at more than `sharp_deg` stay where they are.
+    """
     document = in_meshlab(mesh)
     document.meshing_isotropic_explicit_remeshing(
-        iterations=REMESHING_ROUNDS, targetlen=pymeshlab.PureValue(edge_length_mm), checksurfdist=False
+        iterations=rounds, targetlen=pymeshlab.PureValue(edge_length_mm), featuredeg=sharp_deg, checksurfdist=False
     )
     return from_meshlab(document)
 

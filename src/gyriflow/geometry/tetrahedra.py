@@ -5,32 +5,60 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .jacobians import EDGES, coefficients
+from .jacobians import EDGES, coefficients, shape_values
 from .triangles import Floats, Ints, TriangleMesh, frozen
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
 KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
 NODES_OF_ORDER = {1: 4, 2: 10}
-# the face opposite to each corner, seen counter-clockwise from outside
+# the face opposite to each corner, seen counter-clockwise from outside; with nodes on the edges, its four triangles:
+# at its corners in turn, and between the nodes
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+FINE_FACES = (
+    ((1, 5, 8), (5, 2, 9), (8, 9, 3), (5, 9, 8)),
+    ((0, 7, 6), (7, 3, 9), (6, 9, 2), (7, 9, 6)),
+    ((0, 4, 7), (4, 1, 8), (7, 8, 3), (4, 8, 7)),
+    ((0, 6, 4), (6, 2, 5), (4, 5, 1), (6, 5, 4)),
+)
+# the linear elements between the nodes of a quadratic one: at its corners, and round the diagonal from node 6 to 8
+PIECES = (
+    (0, 4, 6, 7),
+    (4, 1, 5, 8),
+    (6, 5, 2, 9),
+    (7, 8, 9, 3),
+    (6, 8, 4, 5),
+    (6, 8, 5, 9),
+    (6, 8, 9, 7),
+    (6, 8, 7, 4),
+)
 PIECES_OF_ORDER = {1: 1, 2: 4}
 """Triangles that a face is made of: one at each corner and one in the middle where it has nodes on its edges."""
+
+FINER = 4
+"""Pieces of each edge of a face: two between neighbouring nodes."""
+LATTICE = np.array([(i, j, FINER - i - j) for i in range(FINER + 1) for j in range(FINER + 1 - i)])
+"""Vertices of the triangles within a face: barycentric coordinates in `FINER`."""
+PLACE = {(i, j, k): place for place, (i, j, k) in enumerate(LATTICE.tolist())}
+LATTICE_TRIANGLES = np.array(
+    [
+        (PLACE[i, j, k], PLACE[second], PLACE[third])
+        for i, j, k in PLACE
+        for second, third in (((i + 1, j, k - 1), (i, j + 1, k - 1)), ((i, j + 1, k - 1), (i - 1, j + 1, k)))
+        if second in PLACE and third in PLACE
+    ]
+)
+"""The (16, 3) triangles of the lattice, all turned alike."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetrahedralMesh:
-    """A tetrahedral mesh of linear or of quadratic elements.
+    """A tetrahedral mesh of linear or of quadratic elements: (n, 3) nodes in mm, and (m, 4) or (m, 10) elements.
 
-    Attributes
-    ----------
-    vertices : (n, 3) float
-        Positions of the nodes in mm: the corners of elements and, of quadratic ones, the nodes on their edges too.
-    tets : (m, 4) or (m, 10) int
-        Node indices in the order of VTK: four corners, and the nodes on the edges 01, 12, 02, 03, 13, 23. Volumes are
-        positive.
+    Elements are indices of nodes in the order of VTK: four corners, and the nodes on the edges 01, 12, 02, 03, 13, 23.
+    Volumes are positive.
     """
 
     vertices: Floats
@@ -94,7 +122,7 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
     """Returns for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
     pairs = np.stack(np.broadcast_arrays(mesh.tets[:, :1], mesh.tets[:, 1:]), axis=-1).reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
+    graph = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
@@ -125,46 +153,16 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
 def linear_pieces(mesh: TetrahedralMesh) -> Ints:
     """Returns the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight of each quadratic one.
 
-    One lies at each corner, four fill the octahedron between them, round its diagonal from the middle of edge (0, 2) to
-    that of (1, 3). Positive volumes stay positive where the sides are straight.
+    Positive volumes stay positive where the sides are straight.
     """
-    if mesh.order == 1:
-        return mesh.tets
-    node = {frozenset(edge): 4 + i for i, edge in enumerate(EDGES)}
-    m = {(i, j): node[frozenset((i, j))] for i in range(4) for j in range(4) if i != j}
-    one, other = m[0, 2], m[1, 3]
-    ring = (m[0, 1], m[1, 2], m[2, 3], m[0, 3])
-    pieces = [
-        (0, m[0, 1], m[0, 2], m[0, 3]),
-        (m[0, 1], 1, m[1, 2], m[1, 3]),
-        (m[0, 2], m[1, 2], 2, m[2, 3]),
-        (m[0, 3], m[1, 3], m[2, 3], 3),
-        *((one, other, ring[i], ring[(i + 1) % 4]) for i in range(4)),
-    ]
-    return np.asarray(mesh.tets[:, pieces]).reshape(-1, 4)
-
-
-def faces_of_elements(order: int) -> Ints:
-    """Returns the (4, p, 3) places in an element of its faces' triangles, outward; p is `PIECES_OF_ORDER`.
-
-    A face with corners a, b, c and nodes on its edges is split into (a, ab, ca), (ab, b, bc), (ca, bc, c) and
-    (ab, bc, ca).
-    """
-    if order == 1:
-        return np.array(FACES)[:, None, :]
-    node = {frozenset(edge): 4 + i for i, edge in enumerate(EDGES)}
-    split = []
-    for a, b, c in FACES:
-        ab, bc, ca = node[frozenset((a, b))], node[frozenset((b, c))], node[frozenset((c, a))]
-        split.append([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)])
-    return np.array(split)
+    return mesh.tets if mesh.order == 1 else np.asarray(mesh.tets[:, PIECES]).reshape(-1, 4)
 
 
 def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     """Returns the (f, 3) triangles of the faces that belong to one element only, outward, and the (f,) element of each.
 
-    Outward holds for elements of positive volume. The triangles of one quadratic element's face follow each other, see
-    `faces_of_elements`.
+    Outward holds for elements of positive volume. The four triangles of one quadratic element's face follow each other:
+    with corners a, b, c, these are (a, ab, ca), (ab, b, bc), (ca, bc, c) and (ab, bc, ca).
     """
     faces = np.sort(mesh.tets[:, FACES].reshape(-1, 3))
     # one number per face: much faster than comparing rows
@@ -172,7 +170,7 @@ def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     _, first, counts = np.unique(faces @ [count * count, count, 1], return_index=True, return_counts=True)
     outer = np.sort(first[counts == 1])
     pieces = PIECES_OF_ORDER[mesh.order]
-    triangles = mesh.tets[:, faces_of_elements(mesh.order)].reshape(-1, pieces, 3)[outer]
+    triangles = mesh.tets[:, FACES if mesh.order == 1 else FINE_FACES].reshape(-1, pieces, 3)[outer]
     return triangles.reshape(-1, 3), np.repeat(outer // 4, pieces)
 
 
@@ -194,3 +192,35 @@ def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
     faces, _ = boundary_faces(mesh)
     used, local = np.unique(faces, return_inverse=True)
     return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3)), used
+
+
+def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
+    """Returns a finer surface of curved faces: weights (t, n) of the nodes at its vertices, and its (16 f, 3) faces.
+
+    Its first n vertices are the nodes. The (4 f, 3) triangles are those between the nodes 0 to n − 1, each face's four
+    as `boundary_faces` has them.
+    """
+    split = triangles.reshape(-1, 4, 3)
+    nodes = np.concatenate([split[:, [0, 1, 2], [0, 1, 2]], split[:, 3]], axis=1)
+    # those of a tetrahedron's face whose nodes are 0, 1, 2 and 4, 5, 6
+    on_lattice = shape_values(np.pad(LATTICE / FINER, ((0, 0), (0, 1))))[:, [0, 1, 2, 4, 5, 6]]
+    weights = np.broadcast_to(on_lattice, (len(nodes), len(LATTICE), 6)).reshape(-1, 6)
+    names = np.repeat(nodes, len(LATTICE), axis=0)
+    # a vertex is the same for all faces that have it: by the nodes that it follows, and how much
+    parts = np.rint(weights * 2 * FINER).astype(np.int64)
+    names = np.where(parts == 0, -1, names)
+    order = np.argsort(names, axis=1, kind="stable")
+    keys = np.concatenate([np.take_along_axis(names, order, 1), np.take_along_axis(parts, order, 1)], axis=1)
+    at_node = (parts == 2 * FINER).sum(axis=1) * ((parts != 0).sum(axis=1) == 1) > 0
+    count = int(triangles.max()) + 1
+    number = np.empty(len(keys), dtype=np.int64)
+    number[at_node] = names[at_node].max(axis=1)
+    _, first, place = np.unique(keys[~at_node], axis=0, return_index=True, return_inverse=True)
+    number[~at_node] = count + place.ravel()
+    between = np.flatnonzero(~at_node)[first]
+    rows = np.repeat(np.arange(count, count + len(between)), 6)
+    columns = np.maximum(names[between], 0).ravel()
+    own = sparse.coo_array((weights[between].ravel(), (rows - count, columns)), shape=(len(between), count))
+    matrix = sparse.csr_array(sparse.vstack([sparse.eye_array(count), own]))
+    faces = number.reshape(-1, len(LATTICE))[:, LATTICE_TRIANGLES].reshape(-1, 3)
+    return matrix, faces

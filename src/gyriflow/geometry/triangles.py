@@ -22,15 +22,7 @@ def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """A triangle surface.
-
-    Attributes
-    ----------
-    vertices : (n, 3) float
-        Positions in mm.
-    faces : (m, 3) int
-        Vertex indices, counter-clockwise seen from outside.
-    """
+    """A triangle surface: (n, 3) vertices in mm, and (m, 3) faces, their indices counter-clockwise from outside."""
 
     vertices: Floats
     faces: Ints

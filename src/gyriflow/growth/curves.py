@@ -123,30 +123,25 @@ def fitted(
     many weeks, those far from the curve lose their weight (Tukey's biweight, begun from least absolute deviations).
     The standard deviation is Bayesian (Wahba 1983), with the scatter of the weeks about the curve.
 
-    Parameters
-    ----------
-    weeks, values
-        Gestational weeks, at least two different ones, and positive sizes; several brains may share a week.
-
-    Raises
-    ------
-    InputError
-        For other values, and where the sizes shrink and that is not allowed.
+    Gestational weeks are at least two different ones, and sizes positive; several brains may share a week. InputError
+    for other values, and where the sizes shrink and that is not allowed.
     """
     weeks_, values_ = _checked(weeks, values, name)
     count = len(np.unique(weeks_))
     degrees = min(degrees_of_freedom, max(count - 1.0, 2.0))
-    basis = _Basis(weeks_[0], weeks_[-1])
-    design, logs = basis.sizes(weeks_), np.log(values_)
-    penalty = basis.penalty(2 if degrees >= 3 else 1)
+    ends = weeks_[0], weeks_[-1]
+    design, logs = _design(weeks_, *ends), np.log(values_)
+    penalty = _penalty(*ends, order=2 if degrees >= 3 else 1)
     strength = _strength(design, penalty, degrees)
     weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
     coefficients = _solved(design, logs, weights, strength * penalty, may_shrink)
     if not may_shrink and coefficients[1:].max() < 1e-6:
         _refuse_shrinking(name, weeks_)
-    spread = _scatter(logs - design @ coefficients, weights, degrees)
-    at = np.linspace(weeks_[0], weeks_[-1], max(2, round((weeks_[-1] - weeks_[0]) / SPACING_WEEKS) + 1))
-    rows = basis.sizes(at)
+    left = weights.sum() - degrees
+    squares = (weights * (logs - design @ coefficients) ** 2).sum()
+    spread = np.sqrt(squares / left) if left > 0.5 else np.nan
+    at = np.linspace(*ends, max(2, round((ends[1] - ends[0]) / SPACING_WEEKS) + 1))
+    rows = _design(at, *ends)
     free = np.ones(len(coefficients), dtype=bool)
     free[1:] = may_shrink | (coefficients[1:] > 1e-8)
     normal = (design.T * weights) @ design + strength * penalty
@@ -184,32 +179,25 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-class _Basis:
-    """Sizes whose rate of growth is a quadratic spline: column 0 is the logarithm at the first week."""
+def _design(weeks: Floats, first: float, last: float) -> Floats:
+    """Returns the (n, 1 + k) matrix of the logarithm, whose rate is a quadratic spline: column 0 is that at `first`."""
+    integral = BSpline(_knots(first, last), np.eye(KNOT_INTERVALS + 2), 2, extrapolate=False).antiderivative()
+    return np.column_stack([np.ones(len(weeks)), integral(weeks) - integral(first)])
 
-    def __init__(self, first: float, last: float) -> None:
-        inner = np.linspace(first, last, KNOT_INTERVALS + 1)
-        knots = np.concatenate([[first] * 2, inner, [last] * 2])
-        self.first = first
-        self.splines = [BSpline(knots, row, 2, extrapolate=False) for row in np.eye(KNOT_INTERVALS + 2)]
-        self.integrals = [spline.antiderivative() for spline in self.splines]
 
-    def sizes(self, weeks: Floats) -> Floats:
-        """Returns the (n, 1 + k) design matrix of the logarithm."""
-        columns = [integral(weeks) - integral(self.first) for integral in self.integrals]
-        return np.stack([np.ones(len(weeks)), *columns], axis=1)
+def _penalty(first: float, last: float, order: int) -> Floats:
+    """Returns the (1 + k, 1 + k) matrix of squared differences of the rate."""
+    # the end knots lie together, so differences are those of the splines' middles
+    knots = _knots(first, last)
+    middles = 0.5 * (knots[1:-2] + knots[2:-1])
+    slopes = np.diff(np.eye(len(middles)), axis=0) / np.diff(middles)[:, None]
+    if order == 2:
+        slopes = np.diff(slopes, axis=0) / (0.5 * (middles[2:] - middles[:-2]))[:, None]
+    return np.pad(slopes.T @ slopes, ((1, 0), (1, 0)))
 
-    def penalty(self, order: int) -> Floats:
-        """Returns the (1 + k, 1 + k) matrix of squared differences of the rate."""
-        # the end knots lie together, so differences are those of the splines' middles
-        middles = np.array([np.mean(spline.t[i + 1 : i + 3]) for i, spline in enumerate(self.splines)])
-        slopes = np.diff(np.eye(len(middles)), axis=0) / np.diff(middles)[:, None]
-        if order == 2:
-            gaps = 0.5 * (middles[2:] - middles[:-2])
-            slopes = np.diff(slopes, axis=0) / gaps[:, None]
-        matrix = np.zeros((1 + len(middles),) * 2)
-        matrix[1:, 1:] = slopes.T @ slopes
-        return matrix
+
+def _knots(first: float, last: float) -> Floats:
+    return np.concatenate([[first] * 2, np.linspace(first, last, KNOT_INTERVALS + 1), [last] * 2])
 
 
 def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
@@ -221,12 +209,10 @@ def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
         normal = design.T @ design
         return float(np.trace(solve(normal + 10**exponent * penalty + ridge, normal, assume_a="pos"))) - degrees
 
-    low, high = -8.0, 8.0
-    if excess(low) <= 0:
-        return 10**low
-    if excess(high) >= 0:
-        return 10**high
-    return float(10 ** brentq(excess, low, high))
+    for end, sign in ((-8.0, 1), (8.0, -1)):
+        if sign * excess(end) <= 0:
+            return float(10**end)
+    return float(10 ** brentq(excess, -8.0, 8.0))
 
 
 def _solved(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool) -> Floats:
@@ -237,8 +223,7 @@ def _solved(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_
     right = np.concatenate([np.sqrt(weights) * logs, np.zeros(len(root))])
     if may_shrink:
         return np.linalg.lstsq(rows, right, rcond=None)[0]
-    lowest = np.full(design.shape[1], 0.0)
-    lowest[0] = -np.inf
+    lowest = np.append(-np.inf, np.zeros(design.shape[1] - 1))
     return np.asarray(lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls").x)
 
 
@@ -261,11 +246,6 @@ def _robust_weights(
     return weights
 
 
-def _scatter(residuals: Floats, weights: Floats, degrees: float) -> float:
-    left = weights.sum() - degrees
-    return float(np.sqrt((weights * residuals**2).sum() / left)) if left > 0.5 else float("nan")
-
-
 def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     at = np.asarray(week, dtype=float)
     inside = np.clip(at, curve.weeks[0], curve.weeks[-1])
@@ -276,12 +256,8 @@ def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
 
 def _checked(weeks: Sequence[float], values: Sequence[float], name: str) -> tuple[Floats, Floats]:
     weeks_, values_ = np.asarray(weeks, dtype=float), np.asarray(values, dtype=float)
-    bad = (
-        weeks_.shape != values_.shape
-        or not np.isfinite(weeks_).all()
-        or not (np.isfinite(values_) & (values_ > 0)).all()
-    )
-    if bad or len(np.unique(weeks_)) < 2:
+    good = weeks_.shape == values_.shape and np.isfinite([*weeks_, *values_]).all() and (values_ > 0).all()
+    if not good or len(np.unique(weeks_)) < 2:
         raise InputError(
             f"no {name} goes through these weeks",
             found=f"weeks {weeks_.tolist()}, values {values_.tolist()}",

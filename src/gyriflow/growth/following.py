@@ -5,12 +5,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from .curves import Curve, Fit, fitted, tabulated, value
-
-Floats = NDArray[np.float64]
 
 QUANTITIES = ("area_cm2", "volume_ml")
 """Sizes that growth follows, as columns of the table of areas."""
@@ -27,13 +24,9 @@ def fits_of_series(
 ) -> dict[str, dict[str, Fit]]:
     """Returns the curves through the measured sizes of each series of brains, by series and quantity.
 
-    Parameters
-    ----------
-    areas
-        Columns series, week, area_cm2, volume_ml, and of `MORE` what is known; series of two weeks or more. Where
-        brains of less than two weeks have a thickness or ventricles, no curve of these is fitted; they may shrink.
-    until
-        The last week whose brains count; series that then have less than two weeks are left out. None for all.
+    Areas have the columns series, week, area_cm2, volume_ml, and of `MORE` what is known; series of two weeks or more.
+    Where brains of less than two weeks have a thickness or ventricles, no curve of these is fitted; they may shrink.
+    `until` is the last week whose brains count; series that then have less than two weeks are left out.
     """
     if until is not None:
         areas = areas[areas["week"] <= until]
@@ -47,8 +40,9 @@ def fits_of_series(
                 known = known[known[quantity] > 0]
             if quantity in QUANTITIES or len(known["week"].unique()) > 1:
                 shrink = may_shrink or quantity in MORE
-                curve = fitted(known["week"].tolist(), known[quantity].tolist(), name=quantity, may_shrink=shrink)
-                fits[str(name)][quantity] = curve
+                fits[str(name)][quantity] = fitted(
+                    *known[["week", quantity]].to_numpy().T, name=quantity, may_shrink=shrink
+                )
     return fits
 
 
@@ -65,16 +59,11 @@ def followed_sizes(
         Columns series, known_until_gw (NaN for curves through all weeks), quantity, week, value of the curves through
         measured brains; needed where one is `measured`.
     series
-        Name of the start brain's series.
+        That of the start brain; InputError where it is in none.
     weeks
         Output weeks of the run.
     shrink
         Whether a given table may shrink.
-
-    Raises
-    ------
-    InputError
-        Where the start brain is in no series.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
@@ -93,14 +82,7 @@ def followed_sizes(
 def curves_of_run(follow: Mapping[str, Any] | None, curves: pd.DataFrame | None, series: str | None) -> list[Curve]:
     """Returns the curves of `QUANTITIES` that a run followed, or those through the measured brains.
 
-    There are none without either.
-
-    Parameters
-    ----------
-    follow
-        The sizes in the run's parameters; None where its growth was prescribed.
-    curves, series
-        As for `followed_sizes`.
+    There are none without either. `follow` holds the sizes in the run's parameters; None where growth was prescribed.
     """
     if follow is not None:
         return [tabulated(list(follow[name]), list(follow[name].values()), may_shrink=True) for name in QUANTITIES]
@@ -108,13 +90,7 @@ def curves_of_run(follow: Mapping[str, Any] | None, curves: pd.DataFrame | None,
 
 
 def stretch_of_surface(curves: pd.DataFrame, series: str | None, week: float, end_week: float) -> float:
-    """Returns by how much lengths on the measured brains' surface grow between two weeks, on average; at least 1.
-
-    Parameters
-    ----------
-    curves, series
-        As for `followed_sizes`.
-    """
+    """Returns by how much lengths on the measured brains' surface grow between two weeks, on average; at least 1."""
     first, last = value(_measured(curves, series, "area_cm2"), [week, end_week])
     return max(1.0, float(np.sqrt(last / first)))
 
@@ -136,10 +112,6 @@ def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str, un
             found = f"its brains have no {quantity} in {weeks_known}"
         else:
             found = f"the start brain is in no series of brains of {weeks_known}"
-        raise InputError(
-            f"no measured curve of {quantity} can be followed",
-            found=found,
-            remedy=remedy,
-        )
+        raise InputError(f"no measured curve of {quantity} can be followed", found=found, remedy=remedy)
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
     return Curve(weeks, values, np.zeros(len(rows)))

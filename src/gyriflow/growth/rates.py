@@ -21,22 +21,12 @@ TISSUES = ("tissue", "ventricles", "cortex")
 
 
 def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3: Sequence[float]) -> pd.DataFrame:
-    """Returns the growth rates between successive weeks.
+    """Returns the growth rates between successive weeks, in any order: at least two, with positive sizes.
 
     The cortex grows in its surface: α = (θ^(1/2) − 1)/Δt with the growth multiplier θ = A₂/A₁ (the paper's equation,
-    dim = 2). The core grows in volume: ((V₂/V₁)^(1/3) − 1)/Δt, the same equation with dim = 3. Δt is the true time
-    between the two weeks, so that a gap of several weeks gives the mean rate over it.
-
-    These rates refer to the size at the start of the interval. The folding model grows by (1 + rate·dt) in every step,
-    so that its growth compounds: rates for it are ln(θ)/(2Δt) and ln(V₂/V₁)/(3Δt), which reproduce the ratios as long
-    as the steps are short.
-
-    Parameters
-    ----------
-    weeks
-        Gestational weeks, at least two, in any order.
-    areas_mm2, volumes_mm3
-        Cortical area and brain volume of each week.
+    dim = 2), the core in volume: ((V₂/V₁)^(1/3) − 1)/Δt (dim = 3), with Δt the true time between the two weeks. These
+    rates refer to the size at the start of the interval. The folding model grows by (1 + rate·dt) in every step: rates
+    for it, which reproduce the ratios as long as steps are short, are ln(θ)/(2Δt) and ln(V₂/V₁)/(3Δt).
 
     Returns
     -------
@@ -44,28 +34,24 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
         from_week, to_week, area_ratio (θ), rate_per_s, compound_rate_per_s, volume_ratio, core_rate_per_s,
         core_compound_rate_per_s, by ascending week.
 
-    Raises
-    ------
-    InputError
-        Where a week is there twice, or a number is missing or not positive.
+    InputError where a week is there twice, or a number is missing or not positive.
     """
     columns = {"weeks": weeks, "areas_mm2": areas_mm2, "volumes_mm3": volumes_mm3}
-    values = {name: np.asarray(column, dtype=float) for name, column in columns.items()}
-    lengths = {name: len(column) for name, column in values.items()}
+    lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
         raise InputError("each week needs an area and a volume", found=lengths)
-    for name, column in values.items():
+    table = pd.DataFrame(columns, dtype=float)
+    for name, column in table.items():
         if not (np.isfinite(column) & (column > 0)).all():
             raise InputError(f"{name} that are not positive numbers", found=column.tolist())
-    if len(values["weeks"]) < 2:
+    if len(table) < 2:
         raise InputError(
             "a growth rate is between two ages",
-            found=f"{len(values['weeks'])} brain(s)",
+            found=f"{len(table)} brain(s)",
             expected="at least two",
             remedy="List brains of other weeks under `brains`",
         )
-    order = np.argsort(values["weeks"], kind="stable")
-    week, area, volume = (values[name][order] for name in columns)
+    week, area, volume = table.sort_values("weeks", kind="stable").to_numpy().T
     twice = week[1:][np.diff(week) == 0]
     if len(twice):
         raise InputError(
@@ -93,19 +79,15 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
 def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
     """Returns the growth rates of each series of brains: the table of `growth_rates` under its name, in `series`.
 
-    Parameters
-    ----------
-    areas
-        Columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean. Where it has
-        tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and
-        tissue_compound_rate_per_s, …, ln(V₂/V₁)/(3Δt), too; NaN where they are not known.
+    Areas have the columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean. Where
+    they have tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and
+    tissue_compound_rate_per_s, …, ln(V₂/V₁)/(3Δt), too; NaN where they are not known.
     """
     tables = []
     for name, brains in areas.groupby("series", sort=False):
-        weekly = brains.groupby("week", as_index=False)[["area_cm2", "volume_ml"]].mean()
-        weeks, area_cm2, volume_ml = (weekly[column].tolist() for column in weekly)
-        areas_mm2, volumes_mm3 = [a / CM2_PER_MM2 for a in area_cm2], [v / ML_PER_MM3 for v in volume_ml]
-        rates = growth_rates(weeks, areas_mm2, volumes_mm3)
+        weekly = brains.groupby("week")[["area_cm2", "volume_ml"]].mean()
+        areas_mm2, volumes_mm3 = weekly["area_cm2"] / CM2_PER_MM2, weekly["volume_ml"] / ML_PER_MM3
+        rates = growth_rates(weekly.index.tolist(), areas_mm2.tolist(), volumes_mm3.tolist())
         rates.insert(0, "series", name)
         seconds = (rates["to_week"] - rates["from_week"]) * SECONDS_PER_GW
         for tissue in TISSUES:
@@ -120,12 +102,8 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
 def agreement(areas: pd.DataFrame) -> pd.DataFrame:
     """Returns how far series of brains agree with the first one: differences of their rates between common weeks.
 
-    Rates are taken between the successive weeks that both series have, so that the intervals are the same.
-
-    Parameters
-    ----------
-    areas
-        As for `rates_of_series`.
+    Rates are taken between the successive weeks that both series have, so that the intervals are the same. Areas are as
+    for `rates_of_series`.
 
     Returns
     -------
@@ -135,45 +113,28 @@ def agreement(areas: pd.DataFrame) -> pd.DataFrame:
         common weeks.
     """
     names = list(dict.fromkeys(areas["series"]))
-    compared = [f"{kind}{column}" for kind in ("", "core_") for column in _COMPARED]
-    tables = [pd.DataFrame(columns=["series", "reference", "from_week", "to_week", *compared])]
+    columns = ["series", "reference", "from_week", "to_week"]
+    columns += [f"{kind}{of}_per_s" for kind in ("", "core_") for of in ("rate", "reference_rate", "difference")]
+    tables = [pd.DataFrame(columns=columns)]
     for name in names[1:]:
         pair = [areas[areas["series"] == series] for series in (name, names[0])]
         weeks = set(pair[0]["week"]) & set(pair[1]["week"])
         if len(weeks) > 1:
-            rates, others = (rates_of_series(brains[brains["week"].isin(weeks)]) for brains in pair)
-            table = rates[["series", "from_week", "to_week"]].assign(reference=names[0])
+            table, others = (rates_of_series(brains[brains["week"].isin(weeks)]) for brains in pair)
             for kind in ("", "core_"):
-                rate, other = rates[f"{kind}rate_per_s"], others[f"{kind}rate_per_s"]
-                for column, values in zip(_COMPARED, (rate, other, rate - other), strict=True):
-                    table[f"{kind}{column}"] = values
-            tables.append(table)
-    return pd.concat(tables[1:] or tables, ignore_index=True)[tables[0].columns]
-
-
-_COMPARED = ("rate_per_s", "reference_rate_per_s", "difference_per_s")
+                table[f"{kind}reference_rate_per_s"] = other = others[f"{kind}rate_per_s"]
+                table[f"{kind}difference_per_s"] = table[f"{kind}rate_per_s"] - other
+            tables.append(table.assign(reference=names[0])[columns])
+    return pd.concat(tables[1:] or tables, ignore_index=True)
 
 
 def rate_curve(
     rates: pd.DataFrame, column: str, *, allow_negative: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the weeks and the values (1/s) of a growth rate over time: each interval's rate stands at its middle.
+    """Returns the weeks and the values (1/s) of a column of `growth_rates`, each rate in the middle of its interval.
 
-    The rate is linear in between and constant outside.
-
-    Parameters
-    ----------
-    rates
-        Table of `growth_rates`.
-    column
-        Name of the rate's column.
-    allow_negative
-        Whether a rate may be below 0.
-
-    Raises
-    ------
-    InputError
-        Where a rate is negative and must not be, all such intervals named.
+    The rate is linear in between and constant outside. InputError where rates are negative and must not be, all such
+    intervals named.
     """
     below = rates[rates[column] < 0]
     if len(below) and not allow_negative:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..geometry.spins import spins, spun
+from ..geometry.matching import spins, spun
 from ..geometry.triangles import Floats
+from ..parameters.folding import AXES
 from ..parameters.folding import STRAIN as PARTS
 
 SLOWEST, FASTEST = -1.0, 3.0
@@ -22,6 +23,41 @@ CORTEX, STRAIN = "cortex", "strain"
 def regional_map(week: float, part: str = "") -> str:
     """Returns the name of the map of relative growth from a week on, of all tissue or of a part such as `cortex`."""
     return "_".join(filter(None, ("regional_growth", part, f"{week:05.2f}")))
+
+
+def target_map(week: float) -> str:
+    """Returns what the names of the maps of positions that a mesh is to have at a week begin with."""
+    return f"target_{week:05.2f}"
+
+
+def target_maps(weeks: Sequence[float], positions: Floats) -> dict[str, Floats]:
+    """Returns the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at w weeks."""
+    return {
+        f"{target_map(week)}_{axis}": values
+        for week, places in zip(weeks, positions, strict=True)
+        for axis, values in zip(AXES, places.T, strict=True)
+    }
+
+
+def map_names(weeks: Sequence[float], follow: Mapping[str, Any], unmatched: str | None) -> dict[str, dict[float, str]]:
+    """Returns the parameters that name the maps of regional growth, by the week from which each map holds.
+
+    Parameters
+    ----------
+    weeks
+        Of the brains between which growth is known.
+    follow
+        The settings.
+    unmatched
+        Why surfaces did not tell of growth.
+    """
+    known = known_weeks(weeks, follow["known_until_gw"], unmatched)
+    parts = {"regional_growth": ""}
+    if follow["directional"] > 0:
+        parts["regional_strain"] = STRAIN
+    if follow["cortex"] == "area":
+        parts["regional_growth_of_cortex"] = CORTEX
+    return {name: {week: regional_map(week, part) for week in known} for name, part in parts.items()}
 
 
 def known_weeks(weeks: Sequence[float], until: float | None, unmatched: str | None = None) -> list[float]:
@@ -69,47 +105,35 @@ def regional_maps(
     points, right
         (n, 3) vertices, and (n,) whether they are on the right.
     follow
-        The settings.
+        The settings. Maps are `rotated`, and multiplied by normal `noise` cut at three standard deviations, where these
+        ask for it.
     """
     first = known_weeks(weeks, follow["known_until_gw"])
-    local = {"": regional_growth(weeks, growth["volume"], sizes["volume"], follow)}
+
+    def smooth(rates: Floats) -> Floats:
+        return smoothed_over_weeks(rates[: len(first)], list(weeks)[: len(first) + 1], follow["smoothing_gw"])
+
+    local = {"": relative_growth(smooth(growth["volume"]), sizes["volume"], follow["regional"])}
     if follow["cortex"] == "area":
         pial = np.flatnonzero(sizes["area"] > 0)
-        of_pial = regional_growth(weeks, growth["area"][:, pial], sizes["area"][pial], follow)
+        of_pial = relative_growth(smooth(growth["area"][:, pial]), sizes["area"][pial], follow["regional"])
         # the area of a place inside the cortex is that of the pial surface over it
         local[CORTEX] = of_pial[:, cKDTree(points[pial]).query(points)[1]]
     found: dict[str, Floats] = {}
     if follow["directional"] > 0:
-        strain = growth["strain"][: len(first)]
-        smooth = smoothed_over_weeks(
-            strain.reshape(len(strain), -1), list(weeks)[: len(first) + 1], follow["smoothing_gw"]
-        )
-        for week, values in zip(first, smooth.reshape(strain.shape), strict=True):
+        strain = growth["strain"]
+        parts = smooth(strain.reshape(len(strain), -1)).reshape(len(first), *strain.shape[1:])
+        for week, values in zip(first, parts, strict=True):
             name = regional_map(week, STRAIN)
             found |= {f"{name}_{part}": follow["directional"] * values[:, i] for i, part in enumerate(PARTS)}
+    # null models, the same for all weeks and parts: maps rotated over the hemispheres, and noise
+    noise = np.clip(np.random.default_rng(follow["seed"]).standard_normal(len(points)), -3, 3)
     for part, maps in local.items():
-        drawn = as_null_model(maps, points, right, follow)
+        if follow["rotated"]:
+            maps = spun(points, maps.T, spins(1, follow["seed"])[0], right).T
+        drawn = maps * (1 + follow["noise"] * noise)
         found |= {regional_map(week, part): values for week, values in zip(first, drawn, strict=True)}
     return found
-
-
-def regional_growth(weeks: Sequence[float], rates: Floats, weights: Floats, follow: Mapping[str, Any]) -> Floats:
-    """Returns the (k, n) maps of relative growth that a run knows, one for each of its `known_weeks`.
-
-    Parameters
-    ----------
-    weeks
-        (w + 1,) of the brains, ascending.
-    rates
-        (w, n) local log growth per week between them.
-    weights
-        (n,) sizes that belong to the vertices.
-    follow
-        The settings: regional, smoothing_gw, known_until_gw.
-    """
-    known = len(known_weeks(weeks, follow["known_until_gw"]))
-    smooth = smoothed_over_weeks(rates[:known], list(weeks)[: known + 1], follow["smoothing_gw"])
-    return relative_growth(smooth, weights, follow["regional"])
 
 
 def smoothed_over_weeks(rates: Floats, weeks: Sequence[float], sigma_gw: float) -> Floats:
@@ -125,37 +149,12 @@ def smoothed_over_weeks(rates: Floats, weeks: Sequence[float], sigma_gw: float) 
     return np.asarray(kernel / kernel.sum(axis=1, keepdims=True) @ rates)
 
 
-def as_null_model(maps: Floats, points: Floats, right: NDArray[np.bool_], follow: Mapping[str, Any]) -> Floats:
-    """Returns (k, n) maps of relative growth rotated over the hemispheres and with noise, where settings ask for it.
-
-    Both are the same for all k maps. The noise is normal, cut at three standard deviations.
-
-    Parameters
-    ----------
-    points, right
-        (n, 3) vertices, and (n,) whether they are on the right.
-    follow
-        The settings: rotated, noise, seed.
-    """
-    if follow["rotated"]:
-        maps = spun(points, maps.T, spins(1, follow["seed"])[0], right).T
-    noise = np.random.default_rng(follow["seed"]).standard_normal(maps.shape[1])
-    return np.asarray(maps * (1 + follow["noise"] * np.clip(noise, -3, 3)))
-
-
 def relative_growth(rates: Floats, weights: Floats, amplitude: float) -> Floats:
     """Returns (w, n) local growth as a multiple of the whole's: 1 where all grows alike.
 
-    Parameters
-    ----------
-    rates
-        (w, n) local log growth per week in each interval.
-    weights
-        (n,) sizes that belong to the vertices.
-    amplitude
-        0 for uniform growth, 1 for differences as measured.
-
-    InputError where the whole does not grow in an interval, so that there is nothing to be a multiple of.
+    Rates are (w, n) local log growth per week, weights the (n,) sizes of the vertices; the amplitude is 0 for uniform
+    growth, 1 for differences as measured. InputError where the whole does not grow in an interval, so that there is
+    nothing to be a multiple of.
     """
     whole = np.average(rates, axis=1, weights=weights)[:, None]
     if (whole <= 0).any():

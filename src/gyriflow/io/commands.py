@@ -27,22 +27,11 @@ DOCKER = ("docker", "podman")
 def run_command(command: str, files: Mapping[str, AnyPath], made: str, container: str | None = None) -> None:
     """Runs a shell command, in the working directory, with its output in the log.
 
-    Parameters
-    ----------
-    command
-        With places such as {image} for the files.
-    files
-        Path of each such place.
-    made
-        The place of the file that the command has to make.
-    container
-        Image in which the command runs: "docker://NAME" or a .sif file. The files' folders are seen in it.
+    The command has places such as {image} for the `files`; the one in the place `made` it has to make. It runs in the
+    image `container`, "docker://NAME" or a .sif file, where one is given: the files' folders are seen in it.
 
-    Raises
-    ------
-    InputError
-        With the last lines of the output, where the command ends in another code than 0 or makes no file; where a
-        place stands in quotes, in which a path could not be quoted.
+    InputError, with the last lines of the output, where the command ends in another code than 0 or makes no file; where
+    a place stands in quotes, in which a path could not be quoted.
     """
     paths = {name: Path(path).absolute() for name, path in files.items()}
     command = _with_paths(command, paths)

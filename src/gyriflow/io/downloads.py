@@ -5,21 +5,17 @@ A hidden file `.part.NAME` collects the bytes. It survives a broken connection a
 
 import fcntl
 import gzip
-import hashlib
 import shutil
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
-from ..errors import StorageError
-from .files import AnyPath
-
-if TYPE_CHECKING:
-    import requests
+from ..errors import InputError, StorageError
+from .files import AnyPath, sha256_of
 
 TRIES = 4
 """Attempts without a single new byte before a file is given up."""
@@ -37,37 +33,29 @@ PART = ".part."
 Say = Callable[[str], None]
 
 
-def sha256_of(path: AnyPath) -> str:
-    """Returns the SHA-256 of a file; StorageError where it cannot be read."""
-    try:
-        with Path(path).open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise StorageError("cannot be read", path=path, found=error.strerror or error) from error
+def require_checksums(known: Mapping[str, tuple[str, str]]) -> None:
+    """Raises InputError where a file is not that of an atlas: by its path `known` has the atlas and the SHA-256."""
+    for path, (atlas, sha256) in known.items():
+        if sha256_of(path) != sha256:
+            raise InputError(
+                f"is not the file of {atlas}",
+                path=path,
+                found="another SHA-256",
+                expected=sha256,
+                remedy="Delete it, and it is fetched; or give a changed file as a brain of your own under brains",
+            )
 
 
 def fetch(path: AnyPath, url: str, say: Say, *, sha256: str | None = None, size: int | None = None) -> None:
     """Fetches a file, or checks the one that is there, which is never replaced.
 
-    Parameters
-    ----------
-    path
-        Where the file is put, whole and checked; missing folders are made.
-    url
-        Where it is to be had.
-    say
-        Is called with a line of progress.
-    sha256
-        Its checksum; where there is none, the file has to be a GIFTI or NIfTI file that can be read to its end.
-    size
-        Its size in bytes, for which there has to be room.
+    It comes from the URL, is checked, and put under `path`; missing folders are made. `say` is called with lines of
+    progress. Where no checksum is known, a GIFTI or NIfTI file has to be readable to its end. There has to be room for
+    the size in bytes, if it is known.
 
-    Raises
-    ------
-    StorageError
-        Where the server cannot be reached, lacks the file or sends something else, the file that is there is another
-        one, another process fetches it, or the folder cannot be written. Nothing is left under `path` then; what came
-        of a broken download lies in `.part.NAME`, with which the next call goes on.
+    StorageError where the server cannot be reached, lacks the file or sends something else, the file that is there is
+    another one, another process fetches it, or the folder cannot be written. Nothing is left under `path` then; what
+    came of a broken download lies in `.part.NAME`, with which the next call goes on.
     """
     import pooch
 
@@ -109,65 +97,64 @@ def _alone_with(part: Path) -> Iterator[IO[bytes]]:
         finally:
             if part.exists() and not part.stat().st_size:
                 part.unlink()
-                _version_file(part).unlink(missing_ok=True)
 
 
 def _download(
     url: str, output_file: str, _pooch: object, *, part: Path, file: IO[bytes], say: Say, sha256: str | None
 ) -> None:
     """Makes a file of a URL, as pooch asks its downloaders to, out of what is gathered in `part`."""
+    # pooch makes it empty, and it would stay behind if this process were killed
+    Path(output_file).unlink(missing_ok=True)
+    if sha256 is None and not part.name.endswith(".gz"):
+        # nothing would tell whether it is half of another version
+        file.truncate(0)
+    while True:
+        resumed = part.stat().st_size > 0
+        _gather(url, part, file, say)
+        try:
+            _check(part, part.name.removeprefix(PART), sha256)
+            break
+        except ValueError:
+            file.truncate(0)
+            if not resumed:
+                raise
+    part.replace(output_file)
+
+
+def _gather(url: str, part: Path, file: IO[bytes], say: Say) -> None:
+    """Adds to a half file what it lacks, trying again where the connection breaks."""
     import requests
     import urllib3
 
-    # pooch makes it empty, and it would stay behind if this process were killed
-    Path(output_file).unlink(missing_ok=True)
     tries, most = TRIES, 0
     while True:
         try:
-            _go_on(url, part, file, say)
-            break
+            return _go_on(url, part, file, say)
         except (requests.RequestException, urllib3.exceptions.HTTPError) as error:
             response = getattr(error, "response", None)
             status = 0 if response is None else response.status_code
             size = part.stat().st_size
             tries = TRIES - 1 if size > most else tries - 1
             most = max(most, size)
-            # 4xx is an answer that stays the same, but for a server that is asked too often
-            if not tries or (400 <= status < 500 and status != 429):
+            # 4xx is an answer that stays the same, but for a part beyond the end and a server that is asked too often
+            if not tries or (400 <= status < 500 and status not in (416, 429)):
                 raise
             time.sleep(FIRST_WAIT_S * 2 ** (TRIES - 1 - tries))
-    try:
-        _check(part, part.name.removeprefix(PART), sha256)
-    except ValueError:
-        _empty(part, file)
-        raise
-    part.replace(output_file)
-    _version_file(part).unlink(missing_ok=True)
 
 
 def _go_on(url: str, part: Path, file: IO[bytes], say: Say) -> None:
-    """Adds to a half file what it lacks, where the server can send that and has the same version still; else all."""
+    """Adds to a half file what it lacks, where the server can send that; else all."""
     import requests
 
-    version = _version_file(part)
-    have = part.stat().st_size if version.exists() else 0
+    have = part.stat().st_size
     # without compression on the way, positions in the file are those in the answer
-    headers = {"Accept-Encoding": "identity"}
-    if have:
-        headers |= {"Range": f"bytes={have}-", "If-Range": version.read_text()}
+    headers = {"Accept-Encoding": "identity"} | ({"Range": f"bytes={have}-"} if have else {})
     with requests.get(url, stream=True, headers=headers, timeout=TIMEOUT_S) as response:
-        resumed = response.status_code == 206 and response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
-        if response.status_code == 416 or (response.status_code == 206 and not resumed):
-            _empty(part, file)
-            raise requests.ConnectionError("the server sent another part of the file than the one asked for")
-        response.raise_for_status()
-        if not resumed:
-            _empty(part, file)
+        if response.status_code in (200, 416):
+            file.truncate(0)
             have = 0
-            if mark := _version_of(response):
-                version.write_text(mark)
-        length = response.headers.get("Content-Length")
-        total = have + int(length) if length else None
+        response.raise_for_status()
+        total = have + int(response.headers.get("Content-Length", 0))
         told = time.monotonic()
         for chunk in response.raw.stream(CHUNK_BYTES, decode_content=False):
             file.write(chunk)
@@ -175,32 +162,22 @@ def _go_on(url: str, part: Path, file: IO[bytes], say: Say) -> None:
             have += len(chunk)
             if time.monotonic() - told > LINE_EVERY_S:
                 told = time.monotonic()
-                say(f"  {have / BYTES_PER_MB:.1f} MB" + (f" of {total / BYTES_PER_MB:.1f}" if total else ""))
-    if total is not None and have != total:
-        raise requests.ConnectionError(f"the connection broke after {have} of {total} bytes")
-
-
-def _empty(part: Path, file: IO[bytes]) -> None:
-    file.truncate(0)
-    _version_file(part).unlink(missing_ok=True)
-
-
-def _version_file(part: Path) -> Path:
-    """Returns the file that names the version of which a half file is a part."""
-    return part.with_name(f"{part.name}.version")
-
-
-def _version_of(response: "requests.Response") -> str | None:
-    """Returns what a server can be asked to compare before it sends a part; None where it gave nothing that serves."""
-    tag = response.headers.get("ETag", "")
-    return tag if tag and not tag.startswith("W/") else response.headers.get("Last-Modified")
+                say(f"  {have / BYTES_PER_MB:.1f} of {total / BYTES_PER_MB:.1f} MB")
 
 
 def _check(path: Path, name: str, sha256: str | None) -> None:
     """Raises ValueError where a file is not the one of a checksum or, where none is known, no whole one of its kind."""
-    kind = _what_is_wrong(path, name)
-    if kind:
-        raise ValueError(kind)
+    with path.open("rb") as file:
+        start = file.read(1024)
+    if name.endswith(".gz"):
+        try:
+            with gzip.open(path) as unpacked:
+                while unpacked.read(1 << 20):
+                    pass
+        except (OSError, EOFError, zlib.error):
+            raise ValueError(f"no whole gzip file; it begins with {start[:40]!r}") from None
+    if name.endswith(".gii") and not (b"<GIFTI" in start and path.read_bytes().rstrip().endswith(b"</GIFTI>")):
+        raise ValueError(f"no whole GIFTI file; it begins with {start[:40]!r}")
     if sha256 is not None and (found := sha256_of(path)) != sha256:
         raise ValueError(f"the SHA-256 {found} instead of {sha256}")
     if sha256 is None and name.endswith((".nii", ".nii.gz", ".gii")):
@@ -214,22 +191,6 @@ def _check(path: Path, name: str, sha256: str | None) -> None:
                 np.asanyarray(image.dataobj)
         except Exception as error:
             raise ValueError(f"a file that cannot be read: {error}") from error
-
-
-def _what_is_wrong(path: Path, name: str) -> str | None:
-    """Returns what shows that a file is not a whole one of the kind its name says; None for a good or unknown one."""
-    with path.open("rb") as file:
-        start = file.read(1024)
-    if name.endswith(".gz"):
-        try:
-            with gzip.open(path) as unpacked:
-                while unpacked.read(1 << 20):
-                    pass
-        except (OSError, EOFError, zlib.error):
-            return f"no whole gzip file; it begins with {start[:40]!r}"
-    if name.endswith(".gii") and not (b"<GIFTI" in start and path.read_bytes().rstrip().endswith(b"</GIFTI>")):
-        return f"no whole GIFTI file; it begins with {start[:40]!r}"
-    return None
 
 
 @contextmanager

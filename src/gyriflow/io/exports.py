@@ -8,12 +8,11 @@ from pathlib import Path
 import pandas as pd
 
 from ..errors import InputError
-from ..parameters.terms import SIDES, STRUCTURES
+from ..parameters.terms import STRUCTURES, Side
 from .files import AnyPath, replaced, write_json, write_table
 from .surfaces import read_vertex_maps, write_vertex_maps
 
 MEASURED = "real"
-BIDS_VERSION = "1.9.0"
 BIDS_MAPS = {
     "mean_curvature": "curv",
     "sulcal_depth_mm": "sulc",
@@ -25,30 +24,23 @@ BIDS_MAPS = {
     "spangy_dominant_band": "desc-spangyBand_shape",
     "reliable": "desc-reliable_shape",
 }
-"""Entities and suffix of each map's file."""
+"""Entities and suffix of the files of maps that BIDS, or a label of this project's own, names."""
 
 
 @dataclass(frozen=True)
 class ExportedBrain:
-    """A brain at a week, and its files.
+    """A brain at a week, and its files by the sides that it has; regions may be empty.
 
-    Attributes
-    ----------
-    brain, run, week
-        As in the tables; the run is "real" for measured brains.
-    subject
-        Who was scanned; the brain where that is not said.
-    surfaces, maps, regions
-        By side; regions may be empty.
+    The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said.
     """
 
     brain: str
     run: str
     week: float
     subject: str
-    surfaces: Mapping[str, str]
-    maps: Mapping[str, str]
-    regions: Mapping[str, str]
+    surfaces: Mapping[Side, str]
+    maps: Mapping[Side, str]
+    regions: Mapping[Side, str]
 
 
 def export_plain(folder: AnyPath, brains: Sequence[ExportedBrain], tables: Mapping[str, pd.DataFrame]) -> None:
@@ -71,15 +63,9 @@ def export_bids(
     brains of one subject have the same session.
     """
     folder = Path(folder)
-    write_json(
-        folder / "dataset_description.json",
-        {
-            "Name": "gyriflow",
-            "BIDSVersion": BIDS_VERSION,
-            "DatasetType": "derivative",
-            "GeneratedBy": [{"Name": "gyriflow", "Version": version}],
-        },
-    )
+    made_by = [{"Name": "gyriflow", "Version": version}]
+    described = {"Name": "gyriflow", "BIDSVersion": "1.9.0", "DatasetType": "derivative", "GeneratedBy": made_by}
+    write_json(folder / "dataset_description.json", described)
     people: list[tuple[str, str, str, float]] = []
     taken: dict[tuple[str, str, str], ExportedBrain] = {}
     for brain in brains:
@@ -94,18 +80,20 @@ def export_bids(
         if brain.run == MEASURED:
             people.append((name, session, brain.brain, brain.week))
         run = "" if brain.run == MEASURED else f"_acq-{_alphanumeric(brain.run)}"
-        for side in SIDES:
+        for side, surface in brain.surfaces.items():
             stem = folder / name / session / "anat" / f"{name}_{session}{run}_hemi-{side[0].upper()}"
-            _copy(brain.surfaces[side], f"{stem}_pial.surf.gii")
+            _copy(surface, f"{stem}_pial.surf.gii")
             for quantity, values in read_vertex_maps(brain.maps[side]).items():
-                write_vertex_maps(f"{stem}_{BIDS_MAPS[quantity]}.shape.gii", {quantity: values}, STRUCTURES[side])
-            if brain.regions:
+                # a map that BIDS has no name for is described by its own
+                kind = BIDS_MAPS.get(quantity, f"desc-{_alphanumeric(quantity.title())}_shape")
+                write_vertex_maps(f"{stem}_{kind}.shape.gii", {quantity: values}, STRUCTURES[side])
+            if side in brain.regions:
                 _copy(brain.regions[side], f"{stem}_desc-regions_dseg.label.gii")
-    columns = ["participant_id", "session_id", "brain", "gestational_age_weeks"]
-    _write_tsv(folder / "participants.tsv", pd.DataFrame(people, columns=columns)[columns[:1]].drop_duplicates())
-    _write_tsv(folder / "sessions.tsv", pd.DataFrame(people, columns=columns))
-    for name, table in tables.items():
-        _write_tsv(folder / f"{name}.tsv", table)
+    sessions = pd.DataFrame(people, columns=["participant_id", "session_id", "brain", "gestational_age_weeks"])
+    participants = sessions[["participant_id"]].drop_duplicates()
+    for name, table in {"participants": participants, "sessions": sessions, **tables}.items():
+        with replaced(folder / f"{name}.tsv") as temporary:
+            table.to_csv(temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a")
 
 
 def _alphanumeric(text: str) -> str:
@@ -116,8 +104,3 @@ def _alphanumeric(text: str) -> str:
 def _copy(source: AnyPath, target: AnyPath) -> None:
     with replaced(target) as temporary:
         shutil.copyfile(source, temporary)
-
-
-def _write_tsv(path: AnyPath, table: pd.DataFrame) -> None:
-    with replaced(path) as temporary:
-        table.to_csv(temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a")

@@ -1,22 +1,49 @@
-"""Files that appear whole or not at all: temporary names and renames, JSON and tables."""
+"""Files that appear whole or not at all: temporary names and renames, JSON, tables, HDF5; and what a file was."""
 
+import hashlib
 import json
 import math
 import shutil
 import uuid
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError, StorageError
 
+if TYPE_CHECKING:
+    import h5py
+    import pandas as pd
+
 AnyPath = str | PathLike[str]
+AGAIN = "The file may be truncated or of another kind: copy or export it again."
+
+
+@contextmanager
+def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN) -> Iterator[None]:
+    """Turns what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # readers raise whatever a file leads them into; meshio ends the program
+        reason = "no such file" if isinstance(error, FileNotFoundError) else error
+        # of a pair of files the one that is not there
+        path = getattr(error, "filename", None) or path
+        raise InputError(f"cannot be read as {kind}: {reason}", path=path, expected=expected, remedy=remedy) from error
+
+
+def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> None:
+    """Raises InputError where some of a file's (n,) or (n, k) values, such as the coordinates of vertices, are none."""
+    bad = int(np.count_nonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
+    if bad:
+        raise InputError(f"has NaN or infinite {what}", path=path, found=f"{bad} {of}", expected="none")
 
 
 @contextmanager
@@ -66,25 +93,19 @@ def _plain(value: Any) -> Any:
 
 def write_json(path: AnyPath, content: Any) -> None:
     """Writes plain Python and numpy values as JSON; NaN and infinity become null."""
-    text = json.dumps(_plain(content), indent=2, ensure_ascii=False)
-    with replaced(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + "\n")
 
 
 def read_json(path: AnyPath) -> Any:
     """Returns the content of a JSON file; InputError where it is missing or torn."""
-    try:
+    with reading(path, "JSON", remedy=None):
         return json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"cannot be read as JSON: {error}", path=path) from error
 
 
 def read_text(path: AnyPath) -> str:
     """Returns a text file; InputError where it is missing."""
-    try:
+    with reading(path, "text", remedy=None):
         return Path(path).read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read as text: {error}", path=path) from error
 
 
 def write_text(path: AnyPath, text: str) -> None:
@@ -93,7 +114,7 @@ def write_text(path: AnyPath, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def write_table(path: AnyPath, table: pd.DataFrame) -> None:
+def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
     """Writes a table as CSV without its index, ten significant digits."""
     with replaced(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.10g")
@@ -101,14 +122,14 @@ def write_table(path: AnyPath, table: pd.DataFrame) -> None:
 
 def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     """Returns the rows of a tab-separated table with a heading, as texts by column; InputError where it is none."""
-    try:
+    import pandas as pd  # takes half a second, as h5py does below, which most readers need not wait for
+
+    with reading(path, "a tab-separated table", remedy=None):
         table = _read_texts(path)
         # rows that are longer than the heading have names before it, as R writes them, or tabs at their end
         if (table.iloc[:, -table.index.nlevels :] == "").all(axis=None) and not isinstance(table.index, pd.RangeIndex):
             with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):
                 table = _read_texts(path, index_col=False)
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read as a tab-separated table: {error}", path=path) from error
     rows = [{str(name).strip(): value.strip() for name, value in row.items()} for row in table.to_dict("records")]
     for number, row in enumerate(rows, start=2):
         for name, value in row.items():
@@ -124,13 +145,67 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     return rows
 
 
-def _read_texts(path: AnyPath, index_col: Literal[False] | None = None) -> pd.DataFrame:
+def _read_texts(path: AnyPath, index_col: Literal[False] | None = None) -> "pd.DataFrame":
+    import pandas as pd
+
     return pd.read_csv(path, sep="\t", dtype=str, keep_default_na=False, encoding="utf-8-sig", index_col=index_col)
 
 
-def read_table(path: AnyPath) -> pd.DataFrame:
+def read_table(path: AnyPath) -> "pd.DataFrame":
     """Returns a CSV table; InputError where it is missing or torn."""
-    try:
+    import pandas as pd
+
+    with reading(path, "a CSV table", remedy=None):
         return pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read as a CSV table: {error}", path=path) from error
+
+
+@contextmanager
+def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
+    """Yields an HDF5 file to be filled, which takes its place when the block ends well; StorageError where it can't."""
+    import h5py
+
+    with replaced(path) as temporary:
+        # in memory first: HDF5 crashes later on where a write of its own has failed, as on a full disk
+        with h5py.File(temporary.name, "w", driver="core", backing_store=False) as file:
+            yield file
+            file.flush()
+            image = file.id.get_file_image()
+        temporary.write_bytes(image)
+
+
+@contextmanager
+def reading_hdf5(path: AnyPath, what: str, expected: str, remedy: str | None = None) -> Iterator["h5py.File"]:
+    """Yields an HDF5 file to be read; InputError for whatever goes wrong in the block, with what it should be."""
+    import h5py
+
+    with reading(path, what, expected, remedy), h5py.File(path) as file:
+        yield file
+
+
+def sha256_of(path: AnyPath) -> str:
+    """Returns the SHA-256 of a file; StorageError where it cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise StorageError("cannot be read", path=path, found=error.strerror or error) from error
+
+
+def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
+    """Returns for each file that is there its SHA-256, its size in bytes and when it was last written (UTC)."""
+    found = {}
+    for path in map(Path, files):
+        if path.is_file():
+            state = path.stat()
+            written = datetime.fromtimestamp(state.st_mtime, UTC).isoformat(timespec="seconds")
+            found[str(path)] = {"sha256": sha256_of(path), "bytes": state.st_size, "written": written}
+    return found
+
+
+def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
+    """Returns the files of a folder and those in it, in order, without hidden ones and folders of some names."""
+
+    def wanted(path: Path) -> bool:
+        return not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
+
+    return [path for path in sorted(Path(folder).rglob("*")) if path.is_file() and wanted(path)]

@@ -7,7 +7,6 @@ at half the size.
 """
 
 from collections.abc import Mapping, Sequence
-from os import PathLike
 from pathlib import Path
 
 import h5py
@@ -16,9 +15,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..units import week_tag
-from .files import replaced
-from .hdf5 import new_hdf5
-from .tetmeshes import attribute, document, geometry, topology
+from .files import AnyPath, new_hdf5, write_text
+from .tetmeshes import attribute, document, geometry, grid, topology
 
 POSITIONS = "positions"
 CELL_FIELDS = "cell_fields"
@@ -30,26 +28,15 @@ def group_name(week: float) -> str:
 
 
 def write_frame(
-    path: str | PathLike[str],
+    path: AnyPath,
     week: float,
     vertex_fields: Mapping[str, NDArray],
     cell_fields: Mapping[str, NDArray] | None = None,
 ) -> None:
-    """Writes one frame to a file of its own.
+    """Writes the frame of a gestational week to a file of its own.
 
-    Parameters
-    ----------
-    week
-        Gestational week of the frame.
-    vertex_fields
-        `positions` (n, 3) in mm and further arrays (n,) or (n, 3) by name.
-    cell_fields
-        Arrays (m,), (m, 3) or (m, 9) by name, one value per element in the order of the run's mesh.
-
-    Raises
-    ------
-    ValueError
-        Where fields at the vertices are not of one length.
+    Fields at the vertices are `positions` (n, 3) in mm and further arrays (n,) or (n, 3); those of the elements, in the
+    order of the run's mesh, are (m,), (m, 3) or (m, 9). ValueError where those at the vertices differ in length.
     """
     if len({len(values) for values in vertex_fields.values()}) != 1:
         raise ValueError(f"fields at the vertices differ in length: {_lengths(vertex_fields)}")
@@ -69,13 +56,10 @@ def _lengths(fields: Mapping[str, NDArray]) -> str:
     return ", ".join(f"{name} {len(values)}" for name, values in fields.items())
 
 
-def join_frames(path: str | PathLike[str], tets: NDArray, frames: Sequence[str | PathLike[str]]) -> None:
+def join_frames(path: AnyPath, tets: NDArray, frames: Sequence[AnyPath]) -> None:
     """Joins the files of single frames, in the order of time, into `path` (.h5) with a .xdmf beside it.
 
-    Raises
-    ------
-    ValueError
-        Where fields of the elements do not fit the (m, 4) or (m, 10) tetrahedra.
+    ValueError where fields of the elements do not fit the (m, 4) or (m, 10) tetrahedra.
     """
     path = Path(path)
     with new_hdf5(path) as file:
@@ -85,8 +69,7 @@ def join_frames(path: str | PathLike[str], tets: NDArray, frames: Sequence[str |
                 for name in source:
                     source.copy(name, file)
         text = document(_time_series(path.name, file))
-    with replaced(path.with_suffix(".xdmf")) as temporary:
-        temporary.write_text(text)
+    write_text(path.with_suffix(".xdmf"), text)
 
 
 def _time_series(data_name: str, file: h5py.File) -> str:
@@ -107,23 +90,23 @@ def _time_series(data_name: str, file: h5py.File) -> str:
             raise ValueError(f"fields of {len(tets)} elements in {name} have other lengths: {_lengths(cell_fields)}")
         for field, values in cell_fields.items():
             parts.append(attribute(field, "Cell", values, f"{data_name}:/{name}/{CELL_FIELDS}/{field}"))
-        grids.append(f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>')
+        grids.append(grid(name, parts))
     return f'<Grid Name="folding" GridType="Collection" CollectionType="Temporal">{"".join(grids)}</Grid>'
 
 
-def read_weeks(path: str | PathLike[str]) -> list[float]:
+def read_weeks(path: AnyPath) -> list[float]:
     """Returns the gestational weeks of the frames, ascending."""
     with h5py.File(path) as file:
         return sorted(float(name.removeprefix("week_")) for name in file if name.startswith("week_"))
 
 
-def read_tets(path: str | PathLike[str]) -> NDArray[np.int64]:
+def read_tets(path: AnyPath) -> NDArray[np.int64]:
     """Returns the (m, 4) or (m, 10) tetrahedra."""
     with h5py.File(path) as file:
         return file["tets"][:].astype(np.int64)
 
 
-def read_field(path: str | PathLike[str], week: float, field: str) -> NDArray:
+def read_field(path: AnyPath, week: float, field: str) -> NDArray:
     """Returns a field at the vertices at a week; InputError, which names the weeks there are, where there is none."""
     with h5py.File(path) as file:
         name = f"{group_name(week)}/{field}"
@@ -132,6 +115,6 @@ def read_field(path: str | PathLike[str], week: float, field: str) -> NDArray:
         return file[name][:]
 
 
-def read_positions(path: str | PathLike[str], week: float) -> NDArray[np.float64]:
+def read_positions(path: AnyPath, week: float) -> NDArray[np.float64]:
     """Returns the (n, 3) positions in mm at a week."""
     return read_field(path, week, POSITIONS)

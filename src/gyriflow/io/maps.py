@@ -3,15 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import h5py
 import numpy as np
 from nibabel.nifti1 import intent_codes
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import TriangleMesh, merged
-from .files import AnyPath
-from .hdf5 import new_hdf5
+from .files import AnyPath, new_hdf5, reading_hdf5, require_finite
 from .surfaces import load_gifti, read_surface
 from .volumes import AffineSource, read_values
 
@@ -68,9 +66,7 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
             found=f"{len(values)} values",
             expected=f"{len(surface.vertices)}, the number of vertices of {surface_path}",
         )
-    bad = int(np.count_nonzero(~np.isfinite(values)))
-    if bad:
-        raise InputError("has values that are NaN or infinite", path=path, found=f"{bad} vertices", expected="none")
+    require_finite(values, path, "values", "vertices")
     return surface, values
 
 
@@ -99,8 +95,5 @@ def write_maps(path: AnyPath, maps: Mapping[str, Floats]) -> None:
 
 def read_maps(path: AnyPath) -> dict[str, Floats]:
     """Returns the named (n,) values of a file of `write_maps`; InputError where it is missing or torn."""
-    try:
-        with h5py.File(path) as file:
-            return {name: np.asarray(values[:], dtype=np.float64) for name, values in file.items()}
-    except Exception as error:  # HDF5 raises whatever a torn file leads it into
-        raise InputError("cannot be read as maps", path=path, found=error, expected="an HDF5 file") from error
+    with reading_hdf5(path, "maps", "an HDF5 file") as file:
+        return {name: np.asarray(values[:], dtype=np.float64) for name, values in file.items()}

@@ -1,19 +1,18 @@
 """Correspondences between brains, and meshes carried along them, in HDF5 files of the project's own, RAS+ mm."""
 
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
 
-from ..errors import InputError
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
 from ..geometry.triangles import Floats, TriangleMesh
-from .files import AnyPath
-from .hdf5 import new_hdf5
+from .files import AnyPath, new_hdf5, reading_hdf5
+
+AGAIN = "Register the brains, or match their surfaces, again."
 
 
 def write_deformation(path: AnyPath, deformation: Deformation, report: Mapping[str, Any]) -> None:
@@ -32,28 +31,13 @@ def write_deformation(path: AnyPath, deformation: Deformation, report: Mapping[s
 
 def read_deformation(path: AnyPath) -> tuple[Deformation, dict[str, Any]]:
     """Returns the deformation and the report of a file of `write_deformation`; InputError where it is none."""
-    with _reading(path, "a deformation", "an HDF5 file with matrix, displacement and affine") as file:
+    expected = "an HDF5 file with matrix, displacement and affine"
+    with reading_hdf5(path, "a deformation", expected, AGAIN) as file:
         return _deformation(file), json.loads(file.attrs["report"])
 
 
 def _deformation(file: h5py.File) -> Deformation:
     return Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
-
-
-@contextmanager
-def _reading(path: AnyPath, what: str, expected: str) -> Iterator[h5py.File]:
-    """Opens a file that tells how brains correspond; InputError for whatever goes wrong while it is read."""
-    try:
-        with h5py.File(path) as file:
-            yield file
-    except Exception as error:  # HDF5 raises whatever a torn file leads it into
-        raise InputError(
-            f"cannot be read as {what}",
-            path=path,
-            found=error,
-            expected=expected,
-            remedy="Register the brains, or match their surfaces, again.",
-        ) from error
 
 
 def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapping[str, Any]) -> None:
@@ -68,7 +52,7 @@ def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapp
 def read_correspondence(path: AnyPath) -> Correspondence:
     """Returns what `write_deformation` or `write_matched_surfaces` has written; InputError for other files."""
     expected = "an HDF5 file with matrix, displacement and affine, or with first, second and faces"
-    with _reading(path, "a correspondence of brains", expected) as file:
+    with reading_hdf5(path, "a correspondence of brains", expected, AGAIN) as file:
         if "faces" in file:
             return MatchedSurfaces(TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:])
         return _deformation(file)
@@ -105,18 +89,52 @@ def write_carried_mesh(path: AnyPath, carried: CarriedMesh) -> None:
 
 def read_carried_mesh(path: AnyPath) -> CarriedMesh:
     """Returns what `write_carried_mesh` has written; InputError where the file is none of it."""
-    try:
-        with h5py.File(path) as file:
-            growth = {
-                float(length.removesuffix("mm")): {kind: rates[:] for kind, rates in kinds.items()}
-                for length, kinds in file.get("growth", {}).items()
-            }
-            return CarriedMesh(file["weeks"][:], file["positions"][:].astype(np.float64), growth)
-    except Exception as error:  # HDF5 raises whatever a torn file leads it into
-        raise InputError(
-            "cannot be read as a carried mesh",
-            path=path,
-            found=error,
-            expected="an HDF5 file with weeks and positions",
-            remedy="Carry the mesh again.",
-        ) from error
+    expected = "an HDF5 file with weeks and positions"
+    with reading_hdf5(path, "a carried mesh", expected, "Carry the mesh again.") as file:
+        growth = {
+            float(length.removesuffix("mm")): {kind: rates[:] for kind, rates in kinds.items()}
+            for length, kinds in file.get("growth", {}).items()
+        }
+        return CarriedMesh(file["weeks"][:], file["positions"][:].astype(np.float64), growth)
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """The shapes that a mesh is to have.
+
+    Attributes
+    ----------
+    weeks : (w,) float
+        Gestational weeks, ascending, the mesh's own first.
+    positions : (w, n, 3) float
+        Of the vertices, in mm, in the pose of the mesh.
+    sizes : {"area_cm2" or "volume_ml": (w,) float}
+        Of the mesh's boundary.
+    surfaces : {name: w arrays (m, 3) of float}
+        Where simpler ways to foretell the brain put the boundary's vertices, in mm.
+    """
+
+    weeks: Floats
+    positions: Floats
+    sizes: Mapping[str, Floats]
+    surfaces: Mapping[str, Sequence[Floats]]
+
+
+def write_targets(path: AnyPath, targets: Targets) -> None:
+    """Writes the data sets weeks, positions, sizes/{area_cm2, volume_ml} and surfaces/{name}."""
+    with new_hdf5(path) as file:
+        file["weeks"] = np.asarray(targets.weeks, dtype=np.float64)
+        places = {"positions": targets.positions} | {f"surfaces/{name}": at for name, at in targets.surfaces.items()}
+        for name, values in places.items():
+            file.create_dataset(name, data=np.asarray(values, dtype=np.float32), compression="gzip", shuffle=True)
+        for name, values in targets.sizes.items():
+            file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
+
+
+def read_targets(path: AnyPath) -> Targets:
+    """Returns what `write_targets` has written; InputError where the file is none of it."""
+    expected = "an HDF5 file with weeks, positions and sizes"
+    with reading_hdf5(path, "shapes to grow towards", expected, "Make them again.") as file:
+        sizes = {name: values[:] for name, values in file["sizes"].items()}
+        surfaces = {name: list(at[:].astype(np.float64)) for name, at in file.get("surfaces", {}).items()}
+        return Targets(file["weeks"][:], file["positions"][:].astype(np.float64), sizes, surfaces)

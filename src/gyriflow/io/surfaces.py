@@ -1,50 +1,69 @@
-"""Triangle surfaces (GIFTI, VTK, STL, PLY, OBJ, FreeSurfer) and per-vertex maps (GIFTI), in mm."""
+"""Triangle surfaces (GIFTI, VTK, STL, PLY, OBJ, FreeSurfer), in mm, and maps and labels at their vertices (GIFTI).
 
+Where a file says in which space its coordinates are, they are brought to scanner space.
+"""
+
+import hashlib
+import logging
+import warnings
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+from xml.etree import ElementTree
 
 import nibabel as nib
 import numpy as np
-import pyvista as pv
-import trimesh
-from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
+from nibabel.freesurfer.io import read_geometry
+from nibabel.gifti import (
+    GiftiCoordSystem,
+    GiftiDataArray,
+    GiftiImage,
+    GiftiLabel,
+    GiftiLabelTable,
+    GiftiMetaData,
+)
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import TriangleMesh, is_closed
-from ..parameters.terms import Side
-from .files import AnyPath, replaced
-from .spaces import coordinate_systems, freesurfer_space, read_freesurfer_surface, to_scanner_space, warn_of_tkr_ras
+from ..parameters.terms import STRUCTURES, Side
+from .files import AGAIN, AnyPath, reading, replaced, require_finite
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+log = logging.getLogger(__name__)
+
+Floats = NDArray[np.float64]
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
-STRUCTURES: dict[str, Structure] = {"left": "CortexLeft", "right": "CortexRight"}
-"""What GIFTI calls the hemispheres."""
 MESH_SUFFIXES = (".stl", ".ply", ".obj")
 VTK_SUFFIXES = (".vtk", ".vtp")
-SURFACE_KINDS = (".surf.gii", *MESH_SUFFIXES, *VTK_SUFFIXES, "FreeSurfer's lh.pial")
+SURFACE_KINDS = ".surf.gii, .vtk, .vtp, .stl, .ply, .obj, or FreeSurfer's own binary kind, such as lh.pial"
 FREESURFER_SIDES = {"lh": "CortexLeft", "rh": "CortexRight"}
-AGAIN = "The file may be truncated or of another kind: copy or export it again."
+System = tuple[str, str, Floats]
+"""A space of coordinates, the space that a matrix leads to, and the (4, 4) matrix."""
 
 
 def read_surface(path: AnyPath) -> TriangleMesh:
     """Returns the surface of a GIFTI, VTK, STL, PLY, OBJ or FreeSurfer file, in the order of corners of the file.
 
     Coordinates are the file's; where a GIFTI or FreeSurfer file says how they lie in scanner space, they are brought
-    there (`gyriflow.io.spaces`). InputError for missing, truncated or empty files, NaN or infinite coordinates, faces
-    that name missing vertices, and coordinates that are not those of the subject.
+    there. InputError for missing, truncated or empty files, NaN or infinite coordinates, faces that name missing
+    vertices, and coordinates that are not those of the subject.
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError("no such file", path=path, expected=f"a surface ({', '.join(SURFACE_KINDS)})")
     suffix = path.suffix.lower()
-    if suffix in MESH_SUFFIXES:
-        vertices, faces = _read_with_trimesh(path)
-    elif suffix in VTK_SUFFIXES:
-        vertices, faces = _read_with_pyvista(path)
-    elif _is_gifti(path):
-        vertices, faces = _read_gifti_surface(path)
-    else:
-        vertices, faces = read_freesurfer_surface(path)
+    with reading(path, "a surface", SURFACE_KINDS):
+        if suffix in MESH_SUFFIXES:
+            vertices, faces = _read_with_trimesh(path)
+        elif suffix in VTK_SUFFIXES:
+            vertices, faces = _read_with_pyvista(path)
+        elif _is_gifti(path):
+            vertices, faces = _read_gifti_surface(path)
+        else:
+            vertices, faces = _read_freesurfer_surface(path)
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
         raise InputError(
             "holds no surface",
@@ -53,9 +72,7 @@ def read_surface(path: AnyPath) -> TriangleMesh:
             expected="three coordinates for each point and three corners for each face",
             remedy=AGAIN,
         )
-    bad = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
-    if bad:
-        raise InputError("has NaN or infinite coordinates", path=path, found=f"{bad} vertices", expected="none")
+    require_finite(vertices, path, "coordinates", "vertices")
     if not (np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)) or (
         np.abs(faces - np.rint(faces)).max() > 1e-3
     ):
@@ -78,7 +95,7 @@ def declared(path: AnyPath) -> tuple[str | None, str | None]:
         return None, None
     structure = _structure(path)
     if not _is_gifti(path):
-        return freesurfer_space(path), structure
+        return SCANNER if _volume(path)[2] is not None else None, structure
     return to_scanner_space(coordinate_systems(path), path)[1], structure
 
 
@@ -111,18 +128,19 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
     """Writes a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
     suffix = Path(path).suffix.lower()
     if suffix in MESH_SUFFIXES:
+        import trimesh  # takes a second, as pyvista does below, which most readers need not wait for
+
         body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
         with replaced(path) as temporary:
             body.export(temporary)
         return
     if suffix != ".gii":
         raise InputError("unknown kind of surface file", path=path, expected=".gii, .stl, .ply or .obj")
-    meta = {"GeometricType": "Anatomical"} | ({"AnatomicalStructurePrimary": structure} if structure else {})
     points = GiftiDataArray(
         mesh.vertices.astype(np.float32),
         intent="NIFTI_INTENT_POINTSET",
         coordsys=GiftiCoordSystem("NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_SCANNER_ANAT", np.eye(4)),
-        meta=GiftiMetaData(meta),
+        meta=GiftiMetaData({"GeometricType": "Anatomical"} | _named(structure)),
     )
     triangles = GiftiDataArray(
         mesh.faces.astype(np.int32),
@@ -136,14 +154,11 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
 def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, right: TriangleMesh | None) -> None:
     """Writes a brain's pial surface and its hemispheres, None for one that is not there.
 
-    Parameters
-    ----------
-    files
-        Paths as `whole` and, by their names, those of the hemispheres that are there, and as `get("stl")` one for the
-        whole too, if it is given.
+    `files` has the paths `whole`, those of the hemispheres that are there by their names, and `stl` if it is wanted.
     """
     write_surface(files.whole, whole)
-    for side, mesh in (("left", left), ("right", right)):
+    sides: dict[Side, TriangleMesh | None] = {"left": left, "right": right}
+    for side, mesh in sides.items():
         if mesh is not None:
             write_surface(files[side], mesh, STRUCTURES[side])
     if stl := files.get("stl"):
@@ -156,33 +171,24 @@ def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Struct
         GiftiDataArray(np.asarray(values, np.float32), intent="NIFTI_INTENT_SHAPE", meta=GiftiMetaData({"Name": name}))
         for name, values in maps.items()
     ]
-    meta = GiftiMetaData({"AnatomicalStructurePrimary": structure} if structure else {})
     with replaced(path) as temporary:
-        nib.save(GiftiImage(darrays=arrays, meta=meta), temporary)
+        nib.save(GiftiImage(darrays=arrays, meta=GiftiMetaData(_named(structure))), temporary)
+
+
+def _named(structure: Structure | None) -> dict[str, str]:
+    return {"AnatomicalStructurePrimary": structure} if structure else {}
 
 
 def read_vertex_maps(path: AnyPath) -> dict[str, NDArray[np.float64]]:
     """Returns the named per-vertex values of a GIFTI shape file."""
-    image = load_gifti(path)
-    return {
-        array.meta.get("Name") or f"map {number}": np.asarray(array.data, dtype=float)
-        for number, array in enumerate(image.darrays)
-    }
+    arrays = enumerate(load_gifti(path).darrays)
+    return {array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float) for n, array in arrays}
 
 
 def load_gifti(path: AnyPath) -> GiftiImage:
     """Returns the image of a GIFTI file; InputError where it is missing, truncated or of another kind."""
-    try:
+    with reading(path, "GIFTI", "a whole .gii file"):
         image = nib.load(path)
-    except FileNotFoundError as error:
-        raise InputError("no such file", path=path, expected="a GIFTI file") from error
-    except Exception as error:  # nibabel's reader raises whatever a torn file leads it into
-        raise InputError(
-            f"cannot be read as GIFTI: {error}",
-            path=path,
-            expected="a whole .gii file",
-            remedy="The file may be truncated or of another kind: copy or download it again.",
-        ) from error
     if not isinstance(image, GiftiImage):
         raise InputError("is not a GIFTI file", path=path, found=type(image).__name__, expected="a .gii file")
     return image
@@ -225,10 +231,9 @@ def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
 
 
 def _read_with_pyvista(path: Path) -> tuple[NDArray[np.float64], NDArray]:
-    try:
-        data = pv.read(path)
-    except Exception as error:  # VTK's readers raise whatever their parsing runs into
-        raise InputError(f"cannot be read as VTK: {error}", path=path, remedy=AGAIN) from error
+    import pyvista as pv
+
+    data = pv.read(path)
     if not isinstance(data, pv.UnstructuredGrid | pv.PolyData) or not data.n_points or not data.n_cells:
         raise InputError("holds no surface", path=path, found=type(data).__name__, expected="polygons (PolyData)")
     _require_sound_cells(data, path)
@@ -237,8 +242,10 @@ def _read_with_pyvista(path: Path) -> tuple[NDArray[np.float64], NDArray]:
     return np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
 
 
-def _require_sound_cells(data: pv.UnstructuredGrid | pv.PolyData, path: Path) -> None:
+def _require_sound_cells(data: "pv.UnstructuredGrid | pv.PolyData", path: Path) -> None:
     """Raises InputError where cells name points that are not there, on which VTK's filters end the whole process."""
+    import pyvista as pv
+
     arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else []
     if isinstance(data, pv.PolyData):
         arrays = [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
@@ -256,22 +263,205 @@ def _require_sound_cells(data: pv.UnstructuredGrid | pv.PolyData, path: Path) ->
                 expected=f"0 to {data.n_points - 1}",
                 remedy=AGAIN,
             )
-    wrong = int(np.count_nonzero(~np.isfinite(np.asarray(data.points)).all(axis=1)))
-    if wrong:
-        raise InputError("has NaN or infinite coordinates", path=path, found=f"{wrong} vertices", expected="none")
+    require_finite(np.asarray(data.points), path, "coordinates", "vertices")
 
 
 def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:
-    try:
-        # process=True joins equal vertices: STL stores each corner of each face
-        body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
-        vertices, faces = np.asarray(body.vertices, dtype=float), np.asarray(body.faces)
-    except Exception as error:  # trimesh's readers raise whatever their parsing runs into
+    import trimesh
+
+    # process=True joins equal vertices: STL stores each corner of each face
+    body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
+    return np.asarray(body.vertices, dtype=float), np.asarray(body.faces)
+
+
+# --- matched surfaces ------------------------------------------------------------------------------------------
+
+
+def connectivity(path: Path) -> tuple[int, int, str]:
+    """Returns the numbers of vertices and of triangles of a surface file, and a digest of its triangles.
+
+    Neither the order of the triangles nor that of their corners matters. InputError as for `read_surface`.
+    """
+    state = path.stat() if path.exists() else None
+    return _connectivity(path, None if state is None else (state.st_mtime_ns, state.st_size))
+
+
+@cache
+def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]:
+    """Returns the same, once for each state of a file."""
+    mesh = read_surface(path)
+    triangles = np.sort(mesh.faces, axis=1)
+    triangles = triangles[np.lexsort(triangles.T)]
+    digest = hashlib.sha256(np.ascontiguousarray(triangles)).hexdigest()
+    return len(mesh.vertices), len(mesh.faces), digest
+
+
+# --- labels at the vertices ------------------------------------------------------------------------------------
+
+NO_REGION = 0
+UNNAMED = ("", "???", "unknown", "Unknown", "none")
+"""Names that label tables give to what is in no region."""
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#F0E442")
+
+
+def read_vertex_labels(path: AnyPath) -> tuple[NDArray[np.int64], dict[int, str]]:
+    """Returns the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
+
+    InputError for missing or truncated files, another number of arrays than one, and values that are no whole numbers.
+    """
+    image = load_gifti(path)
+    arrays = image.darrays
+    if len(arrays) != 1 or arrays[0].data.ndim != 1:
         raise InputError(
-            f"cannot be read as {path.suffix}: {error}",
+            "is no label file of one array",
             path=path,
-            remedy=AGAIN,
-        ) from error
-    if not len(vertices) or not len(faces):
-        raise InputError("holds no surface", path=path, found=f"{len(vertices)} vertices, {len(faces)} faces")
-    return vertices, faces
+            found=", ".join(str(array.data.shape) for array in arrays) or "no arrays",
+            expected="one label for each vertex (.label.gii)",
+        )
+    values = np.asarray(arrays[0].data)
+    labels = np.rint(values).astype(np.int64)
+    if not np.isfinite(values).all() or np.abs(values - labels).max(initial=0.0) > 1e-3:
+        raise InputError("has values that are no whole numbers", path=path, expected="labels")
+    names = {int(key): str(name).strip() for key, name in image.labeltable.get_labels_as_dict().items()}
+    return labels, {key: name for key, name in names.items() if key != NO_REGION and name not in UNNAMED}
+
+
+def write_vertex_labels(
+    path: AnyPath, labels: NDArray[np.integer], names: Mapping[int, str], structure: Structure | None = None
+) -> None:
+    """Writes (n,) labels, 0 for no region, with their names as a GIFTI label file (.label.gii)."""
+    table = GiftiLabelTable()
+    for number, name in {NO_REGION: "???", **names}.items():
+        colour = "#FFFFFF" if number == NO_REGION else COLOURS[(number - 1) % len(COLOURS)]
+        red, green, blue = (int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5))
+        entry = GiftiLabel(key=int(number), red=red, green=green, blue=blue, alpha=float(number != NO_REGION))
+        entry.label = name  # type: ignore[attr-defined]
+        table.labels.append(entry)
+    array = GiftiDataArray(
+        np.asarray(labels, dtype=np.int32), intent="NIFTI_INTENT_LABEL", meta=GiftiMetaData({"Name": "regions"})
+    )
+    with replaced(path) as temporary:
+        nib.save(GiftiImage(darrays=[array], labeltable=table, meta=GiftiMetaData(_named(structure))), temporary)
+
+
+# --- the space of the coordinates ------------------------------------------------------------------------------
+
+UNKNOWN = "NIFTI_XFORM_UNKNOWN"
+SCANNER = "NIFTI_XFORM_SCANNER_ANAT"
+SUBJECT = (SCANNER, "NIFTI_XFORM_ALIGNED_ANAT")
+RIGID = 1e-3
+C_RAS = ("VolGeomC_R", "VolGeomC_A", "VolGeomC_S")
+"""FreeSurfer's metadata of points in GIFTI: where the centre of their volume is in scanner space, in mm."""
+
+
+def coordinate_systems(path: AnyPath) -> list[System]:
+    """Returns the coordinate systems of the points of a GIFTI file, all of them, in the file's order.
+
+    nibabel keeps one only. InputError where a matrix has not 16 finite numbers.
+    """
+    opener = nib.openers.ImageOpener(str(path), "rb")
+    with opener as stream:
+        root = ElementTree.parse(stream).getroot()
+    found: list[System] = []
+    points = [array for array in root.iter("DataArray") if array.get("Intent") in ("NIFTI_INTENT_POINTSET", "1008")]
+    for element in (element for array in points for element in array.iter("CoordinateSystemTransformMatrix")):
+        numbers = (element.findtext("MatrixData") or "").split()
+        data, to = ((element.findtext(tag) or UNKNOWN).strip() for tag in ("DataSpace", "TransformedSpace"))
+        try:
+            matrix = np.array(numbers, dtype=float).reshape(4, 4)
+        except ValueError as error:
+            problem = "has a coordinate system that is no matrix"
+            raise InputError(problem, path=path, found=f"{len(numbers)} entries") from error
+        require_finite(matrix, path, "entries in a coordinate system", "rows")
+        found.append((data, to, matrix))
+    return found
+
+
+def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str | None]:
+    """Returns the (4, 4) matrix that brings coordinates to scanner space, and the space they are in then.
+
+    A rigid matrix into scanner or aligned space is applied. None is where the coordinates are in one of these already.
+    Those that lead to Talairach or MNI space are not, since these have other sizes; each that is not applied is logged.
+    The space is None where the file does not say it. InputError for matrices into scanner space that change sizes, and
+    for coordinates in Talairach or MNI space that a matrix leads out of.
+    """
+    nothing = np.eye(4)
+    moving = [system for system in systems if not np.allclose(system[2], nothing, atol=1e-6)]
+    own = next((data for data, _, _ in systems if data in SUBJECT), None)
+    if own is not None:
+        for _, to, _ in moving:
+            log.warning("%s: the coordinates are in %s already; its matrix to %s was not applied", path, own, to)
+        return nothing, own
+    for space in SUBJECT:
+        for data, to, matrix in moving:
+            if to != space:
+                continue
+            rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)
+            if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
+                raise InputError(
+                    f"has a coordinate-system matrix from {data} to {to} that changes sizes or mirrors",
+                    path=path,
+                    found=f"\n{matrix}\n",
+                    expected="a rigid motion",
+                    remedy="Give the surface in the coordinates of its scanner.",
+                )
+            log.warning("%s: the coordinate-system matrix of the file was applied, to %s", path, to)
+            return matrix, to
+    for _, to, matrix in moving:
+        size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+        said = "%s: its matrix to %s, which scales by %.3g, was not applied: sizes are the subject's own"
+        log.warning(said, path, to, size)
+    if moving:
+        return nothing, None
+    named = next((to for data, to, _ in systems if UNKNOWN not in (data, to)), None)
+    return nothing, named or next((to for _, to, _ in systems if to in SUBJECT), None)
+
+
+def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
+    """Warns where points whose space a file does not say may be relative to the centre of a volume (tkr RAS).
+
+    `metadata` are those of the points. FreeSurfer's converter gives the volume's centre there, whichever space it
+    writes the points in.
+    """
+    try:
+        centre = [float(metadata[key]) for key in C_RAS]
+    except (KeyError, ValueError):
+        return
+    if any(abs(place) > 1e-3 for place in centre):
+        log.warning(
+            "%s: does not say the space of its coordinates: they may be relative to the centre of FreeSurfer's volume "
+            "(tkr RAS), off volumes in scanner space by C_RAS = (%g, %g, %g) mm. Before volumes of regions or maps are "
+            "used with it, convert it anew with mris_convert --to-scanner",
+            path,
+            *centre,
+        )
+
+
+def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, NDArray[np.int64]]:
+    """Returns vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, in scanner space.
+
+    Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file.
+    Without it they stay relative to that centre, and a warning says so. InputError for any other kind of file.
+    """
+    vertices, faces, matrix = _volume(path)
+    if matrix is None:
+        log.warning("%s: says nothing of its volume: the coordinates are relative to its centre (tkr RAS)", path)
+        return vertices, faces
+    return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces
+
+
+def _volume(path: AnyPath) -> tuple[Floats, NDArray[np.int64], Floats | None]:
+    """Returns vertices, faces and the (4, 4) matrix to scanner space, or None where the file does not say it."""
+    # the warnings are about missing geometry, which is reported
+    with reading(path, "a surface", SURFACE_KINDS), warnings.catch_warnings(action="ignore", category=UserWarning):
+        vertices, faces, info = read_geometry(str(path), read_metadata=True)
+    vertices, faces = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
+    if not str(info.get("valid", "")).startswith("1") or not {"xras", "yras", "zras", "cras"} <= set(info):
+        return vertices, faces, None
+    axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
+    matrix = np.eye(4)
+    # tkr RAS has the axes of a coronal volume, with columns to the left, rows down, slices forward
+    matrix[:3, :3] = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    matrix[:3, 3] = info["cras"]
+    return vertices, faces, matrix

@@ -1,17 +1,22 @@
-"""Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files hold mm."""
+"""Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files hold mm.
 
-from collections.abc import Mapping
-from os import PathLike
+The start mesh of a run stands in one file with its regions, of which ParaView shows two blocks: `mesh`, the elements
+with all fields and tags, and `facets`, the pial triangles with theirs. dolfinx reads the mesh by `read_mesh()`, and
+tags by `read_meshtags(mesh, NAME, xpath="/Xdmf/Domain[2]")`: a second domain, which ParaView leaves out, has a grid for
+each tag, since dolfinx before 0.10 reads a grid's first tag only.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from .files import replaced
-from .hdf5 import new_hdf5
+from .files import AnyPath, new_hdf5, reading, reading_hdf5, write_text
 
 XDMF_NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
 XDMF_ATTRIBUTE = {1: "Scalar", 3: "Vector", 9: "Tensor"}
@@ -45,6 +50,11 @@ def geometry(points: NDArray, where: str) -> str:
     return f'<Geometry GeometryType="XYZ">{data_item(points, where)}</Geometry>'
 
 
+def grid(name: str, parts: Iterable[str]) -> str:
+    """Returns the XDMF grid of a mesh, from its elements."""
+    return f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>'
+
+
 def document(*domains: str) -> str:
     """Returns a whole XDMF document around the grids of its domains."""
     inside = "".join(f"<Domain>{grids}</Domain>" for grids in domains)
@@ -52,20 +62,12 @@ def document(*domains: str) -> str:
 
 
 def write_tetrahedral_mesh(
-    path: str | PathLike[str],
+    path: AnyPath,
     mesh: TetrahedralMesh,
     vertex_fields: Mapping[str, NDArray] | None = None,
     cell_fields: Mapping[str, NDArray] | None = None,
 ) -> None:
-    """Writes `path` (.xdmf) and the .h5 beside it.
-
-    Parameters
-    ----------
-    mesh
-        Vertices in mm.
-    vertex_fields, cell_fields
-        Arrays of shape (n,) or (n, 3) by name.
-    """
+    """Writes `path` (.xdmf) and the .h5 beside it: a mesh in mm, with fields (n,) or (n, 3) by name."""
     path = Path(path)
     data = path.with_suffix(".h5")
     fields = [("Node", name, np.asarray(values)) for name, values in (vertex_fields or {}).items()]
@@ -80,41 +82,108 @@ def write_tetrahedral_mesh(
         geometry(mesh.vertices, f"{data.name}:/vertices"),
         *(attribute(name, centre, values, f"{data.name}:/{centre}/{name}") for centre, name, values in fields),
     ]
-    with replaced(path) as temporary:
-        temporary.write_text(document(f'<Grid Name="mesh" GridType="Uniform">{"".join(parts)}</Grid>'))
+    write_text(path, document(grid("mesh", parts)))
 
 
-def read_tetrahedral_mesh(path: str | PathLike[str]) -> TetrahedralMesh:
+def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
     """Returns the tetrahedra of an XDMF file (or any file that meshio reads), every volume made positive.
 
-    They are quadratic where the file has tetrahedra of ten nodes.
-
-    Raises
-    ------
-    InputError
-        Where the file cannot be read, holds no tetrahedra, points that are not numbers, or flat elements.
+    They are quadratic where the file has tetrahedra of ten nodes. InputError where the file cannot be read, holds no
+    tetrahedra, points that are not numbers, or flat elements.
     """
-    read, tets = _content(Path(path))
-    points = np.asarray(read.points, dtype=float)
+    points, tets = _content(Path(path))
     wrong = int((~np.isfinite(points)).any(axis=1).sum())
     if wrong:
         raise InputError("has points that are not numbers", path=path, found=f"{wrong} of {len(points)}")
     used, local = np.unique(tets, return_inverse=True)
     mesh = TetrahedralMesh(points[used], local.reshape(tets.shape))
     volumes = signed_volumes(mesh)
-    if (volumes == 0).any():
+    if not volumes.all():
         raise InputError("has elements without volume", path=path, found=f"{int((volumes == 0).sum())}")
     turned = np.where((volumes < 0)[:, None], mesh.tets[:, TURNED[mesh.tets.shape[1]]], mesh.tets)
     return TetrahedralMesh(mesh.vertices, turned)
 
 
-def _content(path: Path) -> tuple[meshio.Mesh, NDArray]:
-    try:
+def _content(path: Path) -> tuple[NDArray[np.float64], NDArray]:
+    import meshio
+
+    with reading(path, "a tetrahedral mesh", "XDMF with its .h5 beside it", None):
         read = meshio.read(path)
-        return read, read.cells_dict["tetra10" if "tetra10" in read.cells_dict else "tetra"]
-    except KeyError:
-        raise InputError("holds no tetrahedra", path=path, found=sorted(read.cells_dict) or "no cells") from None
-    except (Exception, SystemExit) as error:  # meshio leaves through sys.exit on files that it does not know
-        raise InputError(
-            "cannot be read as a tetrahedral mesh", path=path, found=error, expected="XDMF with its .h5 beside it"
-        ) from None
+        cells = read.cells_dict
+    if not {"tetra10", "tetra"} & set(cells):
+        raise InputError("holds no tetrahedra", path=path, found=sorted(cells) or "no cells")
+    return np.asarray(read.points, dtype=float), cells["tetra10" if "tetra10" in cells else "tetra"]
+
+
+# --- a run's mesh with its regions ------------------------------------------------------------------------------
+
+Tags = Mapping[str, NDArray[np.int32]]
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """A tetrahedral mesh with tags and fields.
+
+    Attributes
+    ----------
+    mesh
+        Vertices in mm.
+    facets : (f, 3) int
+        Facets of the boundary as vertex indices.
+    fields : {name: (n,) or (n, 3)}
+        Fields at the vertices.
+    cell_tags, facet_tags : {name: (m,) int}, {name: (f,) int}
+        A name in both is read by dolfinx from the grid `facet_NAME` for the facets.
+    """
+
+    mesh: TetrahedralMesh
+    facets: NDArray[np.int64]
+    fields: Mapping[str, NDArray]
+    cell_tags: Tags
+    facet_tags: Tags
+
+
+def write_regions(path: AnyPath, regions: Regions) -> None:
+    """Writes `path` (.xdmf) and the .h5 beside it."""
+    path = Path(path)
+    data = path.with_suffix(".h5")
+    cells = {"tets": regions.mesh.tets, "facets": regions.facets}
+    tags = {"tets": regions.cell_tags, "facets": regions.facet_tags}
+    with new_hdf5(data) as file:
+        file["vertices"] = regions.mesh.vertices
+        for kind, values in cells.items():
+            file[kind] = values
+            for name, tag in tags[kind].items():
+                file[f"{kind}_tags/{name}"] = np.asarray(tag, dtype=np.int32)
+        for name, field in regions.fields.items():
+            file[f"fields/{name}"] = field
+
+    def part(name: str, kind: Literal["tets", "facets"], tags: Tags, fields: Mapping[str, NDArray]) -> str:
+        parts = [
+            topology(cells[kind], f"{data.name}:/{kind}"),
+            geometry(regions.mesh.vertices, f"{data.name}:/vertices"),
+            *(
+                attribute(tag, "Cell", np.asarray(tags[tag], dtype=np.int32), f"{data.name}:/{kind}_tags/{tag}")
+                for tag in tags
+            ),
+            *(attribute(field, "Node", fields[field], f"{data.name}:/fields/{field}") for field in fields),
+        ]
+        return grid(name, parts)
+
+    shown = part("mesh", "tets", regions.cell_tags, regions.fields) + part("facets", "facets", regions.facet_tags, {})
+    single = [part(name, "tets", {name: tag}, {}) for name, tag in regions.cell_tags.items()]
+    single += [
+        part(f"facet_{name}" if name in regions.cell_tags else name, "facets", {name: tag}, {})
+        for name, tag in regions.facet_tags.items()
+    ]
+    write_text(path, document(shown, "".join(single)))
+
+
+def read_regions(path: AnyPath) -> Regions:
+    """Returns what `write_regions` has written to `path`; InputError where the .h5 beside it was not written so."""
+    data = Path(path).with_suffix(".h5")
+    with reading_hdf5(data, "regions", "regions.h5 of a run") as file:
+        mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
+        kinds = ("fields", "tets_tags", "facets_tags")
+        groups = [{name: values[:] for name, values in file[kind].items()} for kind in kinds]
+        return Regions(mesh, file["facets"][:], *groups)

@@ -12,7 +12,7 @@ from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .files import AnyPath, replaced
+from .files import AnyPath, reading, replaced, require_finite
 
 log = logging.getLogger(__name__)
 
@@ -60,25 +60,12 @@ def read_values(
     `content` says in messages what the values are: "labels". InputError for missing or truncated files, other numbers
     of axes, unclear orientation.
     """
-    try:
+    with reading(path, "an image", f"a whole volume of {content} (.nii, .nii.gz, .mgz)"):
         image = nib.load(path)
         if not isinstance(image, SpatialImage):
             raise InputError("is no volume", path=path, found=type(image).__name__, expected=f"a volume of {content}")
         _require_its_size(image, path)
         values = np.asanyarray(image.dataobj)
-    except FileNotFoundError as error:
-        # of a pair of files the one that is not there
-        path = error.filename or path
-        raise InputError("no such file", path=path, expected=f"a volume of {content} (.nii, .nii.gz, .mgz)") from error
-    except InputError:
-        raise
-    except Exception as error:  # nibabel's readers raise whatever a torn header leads them into
-        raise InputError(
-            f"cannot be read as an image: {error}",
-            path=path,
-            expected=f"a whole volume of {content} (.nii, .nii.gz, .mgz)",
-            remedy="The file may be truncated or of another kind: copy or download it again.",
-        ) from error
     values = _three_axes(values, path, content)
     return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
 
@@ -156,9 +143,10 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
     unit = _length_unit(header, path)
     if unit == "unknown":
         log.warning("%s: no unit of length in the header, mm taken", path)
-    scale = np.diag([MM_PER_NIFTI_UNIT[unit]] * 3 + [1.0])
+    # row by row: a product of matrices would take 0 times infinite entries
+    scale = np.array([[MM_PER_NIFTI_UNIT[unit]]] * 3 + [[1.0]])
     if affine_from != "auto":
-        return scale @ matrices[affine_from]
+        return scale * matrices[affine_from]
     given = [name for name, code in codes.items() if code > 0]
     if not given:
         raise InputError(
@@ -179,7 +167,7 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
                 expected="the same position of every voxel",
                 remedy="Say which one holds with the brain's affine_from: qform or sform.",
             )
-    return scale @ matrices[given[0]]
+    return scale * matrices[given[0]]
 
 
 def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
@@ -232,9 +220,7 @@ def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
 def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
     if values.dtype.kind != "f":
         return _in_range(values, path)
-    bad = int(np.count_nonzero(~np.isfinite(values)))
-    if bad:
-        raise InputError("has values that are NaN or infinite", path=path, found=f"{bad} voxels", expected="none")
+    require_finite(values.ravel(), path, "values", "voxels")
     rounded = np.rint(values)
     broken = int(np.count_nonzero(np.abs(values - rounded) > 1e-3))
     if broken:

@@ -1,13 +1,12 @@
 """YAML files: configurations, read strictly, and the parameters of a run."""
 
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from ..errors import InputError
-from .files import replaced
+from .files import AnyPath, write_text
 
 MOST_VALUES = 1_000_000
 """How many values a file may have, so that a few lines of nested aliases don't fill the memory."""
@@ -43,7 +42,7 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
 _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
 
 
-def read_yaml(path: str | PathLike[str]) -> Any:
+def read_yaml(path: AnyPath) -> Any:
     """Returns the content of a YAML (or JSON) file; InputError where it is missing, malformed or names a key twice."""
     try:
         content = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
@@ -72,7 +71,6 @@ def yaml_text(content: Any) -> str:
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
 
 
-def write_yaml(path: str | PathLike[str], content: Any) -> None:
+def write_yaml(path: AnyPath, content: Any) -> None:
     """Writes plain dictionaries, lists and numbers, keys in their order."""
-    with replaced(path) as part:
-        part.write_text(yaml_text(content), encoding="utf-8")
+    write_text(path, yaml_text(content))

@@ -3,13 +3,13 @@
 import logging
 from collections.abc import Mapping, Sequence
 
-import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
+from ..geometry.matching import barycentric, nearest_on
 from ..geometry.triangles import TriangleMesh, corners, face_areas, transformed
 from ..parameters.folding import VENTRICLES
 
@@ -35,27 +35,14 @@ def vertex_map_on_mesh(
     A vertex on the mesh's own surface takes the value at the nearest point of the surface, linear in its triangle; an
     inner vertex takes that of the nearest vertex on the mesh's surface, ties going to smaller coordinates.
 
-    Parameters
-    ----------
-    mesh_vertices_mm : (n, 3) float
-        Vertices of the tetrahedral mesh.
-    pial_facets : (f, 3) int
-        Its outer facets as indices of vertices.
-    surface
-        The map's surface, in the coordinates of the mesh, of any number of pieces.
-    values : (k,) float
-        Values at the surface's vertices.
-    path
-        The map's file, for messages.
-
-    Raises
-    ------
-    InputError
-        Where a twentieth of the mesh's surface is more than 5 mm from the map's.
+    `mesh_vertices_mm` (n, 3) and the outer facets `pial_facets` (f, 3) are the mesh's; `values` (k,) are at the
+    vertices of `surface`, which is in the mesh's coordinates, of any number of pieces. InputError, with the map's
+    `path`, where a twentieth of the mesh's surface is more than 5 mm from the map's.
     """
     pial = np.unique(pial_facets)
     points = mesh_vertices_mm[pial]
-    distance, faces, nearest = _nearest_points(points, surface)
+    surface = _solid(surface)
+    distance, faces, nearest = nearest_on(points, surface)
     far = float(np.quantile(distance, QUANTILE))
     log.info("the surface of %s is %.2f mm from the mesh's (median; 95 %%: %.2f mm)", path, np.median(distance), far)
     if far > FARTHEST_MM:
@@ -66,7 +53,7 @@ def vertex_map_on_mesh(
             expected=f"at most {FARTHEST_MM:g} mm",
             remedy="Is it the surface of this brain, both hemispheres, in the same coordinates?",
         )
-    on_pial = np.einsum("ij,ij->i", _shares(nearest, corners(surface)[faces]), values[surface.faces[faces]])
+    on_pial = np.einsum("ij,ij->i", barycentric(nearest, corners(surface)[faces]), values[surface.faces[faces]])
     mapped = on_pial[_nearest_vertices(mesh_vertices_mm, points)]
     mapped[pial] = on_pial
     return mapped
@@ -75,23 +62,9 @@ def vertex_map_on_mesh(
 def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike, path: str | None = None) -> Floats:
     """Returns a volume's (n,) values at the vertices of a mesh, linear between the centres of voxels.
 
-    In the outer half of the outermost voxels the value is constant outwards.
-
-    Parameters
-    ----------
-    mesh_vertices_mm : (n, 3) float
-        Vertices of the tetrahedral mesh.
-    data : (i, j, k) float
-        Values of the voxels.
-    affine : (4, 4) float
-        Voxel index to position in the coordinates of the mesh.
-    path
-        The volume's file, for messages.
-
-    Raises
-    ------
-    InputError
-        Where vertices lie outside the volume, or between voxels of which one is NaN or infinite.
+    In the outer half of the outermost voxels the value is constant outwards. `data` are (i, j, k), `affine` (4, 4)
+    leads to the mesh's coordinates. InputError, with the volume's `path`, where vertices lie outside it, or between
+    voxels of which one is NaN or infinite.
     """
     matrix = np.asarray(affine, dtype=float)
     index = np.linalg.solve(matrix[:3, :3], (mesh_vertices_mm - matrix[:3, 3]).T).T
@@ -129,21 +102,8 @@ def ventricle_map(
 ) -> dict[str, Floats]:
     """Returns, by its name, the map of the part of ventricles in the tissue around the n vertices of a mesh, 0 to 1.
 
-    Parameters
-    ----------
-    labels : (i, j, k) int
-        Of the voxels.
-    affine : (4, 4) float
-        Voxel index to position on the mesh, in mm.
-    ventricles
-        The labels that are ventricles.
-    path
-        The file of the labels, for messages.
-
-    Raises
-    ------
-    InputError
-        Where no vertex lies in a ventricle.
+    `labels` (i, j, k) have the (4, 4) affine to the mesh in mm; those of `ventricles` are fluid. InputError, with the
+    volume's `path`, where no vertex lies in a ventricle.
     """
     fluid = np.isin(labels, ventricles).astype(float)
     found = volume_map_on_mesh(mesh_vertices_mm, fluid, affine, path)
@@ -179,32 +139,17 @@ def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> No
 
 
 def move_to_mesh(points: Floats, surface: TriangleMesh, pose: ArrayLike) -> TriangleMesh:
-    """Returns the surface of a map in the pose of (k, 3) points on the mesh.
+    """Returns the surface of a map where it is nearest to (k, 3) points on the mesh on average.
 
     Surfaces of the input are moved like the brain, by its (4, 4) pose; those that gyriflow made have been already.
     """
-    return move_nearest(points, surface, [pose, np.eye(4)])
+    moved = transformed(surface, pose)
+    return min(moved, surface, key=lambda candidate: nearest_on(points, _solid(candidate))[0].mean())
 
 
-def move_nearest(points: Floats, surface: TriangleMesh, matrices: Sequence[ArrayLike]) -> TriangleMesh:
-    """Returns the surface moved by that of the (4, 4) matrices which brings it nearest to (k, 3) points on average."""
-    moved = [transformed(surface, matrix) for matrix in matrices]
-    return min(moved, key=lambda candidate: _nearest_points(points, candidate)[0].mean())
-
-
-def _nearest_points(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Floats]:
-    """Returns for (k, 3) points the distance to a surface, and the face and the position of its nearest point."""
-    # a triangle without area has no place inside, and its edges belong to others too
-    solid = np.flatnonzero(face_areas(surface) > 0)
-    squared, face, nearest = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces[solid])
-    return np.sqrt(squared), solid[face], nearest
-
-
-def _shares(points: Floats, triangles: Floats) -> Floats:
-    """Returns the (k, 3) barycentric coordinates of (k, 3) points in (k, 3, 3) triangles, from partial areas."""
-    to_corner = triangles - points[:, None]
-    areas = np.linalg.norm(np.cross(to_corner[:, [1, 2, 0]], to_corner[:, [2, 0, 1]]), axis=2)
-    return areas / areas.sum(axis=1, keepdims=True)
+def _solid(surface: TriangleMesh) -> TriangleMesh:
+    """Returns a surface without triangles that have no area: no place is inside, and their edges belong to others."""
+    return TriangleMesh(surface.vertices, surface.faces[face_areas(surface) > 0])
 
 
 def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:

@@ -34,21 +34,10 @@ OPTIMISED_DEG = 140
 
 
 def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> TetrahedralMesh:
-    """Returns the mesh that a mesher makes in a process of its own; what that prints is logged line by line.
+    """Returns the mesh that a mesher, "pytetwild" or "tetgen", makes in a process of its own; its lines are logged.
 
-    Parameters
-    ----------
-    name
-        "pytetwild" or "tetgen".
-    arrays
-        `vertices` (n, 3) and `faces` (m, 3) of the surface, and what the mesher needs besides.
-    time_limit_s
-        The process is stopped after this time.
-
-    Raises
-    ------
-    MeshError
-        Where the mesher is not installed, dies or takes too long, with its last words.
+    `arrays` are `vertices` (n, 3) and `faces` (m, 3) of the surface, and what the mesher needs besides. MeshError where
+    it is not installed, dies or takes longer than `time_limit_s`, with its last words.
     """
     sent = io.BytesIO()
     np.savez(sent, **arrays)

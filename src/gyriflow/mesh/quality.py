@@ -1,20 +1,138 @@
-"""Quality of a mesh: radius ratio, dihedral angles and volumes of its elements, and how its surface was kept."""
+"""Quality of a mesh: shape of its elements, how well its surface and narrow gaps are kept, and limits."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
 from typing import Any
 
+import igl
+import igl.embree
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from ..geometry.crossings import crossing_faces
+from ..errors import MeshError
 from ..geometry.jacobians import lower_bounds
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, radius_ratios, signed_volumes
-from ..geometry.triangles import TriangleMesh, area, face_areas, mean_edge_length, signed_volume
-from .fidelity import gap_kept, gap_summary, gap_walls, surface_distance
+from ..geometry.matching import crossing_faces, nearest_on
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, radius_ratios, signed_volumes
+from ..geometry.triangles import TriangleMesh, area, corners, face_areas, face_normals, mean_edge_length, signed_volume
 
-EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+Floats = NDArray[np.float64]
+QUANTILE = 0.99
+GAP_MM = 3.0
+"""Walls that face each other within this distance are those of a gap."""
+PARALLEL = -0.9
+"""Cosine between the normals of walls that face each other; less opposed ones meet at the bottom of a gap."""
+OFF_MM = 1e-4
+"""A ray starts so far above its own face."""
+STILL_OPEN = 0.5
+"""A gap counts as kept where so much of its width is left."""
+SIDES_OF_ELEMENT = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+LIMITS = {
+    "min_radius_ratio": ("radius_ratio", "radius ratio"),
+    "min_dihedral_deg": ("min_dihedral_deg", "dihedral angle in degrees"),
+    "max_dihedral_deg": ("max_dihedral_deg", "dihedral angle in degrees"),
+    "min_volume_mm3": ("volume_mm3", "volume in mm3"),
+    "min_jacobian_ratio": ("jacobian_ratio", "ratio of Jacobians"),
+}
+"""Gates of elements: what of `element_quality` each holds, and its name."""
 OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class GapWalls:
+    """Faces of a closed surface that face a parallel wall across a narrow gap.
+
+    The (g, 3) `middle` of the gap before each face in mm, its unit `normal`, the (g,) `width` to the wall opposite in
+    mm and the `area` of the face in mm².
+    """
+
+    middle: Floats
+    normal: Floats
+    width: Floats
+    area: Floats
+
+
+def surface_distance(mesh: TriangleMesh, other: TriangleMesh) -> dict[str, float]:
+    """Returns how far two surfaces are from each other, in mm.
+
+    `hausdorff99` is the distance within which 99 % of either surface's area lies from the other surface, the larger of
+    both directions; `hausdorff` is the largest distance found. Every face is sampled at the centroids of the four
+    triangles between its corners and the middles of its edges, and for the largest distance at its corners.
+    """
+    ways = [_distances(mesh, other), _distances(other, mesh)]
+    return {
+        "hausdorff99": max(_quantile(distance, weight, QUANTILE) for distance, weight in ways),
+        "hausdorff": max(float(distance.max()) for distance, _ in ways),
+    }
+
+
+def gap_walls(mesh: TriangleMesh) -> GapWalls:
+    """Returns the walls of narrow gaps of a closed surface, such as the fissure and sulci.
+
+    From every face's centroid a ray goes outwards; where it meets a parallel wall within 3 mm, there is a gap.
+    """
+    normals = face_normals(mesh)
+    start = corners(mesh).mean(axis=1) + OFF_MM * normals
+    face, distance = _first_hits(mesh, start, normals)
+    facing = face >= 0
+    facing[facing] = np.einsum("ij,ij->i", normals[facing], normals[face[facing]]) < PARALLEL
+    half = 0.5 * distance[facing, None] * normals[facing]
+    return GapWalls(start[facing] + half, normals[facing], OFF_MM + distance[facing], face_areas(mesh)[facing])
+
+
+def gap_summary(walls: GapWalls) -> dict[str, float | None]:
+    """Returns the widths of gaps and the area of their walls.
+
+    `percentile1` and `median` are widths in mm below which 1 % and half of the walls' area lies (None where there is
+    no gap; at the bottom of a gap the width ends in 0, so that the least one says nothing), `area_mm2` is that area.
+    """
+    return {
+        "percentile1": _quantile(walls.width, walls.area, 0.01) if len(walls.width) else None,
+        "median": _quantile(walls.width, walls.area, 0.5) if len(walls.width) else None,
+        "area_mm2": float(walls.area.sum()),
+    }
+
+
+def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
+    """Returns the share of the walls' area before which another surface leaves the gap open; None without a gap.
+
+    It is open where its middle is outside the closed surface `mesh`, and the walls of that are at least half as far
+    apart there.
+    """
+    if not len(walls.width):
+        return None
+    # a ray finds the wall in front of it and the one behind
+    width = np.zeros(len(walls.width))
+    for sign in (1.0, -1.0):
+        face, distance = _first_hits(mesh, walls.middle, sign * walls.normal)
+        width += np.where(face >= 0, distance, GAP_MM)
+    outside = igl.fast_winding_number(mesh.vertices, mesh.faces, walls.middle) < 0.5
+    return float(walls.area[outside & (width >= STILL_OPEN * walls.width)].sum() / walls.area.sum())
+
+
+def _first_hits(mesh: TriangleMesh, start: Floats, direction: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Returns the face that each of (n,) rays meets first within 3 mm, −1 where there is none, and its distance."""
+    rays = igl.embree.EmbreeIntersector()
+    rays.init(np.asfortranarray(mesh.vertices, dtype=np.float32), np.asfortranarray(mesh.faces, dtype=np.int32), True)
+    hits = [
+        rays.intersectRay_first(origin, towards, 0.0, GAP_MM)
+        for origin, towards in zip(start.astype(np.float32), direction.astype(np.float32), strict=True)
+    ]
+    return np.array([hit[0] for hit in hits], dtype=np.int64), np.array([hit[1] for hit in hits], dtype=np.float64)
+
+
+def _distances(mesh: TriangleMesh, other: TriangleMesh) -> tuple[Floats, Floats]:
+    """Returns the distances in mm of (k,) points of a surface from another one, and the area in mm² of each."""
+    a, b, c = corners(mesh).transpose(1, 0, 2)
+    centroids = [(a + b + c) / 3, (4 * a + b + c) / 6, (a + 4 * b + c) / 6, (a + b + 4 * c) / 6]
+    distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), other)
+    return distance, np.concatenate([np.tile(face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
+
+
+def _quantile(values: Floats, weights: Floats, share: float) -> float:
+    """Returns the value below which so much of the weight lies."""
+    return float(np.quantile(values, share, weights=weights, method="inverted_cdf"))
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
@@ -31,7 +149,7 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     """Returns the (m, 6) angles in degrees between the faces at each edge, as they are between the corners."""
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
-    for i, ((a, b), (c, d)) in enumerate(zip(EDGES, OPPOSITE, strict=True)):
+    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, OPPOSITE, strict=True)):
         edge = corner[:, b] - corner[:, a]
         first, second = (np.cross(edge, corner[:, k] - corner[:, a]) for k in (c, d))
         sine = np.linalg.norm(np.cross(first, second), axis=1)
@@ -53,18 +171,6 @@ def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
     )
 
 
-def elements_through(mesh: TetrahedralMesh, thickness_mm: float) -> float:
-    """Returns the elements through a layer below the surface: its thickness over the mean edge length in it.
-
-    Those elements count whose centroid lies within `thickness_mm` of a vertex of the surface.
-    """
-    outer = np.unique(boundary_faces(mesh)[0])
-    depth = cKDTree(mesh.vertices[outer]).query(mesh.vertices[mesh.corners].mean(axis=1))[0]
-    corner = mesh.vertices[mesh.corners[depth <= thickness_mm]]
-    lengths = [np.linalg.norm(corner[:, b] - corner[:, a], axis=1) for a, b in EDGES]
-    return float(thickness_mm / np.mean(lengths))
-
-
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
     """Returns counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
@@ -78,11 +184,12 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     own, _ = boundary_surface(mesh)
     volume = quality["volume_mm3"]
     walls = gap_walls(surface)
+    tenths = 10 * np.log10(volume)
     classes = {
         "radius_ratio": np.linspace(0, 1, 41),
         "min_dihedral_deg": np.linspace(0, 90, 46),
         "max_dihedral_deg": np.linspace(60, 180, 61),
-        "volume_mm3": 10.0 ** (np.arange(*_tenths_of_decades(volume)) / 10),
+        "volume_mm3": 10.0 ** (np.arange(np.floor(tenths.min()) - 1, np.ceil(tenths.max()) + 2) / 10),
     }
     return {
         "order": mesh.order,
@@ -98,9 +205,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "gap_kept": gap_kept(walls, own),
         "volume_mm3": float(volume.sum()),
         "volume_change": float(volume.sum() / signed_volume(surface) - 1),
-        "min_radius_ratio": float(quality["radius_ratio"].min()),
-        "mean_radius_ratio": float(quality["radius_ratio"].mean()),
-        "median_radius_ratio": float(quality["radius_ratio"].median()),
+        **{f"{name}_radius_ratio": float(quality["radius_ratio"].agg(name)) for name in ("min", "mean", "median")},
         "min_dihedral_deg": float(quality["min_dihedral_deg"].min()),
         "max_dihedral_deg": float(quality["max_dihedral_deg"].max()),
         "min_volume_mm3": float(volume.min()),
@@ -112,7 +217,46 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     }
 
 
-def _tenths_of_decades(values: pd.Series) -> tuple[int, int]:
-    """Returns the range of n for which 10^(n/10) are the edges of classes that hold all of some positive values."""
-    logarithms = 10 * np.log10(values)
-    return int(np.floor(logarithms.min())) - 1, int(np.ceil(logarithms.max())) + 2
+def refuse_bad_mesh(
+    mesh: TetrahedralMesh,
+    summary: Mapping[str, Any],
+    path: str | PathLike[str] | None = None,
+    **gates: float,
+) -> None:
+    """Raises MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
+
+    For elements the message has the number of bad ones and the worst place. Faces of the mesh's surface that cross
+    each other are always refused. `path` is for the message: where the mesh can be looked at.
+
+    The `gates` are min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3, min_jacobian_ratio,
+    max_volume_change, max_surface_distance_mm and min_gap_kept, all of them.
+    """
+    quality, faults = element_quality(mesh), []
+    for gate, (column, name) in LIMITS.items():
+        least, limit, values = gate.startswith("min"), gates[gate], quality[column].to_numpy()
+        bad, worst = (values < limit, values.argmin()) if least else (values > limit, values.argmax())
+        if bad.any():
+            place = np.round(mesh.vertices[mesh.corners[worst]].mean(axis=0), 1).tolist()
+            found = f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at {place} mm"
+            faults.append((found, f"{name} at {'least' if least else 'most'} {limit:g}"))
+    change, distance = summary["volume_change"], summary["surface_distance_mm"]["hausdorff99"]
+    if abs(change) > gates["max_volume_change"]:
+        found = f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} % against the surface's"
+        faults.append((found, f"at most {100 * gates['max_volume_change']:g} % (mesh.max_volume_change)"))
+    if distance > gates["max_surface_distance_mm"]:
+        found = f"a surface {distance:.3f} mm from the one that was filled (99 % of it is nearer)"
+        faults.append((found, f"at most {gates['max_surface_distance_mm']:g} mm (mesh.max_surface_distance_mm)"))
+    if summary["gap_kept"] is not None and summary["gap_kept"] < gates["min_gap_kept"]:
+        found = f"narrow gaps, such as the fissure, open along {100 * summary['gap_kept']:.0f} % of their walls"
+        faults.append((found, f"at least {100 * gates['min_gap_kept']:g} % (mesh.min_gap_kept)"))
+    if summary["crossing_faces"]:
+        faults.append((f"{summary['crossing_faces']} faces of its surface that cross others", "none that cross"))
+    if faults:
+        raise MeshError(
+            "the mesh is not good enough",
+            path=path,
+            found="; ".join(found for found, _ in faults),
+            expected="; ".join(expected for _, expected in faults),
+            remedy="Mesh with another mesh.envelope_mm, other edge lengths or another mesh.mesher, or lower the gates "
+            "of mesh.",
+        )

@@ -1,23 +1,25 @@
-"""Filling a closed surface with tetrahedra, and refusing a mesh that is not the inside of it."""
+"""Filling a closed surface with tetrahedra of wanted sizes, and refusing a mesh that is not the inside of it."""
 
 import logging
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ..errors import MeshError
-from ..geometry.crossings import crossing_faces
+from ..geometry.matching import crossing_faces
 from ..geometry.remeshing import remesh, untangle
-from ..geometry.tetrahedra import PIECES_OF_ORDER, TetrahedralMesh, boundary_surface, signed_volumes
-from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
+from ..geometry.tetrahedra import PIECES_OF_ORDER, TetrahedralMesh, boundary_surface, grid, signed_volumes
+from ..geometry.triangles import TriangleMesh, area, edges, euler_number, face_components, is_closed, signed_volume
 from ..parameters.terms import Mesher
-from .curving import curve_edges
-from .improvement import improve
 from .meshers import run_mesher
-from .sizing import background_mesh, edge_length_for
+from .nodes import curve_edges, improve
 
 log = logging.getLogger(__name__)
-
+FACE_AREA = np.sqrt(3) / 4
+"""Area of an equilateral triangle, in edges squared."""
 NEAR = 0.02
 """A remeshed surface has the number of faces that was asked for when it differs by this part."""
 ATTEMPTS = 4
@@ -25,6 +27,44 @@ OTHER_VOLUME = 0.05
 """A mesh whose volume differs by more than this part is that of another shape; nearer ones are left to the gates."""
 REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 """Volume of the regular tetrahedron, in edges cubed."""
+
+
+def finer(settings: Mapping[str, Any], stretch: float) -> dict[str, Any]:
+    """Returns settings (surface_edge_mm, core_edge_mm, pial_faces) of nodes as far apart as wanted once stretched.
+
+    Lengths are stretched by `stretch`, 1 or more.
+    """
+    faces = settings["pial_faces"]
+    return {
+        **settings,
+        "surface_edge_mm": settings["surface_edge_mm"] / stretch,
+        "core_edge_mm": settings["core_edge_mm"] / stretch,
+        "pial_faces": None if faces is None else round(faces * stretch**2),
+    }
+
+
+def edge_length_at(
+    depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, fine_depth_edges: float, growth: float
+) -> NDArray[np.float64]:
+    """Returns the wanted edge length in mm at depths in mm below the surface.
+
+    It is that of the surface down to `fine_depth_edges` of them, grows by `growth` per mm from there on, and ends at
+    that of the core.
+    """
+    below = np.maximum(depth - fine_depth_edges * surface_edge_mm, 0.0)
+    return np.minimum(surface_edge_mm + growth * below, core_edge_mm)
+
+
+def background_mesh(
+    surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, fine_depth_edges: float, growth: float
+) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
+    """Returns a regular tetrahedral grid around the surface and the wanted edge length in mm at its vertices."""
+    spacing = max(2 * surface_edge_mm, 1.0)
+    low = surface.vertices.min(axis=0) - spacing
+    counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
+    background = grid([start + spacing * np.arange(count) for start, count in zip(low, counts, strict=True)])
+    depth = cKDTree(surface.vertices).query(background.vertices)[0]
+    return background, edge_length_at(depth, surface_edge_mm, core_edge_mm, fine_depth_edges, growth)
 
 
 def tetrahedralise(
@@ -40,50 +80,30 @@ def tetrahedralise(
     edge_growth: float = 0.5,
     order: int = 1,
 ) -> TetrahedralMesh:
-    """Returns a tetrahedral mesh of the inside of a closed surface.
+    """Returns a tetrahedral mesh of the inside of a closed, outward surface in mm, of one or more components.
 
-    Parameters
-    ----------
-    surface
-        Closed, outward, in mm; one or more components.
-    surface_edge_mm, core_edge_mm
-        Distance of neighbouring nodes at the surface, and deep inside: the edge length of linear elements, and half
-        of that of quadratic ones. So both orders have about as many nodes.
-    envelope_mm
-        How far pytetwild may leave the given surface.
-    time_limit_s
-        The mesher is stopped after this time.
-    mesher
-        "pytetwild" (fTetWild) makes a surface of its own within the envelope, and sizes elements by their depth.
-        "tetgen" keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as
-        their quality allows, and the poor ones are improved.
-    pial_faces
-        About how many triangles between nodes the mesh's surface is to have; `surface_edge_mm` then follows from it.
-    fine_depth_edges, edge_growth
-        For pytetwild: down to this depth in surface edges elements are as fine as at the surface; below, distances of
-        nodes grow by this part of each mm.
-    order
-        1 for linear elements; 2 for quadratic ones, curved to follow the given surface.
+    `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the surface and deep inside: the edge
+    length of linear elements (`order` 1), half of that of quadratic ones (2), which are curved to follow the surface.
+    So both orders have about as many nodes. With `pial_faces`, about so many triangles between nodes make the surface,
+    and `surface_edge_mm` follows. The mesher is stopped after `time_limit_s`.
 
-    Raises
-    ------
-    MeshError
-        Where the surface is open or inside out, the mesher fails or takes too long, or its mesh is not the inside of
-        the surface: other components or handles, inverted elements, a volume that differs by more than 5 %.
+    "pytetwild" (fTetWild) makes a surface of its own within `envelope_mm`, and sizes elements by their depth: down to
+    `fine_depth_edges` surface edges they are as fine as at the surface, below they grow by `edge_growth` of each mm.
+    "tetgen" keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as their
+    quality allows, and the poor ones are improved.
+
+    MeshError where the surface is open or inside out, the mesher fails or takes too long, or its mesh is not the inside
+    of the surface: other components or handles, inverted elements, a volume that differs by more than 5 %.
     """
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
         raise MeshError("the surface to be filled must be closed and face outwards", remedy="Repair it first.")
     faces = pial_faces // PIECES_OF_ORDER[order] if pial_faces else None
-    edge = edge_length_for(surface, faces) if faces else order * surface_edge_mm
+    edge = float(np.sqrt(area(surface) / (FACE_AREA * faces))) if faces else order * surface_edge_mm
     core = max(order * core_edge_mm, edge)
     if mesher == "tetgen":
         even = even_surface(surface, edge, faces)
-        arrays: dict[str, Any] = {
-            "vertices": even.vertices,
-            "faces": even.faces,
-            "volume": REGULAR_VOLUME * core**3,
-        }
+        arrays: dict[str, Any] = {"vertices": even.vertices, "faces": even.faces, "volume": REGULAR_VOLUME * core**3}
     else:
         background, lengths = background_mesh(surface, edge, core, fine_depth_edges / order, order * edge_growth)
         arrays = {

@@ -1,7 +1,11 @@
-"""Curvature of triangle surfaces; outward normals, so that gyri are positive and sulci negative."""
+"""Curvature of triangle surfaces, from quadrics fitted round each vertex, and its integrals over a surface.
+
+Normals are outward, so that gyri are positive and sulci negative.
+"""
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +13,17 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, TriangleMesh, edges, mean_edge_length
-from ..parameters.metrics import CURVATURE_RADIUS_MM
-from .quadrics import fit_quadrics
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    edges,
+    mean_edge_length,
+    unit,
+    vertex_areas,
+    vertex_normals,
+)  # fmt: skip
+from ..parameters.terms import CURVATURE_RADIUS_MM
 
 log = logging.getLogger(__name__)
 
@@ -19,6 +31,16 @@ EDGES_PER_RADIUS = 2.0
 """Radius of the smallest ball in edges: with fewer neighbours a quadric follows the noise."""
 
 MAX_FAILED_SHARE = 0.01
+
+CHUNK = 1024
+"""Vertices worked on at once: the arrays of their neighbours then stay in the processor's cache."""
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Shares of the area at which its distribution over mean curvature is given."""
+
+_POWERS = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0))
+_MONOMIALS = sorted({(a + c, b + d) for a, b in _POWERS for c, d in _POWERS})
+_NORMAL_EQUATIONS = np.array([[_MONOMIALS.index((a + c, b + d)) for a, b in _POWERS] for c, d in _POWERS])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +92,7 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
     The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
     curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
     local edges are longer than half of `radius_mm`, the ball grows to two of them, and a warning names the finest
-    scale of the mesh. Weights: see `quadrics.fit_quadrics`. MeshError where a vertex in a hundred has no usable
+    scale of the mesh. Weights: see `_quadrics`. MeshError where a vertex in a hundred has no usable
     neighbourhood.
     """
     finest = EDGES_PER_RADIUS * mean_edge_length(mesh)
@@ -81,15 +103,15 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
             finest,
         )
     radii = np.maximum(radius_mm, EDGES_PER_RADIUS * _edge_lengths(mesh))
-    quadrics = fit_quadrics(mesh, radii)
-    failed = int(np.count_nonzero(~quadrics.fitted))
+    coefficients, fitted, one_sided = _quadrics(mesh, radii)
+    failed = int(np.count_nonzero(~fitted))
     if failed > MAX_FAILED_SHARE * len(mesh.vertices):
         raise MeshError(
             "no curvature can be fitted",
             found=f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood",
             remedy="Repair or remesh the surface",
         )
-    a, b, c, d, e, _ = quadrics.coefficients.T
+    a, b, c, d, e, _ = coefficients.T
     # first and second fundamental form of the height function; outward normals make a cap negative
     stretch = 1.0 + d**2 + e**2
     mean = -((1.0 + e**2) * a - d * e * b + (1.0 + d**2) * c) / stretch**1.5
@@ -98,17 +120,9 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
     return Curvature(
         maximum=mean + half_difference,
         minimum=mean - half_difference,
-        reliable=quadrics.fitted & ~quadrics.one_sided,
+        reliable=fitted & ~one_sided,
         radius_mm=radii,
     )
-
-
-def _edge_lengths(mesh: TriangleMesh) -> Floats:
-    """Returns the (n,) mean length in mm of the edges at each vertex, 0 without edges."""
-    pairs, _ = edges(mesh)
-    lengths = np.repeat(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2)
-    size = len(mesh.vertices)
-    return np.bincount(pairs.ravel(), lengths, size) / np.maximum(np.bincount(pairs.ravel(), minlength=size), 1)
 
 
 def continue_smoothly(values: Floats, known: NDArray[np.bool_], stiffness: sparse.csc_matrix) -> Floats:
@@ -123,3 +137,147 @@ def continue_smoothly(values: Floats, known: NDArray[np.bool_], stiffness: spars
     filled = values.copy()
     filled[unknown] = spsolve(sparse.csc_matrix(rows[:, unknown]), -rows[:, np.flatnonzero(known)] @ values[known])
     return filled
+
+
+def curvature_integrals(bend: Curvature, areas: Floats) -> dict[str, float]:
+    """Returns integrals over a surface with (n,) areas of the vertices in mm², |k₁| the larger principal curvature.
+
+    intrinsic_curvature_index
+        1/4π ∫ max(K, 0) dA; 1 for all convex surfaces (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102).
+    folding_index
+        1/4π ∫ |k₁|(|k₁| − |k₂|) dA; 0 for a sphere (the same).
+    mean_curvature_norm
+        The L² norm 1/4π ∫ H² dA; 1 for a sphere (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
+    gaussian_curvature_norm
+        The L² norm 1/4π √(A ∫ K² dA) with A the area; 1 for a sphere (the same).
+    """
+    smaller, larger = np.sort(np.abs([bend.maximum, bend.minimum]), axis=0)
+    integrals = {
+        "intrinsic_curvature_index": np.maximum(bend.gaussian, 0.0) @ areas,
+        "folding_index": (larger * (larger - smaller)) @ areas,
+        "mean_curvature_norm": bend.mean**2 @ areas,
+        "gaussian_curvature_norm": np.sqrt(areas.sum() * (bend.gaussian**2 @ areas)),
+    }
+    return {name: float(value) / (4.0 * np.pi) for name, value in integrals.items()}
+
+
+def mean_curvature_quantiles(bend: Curvature, areas: Floats) -> dict[str, float]:
+    """Returns the mean curvatures in 1/mm below which 5, 25, 50, 75 and 95 % of the area are, by name."""
+    values = np.quantile(bend.mean, QUANTILES, weights=areas, method="inverted_cdf")
+    names = (f"mean_curvature_q{round(100 * share):02d}" for share in QUANTILES)
+    return dict(zip(names, map(float, values), strict=True))
+
+
+def join(bends: list[Curvature]) -> Curvature:
+    """Returns the curvature of surfaces side by side."""
+    return Curvature(*(np.concatenate([getattr(bend, one.name) for bend in bends]) for one in fields(Curvature)))
+
+
+def _edge_lengths(mesh: TriangleMesh) -> Floats:
+    """Returns the (n,) mean length in mm of the edges at each vertex, 0 without edges."""
+    pairs, _ = edges(mesh)
+    lengths = np.repeat(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2)
+    size = len(mesh.vertices)
+    return np.bincount(pairs.ravel(), lengths, size) / np.maximum(np.bincount(pairs.ravel(), minlength=size), 1)
+
+
+type Quadrics = tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]
+
+
+def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
+    """Returns quadrics over the tangent planes of n vertices, by weighted least squares in a ball round each.
+
+    The ball takes in what is linked to its centre by edges inside it: not the other wall of a sulcus. The weight is
+    area × cosine × (1 − d²/radius²): area of the vertex, turned into the tangent plane, so that the sum stands for an
+    integral that does not depend on the mesh; nothing changes by a jump at the rim; and what is turned away by more
+    than 90° does not count. The tangent plane is that of the weighted mean of the normals.
+
+    Returns
+    -------
+    coefficients : (n, 6) float
+        Of z = a x² + b x y + c y² + d x + e y + f: a, b, c in 1/mm, d, e without unit, f in mm; z along the outward
+        normal. 0 where nothing could be fitted.
+    fitted : (n,) bool
+        False where the neighbours do not determine a quadric.
+    one_sided : (n,) bool
+        True where the ball holds a vertex of the boundary of an open surface.
+    """
+    links, boundary = _links(mesh)
+    normals, areas = vertex_normals(mesh), vertex_areas(mesh)
+    found = [
+        _fit(mesh.vertices, normals, areas, radii_mm, centres, balls, boundary)
+        for centres, balls in _balls(mesh.vertices, radii_mm, links)
+    ]
+    coefficients, fitted, one_sided = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return coefficients, fitted, one_sided
+
+
+def _links(mesh: TriangleMesh) -> tuple[sparse.csr_matrix, NDArray[np.bool_]]:
+    """Returns the (n, n) matrix of a vertex's links to itself and its neighbours, and the (n,) mask of the boundary."""
+    pairs, uses = edges(mesh)
+    size = len(mesh.vertices)
+    boundary = np.zeros(size, dtype=bool)
+    boundary[pairs[uses == 1]] = True
+    both = np.concatenate([pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)])
+    return sparse.csr_matrix((np.ones(len(both), dtype=bool), both.T), shape=(size, size)), boundary
+
+
+def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
+    """Yields indices of (c,) centres and the (c, n) pattern of the vertices in their balls, grown ring by ring."""
+    for start in range(0, len(vertices), CHUNK):
+        centres = np.arange(start, min(start + CHUNK, len(vertices)))
+        ball = links[centres]
+        size = 0
+        while ball.nnz > size:
+            size = ball.nnz
+            ball = ball @ links
+            counts = np.diff(ball.indptr)
+            away = vertices[ball.indices] - np.repeat(vertices[centres], counts, axis=0)
+            inside = np.einsum("ij,ij->i", away, away) < np.repeat(radii_mm[centres] ** 2, counts)
+            ends = np.concatenate([[0], np.cumsum(inside)])[ball.indptr]
+            ball = sparse.csr_matrix(
+                (np.ones(ends[-1], dtype=bool), ball.indices[inside], ends), shape=(len(centres), len(vertices))
+            )
+        yield centres, ball
+
+
+def _fit(
+    vertices: Floats,
+    normals: Floats,
+    areas: Floats,
+    radii_mm: Floats,
+    centres: Ints,
+    balls: sparse.csr_matrix,
+    boundary: NDArray[np.bool_],
+) -> Quadrics:
+    """Returns what `_quadrics` does for some centres and the patterns of their balls."""
+    near, starts, counts = balls.indices, balls.indptr[:-1], np.diff(balls.indptr)
+    scale = np.repeat(radii_mm[centres], counts)
+    away = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[:, None]
+    facing = normals[near]
+    share = areas[near] * (1.0 - np.einsum("ij,ij->i", away, away))
+
+    upright = normals[centres]
+    for _ in range(2):
+        weights = share * np.maximum(np.einsum("ij,ij->i", facing, np.repeat(upright, counts, axis=0)), 0.0)
+        upright = unit(np.add.reduceat(weights[:, None] * facing, starts))
+    across = unit(np.cross(upright, np.eye(3)[np.abs(upright).argmin(axis=1)]))
+    frames = np.stack([across, np.cross(upright, across), upright], axis=1)
+    x, y, z = np.einsum("ijk,ik->ji", np.repeat(frames, counts, axis=0), away)
+
+    powers = {(0, 0): weights, (1, 0): weights * x, (0, 1): weights * y}
+    for a, b in _MONOMIALS:
+        if (a, b) not in powers:
+            powers[a, b] = powers[a - 1, b] * x if a else powers[a, b - 1] * y
+    columns = [*(powers[key] for key in _MONOMIALS), *(powers[key] * z for key in _POWERS)]
+    sums = np.stack([np.add.reduceat(column, starts) for column in columns], axis=1)
+    sums /= np.maximum(sums[:, [_MONOMIALS.index((0, 0))]], np.finfo(float).tiny)
+
+    matrices, right = sums[:, _NORMAL_EQUATIONS], sums[:, len(_MONOMIALS) :]
+    values = np.linalg.eigvalsh(matrices)
+    fitted = values[:, 0] > 1e-9 * np.abs(values[:, -1])
+    coefficients = np.zeros((len(centres), 6))
+    coefficients[fitted] = np.linalg.solve(matrices[fitted], right[fitted, :, None])[..., 0]
+    # back from units of the radius
+    coefficients *= radii_mm[centres, None] ** np.array([-1, -1, -1, 0, 0, 1])
+    return coefficients, fitted, balls @ boundary

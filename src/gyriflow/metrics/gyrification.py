@@ -1,4 +1,4 @@
-"""Envelopes of pial surfaces, and gyrification indices of hemispheres, of brains and at each vertex."""
+"""What is around pial surfaces (hull, envelope), sulcal depth below it, and gyrification indices."""
 
 from dataclasses import dataclass
 
@@ -7,10 +7,10 @@ import numpy as np
 import trimesh
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from ..errors import MeshError
-from ..geometry.meshlab import pymeshlab
+from ..geometry.remeshing import pymeshlab
 from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, vertex_normals
 
 ENVELOPE_RADIUS_MM = 5.0
@@ -62,6 +62,32 @@ def envelope(mesh: TriangleMesh, *, radius_mm: float = ENVELOPE_RADIUS_MM) -> Tr
     wrap = meshes.current_mesh()
     outside = TriangleMesh(wrap.vertex_matrix(), wrap.face_matrix())
     return TriangleMesh(outside.vertices - ENVELOPE_OFFSET_MM * vertex_normals(outside), outside.faces)
+
+
+def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns the convex hull, its faces outward; MeshError for a flat surface."""
+    try:
+        hull = ConvexHull(mesh.vertices)
+    except QhullError as error:
+        raise MeshError("the surface has no convex hull", remedy="It has to enclose a volume") from error
+    faces = np.asarray(hull.simplices, dtype=np.int64)
+    a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    used, local = np.unique(faces, return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3))
+
+
+def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
+    """Returns the (n,) straight distance in mm from each vertex outwards to the closed surface around; 0 outside it.
+
+    Around is the convex hull of the hemisphere: of the measures that were compared it is nearest to the
+    known depths of phantoms, and does not jump when the lips of a fissure close.
+    """
+    signed, *_ = igl.signed_distance(
+        mesh.vertices, around.vertices, around.faces, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+    )
+    return np.maximum(-signed, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

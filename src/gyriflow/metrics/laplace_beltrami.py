@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from lapy import Solver, TriaMesh
 from scipy import linalg, sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from ..errors import MeshError, SolverError
 from ..geometry.triangles import Floats, TriangleMesh
@@ -87,7 +87,11 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
     from petsc4py import PETSc
     from slepc4py import SLEPc
 
-    operators = [_petsc(matrix) for matrix in (stiffness, mass)]
+    operators = []
+    for rows in (stiffness.tocsr(), mass.tocsr()):
+        csr = rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
+        operators.append(PETSc.Mat().createAIJ(rows.shape, csr=csr, comm=PETSc.COMM_SELF))
+        operators[-1].setOption(PETSc.Mat.Option.SYMMETRIC, True)
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)
     try:
         solver.setOperators(*operators)
@@ -134,38 +138,22 @@ def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
     return Modes(values[order], functions[:, order])
 
 
-def _petsc(matrix: sparse.csc_matrix) -> Any:
-    """Returns a symmetric matrix as PETSc's, on this process alone."""
-    from petsc4py import PETSc
-
-    rows = matrix.tocsr()
-    csr = rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
-    result = PETSc.Mat().createAIJ(rows.shape, csr=csr, comm=PETSc.COMM_SELF)
-    result.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return result
-
-
 def _spacing(mass: sparse.csc_matrix) -> float:
     """Returns the mean distance between eigenvalues in mm⁻² by Weyl's law."""
     return float(4.0 * np.pi / mass.sum())
 
 
 def count_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> int:
-    """Returns the number of eigenvalues below `value` (mm⁻²), from the inertia of K − value·M."""
-    return _factorise(stiffness, mass, value)[1]
+    """Returns the number of eigenvalues below `value` (mm⁻²), from the inertia of K − value·M.
 
-
-def _factorise(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: float) -> tuple[SuperLU, int]:
-    """Returns the factors of K − shift·M and the number of its negative eigenvalues.
-
-    With pivots on the diagonal, P(K − shift·M)Pᵀ = L U with U = D Lᵀ, so D has the signs of the eigenvalues.
+    With pivots on the diagonal, P(K − value·M)Pᵀ = L U with U = D Lᵀ, so D has the signs of the eigenvalues.
     """
     factors = splu(
-        sparse.csc_matrix(stiffness - shift * mass),
+        sparse.csc_matrix(stiffness - value * mass),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
     if not np.array_equal(factors.perm_r, factors.perm_c):
-        raise SolverError("no inertia: a pivot off the diagonal was taken", found=f"shift {shift:g} mm⁻²")
-    return factors, int(np.count_nonzero(factors.U.diagonal() < 0))
+        raise SolverError("no inertia: a pivot off the diagonal was taken", found=f"shift {value:g} mm⁻²")
+    return int(np.count_nonzero(factors.U.diagonal() < 0))

@@ -1,4 +1,8 @@
-"""All metrics of one brain."""
+"""All metrics of one brain: what is measured on its hemispheres, and the rows of its tables.
+
+A metric is a row (name, value, unit) of `size_rows` (of any surface), `folding_rows` (of one hemisphere or both),
+`thickness_rows` or `spectrum_rows` (of a hemisphere); a map is an entry of `Hemisphere.maps`.
+"""
 
 import os
 from collections.abc import Mapping
@@ -6,14 +10,16 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 from tempfile import TemporaryDirectory
+from typing import Any
 
+import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import MeshError
-from ..geometry.crossings import crossing_faces
-from ..geometry.triangles import Floats, TriangleMesh, signed_volume
-from ..parameters.metrics import (
+from ..geometry.matching import crossing_faces
+from ..geometry.triangles import Floats, TriangleMesh, area, mean_edge_length, signed_volume, vertex_areas
+from ..parameters.terms import (
     CURVATURE_RADIUS_MM,
     SPANGY_MODES,
     SPANGY_PROXY,
@@ -21,22 +27,194 @@ from ..parameters.metrics import (
     SpangyProxy,
     WeylFormula,
 )
-from ..units import ML_PER_MM3
-from .gyrification import cap
-from .hemisphere import (
-    Hemisphere,
-    Settings,
-    coefficient_table,
-    folding_rows,
-    measure_hemisphere,
-    size_rows,
-    spectrum_rows,
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .curvature import (
+    Curvature,
+    continue_smoothly,
+    curvature,
+    curvature_integrals,
+    join,
+    mean_curvature_quantiles,
 )
-from .mode_numbers import SpangyModes
+from .gyrification import (
+    Pieces,
+    cap,
+    convex_hull,
+    envelope,
+    gyrification_index,
+    local_gyrification_index,
+    pieces_over,
+    sulcal_depth,
+)
+from .laplace_beltrami import laplacian
+from .spangy import SpangyModes, Spectrum, first_eigenvalue, modes_of, spectrum, weyl_number
 from .thickness import at_part
+
+type Row = tuple[str, float, str]
 
 LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
 """The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How hemispheres are measured; the names and values of the configuration's `metrics`.
+
+    See `curvature.curvature`, `spangy.modes_of`, and `spangy.weyl_number` for the wavelength. The proxy is
+    "shape_index" as in the paper, or "mean_curvature" as in Germanaud et al. 2012.
+    """
+
+    curvature_radius_mm: float = CURVATURE_RADIUS_MM
+    spangy_proxy: SpangyProxy = SPANGY_PROXY
+    spangy_modes: SpangyModes = SPANGY_MODES
+    spangy_wavelength: WeylFormula = SPANGY_WAVELENGTH
+
+
+@dataclass(frozen=True, eq=False)
+class Hemisphere:
+    """A hemisphere of n vertices, "left" or "right", and what was measured on it.
+
+    Hull and envelope are without what lies over cuts; depth, local gyrification and thickness (NaN where it is not
+    known) are (n,), in mm; `crossing` is the number of faces that cut others, `weyl` Weyl's number of modes.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    bend: Curvature
+    hull: Pieces
+    envelope: Pieces
+    depth: Floats
+    local_gyrification: Floats
+    thickness: Floats
+    crossing: int
+    spectrum: Spectrum
+    weyl: int
+
+    def maps(self) -> dict[str, NDArray]:
+        """Returns the arrays per vertex by name, as in `BrainMetrics.maps`."""
+        known = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
+        return {
+            "shape_index": self.bend.shape_index,
+            "curvedness": self.bend.curvedness,
+            "mean_curvature": self.bend.mean,
+            "gaussian_curvature": self.bend.gaussian,
+            "sulcal_depth_mm": self.depth,
+            "local_gyrification_index": self.local_gyrification,
+            **known,
+            "spangy_dominant_band": self.spectrum.dominant_band,
+            "reliable": self.bend.reliable.astype(np.int32),
+        }
+
+
+def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, settings: Settings) -> Hemisphere:
+    """Returns what is measured on a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
+    hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
+    bend = curvature(mesh, radius_mm=settings.curvature_radius_mm)
+    formula = settings.spangy_wavelength
+    stiffness, mass = laplacian(mesh)
+    first = first_eigenvalue(stiffness, mass)
+    modes, reach = modes_of(settings.spangy_modes, name, mesh, stiffness, mass, first, formula)
+    # near a cut the proxy is continued from beyond
+    proxy = bend.shape_index if settings.spangy_proxy == "shape_index" else bend.mean
+    values = continue_smoothly(proxy, bend.reliable, stiffness)
+    return Hemisphere(
+        name=name,
+        mesh=mesh,
+        bend=bend,
+        hull=pieces_over(hull, mesh),
+        envelope=around,
+        depth=sulcal_depth(mesh, hull),
+        local_gyrification=local_gyrification_index(mesh, around),
+        thickness=np.full(len(mesh.vertices), np.nan) if thickness is None else np.asarray(thickness, dtype=float),
+        crossing=crossing_faces(mesh),
+        spectrum=spectrum(values, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach),
+        weyl=weyl_number(area(mesh), first, formula),
+    )
+
+
+def size_rows(mesh: TriangleMesh, crossing: int) -> list[Row]:
+    """Returns the rows of size of a hemisphere or of the whole, and the number of faces that cut others."""
+    return [
+        ("volume", signed_volume(cap(mesh)) * ML_PER_MM3, "mL"),
+        ("area", area(mesh) * CM2_PER_MM2, "cm2"),
+        ("crossing_faces", float(crossing), "1"),
+    ]
+
+
+def folding_rows(sides: list[Hemisphere]) -> list[Row]:
+    """Returns the rows of folding of one hemisphere, or of a brain's two together; what is near cuts is left out.
+
+    Indices are of both hemispheres' areas, each in its own hull; means are over the vertices of both, by area.
+    """
+    meshes = [side.mesh for side in sides]
+    areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
+    bend = join([side.bend for side in sides])
+    weights = areas * bend.reliable
+    if not weights.any():
+        raise MeshError(
+            "no curvature away from the cut",
+            found="every vertex has the edge of the surface within its radius",
+            remedy="Lower metrics.curvature_radius_mm",
+        )
+
+    def mean(values: NDArray) -> float:
+        return float(np.average(values, weights=weights))
+
+    depth = np.concatenate([side.depth for side in sides])
+    deep = np.quantile(depth, 0.95, weights=weights, method="inverted_cdf")
+    return [
+        ("gyrification_index", gyrification_index(meshes, [side.hull for side in sides]), "1"),
+        ("gyrification_index_envelope", gyrification_index(meshes, [side.envelope for side in sides]), "1"),
+        ("mean_shape_index", mean(bend.shape_index), "1"),
+        ("mean_curvedness", mean(bend.curvedness), "1/mm"),
+        ("sulcal_area_share", mean(bend.shape_index < 0), "1"),
+        ("curvature_radius", mean(bend.radius_mm), "mm"),
+        ("mean_sulcal_depth", mean(depth), "mm"),
+        ("sulcal_depth_95", float(deep), "mm"),
+        *((name, value, "1") for name, value in curvature_integrals(bend, weights).items()),
+        *((name, value, "1/mm") for name, value in mean_curvature_quantiles(bend, weights).items()),
+        *thickness_rows(np.concatenate([side.thickness for side in sides]), areas),
+    ]
+
+
+def thickness_rows(values: Floats, areas: Floats) -> list[Row]:
+    """Returns the rows of thickness at (n,) vertices, NaN where it was not measured; weights by area."""
+    known = np.isfinite(values)
+    if not known.any():
+        return []
+    chosen, weights = values[known], areas[known]
+    mean = float(np.average(chosen, weights=weights))
+    low, high = np.quantile(chosen, [0.05, 0.95], weights=weights, method="inverted_cdf")
+    return [
+        ("mean_thickness", mean, "mm"),
+        ("thickness_sd", float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))), "mm"),
+        ("thickness_q05", float(low), "mm"),
+        ("thickness_q95", float(high), "mm"),
+        ("thickness_measured_share", float(weights.sum() / areas.sum()), "1"),
+    ]
+
+
+def spectrum_rows(side: Hemisphere, proxy: SpangyProxy) -> list[Row]:
+    """Returns the rows of a hemisphere's spectrum.
+
+    A band that is cut off has NaN, and relative powers are NaN where a band that they are shares of is cut off:
+    `spectra` has all values with their flags.
+    """
+    unit = "mm2" if proxy == "shape_index" else "1"
+    bands = side.spectrum.bands
+    power = bands["power"].where(bands["complete"])
+    share = bands["relative_power"].where(bands["complete"] & bands["denominator_complete"])
+    rows: list[Row] = []
+    for band in bands["band"]:
+        rows.append((f"spangy_B{band}_power", float(power[band]), unit))
+        if band > 0:
+            rows.append((f"spangy_B{band}_relative_power", float(share[band]), "1"))
+    return [
+        *rows,
+        ("spangy_modes", float(len(side.spectrum.eigenvalues)), "1"),
+        ("spangy_captured_share", side.spectrum.captured, "1"),
+        ("weyl_number", float(side.weyl), "1"),
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +250,8 @@ def measure_brain(
     *,
     thickness_mm: Floats | None = None,
     label_volumes_ml: Mapping[str, float] | None = None,
-    curvature_radius_mm: float = CURVATURE_RADIUS_MM,
-    spangy_proxy: SpangyProxy = SPANGY_PROXY,
-    spangy_modes: SpangyModes = SPANGY_MODES,
-    spangy_wavelength: WeylFormula = SPANGY_WAVELENGTH,
     threads: int = 1,
+    **settings: Any,
 ) -> BrainMetrics:
     """Returns the metrics of a brain.
 
@@ -94,16 +269,10 @@ def measure_brain(
         Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
     label_volumes_ml
         Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
-    curvature_radius_mm
-        Radius of the balls that curvature is fitted in, see `curvature.curvature`.
-    spangy_proxy
-        What is analysed: "shape_index" as in the paper, or "mean_curvature" as in Germanaud et al. 2012.
-    spangy_modes
-        Which modes, see `mode_numbers.modes_of`.
-    spangy_wavelength
-        The formula of Weyl's number, see `spangy.weyl_number`.
     threads
         With two or more, the hemispheres are measured at the same time, each in a process of its own.
+    settings
+        Those of `Settings`.
 
     Raises
     ------
@@ -111,45 +280,7 @@ def measure_brain(
         Where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
-    _check_outward((whole, *meshes.values()))
-    settings = Settings(curvature_radius_mm, spangy_proxy, spangy_modes, spangy_wavelength)
-    thicknesses = {
-        name: None if thickness_mm is None else at_part(thickness_mm, whole, mesh) for name, mesh in meshes.items()
-    }
-    jobs = [(name, mesh, thicknesses[name], settings) for name, mesh in meshes.items()]
-    sides = _measure_sides(jobs, threads)
-    rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + folding_rows(sides)]
-    known = label_volumes_ml or {}
-    rows += [("whole", metric, known[name], "mL") for metric, name in LABEL_VOLUMES.items() if name in known]
-    for side in sides:
-        own = size_rows(side.mesh, side.crossing) + folding_rows([side]) + spectrum_rows(side, spangy_proxy)
-        rows += [(side.name, *row) for row in own]
-    spectra = [side.spectrum.bands.assign(hemisphere=side.name, weyl_formula=spangy_wavelength) for side in sides]
-    joined = pd.concat(spectra, ignore_index=True)
-    return BrainMetrics(
-        table=pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"]),
-        maps={side.name: side.maps() for side in sides},
-        spectra=joined[["hemisphere", *joined.columns.drop("hemisphere")]],
-        coefficients=pd.concat([coefficient_table(side) for side in sides], ignore_index=True),
-    )
-
-
-def _measure_sides(jobs: list[tuple[str, TriangleMesh, Floats | None, Settings]], threads: int) -> list[Hemisphere]:
-    """Returns the hemispheres, measured one after the other or each in a process: PETSc cannot be used by threads."""
-    if threads == 1:
-        return [measure_hemisphere(*job) for job in jobs]
-    # forked, since a new interpreter would run the calling script again; what MPI leaves behind goes with the folder
-    with (
-        TemporaryDirectory(prefix="gyriflow-") as folder,
-        ProcessPoolExecutor(
-            min(threads, len(jobs)), get_context("fork"), os.environ.update, ({"TMPDIR": folder},)
-        ) as pool,
-    ):
-        return list(pool.map(measure_hemisphere, *zip(*jobs, strict=True)))
-
-
-def _check_outward(meshes: tuple[TriangleMesh, ...]) -> None:
-    for mesh in meshes:
+    for mesh in (whole, *meshes.values()):
         volume_mm3 = signed_volume(cap(mesh))
         if volume_mm3 <= 0:
             raise MeshError(
@@ -158,3 +289,44 @@ def _check_outward(meshes: tuple[TriangleMesh, ...]) -> None:
                 expected="a positive volume",
                 remedy="Turn the faces round",
             )
+    chosen = Settings(**settings)
+    jobs = [
+        (name, mesh, None if thickness_mm is None else at_part(thickness_mm, whole, mesh), chosen)
+        for name, mesh in meshes.items()
+    ]
+    if threads == 1:
+        sides = [measure_hemisphere(*job) for job in jobs]
+    else:
+        # each in a process, since PETSc cannot be used by threads; forked, since a new interpreter would run the
+        # calling script again; what MPI leaves behind goes with the folder
+        with (
+            TemporaryDirectory(prefix="gyriflow-") as folder,
+            ProcessPoolExecutor(
+                min(threads, len(jobs)), get_context("fork"), os.environ.update, ({"TMPDIR": folder},)
+            ) as pool,
+        ):
+            sides = list(pool.map(measure_hemisphere, *zip(*jobs, strict=True)))
+    rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + folding_rows(sides)]
+    known = label_volumes_ml or {}
+    rows += [("whole", metric, known[name], "mL") for metric, name in LABEL_VOLUMES.items() if name in known]
+    for side in sides:
+        own = size_rows(side.mesh, side.crossing) + folding_rows([side]) + spectrum_rows(side, chosen.spangy_proxy)
+        rows += [(side.name, *row) for row in own]
+    spectra = pd.concat([side.spectrum.bands for side in sides], keys=list(meshes), names=["hemisphere", None])
+    coefficients = {
+        side.name: pd.DataFrame(
+            {
+                "mode": np.arange(len(side.spectrum.eigenvalues)),
+                "eigenvalue_per_mm2": side.spectrum.eigenvalues,
+                "band": side.spectrum.band,
+                "coefficient": side.spectrum.coefficients,
+            }
+        )
+        for side in sides
+    }
+    return BrainMetrics(
+        table=pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"]),
+        maps={side.name: side.maps() for side in sides},
+        spectra=spectra.reset_index("hemisphere").reset_index(drop=True).assign(weyl_formula=chosen.spangy_wavelength),
+        coefficients=pd.concat(coefficients, names=["hemisphere"]).reset_index("hemisphere").reset_index(drop=True),
+    )

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import SIDES, Side
-from .age_metrics import BRAIN, MEASURED, OF_THE_ANALYSIS
+from .tables import BRAIN, MEASURED, OF_THE_ANALYSIS
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
@@ -62,19 +62,12 @@ class PublishedNorm:
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
     """Returns the norms of a file of `norms/`, by structure; InputError where a standard deviation is not positive."""
     norms = {}
+    first, last = data["weeks"]
+    shared = {"unit": data["unit"], "subjects": data["subjects"], "scheme": data.get("scheme", "")}
     for name, entry in data["structures"].items():
-        first, last = data["weeks"]
-        norm = PublishedNorm(
-            tuple(entry["mean"]),
-            tuple(entry["sd"]),
-            (first, last),
-            tuple(entry["labels"]),
-            data["unit"],
-            data["subjects"],
-            data.get("scheme", ""),
-            entry.get("tissue", ""),
-            entry.get("side"),
-        )
+        own: dict[str, Any] = {"mean": tuple(entry["mean"]), "sd": tuple(entry["sd"]), "labels": tuple(entry["labels"])}
+        own |= {key: entry[key] for key in ("tissue", "side") if key in entry}
+        norm = PublishedNorm(**own, weeks=(first, last), **shared)
         lowest = float(np.polyval(norm.sd, np.linspace(first, last, 201)).min())
         if lowest <= 0:
             raise InputError(
@@ -89,13 +82,8 @@ def structure_volumes(
 ) -> tuple[dict[str, float], list[str]]:
     """Returns the volumes of the structures that norms are of, and those that are of labels of another scheme.
 
-    Parameters
-    ----------
-    volumes
-        By label, in the norms' unit.
-
-    A brain of another scheme has the volumes of its nearest tissues, such as its cortex; a structure that it has no
-    list for, or no voxel of, is left out.
+    Volumes are by label, in the norms' unit. A brain of another scheme has those of its nearest tissues, such as its
+    cortex; a structure that it has no list for, or no voxel of, is left out.
     """
     found, others = {}, []
     for name, norm in norms.items():
@@ -156,27 +144,17 @@ def published_scores(
 def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
     """Returns the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
 
-    Parameters
-    ----------
-    metrics : columns subject, run, week, hemisphere, metric, value, unit
-    reference
-        Subjects whose measured brains are the norm.
-
-    Returns
-    -------
-    DataFrame
-        hemisphere, metric, unit, week, brains (at most half a week away), mean, sd (NaN for one brain), q05, q25, q50,
-        q75, q95 (NaN for fewer than five brains).
+    Metrics have the columns subject, run, week, hemisphere, metric, value, unit; the reference are subjects whose
+    measured brains are the norm. Columns hemisphere, metric, unit, week, brains (at most half a week away), mean, sd
+    (NaN for one brain), q05, q25, q50, q75, q95 (NaN for fewer than five brains).
     """
     rows = []
-    for (hemisphere, metric), known in _reference(metrics, reference).groupby(["hemisphere", "metric"], sort=False):
+    for names, known in _by_metric(metrics, reference):
         for week in np.unique(known["week"]):
-            near = known.loc[(known["week"] - week).abs() <= WINDOW_GW, "value"].to_numpy(dtype=float)
-            sd = float(near.std(ddof=1)) if len(near) > 1 else np.nan
-            enough = len(near) >= LEAST_BRAINS
-            quantiles = np.quantile(near, list(QUANTILES.values())) if enough else np.full(len(QUANTILES), np.nan)
-            unit = known["unit"].iloc[0]
-            rows.append((hemisphere, metric, unit, week, len(near), float(near.mean()), sd, *quantiles))
+            near = known.loc[(known["week"] - week).abs() <= WINDOW_GW, "value"]
+            enough = near if len(near) >= LEAST_BRAINS else near.iloc[:0]
+            quantiles = enough.quantile(list(QUANTILES.values()))
+            rows.append((*names, known["unit"].iloc[0], week, len(near), near.mean(), near.std(), *quantiles))
     columns = ["hemisphere", "metric", "unit", "week", "brains", "mean", "sd", *QUANTILES]
     return pd.DataFrame(rows, columns=columns)
 
@@ -187,12 +165,7 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
     A quadratic of the week (a line for three weeks, their mean for fewer) is put through the reference brains by least
     squares. The centile is that of a further brain's value under Student's distribution, which is the wider the fewer
     brains there are: t = (x − expected)/(s √(1 + h)), with s the scatter round the curve and h the leverage of the
-    week. A brain of the reference is compared with the others.
-
-    Parameters
-    ----------
-    metrics, reference
-        As for `measured_norms`; all brains of the table but those of the reference's runs are scored, and these too.
+    week. All brains of the table are scored; one of the reference is compared with the others.
 
     Returns
     -------
@@ -203,7 +176,7 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
         reference's weeks", "too few brains" or "other hemispheres" (than the reference has, so compared with none),
         then without z and centile.
     """
-    known = dict(list(_reference(metrics, reference).groupby(["hemisphere", "metric"])))
+    known = dict(_by_metric(metrics, reference))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     table = metrics.assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
     rows = []
@@ -222,6 +195,24 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
     return pd.DataFrame(rows, columns=columns)
 
 
+def nearest_weeks(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+    """Returns for each metric of each brain the reference brain whose value is nearest to it, and that brain's week.
+
+    A brain of the reference is compared with the others, which tells how well the metric gives a week; brains with
+    other hemispheres than the reference's are left out. Columns subject, run, week, hemisphere, metric, value, unit,
+    nearest (the reference brain), nearest_week, nearest_value. With one reference brain a week nothing is known of how
+    fetuses of one age differ: no fetus can be dated so.
+    """
+    keys = [*BRAIN, "hemisphere", "metric", "value", "unit"]
+    known = _reference(metrics, reference)[["hemisphere", "metric", "subject", "week", "value"]]
+    named = {"subject": "nearest", "week": "nearest_week", "value": "nearest_value"}
+    pairs = metrics.loc[same_sides(metrics, reference), keys].merge(known.rename(columns=named))
+    pairs = pairs[(pairs["run"] != MEASURED) | (pairs["subject"] != pairs["nearest"])]
+    away = (pairs["value"] - pairs["nearest_value"]).abs().dropna()
+    closest = away.groupby([pairs[key] for key in (*BRAIN, "hemisphere", "metric")], sort=False).idxmin()
+    return pairs.loc[closest].reset_index(drop=True)
+
+
 def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     """Returns for each row of a table of metrics whether its brain has the hemispheres of a reference's brains.
 
@@ -237,91 +228,67 @@ def _reference(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
     return known[~known["metric"].isin(OF_THE_ANALYSIS)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Curve:
-    """A quadratic of the week through reference brains (a line for three weeks, their mean for fewer).
+def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
+    """Returns the rows of the reference's measured brains by (hemisphere, metric)."""
+    return list(_reference(metrics, reference).groupby(["hemisphere", "metric"], sort=False))
 
-    Attributes
-    ----------
-    factors, centre
-        Coefficients of the powers of (week − centre), highest first.
-    inverse
-        Inverse of the normal matrix, for leverages.
-    sd
-        Scatter round the curve.
-    freedom
-        Degrees of freedom of the scatter.
-    """
 
-    factors: Floats
-    centre: float
-    inverse: Floats
+class _Curve(NamedTuple):
+    """What the curve through reference brains says at k weeks, and the scatter round it with its degrees of freedom."""
+
+    expected: Floats
+    leverage: Floats
     sd: float
     freedom: int
 
-    def at(self, week: float) -> tuple[float, float]:
-        """Returns the expected value at a week, and the leverage h of that week."""
-        here = np.vander([week - self.centre], len(self.factors))[0]
-        return float(here @ self.factors), float(here @ self.inverse @ here)
 
-
-def _curve(weeks: Floats, values: Floats) -> _Curve | None:
-    """Returns the curve through reference brains; None where there are too few for a scatter."""
+def _curve(weeks: Floats, values: Floats, at: Floats) -> _Curve | None:
+    """Returns the curve through reference brains at some weeks; None where there are too few for a scatter."""
     distinct = len(np.unique(weeks))
     degree = 2 if distinct > 3 else 1 if distinct == 3 else 0
     freedom = len(weeks) - degree - 1
     if freedom < LEAST_FREEDOM:
         return None
     centre = float(weeks.mean())
-    powers = np.vander(weeks - centre, degree + 1)
+    powers, here = (np.vander(x - centre, degree + 1) for x in (weeks, at))
     factors, *_ = np.linalg.lstsq(powers, values, rcond=None)
     sd = float(np.sqrt(np.sum((values - powers @ factors) ** 2) / freedom))
-    return _Curve(factors, centre, np.linalg.inv(powers.T @ powers), sd, freedom)
+    leverage = np.einsum("ij,jk,ik->i", here, np.linalg.inv(powers.T @ powers), here)
+    return _Curve(here @ factors, leverage, sd, freedom)
 
 
 def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, points: int = 41) -> pd.DataFrame:
-    """Returns the curves that centiles are of, over the reference's weeks.
+    """Returns the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
 
-    Parameters
-    ----------
-    metrics, reference
-        As for `measured_norms`.
-
-    Returns
-    -------
-    DataFrame
-        hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
-        Student's distribution. No rows where there are too few brains.
+    Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
+    Student's distribution.
     """
-    rows = []
-    for (hemisphere, metric), known in _reference(metrics, reference).groupby(["hemisphere", "metric"], sort=False):
+    columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
+    parts = [pd.DataFrame(columns=columns)]
+    for (hemisphere, metric), known in _by_metric(metrics, reference):
         weeks, values = known["week"].to_numpy(dtype=float), known["value"].to_numpy(dtype=float)
-        curve = _curve(weeks, values)
-        if curve is None:
-            continue
-        wide = float(stats.t.ppf(0.95, curve.freedom)) * curve.sd
-        for week in np.linspace(weeks.min(), weeks.max(), points if np.ptp(weeks) else 1):
-            expected, leverage = curve.at(float(week))
-            half = wide * np.sqrt(1 + leverage)
-            rows.append((hemisphere, metric, known["unit"].iloc[0], week, expected, expected - half, expected + half))
-    return pd.DataFrame(rows, columns=["hemisphere", "metric", "unit", "week", "expected", "low", "high"])
+        at = np.linspace(weeks.min(), weeks.max(), points if np.ptp(weeks) else 1)
+        if (curve := _curve(weeks, values, at)) is not None:
+            half = float(stats.t.ppf(0.95, curve.freedom)) * curve.sd * np.sqrt(1 + curve.leverage)
+            band = {"week": at, "expected": curve.expected, "low": curve.expected - half, "high": curve.expected + half}
+            names = {"hemisphere": hemisphere, "metric": metric, "unit": known["unit"].iloc[0]}
+            parts.append(pd.DataFrame(band).assign(**names)[columns])
+    return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
 def _score(
     week: float, value: float, weeks: Floats, values: Floats
 ) -> tuple[float, float, float, float, int, int, str]:
     """Returns expected, sd, z, centile, brains, brains_of_week and flag of `measured_scores`."""
-    of_week = int(np.count_nonzero(np.abs(weeks - week) <= WINDOW_GW))
-    nothing = (np.nan, np.nan, np.nan, np.nan, len(weeks), of_week)
-    curve = _curve(weeks, values) if len(weeks) else None
-    if curve is None:
-        return *nothing, "too few brains"
-    if not weeks.min() - WINDOW_GW <= week <= weeks.max() + WINDOW_GW:
-        return *nothing, "outside the reference's weeks"
-    expected, leverage = curve.at(week)
+    counts = len(weeks), int(np.count_nonzero(np.abs(weeks - week) <= WINDOW_GW))
+    curve = _curve(weeks, values, np.array([week])) if len(weeks) else None
+    if curve is None or not weeks.min() - WINDOW_GW <= week <= weeks.max() + WINDOW_GW:
+        why = "too few brains" if curve is None else "outside the reference's weeks"
+        return np.nan, np.nan, np.nan, np.nan, *counts, why
+    expected = float(curve.expected[0])
     if curve.sd == 0:
-        return expected, curve.sd, np.nan, np.nan, len(weeks), of_week, "too few brains"
+        return expected, curve.sd, np.nan, np.nan, *counts, "too few brains"
     z = (value - expected) / curve.sd
-    centile = 100 * float(stats.t.cdf(z / np.sqrt(1 + leverage), curve.freedom))
+    centile = 100 * float(stats.t.cdf(z / np.sqrt(1 + curve.leverage[0]), curve.freedom))
     single = (np.abs(weeks[:, None] - weeks) <= WINDOW_GW).sum() == len(weeks)
-    return expected, curve.sd, z, centile, len(weeks), of_week, "one brain a week" if single else "ok"
+    return expected, curve.sd, z, centile, *counts, "one brain a week" if single else "ok"

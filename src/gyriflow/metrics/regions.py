@@ -1,4 +1,4 @@
-"""Metrics by region, from labels at the vertices of hemispheres, and the asymmetry between left and right."""
+"""Metrics by region, from labels at the vertices of hemispheres."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Ints, TriangleMesh, area, vertex_areas
-from ..parameters.terms import SIDES
 from ..units import CM2_PER_MM2
 
 UNLABELLED = 0
@@ -77,27 +76,3 @@ def region_metrics(
                     mean = float(np.average(values[used], weights=areas[used])) if areas[used].any() else np.nan
                     rows.append((side, name, f"mean_{key.removesuffix('_mm').removeprefix('mean_')}", mean, unit))
     return pd.DataFrame(rows, columns=["hemisphere", "region", "metric", "value", "unit"])
-
-
-def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
-    """Returns the asymmetry index 2 (left − right)/(|left| + |right|) of each metric, of each region where there are.
-
-    Between −2 and 2, positive where the left side has more; NaN where both are 0 or one is not known.
-
-    Parameters
-    ----------
-    metrics : columns hemisphere, metric, value, and any others that rows of both sides have alike, such as region
-
-    Returns
-    -------
-    DataFrame
-        The other columns, metric, asymmetry_index.
-    """
-    keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
-    sides = metrics[metrics["hemisphere"].isin(SIDES)]
-    # of a hemisphere that is alone nothing can be said
-    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(columns=list(SIDES))
-    wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
-    total = wide["left"].abs() + wide["right"].abs()
-    index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)
-    return index.rename("asymmetry_index").reset_index()

@@ -1,21 +1,30 @@
 """Spectral analysis of gyrification (SpAnGy): the power of a folding proxy in bands of spatial frequency.
 
-Germanaud et al. 2012, "Larger is twistier", NeuroImage 63, 1257-1272.
+Germanaud et al. 2012, "Larger is twistier", NeuroImage 63, 1257-1272. Which modes a spectrum is made of, its bands, and
+how far two spectra are from each other.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, Ints
-from ..parameters.metrics import WeylFormula
-from .laplace_beltrami import Modes, lowest_modes
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area
+from ..parameters.terms import FOLD_BANDS, LastBand, WeylFormula
+from .laplace_beltrami import Modes, count_below, laplacian, lowest_modes, modes_below
+
+type SpangyModes = int | LastBand | Literal["own"] | Mapping[str, int]
 
 BANDS = 6
 """The bands are B0 to B6; B4, B5 and B6 go with primary, secondary and tertiary folds."""
+
+HEMISPHERE = ["subject", "run", "week", "hemisphere"]
+"""The columns that name a hemisphere in the tables of a study."""
 
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
@@ -80,6 +89,50 @@ def band_limits(first: float) -> Floats:
     return first * 4.0 ** np.arange(BANDS + 1)
 
 
+def weyl_numbers(sides: Mapping[str, TriangleMesh], formula: WeylFormula) -> pd.DataFrame:
+    """Returns per hemisphere of a brain: hemisphere, vertices, area_mm2, first_eigenvalue_per_mm2, weyl_number."""
+    rows = []
+    for name, mesh in sides.items():
+        first = first_eigenvalue(*laplacian(mesh))
+        rows.append((name, len(mesh.vertices), area(mesh), first, weyl_number(area(mesh), first, formula)))
+    return pd.DataFrame(rows, columns=["hemisphere", "vertices", "area_mm2", "first_eigenvalue_per_mm2", "weyl_number"])
+
+
+def common_modes(numbers: pd.DataFrame) -> dict[str, int]:
+    """Returns the largest Weyl number per hemisphere of tables as `weyl_numbers` makes, joined."""
+    return {str(name): int(number) for name, number in numbers.groupby("hemisphere")["weyl_number"].max().items()}
+
+
+def modes_of(
+    choice: SpangyModes,
+    hemisphere: str,
+    mesh: TriangleMesh,
+    stiffness: sparse.csc_matrix,
+    mass: sparse.csc_matrix,
+    first: float,
+    formula: WeylFormula,
+) -> tuple[Modes, float]:
+    """Returns the modes that a hemisphere's spectrum is made of, and the λ in mm⁻² below which none is missing.
+
+    The name of a band stands for all modes up to its end; that none is missing there is known by inertia, so that no
+    mode of the next band is needed to show it. "own" is Weyl's number, a mapping gives the number per hemisphere. All
+    these are at most half as many as there are vertices. A number is taken as it is.
+    """
+    most = len(mesh.vertices) // 2
+    if isinstance(choice, str) and choice != "own":
+        end = float(band_limits(first)[int(choice.removeprefix("B"))])
+        if count_below(stiffness, mass, end) <= most:
+            return modes_below(stiffness, mass, end), end
+        number = most
+    elif isinstance(choice, int):
+        number = choice
+    else:
+        wanted = choice[hemisphere] if isinstance(choice, Mapping) else weyl_number(area(mesh), first, formula)
+        number = max(2, min(wanted, most))
+    modes = lowest_modes(stiffness, mass, number)
+    return modes, float(modes.eigenvalues[-1])
+
+
 def bands_of_modes(eigenvalues: Floats) -> Ints:
     """Returns the (k,) band of each mode: 0 for the constant alone, −1 beyond B6."""
     limits = band_limits(eigenvalues[1])
@@ -101,46 +154,88 @@ def spectrum(
     """
     coefficients = modes.functions.T @ (mass @ proxy)
     band = bands_of_modes(modes.eigenvalues)
-    power = np.array([np.sum(coefficients[band == k] ** 2) for k in range(BANDS + 1)])
     reach = float(modes.eigenvalues[-1]) if reach is None else reach
-    bands = _band_table(modes.eigenvalues, band, power, edge_length_mm, reach)
-    return Spectrum(
-        eigenvalues=modes.eigenvalues,
-        coefficients=coefficients,
-        band=band,
-        bands=bands,
-        dominant_band=_dominant_band(
-            proxy, coefficients, band, modes.functions, bands["band"].to_numpy()[1:][bands["complete"][1:]]
-        ),
-        captured=float(np.sum(coefficients**2) / (proxy @ (mass @ proxy))) if proxy.any() else 1.0,
-    )
+    bands = _band_table(modes.eigenvalues, band, coefficients, edge_length_mm, reach)
+    dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
+    if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
+        parts = np.stack([modes.functions[:, band == k] @ coefficients[band == k] for k in whole])
+        dominant = np.where(proxy > 0, whole[parts.argmax(axis=0)], -whole[parts.argmin(axis=0)])
+    captured = float(np.sum(coefficients**2) / (proxy @ (mass @ proxy))) if proxy.any() else 1.0
+    return Spectrum(modes.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
-def _band_table(eigenvalues: Floats, band: Ints, power: Floats, edge_length_mm: float, reach: float) -> pd.DataFrame:
+def _band_table(
+    eigenvalues: Floats, band: Ints, coefficients: Floats, edge_length_mm: float, reach: float
+) -> pd.DataFrame:
     limits = band_limits(eigenvalues[1])
+    power = np.array([np.sum(coefficients[band == k] ** 2) for k in range(BANDS + 1)])
     numbers = np.array([np.count_nonzero(band == k) for k in range(BANDS + 1)])
-    wavelengths = 2.0 * np.pi / np.sqrt(limits)
+    wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
     total = power[1:].sum()
+    shares = power / total if total > 0 else np.zeros_like(power)
     complete = np.concatenate([[True], limits[1:] <= reach * (1.0 + ROUNDING)])
+    whole = np.arange(BANDS + 1) == 0
     return pd.DataFrame(
         {
             "band": np.arange(BANDS + 1),
-            "wavelength_min_mm": np.concatenate([[np.inf], wavelengths[1:]]),
-            "wavelength_max_mm": np.concatenate([[np.inf], wavelengths[:-1]]),
+            "wavelength_min_mm": np.where(whole, np.inf, wavelengths[1:]),
+            "wavelength_max_mm": wavelengths[:-1],
             "modes": numbers,
             "power": np.where(numbers > 0, power, np.nan),
-            "relative_power": np.concatenate(
-                [[np.nan], np.where(numbers[1:] > 0, power[1:] / total if total > 0 else 0.0, np.nan)]
-            ),
+            "relative_power": np.where((numbers > 0) & ~whole, shares, np.nan),
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
-            "resolved": np.concatenate([[True], wavelengths[1:] >= EDGES_PER_WAVELENGTH * edge_length_mm]),
+            "resolved": whole | (wavelengths[1:] >= EDGES_PER_WAVELENGTH * edge_length_mm),
         }
     )
 
 
-def _dominant_band(proxy: Floats, coefficients: Floats, band: Ints, functions: Floats, bands: Ints) -> Ints:
-    if not len(bands):
-        return np.zeros(len(proxy), dtype=np.int64)
-    parts = np.stack([functions[:, band == k] @ coefficients[band == k] for k in bands])
-    return np.where(proxy > 0, bands[parts.argmax(axis=0)], -bands[parts.argmin(axis=0)])
+def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
+    """Returns how far the spectrum of each hemisphere is from those of the same side of all measured brains.
+
+    The distance up to band Bk is √Σ(s − s′)² over the fold bands B4 to Bk, where s is the share that a band has of the
+    power of B1 to Bk: 0 for equal shares, at most √2. Neither the size of the brain nor the number of modes enters it.
+    There is one up to B4, up to B5 and up to B6, each between all pairs whose bands are complete in both.
+
+    Spectra have the columns subject, run ("real" for measured brains), week, hemisphere, band, power, complete,
+    resolved. A measured brain is not compared with itself.
+
+    Returns
+    -------
+    DataFrame
+        subject, run, week, hemisphere, real (the measured brain), real_week, metric (spectral_distance_B4,
+        spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok"; "B5 B6 not resolved": in one
+        of the two these bands are finer than its edges resolve; "B6 cut off": not complete in one of the two, then
+        without a value).
+    """
+    complete, resolved, powers = (
+        spectra.pivot_table(name, HEMISPHERE, "band", aggfunc="first").reindex(columns=range(1, BANDS + 1))
+        for name in ("complete", "resolved", "power")
+    )
+    hemispheres = list(complete.index)
+    fine = resolved.eq(True).to_numpy()
+    whole = powers.reindex(complete.index).where(complete.eq(True)).to_numpy(dtype=float)
+    rows = [
+        (*own, other[0], other[2], *row)
+        for i, own in enumerate(hemispheres)
+        for j, other in enumerate(hemispheres)
+        if other[1] == "real" and other[3] == own[3] and i != j
+        for row in _distances(whole[i], whole[j], fine[i] & fine[j])
+    ]
+    table = pd.DataFrame(rows, columns=[*HEMISPHERE, "real", "real_week", "metric", "value", "flag"])
+    return table.assign(unit="1")[[*table.columns[:-1], "unit", "flag"]]
+
+
+def _distances(a: Floats, b: Floats, resolved: NDArray[np.bool_]) -> list[tuple[str, float, str]]:
+    """Returns metric, value and flag for the powers of B1 to B6, NaN where a band is not complete."""
+    rows = []
+    for last in FOLD_BANDS:
+        fold = slice(FOLD_BANDS[0] - 1, last)
+        shares = a[:last] / a[:last].sum(), b[:last] / b[:last].sum()
+        cut, coarse = (
+            " ".join(f"B{k + 1}" for k in np.flatnonzero(bands)) for bands in (np.isnan(a + b)[:last], ~resolved[:last])
+        )
+        flag = f"{cut} cut off" if cut else f"{coarse} not resolved" if coarse else "ok"
+        name = "spectral_distance_B4" + (f"_to_B{last}" if last > FOLD_BANDS[0] else "")
+        rows.append((name, float(np.linalg.norm(shares[0][fold] - shares[1][fold])), flag))
+    return rows

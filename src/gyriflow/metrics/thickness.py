@@ -1,4 +1,4 @@
-"""Cortical thickness of simulated brains, and thickness as metrics."""
+"""Cortical thickness of simulated brains, and values of a surface at its parts."""
 
 import numpy as np
 import pyvista as pv
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import InputError, MeshError
-from ..geometry.layers import layer_thickness
+from ..geometry.matching import layer_thickness
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh
 
@@ -33,7 +33,7 @@ def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats
     The border between cortex and core is where the depth at the start is the cortical thickness, which is where the
     cortical weight is ½. It is made of material points and carried with the tissue: the cortex of a later week is what
     was cortex at the start, however much it has grown or been pressed. Thickness is then that of the layer between the
-    pial surface and the carried border, as in measured brains (`geometry.layers.layer_thickness`).
+    pial surface and the carried border, as in measured brains (`geometry.matching.layer_thickness`).
 
     Parameters
     ----------
@@ -76,20 +76,3 @@ def at_part(values: NDArray, whole: TriangleMesh, part: TriangleMesh) -> NDArray
             expected=f"{len(whole.vertices)} values, and a part of this surface",
         )
     return values[nearest]
-
-
-def thickness_metrics(values: Floats, areas: Floats) -> list[tuple[str, float, str]]:
-    """Returns metric, value and unit of thickness at (n,) vertices, NaN where it was not measured; weights by area."""
-    known = np.isfinite(values)
-    if not known.any():
-        return []
-    chosen, weights = values[known], areas[known]
-    mean = float(np.average(chosen, weights=weights))
-    low, high = np.quantile(chosen, [0.05, 0.95], weights=weights, method="inverted_cdf")
-    return [
-        ("mean_thickness", mean, "mm"),
-        ("thickness_sd", float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))), "mm"),
-        ("thickness_q05", float(low), "mm"),
-        ("thickness_q95", float(high), "mm"),
-        ("thickness_measured_share", float(weights.sum() / areas.sum()), "1"),
-    ]

@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
+from ..errors import InputError
 from .following import Follow
-from .settings import Problem, Settings, check, setting, up_to_invalid
+from .settings import Problem, Settings, check, line, setting, validated
 from .terms import FieldName, MaterialName, MedialWall, Side
 from .varying import (
     Floats,
@@ -48,6 +49,8 @@ Memory = Annotated[
 Fraction = Annotated[float, Field(gt=0, le=2)]
 STRAIN = ("xx", "yy", "zz", "xy", "xz", "yz")
 """Parts of a symmetric tensor, which end the names of their maps."""
+AXES = ("x", "y", "z")
+"""Which end the names of the maps of positions."""
 VENTRICLES = "ventricles"
 """The map of the part of ventricles in the tissue around a vertex."""
 
@@ -58,12 +61,11 @@ class Contact(Settings):
     kind: Literal["global", "planes", "none"] = setting(
         "global", "",
         "`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's "
-        "plane, folds run through each other (the paper); `none`: no contact.",
+        "plane, but folds may cross each other (the paper); `none`: no contact.",
     )  # fmt: skip
     distance_mm: float | None = setting(
-        None, "mm", "With `global`, distance at which contact begins; null: a fifth of the surface's mean edge, and "
-        "no more than the smallest gap at the start.",
-        gt=0, le=5,
+        None, "mm", "With `global`, distance at which contact begins; `null`: a fifth of the surface's mean edge, at "
+        "most the smallest gap at the start.", gt=0, le=5,
     )  # fmt: skip
     stiffness_pa: float | None = setting(
         None, "Pa", "With `global`, stiffness of the barrier; `null`: a tenth of the cortex's largest shear modulus.",
@@ -71,10 +73,8 @@ class Contact(Settings):
     )  # fmt: skip
     penalty_pa_per_m: float = setting(5.0e5, "Pa/m", "With `planes`, pressure per depth of penetration.", gt=0, le=1e9)
     gap_mm: float = setting(
-        2.5, "mm",
-        "Width of the fissure. The planes are a quarter of it from the middle, and nothing grows between them. With "
-        "all kinds but `none`.",
-        gt=0, le=20,
+        2.5, "mm", "Width of the fissure, unless `none`. Planes are a quarter of it from the middle; nothing grows "
+        "between them.", gt=0, le=20,
     )  # fmt: skip
 
 
@@ -83,21 +83,17 @@ class NoGrowth(Settings):
 
     kind: Literal["ellipsoid", "none"] = setting(
         "ellipsoid", "",
-        "`ellipsoid`: no growth in it, nor in the bridge between the hemispheres; `none`: all tissue grows.",
+        "`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`: all tissue grows.",
     )  # fmt: skip
     shift_y: float = setting(0.05, "Y-extent", "Anterior shift of its centre from the middle.", ge=-1, le=1)
     shift_z: float = setting(-0.15, "Z-extent", "Superior shift of its centre from the middle.", ge=-1, le=1)
-    semi_axes: tuple[Fraction, Fraction, Fraction] = setting(
-        (0.35, 0.40, 0.50), "extents", "Semi-axes along X, Y, Z, each above 0 and at most 2."
-    )
+    semi_axes: tuple[Fraction, Fraction, Fraction] = setting((0.35, 0.40, 0.50), "extents", "Semi-axes along X, Y, Z.")
 
 
 class Solver(Settings):
     """The nonlinear and the linear solver."""
 
-    newton_tolerance: float = setting(
-        1e-6, "", "Newton stops when the residual has fallen to this fraction of its value at u = 0.", gt=0, lt=1
-    )
+    newton_tolerance: float = setting(1e-6, "", "Residual at which Newton stops, over its value at u = 0.", gt=0, lt=1)
     krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
     max_newton: int = setting(20, "", "Newton iterations without progress before a step is halved.", ge=1, le=200)
     max_halvings: int = setting(6, "", "Halvings of the time step before the run ends.", ge=0, le=30)
@@ -106,83 +102,67 @@ class Solver(Settings):
 class FoldingSettings(Settings):
     """The mechanical model, its parameters and its numerics.
 
-    The defaults are the reference values of the paper, except contact (`global`; the paper's is `planes`) and the
-    elements (quadratic; the paper's are linear). `preset: fetalfoldsim` has the paper's contact, `mesh: {order: 1}` its
-    elements.
+    The defaults are the paper's, except `contact` (`planes` in the paper) and elements (linear in the paper: `mesh:
+    {order: 1}`).
     """
 
-    preset: Literal["fetalfoldsim", "measured"] | None = setting(
+    preset: Literal["fetalfoldsim", "measured", "expected"] | None = setting(
         None, "",
-        "Parameters to start from; other keys come on top, for a preset of a run the run's own. `fetalfoldsim`: those "
-        "of the paper, whose linear elements are `mesh: {order: 1}`; `measured`: growth that follows the brains' areas "
-        "and volumes, in places and directions as registration measures it. All values stand in `params.yaml`.",
+        "Parameters to start from; other keys come on top, for the preset of a run the run's own. `fetalfoldsim`: the "
+        "paper's; `measured`: growth that takes the brain to the shapes that its series was measured to have; "
+        "`expected`: to those that the growth of another population, such as an atlas, would give it.",
     )  # fmt: skip
     end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
-    step_s: float = setting(
-        43200.0, "s", "Time step; the last one before an output week is shortened to fit.", gt=0, le=604800
-    )
-    thickness_mm: VaryingNumber = varying(1.5, "mm", "Cortical thickness H; at the start if it grows.", gt=0, le=10)
+    step_s: float = setting(43200.0, "s", "Time step; shortened where an output week comes first.", gt=0, le=604800)
+    thickness_mm: VaryingNumber = varying(1.5, "mm", "Cortical thickness H₀ at the start.", gt=0, le=10)
     thickness_growth_mm_per_gw: float = setting(
-        0.0, "mm/GW", "Growth β of the thickness since the start, H = H₀ + β·t.", ge=-1, le=1
+        0.0, "mm/GW", "Growth rate β of the thickness: H = H₀ + β·t.", ge=-1, le=1
     )
     shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
     shear_modulus_core_pa: VaryingNumber = varying(300.0, "Pa", "Shear modulus of the core.", gt=0, le=1e7)
-    material: MaterialName = setting(
-        "neo-hookean", "", "Constitutive law; docs/model.md gives the energy of each. The paper's is `neo-hookean`."
-    )
+    material: MaterialName = setting("neo-hookean", "", "Constitutive law (docs/model.md), as in the paper.")
     poisson_ratio: float = setting(0.45, "", "Poisson's ratio ν.", ge=0, lt=0.5)
     growth_rate_per_s: VaryingOrEstimated = varying(
-        2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated`: from the brains' areas.", ge=-1e-5, le=1e-5
+        2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated` from the brains' areas.", ge=-1e-5, le=1e-5
     )
     radial_growth_rate_per_s: VaryingNumber = varying(
         0.0, "1/s", "Radial growth rate of the core, along the cortical normal.", ge=-1e-5, le=1e-5
     )
     core_growth_rate_per_s: VaryingOrEstimated = varying(
-        0.0, "1/s",
-        "Isotropic growth rate of the core; `estimated`: from the brains' volumes.", ge=-1e-5, le=1e-5,
-    )  # fmt: skip
-    follow: Follow | None = setting(
-        None, "", "Growth that follows curves of area and volume; the two growth rates then have no meaning."
+        0.0, "1/s", "Isotropic growth rate of the core; `estimated` from the brains' volumes.", ge=-1e-5, le=1e-5
     )
-    allow_negative_growth: bool = setting(False, "", "Whether the growth rates may be negative (atrophy).")
+    follow: Follow | None = setting(None, "", "Curves of area and volume to follow, instead of these two rates.")
+    allow_negative_growth: bool = setting(False, "", "Whether growth rates may be negative (atrophy).")
     stress_memory_gw: Memory = setting(
         0.0, "GW",
-        "Relaxation time of elastic stress: 0 forgets it after each step (the paper), `infinite` keeps all of it.",
+        "Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.",
         word="infinite",
-    )  # fmt: skip
-    time_scheme: Literal["implicit", "adams-bashforth", "midpoint"] = setting(
-        "implicit", "",
-        "`implicit`: each step is a nonlinear equilibrium, of first order in time (the paper); `adams-bashforth` and "
-        "`midpoint`: of second order, with one and two linear solves a step. These need a model that forgets stress, "
-        "and not contact by planes.",
     )  # fmt: skip
     support: Literal["ellipsoid", "base", "box", "free"] = setting(
         "ellipsoid", "",
-        "How the brain is held: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the flat "
-        "base; `box` does too and lets the upright sides slide; `free`: unconstrained (rigid motions are removed).",
+        "What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the flat "
+        "base, `box` too, and lets upright sides slide; `free` removes rigid motions only.",
     )  # fmt: skip
     medial_wall: MedialWall = setting(
         "sliding", "",
-        "Of a brain of one hemisphere, how its medial wall is supported: `sliding` keeps it in its plane, as the other "
-        "hemisphere would, `held` clamps it. It has no cortex. No meaning for brains of two hemispheres.",
+        "What holds the medial wall, which has no cortex, of a hemisphere alone: `sliding` keeps it in its plane, as "
+        "the other hemisphere would; `held` clamps it.",
     )  # fmt: skip
     contact: Contact = setting(Contact(), "", "Contact.")
     no_growth: NoGrowth = setting(NoGrowth(), "", "Tissue that does not grow.")
     output_every_gw: float = setting(
-        1.0, "GW", "Interval between output weeks; the start and the end are always included.", ge=0.01, le=10
+        1.0, "GW", "Interval between output weeks, besides the first and the last.", ge=0.01, le=10
     )
     fields: tuple[FieldName, ...] = setting(
-        ("displacement", "cortex_weight", "growth"), "", "Fields written for ParaView at each output week."
+        ("displacement", "cortex_weight", "growth"), "", "Fields for ParaView at each output week."
     )
-    solver: Solver = setting(Solver(), "", "The solvers.")
-    ranks: int = setting(2, "", "MPI ranks of one simulation.", ge=1, le=4096)
+    solver: Solver = setting(Solver(), "", "Solvers.")
+    ranks: int = setting(2, "", "MPI ranks of a simulation.", ge=1, le=4096)
 
     @check
     def _rates_or_curves(self) -> Iterator[Problem]:
-        if not self.gives("follow"):
-            return
         for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
-            if self.gives(key) and type(self) is FoldingSettings:
+            if self.follow is not None and self.gives(key) and type(self) is FoldingSettings:
                 yield Problem("has no meaning with `follow`, which sets it at each step", (key,))
 
     @field_validator("*")
@@ -232,6 +212,10 @@ class FoldingParameters(FoldingSettings):
         {}, "GW", "With `follow.directional`: likewise what the names of the six maps of measured strain begin with."
     )
 
+    targets: dict[Week, str] = setting(
+        {}, "GW", "With `follow.loop: closed`: by week what the names of the maps of the mesh's positions begin with."
+    )
+
     ventricle_growth_rate_per_s: float = setting(
         0.0, "1/s", "With `follow.ventricles_ml`: growth of the ventricles in all directions, set before each step."
     )
@@ -247,28 +231,23 @@ class FoldingParameters(FoldingSettings):
         own = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
         strain = {f"{name}_{part}" for name in self.regional_strain.values() for part in STRAIN}
         ventricles = {VENTRICLES} if self.with_ventricles else set()
+        targets = {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
         local = set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
-        return own | strain | local | ventricles
+        return own | strain | local | targets | ventricles
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
         return thickness_at(self, self.start_week, week, maps)
 
     @check
-    def _output_weeks_ascend(self) -> Iterator[Problem]:
+    def _values_are_possible(self) -> Iterator[Problem]:
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
             yield Problem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
-
-    @check
-    def _no_estimates_left(self) -> Iterator[Problem]:
         for key in GROWTH_RATES:
-            if self.has(key) and getattr(self, key) == "estimated":
+            if getattr(self, key) == "estimated":
                 yield Problem("found 'estimated'; expected the curve of the growth stage", (key,))
-
-    @check
-    def _values_are_possible(self) -> Iterator[Problem]:
-        return value_problems(self, self.start_week, {})
+        yield from value_problems(self, self.start_week, {})
 
 
 def thickness_at(p: FoldingSettings, start_week: float, week: float, maps: Maps) -> float | Floats:
@@ -286,58 +265,51 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     start
         Name of the start in messages, such as "the week of the start brain a".
     """
-    groups = (_week_problems, _thickness_problems, _stiffness_problems, _growth_problems, _step_problems)
-    for problems in (*groups, _scheme_problems):
-        yield from up_to_invalid(problems(p, start_week, maps, start))
-
-
-def _known(p: FoldingSettings, key: str, maps: Maps) -> Any:
-    """Returns the value of a parameter that may vary; None if it is estimated or its map is missing."""
-    value = getattr(p, key)
-    missing = isinstance(value, Varying) and value.map is not None and value.map not in maps
-    return None if missing or value == "estimated" else value
-
-
-def _week_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
-    if p.end_week <= start_week:
+    end = p.end_week
+    if end <= start_week:
         called = f"{start_week:g}, {start}" if start else f"start_week, {start_week:g}"
-        yield Problem(f"found {p.end_week:g}; it should be above {called}", ("end_week",))
-
-
-def _thickness_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
-    value = _known(p, "thickness_mm", maps)
-    for week in weeks_within(value, start_week, p.end_week) if value is not None else ():
-        reached = float(np.min(thickness_at(p, start_week, week, maps)))
-        if reached <= 0:
+        yield Problem(f"found {end:g}; it should be above {called}", ("end_week",))
+    known = {
+        key: value
+        for key in VARYING
+        if (value := getattr(p, key)) != "estimated"
+        and not (isinstance(value, Varying) and value.map not in (None, *maps))
+    }
+    for week in weeks_within(known["thickness_mm"], start_week, end) if "thickness_mm" in known else ():
+        if (reached := float(np.min(thickness_at(p, start_week, week, maps)))) <= 0:
             yield Problem(f"reaches {reached:g} mm at {week:g} GW; it should stay above 0", ("thickness_mm",))
-            return
-
-
-def _stiffness_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
+            break
+    ranges = {key: value_range(value, maps, start_week, end) for key, value in known.items()}
     for key in ("shear_modulus_cortex_pa", "shear_modulus_core_pa"):
-        value = _known(p, key, maps)
-        if value is not None and (least := value_range(value, maps, start_week, p.end_week)[0]) <= 0:
+        if key in ranges and (least := ranges[key][0]) <= 0:
             yield Problem(f"reaches {least:g} Pa; it should stay above 0", (key,))
-
-
-def _growth_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
-    for key in () if p.allow_negative_growth else GROWTH_RATES:
-        value = _known(p, key, maps) if p.has(key) else None
-        if value is not None and (least := value_range(value, maps, start_week, p.end_week)[0]) < 0:
+    rates = {key: ranges[key] for key in GROWTH_RATES if key in ranges}
+    for key, (least, _) in rates.items():
+        if least < 0 and not p.allow_negative_growth:
             yield Problem(f"found {least:g}; it should be 0 or more unless allow_negative_growth is true", (key,))
-
-
-def _step_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
-    known = [value for key in GROWTH_RATES if (value := _known(p, key, maps)) is not None]
-    growth = p.step_s * sum(max(map(abs, value_range(value, maps, start_week, p.end_week))) for value in known)
-    if growth >= 1:
+    if (growth := p.step_s * sum(max(map(abs, rate)) for rate in rates.values())) >= 1:
         yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
 
 
-def _scheme_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str) -> Iterator[Problem]:
-    if p.time_scheme == "implicit":
-        return
-    if p.stress_memory_gw > 0:
-        yield Problem(f"found {p.time_scheme}; with stress_memory_gw above 0 it should be implicit", ("time_scheme",))
-    if p.contact.kind == "planes":
-        yield Problem(f"found {p.time_scheme}; with contact.kind planes it should be implicit", ("time_scheme",))
+def parameters_from(values: Any) -> FoldingParameters:
+    """Returns the parameters from nested mappings as read from YAML; numbers written as 2e-7 are understood.
+
+    Raises
+    ------
+    InputError
+        Naming all problems at once.
+    """
+    return validated(FoldingParameters, values, "folding parameters")
+
+
+def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
+    """Raises InputError where a map is missing, does not fit the mesh, or holds impossible values."""
+    for name in sorted(p.maps):
+        if name not in maps:
+            raise InputError(f"the map {name} is missing", expected="a file with it, given with --maps")
+        found = maps[name].shape
+        if found != (vertices,):
+            raise InputError(f"the map {name} does not fit the mesh", found=found, expected=f"{vertices} values")
+    problems = [line(problem.key, problem.text) for problem in value_problems(p, p.start_week, maps)]
+    if problems:
+        raise InputError("folding parameters: " + "; ".join(problems))

@@ -16,74 +16,92 @@ SizeCurve = Annotated[
 """A size by gestational week, or the curve through the measured brains."""
 
 
+OPEN_ONLY = ("regional", "directional", "cortex", "smoothing_gw", "known_until_gw", "rotated", "noise", "ventricles_ml")
+"""What changes growth that is measured, and cannot change shapes."""
+BEFORE_GW = 1.0
+"""How far before the first week of the population that tells of its growth a brain may be."""
+
+
 class Follow(Settings):
-    """Growth that follows a brain: before each step the rates of cortex and core are set so that both curves are met.
+    """Growth that follows a brain: each step's rates of cortex and core are set so that area and volume meet curves.
 
     A brain that does not start on the curves comes onto them within its first week.
     """
 
     area_cm2: SizeCurve = setting(
         "measured", "cm²",
-        "Pial area of both hemispheres by gestational week, as `{21: 99, 30: 252}`; `measured`: a smooth curve through "
-        "the brains of the start's growth series.",
+        "Pial area of both hemispheres by week, as `{21: 99, 30: 252}`; `measured`: a smooth curve through the brains "
+        "of the start's growth series.",
     )  # fmt: skip
-    volume_ml: SizeCurve = setting(
-        "measured", "mL", "Volume inside the pial surface by gestational week, or `measured`; likewise."
-    )
+    volume_ml: SizeCurve = setting("measured", "mL", "Volume inside the pial surface, likewise.")
     thickness_mm: SizeCurve | None = setting(
-        None, "mm",
-        "Cortical thickness by gestational week, or `measured`, a curve through the mean thickness of these brains; "
-        "`null`: the run's `thickness_mm`.",
-    )  # fmt: skip
+        None, "mm", "Mean cortical thickness, likewise; `null`: the run's `thickness_mm`."
+    )
     ventricles_ml: SizeCurve | None = setting(
         None, "mL",
-        "Volume of the ventricles by gestational week, or `measured`, a curve through that of these brains' labels: "
-        "they then grow by a rate of their own, and the core around them by what remains. `null`: like the core.",
+        "Volume of the ventricles, likewise, from labels. They then have a growth rate of their own. `null`: they grow "
+        "like the core.",
     )  # fmt: skip
     regional: float = setting(
         0.0, "",
-        "How much of the measured differences between regions growth has: 0 none, 1 all; they come from registering "
-        "the brains of successive weeks, or from their surfaces' vertices if these are matched.",
+        "Part of the measured differences between regions that growth has. They come from registered brains of "
+        "successive weeks, or from matched vertices of their surfaces.",
         ge=0, le=2,
     )  # fmt: skip
     smoothing_mm: float = setting(
-        6.0, "mm", "Standard deviation of the Gaussian that smooths measured local growth.", ge=1, le=50
+        6.0, "mm", "Standard deviation of the Gaussian that smooths measured growth in space.", ge=1, le=50
     )
     smoothing_gw: float = setting(
-        0.0, "GW",
-        "Standard deviation of the Gaussian over the weeks that smooths measured local growth: brains of successive "
-        "weeks are other fetuses.",
-        ge=0, le=20,
-    )  # fmt: skip
+        0.0, "GW", "The same over weeks, of which each has brains of other fetuses.", ge=0, le=20
+    )
     cortex: Literal["volume", "area"] = setting(
-        "volume", "",
-        "What the cortex's regional growth is that of: `volume` of the tissue, like the core's, or `area` of the pial "
-        "surface.",
-    )  # fmt: skip
+        "volume", "", "Whether regional growth of the cortex is that of its `volume`, or of the pial `area`."
+    )
     directional: float = setting(
         0.0, "",
-        "How much of the measured differences between directions growth has: 0 none, 1 all. Cortex and core then grow "
-        "by their rates in all directions, and by the measured strain without change of volume.",
+        "Part of the measured differences between directions that growth has. Cortex and core then grow in all "
+        "directions by their rates, and by the measured strain without change of volume.",
         ge=0, le=2,
+    )  # fmt: skip
+    loop: Literal["open", "closed"] = setting(
+        "open", "",
+        "`open`: growth is what is measured between brains of successive weeks. `closed`: in each step, what takes the "
+        "simulated brain to the shape that it is to have by the next of these weeks; smoothing and mechanics then do "
+        "not add up, and curves and amounts of growth have no meaning.",
+    )  # fmt: skip
+    growth_of: Literal["own", "another"] = setting(
+        "own", "",
+        "Whose growth that is: of the start's `own` series, or of `another` population, such as an atlas. The brain is "
+        "then expected to move as the atlas does and to keep what sets it apart: a prediction. Needs `loop: closed`.",
     )  # fmt: skip
     known_until_gw: Week | None = setting(
         None, "GW",
-        "Only brains up to this week give curves and maps, earlier ones than the start's among them, and what comes "
-        "after is extrapolated: a prediction. `null`: all brains.",
+        "A prediction: only brains up to this week, and earlier ones than the start, give curves and maps, which are "
+        "extrapolated. `null`: all brains.",
     )  # fmt: skip
     rotated: bool = setting(
-        False, "", "Whether the maps are rotated over the brain at random, which keeps their smoothness: a null model."
+        False, "", "Null model: maps are rotated over the brain at random, which keeps their smoothness."
     )
     noise: float = setting(
-        0.0,
-        "",
-        "Standard deviation of random differences of growth, as a part of the mean, vertex by vertex.",
-        ge=0,
-        le=1,
+        0.0, "", "Standard deviation of random growth at each vertex, as a part of the mean.", ge=0, le=1
     )
-    seed: int = setting(0, "", "Of the rotation and of the noise.", ge=0)
+    seed: int = setting(0, "", "Seed of rotation and noise.", ge=0)
+
+    @check
+    def _closed_loop_takes_whole_shapes(self) -> Iterator[Problem]:
+        if self.loop == "open" and self.growth_of == "another":
+            yield Problem("growth of another population needs loop: closed", ("growth_of",))
+        if self.growth_of == "another" and self.thickness_mm == "measured":
+            yield Problem(
+                "is measured on the start's own later brains, which a prediction must not know", ("thickness_mm",)
+            )
+        if self.loop == "open":
+            return
+        for key in OPEN_ONLY:
+            if getattr(self, key) != type(self).model_fields[key].default:
+                yield Problem("has no meaning where growth leads to whole shapes: set loop to open", (key,))
 
     @check
     def _directions_are_not_rotated(self) -> Iterator[Problem]:
-        if self.gives("directional") and self.directional > 0 and self.gives("rotated") and self.rotated:
+        if self.directional > 0 and self.rotated:
             yield Problem("rotates maps of growth, not of its directions: set directional to 0", ("rotated",))

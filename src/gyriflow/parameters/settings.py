@@ -1,35 +1,34 @@
-"""The base of all settings: each key has its unit, bounds and description, and all problems are reported at once.
+"""The base of all settings: each key has its unit, bounds and description, and problems are told together.
 
 Pydantic checks single keys. A check across keys is a method with the decorator `check` that yields a `Problem` for each
-mistake. Checks run even if some keys are invalid: the settings then hold only the valid keys, and a check stops at the
-first key that is missing.
+mistake; it runs where all keys are valid.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+import difflib
+import re
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_origin
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, ClassVar, Self, Union, get_args, get_origin
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
     ModelWrapValidatorHandler,
-    TypeAdapter,
     ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+from ..errors import InputError
 
 PROBLEM = "problem"
 """Type of the errors whose message is complete as it is."""
-_NOTHING = object()
-
-
-class NotValidError(AttributeError):
-    """A check asks for a key that is missing or invalid."""
 
 
 @dataclass(frozen=True)
@@ -51,35 +50,26 @@ def refused(text: str) -> PydanticCustomError:
     return PydanticCustomError(PROBLEM, text)
 
 
-def up_to_invalid(problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Yields problems until one needs a key that is missing or invalid."""
-    with suppress(NotValidError):
-        yield from problems
-
-
 class Settings(BaseModel):
     """Settings that are validated as a whole and cannot change afterwards."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+    further_checks: ClassVar[tuple[Callable[[Any], Iterator[Problem]], ...]] = ()
+    """Checks across keys that are no methods."""
     checks: ClassVar[tuple[Callable[[Any], Iterator[Problem]], ...]] = ()
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
         known = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
-        cls.checks = tuple(value for value in known.values() if getattr(value, "is_check", False))
+        cls.checks = (*(value for value in known.values() if getattr(value, "is_check", False)), *cls.further_checks)
 
     @field_validator("*", mode="before")
     @classmethod
-    def _refuse_truth_values_as_numbers(cls, value: Any, info: ValidationInfo) -> Any:
+    def _refuse_what_yaml_or_a_system_takes_amiss(cls, value: Any, info: ValidationInfo) -> Any:
         # YAML reads `on`, `yes` and the like as true, which would pass as 1.0
         if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
             raise ValueError("Input should be a number or text, not true or false")
-        return value
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _refuse_texts_with_nul(cls, value: Any) -> Any:
         # which ends a path or an argument for the system
         inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
         if any(isinstance(text, str) and "\0" in text for text in inner):
@@ -88,50 +78,17 @@ class Settings(BaseModel):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
+    def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         # an empty section, such as `mesh:`
-        raw = {} if raw is None else raw
-        errors: list[InitErrorDetails] = []
-        try:
-            settings = handler(raw)
-        except ValidationError as error:
-            if not isinstance(raw, Mapping):
-                raise
-            errors = [_again(details) for details in error.errors()]
-            settings = cls._valid_part(raw, {str(details["loc"][0]) for details in errors}, info.context)
-        found = [problem for check in cls.checks for problem in up_to_invalid(check(settings))]
-        errors += [InitErrorDetails(type=refused(p.text), loc=p.key, input=None) for p in dict.fromkeys(found)]
-        if errors:
+        settings = handler({} if raw is None else raw)
+        if found := dict.fromkeys(problem for check in cls.checks for problem in check(settings)):
+            errors = [InitErrorDetails(type=refused(problem.text), loc=problem.key, input=None) for problem in found]
             raise ValidationError.from_exception_data(cls.__name__, errors)
         return settings
 
-    @classmethod
-    def _valid_part(cls, raw: Mapping[str, Any], wrong: set[str], context: Any) -> Self:
-        """Returns settings with the valid keys of `raw` and the defaults, without the keys in `wrong`."""
-        values = {}
-        for name in raw.keys() & cls.model_fields.keys():
-            value = valid_part(cls.model_fields[name].rebuild_annotation(), raw[name], context, whole=name not in wrong)
-            if value is not _NOTHING:
-                values[name] = value
-        settings = cls.model_construct(_fields_set=set(raw) & set(cls.model_fields), **values)
-        for name in raw.keys() - values.keys():
-            settings.__dict__.pop(name, None)
-        return settings
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            if name in type(self).model_fields:
-                raise NotValidError(name)
-            return super().__getattr__(name)
-
-    def has(self, *keys: str) -> bool:
-        """Returns whether the values of all these keys are valid."""
-        return all(hasattr(self, key) for key in keys)
-
     def gives(self, key: str) -> bool:
-        """Returns whether a key was given with a value other than null, valid or not."""
-        return key in self.model_fields_set and self.__dict__.get(key, _NOTHING) is not None
+        """Returns whether a key was given with a value other than null."""
+        return key in self.model_fields_set and getattr(self, key) is not None
 
 
 def setting(default: Any, unit: str, description: str, *, word: str | None = None, **bounds: Any) -> Any:
@@ -144,31 +101,118 @@ def setting(default: Any, unit: str, description: str, *, word: str | None = Non
     return Field(default, description=description, json_schema_extra=extra, **bounds)
 
 
-def valid_part(kind: Any, raw: Any, context: Any, *, whole: bool) -> Any:
-    """Returns the valid part of a value of the type `kind`, for settings and for lists and tables of settings."""
-    if whole:
-        try:
-            return TypeAdapter(kind).validate_python(raw, context=context)
-        except ValidationError:  # of a value that a validator of its field makes valid
-            return _NOTHING
-    arguments = get_args(kind)
-    if isinstance(kind, type) and issubclass(kind, Settings):
-        given = raw if isinstance(raw, Mapping) else {}
-        try:
-            return kind.model_validate(raw, context=context)
-        except ValidationError as error:
-            wrong = {str(part) for details in error.errors() for part in details["loc"][:1]}
-            return kind._valid_part(given, wrong, context)
-    if get_origin(kind) is tuple and arguments[1:] == (...,) and isinstance(raw, list | tuple):
-        parts = [valid_part(arguments[0], item, context, whole=False) for item in raw]
-        return _NOTHING if _NOTHING in parts else tuple(parts)
-    if get_origin(kind) is dict and isinstance(raw, Mapping):
-        table = {key: valid_part(arguments[1], item, context, whole=False) for key, item in raw.items()}
-        return _NOTHING if _NOTHING in table.values() else table
-    return _NOTHING
+# messages: the full path of each key, what was found, what is allowed
+
+Key = tuple[str | int, ...]
 
 
-def _again(details: Any) -> InitErrorDetails:
-    """Converts an error that pydantic has reported into a form that can be raised again."""
-    kind = refused(details["msg"]) if details["type"] == PROBLEM else details["type"]
-    return InitErrorDetails(type=kind, loc=details["loc"], input=details["input"], ctx=details.get("ctx", {}))
+def messages(error: ValidationError, kind: type[BaseModel]) -> list[tuple[Key, str]]:
+    """Returns the path and the text of each problem of settings of a kind, in the order of the keys."""
+    return [_message(details, kind) for details in error.errors()]
+
+
+def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
+    """Returns settings of a kind from plain mappings; InputError naming `where` and all problems at once."""
+    try:
+        return kind.model_validate(raw)
+    except ValidationError as error:
+        raise InputError(f"{where}: {'; '.join(line(*problem) for problem in messages(error, kind))}") from None
+
+
+def line(path: Key, text: str) -> str:
+    """Returns a problem as a line, such as `brains[0].week: found 20; it should be 21 or more`."""
+    return f"{dotted(path)}: {text}"
+
+
+def dotted(path: Key) -> str:
+    """Returns the path of a key as it is written, such as `brains[0].week`."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Returns a hint for an unknown name: the most similar known name, or all of them."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+
+
+def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
+    # pydantic puts the tag of a union's member, here in parentheses, into the path
+    path = tuple(part for part in details["loc"] if not str(part).startswith("("))
+    match details["type"]:
+        case t if t == PROBLEM:
+            return path, details["msg"]
+        case "extra_forbidden":
+            return path, f"unknown key; {nearest(str(path[-1]), keys_at(kind, path[:-1]))}"
+        case "missing":
+            return path, "is missing"
+        case "model_type":
+            return path, f"found {details['input']!r}; it should hold keys and values"
+    expected = details["msg"].removeprefix("Value error, ").removeprefix("Input should ")
+    return path, f"found {details['input']!r}; it should {expected}"
+
+
+def keys_at(kind: Any, path: Key) -> list[str]:
+    """Returns the keys of the settings at `path` inside the type `kind`."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if path and origin in (dict, tuple):
+        return keys_at(arguments[1 if origin is dict else 0], path[1:])
+    models = _models(kind)
+    if not models:
+        return []
+    if not path:
+        return list(models[0].model_fields)
+    field = models[0].model_fields.get(str(path[0]))
+    return keys_at(field.annotation, path[1:]) if field is not None else []
+
+
+def _models(kind: Any) -> list[type[BaseModel]]:
+    if get_origin(kind) in (Union, UnionType, Annotated):
+        return [model for part in get_args(kind) for model in _models(part)]
+    return [kind] if isinstance(kind, type) and issubclass(kind, BaseModel) else []
+
+
+# paths of input files
+
+
+def beside(folder: Path, path: str) -> Path:
+    """Returns the place of a file that is named relative to a folder, or below a home folder (`~/scans/a.nii.gz`)."""
+    try:
+        return folder / Path(path).expanduser()
+    except RuntimeError:  # no home folder of that name: `~` is part of the file's
+        return folder / path
+
+
+def located(folder: Path | str, path: str) -> Path:
+    """Returns the absolute path of a file or folder in a folder or else, where it is only there, in the working one."""
+    places = [beside(Path(folder), path), Path.cwd() / path]
+    return next((place for place in places if place.exists()), places[0]).resolve()
+
+
+def _absolute(path: str, info: ValidationInfo) -> str:
+    """Returns the absolute path of a file, which must exist.
+
+    The context names the `folder` of the configuration, which is searched for relative paths before the working
+    directory, and `awaited` files, which need not exist yet. Without a context the path is returned unchanged.
+    """
+    if not info.context:
+        return path
+    folder, place = Path(info.context["folder"]), located(info.context["folder"], path)
+    if not place.is_file() and path not in info.context.get("awaited", ()):
+        raise refused(f"no such file: {beside(folder, path)}{_present_instead(beside(folder, path))}")
+    return str(place)
+
+
+InputFile = Annotated[str, AfterValidator(_absolute)]
+"""The path of a file that is read; relative to the configuration file or else to the working directory."""
+
+
+def _present_instead(path: Path) -> str:
+    """Returns the files beside a missing one that differ from it only in a number, such as other weeks."""
+    pattern = re.compile(re.sub(r"\d+(\\\.\d+)?", r"[0-9.]+", re.escape(path.name)))
+    try:
+        names = sorted(other.name for other in path.parent.iterdir() if pattern.fullmatch(other.name))
+    except OSError:
+        names = []
+    return f"; there are {', '.join(names)}" if names else ""

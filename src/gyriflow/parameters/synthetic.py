@@ -33,13 +33,12 @@ class PhantomSettings(Settings):
     """A synthetic brain of the brain's week."""
 
     voxel_mm: float = setting(0.8, "mm", "Edge of the isotropic voxels.", ge=0.3, le=2.0)
-    seed: int = setting(0, "", "Seed of the random pattern of the folds.", ge=0)
-    cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex layer.", ge=0.8, le=4.0)
+    seed: int = setting(0, "", "Seed of the folds' random pattern.", ge=0)
+    cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex.", ge=0.8, le=4.0)
     pathology: Pathology | None = setting(
         None, "",
-        "What is wrong with the brain: `agenesis` of the corpus callosum, `holoprosencephaly`, `wide-ventricle` on the "
-        "right, `hypoplasia` of the right hemisphere, `midline-shift` to the right by 8 mm, `hemimegalencephaly` of "
-        "the right hemisphere.",
+        "`agenesis` of the corpus callosum, `holoprosencephaly`, `midline-shift` to the right by 8 mm, or in the right "
+        "hemisphere `wide-ventricle`, `hypoplasia`, `hemimegalencephaly`.",
     )  # fmt: skip
 
     @property
@@ -49,29 +48,25 @@ class PhantomSettings(Settings):
 
 
 class ShapeSettings(Settings):
-    """A simple geometry in the place of a brain, for teaching and verification, centred on x = 0 and y = 0."""
+    """A simple geometry in place of a brain, for teaching and verification, centred on x = 0 and y = 0."""
 
     kind: ShapeKind = setting(
         ..., "",
-        "`sphere`, `ellipsoid` (both centred on z = 0), `half-ellipsoid` (a dome on a flat base at z = 0) or `slab` "
-        "(a box upwards from z = 0).",
+        "`sphere` and `ellipsoid` are centred on z = 0; `half-ellipsoid` (a dome) and `slab` (a box) stand on z = 0.",
     )  # fmt: skip
     radius_mm: float = setting(23.0, "mm", "Radius of a sphere.", ge=5, le=150)
     semi_axes_mm: tuple[Length, Length, Length] = setting(
         (21.0, 28.0, 22.0), "mm",
-        "Semi-axes along X, Y, Z of an ellipsoid or half-ellipsoid, each 5 to 150; the longest is at most twice the "
-        "shortest.",
+        "Semi-axes along X, Y, Z of an ellipsoid or half-ellipsoid; the longest is at most twice the shortest.",
     )  # fmt: skip
-    extent_mm: tuple[Length, Length, Length] = setting(
-        (40.0, 40.0, 12.0), "mm", "Extents of a slab along X, Y, Z, each 5 to 150."
-    )
+    extent_mm: tuple[Length, Length, Length] = setting((40.0, 40.0, 12.0), "mm", "Extents of a slab along X, Y, Z.")
     noise_mm: float = setting(
         0.05, "mm",
-        "Root mean square height of smooth bumps that start the folding, at most a fiftieth of the smallest size. Flat "
-        "bases and a slab's sides stay flat.",
+        "Root mean square height of the smooth bumps that start the folding, at most a fiftieth of the smallest size. "
+        "Flat bases and a slab's sides have none.",
         ge=0, le=0.5,
     )  # fmt: skip
-    seed: int = setting(0, "", "Seed of the random pattern of the bumps.", ge=0)
+    seed: int = setting(0, "", "Seed of the bumps' random pattern.", ge=0)
 
     @property
     def size_mm(self) -> tuple[float, float, float]:
@@ -80,23 +75,16 @@ class ShapeSettings(Settings):
         return (size, size, size) if self.kind == "sphere" else size
 
     @check
-    def _size_of_its_kind(self) -> Iterator[Problem]:
-        own = SHAPE_SIZES[self.kind]
+    def _size_and_bumps_fit_the_kind(self) -> Iterator[Problem]:
+        own, longest, shortest = SHAPE_SIZES[self.kind], max(self.size_mm), min(self.size_mm)
         for key in dict.fromkeys(SHAPE_SIZES.values()):
             if self.gives(key) and key != own:
                 yield Problem(f"has no meaning with kind {self.kind}, whose size is {own}", (key,))
-
-    @check
-    def _even_triangles_fit(self) -> Iterator[Problem]:
-        key, longest, shortest = SHAPE_SIZES[self.kind], max(self.size_mm), min(self.size_mm)
-        if key == "semi_axes_mm" and longest > MOST_UNEQUAL_AXES * shortest:
+        if own == "semi_axes_mm" and longest > MOST_UNEQUAL_AXES * shortest:
             expected = f"at most {MOST_UNEQUAL_AXES:g} times the shortest, {shortest:g}"
-            yield Problem(f"found {longest:g} as the longest; it should be {expected}", (key,))
-
-    @check
-    def _bumps_are_small(self) -> Iterator[Problem]:
-        largest = MOST_NOISE * min(self.size_mm)
+            yield Problem(f"found {longest:g} as the longest; it should be {expected}", (own,))
+        largest = MOST_NOISE * shortest
         # the default suits the default sizes; only a given value can be wrong
         if self.gives("noise_mm") and self.noise_mm > largest:
-            expected = f"at most {largest:g}, a fiftieth of the smallest size in {SHAPE_SIZES[self.kind]}"
+            expected = f"at most {largest:g}, a fiftieth of the smallest size in {own}"
             yield Problem(f"found {self.noise_mm:g}; it should be {expected}", ("noise_mm",))

@@ -1,5 +1,6 @@
 """Names and codes that files, settings and figures share."""
 
+from collections.abc import Iterable, Sequence
 from typing import Literal, get_args
 
 Side = Literal["left", "right"]
@@ -8,16 +9,9 @@ STRUCTURES: dict[Side, Literal["CortexLeft", "CortexRight"]] = {"left": "CortexL
 """What GIFTI files call the cortex of each side."""
 
 VertexField = Literal[
-    "displacement",
-    "distance",
-    "cortex_weight",
-    "growth",
-    "shear_modulus",
-    "bulk_modulus",
-    "normal",
-    "zones",
+    "displacement", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal", "zones",
     "contact_pressure",
-]
+]  # fmt: skip
 """Fields that a run can write for ParaView with values per vertex."""
 ElementField = Literal["stress", "strain", "volume_ratio"]
 """Fields with values per element (up to four arrays each)."""
@@ -66,3 +60,50 @@ of that table were found), so that what is said of later weeks is cautious."""
 
 LONGEST_NAME = 100
 """Characters that the name of a brain, run or study has at most: names of files have 255 bytes."""
+
+# metrics
+
+SpangyProxy = Literal["shape_index", "mean_curvature"]
+"""The map whose spectrum is analysed."""
+LastBand = Literal["B4", "B5", "B6"]
+"""The last complete band."""
+ModesWord = Literal[LastBand, "common", "own"]
+"""What the number of eigenmodes may be called instead of being given."""
+WeylFormula = Literal["paper", "textbook"]
+"""Relation between the shortest wavelength WL and λ: 2π/WL² or (2π/WL)²."""
+
+ExportNames = Literal["plain", "bids"]
+"""How exported files are named."""
+
+CURVATURE_RADIUS_MM = 3.0
+"""At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
+SPANGY_PROXY: SpangyProxy = "shape_index"
+SPANGY_MODES: LastBand = "B5"
+SPANGY_WAVELENGTH: WeylFormula = "paper"
+
+FOLD_BANDS = (4, 5, 6)
+"""Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
+
+# what a calibration may be scored by
+
+Score = Literal["shape_index", "mean_curvature", "curvature_distribution", "size", "surface_distance"]
+"""A measure of how far a simulated brain is from a real one of its week.
+
+- shape_index, mean_curvature: 1 − r, with r the correlation over the pial surface after scaling to the real volume;
+- curvature_distribution: distance between the two distributions of mean curvature (1/mm);
+- size: √(a² + v²), with a, v the relative differences of pial area and volume;
+- surface_distance: mean distance of the two surfaces, each to the other, in mm.
+"""
+SCORES: tuple[Score, ...] = get_args(Score)
+
+AMPLITUDE = ".amplitude"
+"""Ending of a parameter that scales a curve of the base run."""
+STIFFNESS_RATIO = "stiffness_ratio"
+"""The parameter that sets the shear modulus of the cortex to a multiple of that of the core."""
+
+
+def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
+    """Returns what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
+    pairs = [(run, brain) for run, brain in folded]
+    several = {run for run, _ in pairs if sum(run == other for other, _ in pairs) > 1}
+    return [f"{run} · {brain}" if run in several else run for run, brain in pairs]

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, field_validator
 
-from .files import InputFile
-from .settings import Problem, Settings, check, setting
+from .settings import InputFile, Problem, Settings, check, setting
 
 Floats = NDArray[np.float64]
 Maps = Mapping[str, Floats]
 """Values at the mesh's vertices by parameter name; they move with the tissue."""
-Week = Annotated[float, Field(ge=15, le=45)]
+WEEKS = (15.0, 45.0)
+"""First and last gestational week that gyriflow knows."""
+Week = Annotated[float, Field(ge=WEEKS[0], le=WEEKS[1])]
 FileOrPair = Annotated[
     Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],
     Discriminator(lambda value: "(pair)" if isinstance(value, list | tuple) else "(file)"),
@@ -23,15 +24,15 @@ FileOrPair = Annotated[
 class Varying(Settings):
     """A parameter that varies: a curve over `weeks`, a `map` over the brain, or both, which are multiplied.
 
-    A map is a GIFTI file with one value per vertex of `surface` (or one such file for each hemisphere), or a NIfTI
-    volume in world coordinates, without `surface`. Maps move with the tissue.
+    A map is a GIFTI file with a value per vertex of `surface` (or one for each hemisphere), or a NIfTI volume in world
+    coordinates. Maps move with the tissue.
     """
 
     weeks: dict[Week, float] | None = setting(
-        None, "GW", "Values by gestational week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside."
+        None, "GW", "Values by week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside."
     )
-    map: FileOrPair | None = setting(None, "", "File with the values, or the left and the right hemisphere's.")
-    surface: FileOrPair | None = setting(None, "", "Surface file, or the left and the right one, of the map.")
+    map: FileOrPair | None = setting(None, "", "File with the values, or a list of the left and the right one.")
+    surface: FileOrPair | None = setting(None, "", "Surface file of the map, or the left and the right one.")
 
     @field_validator("weeks", mode="before")
     @classmethod
@@ -50,7 +51,7 @@ class Varying(Settings):
 
     @check
     def _has_a_curve_or_a_map(self) -> Iterator[Problem]:
-        if not self.weeks and not self.gives("map"):
+        if not self.weeks and self.map is None:
             yield Problem("found no values; it should be a number, or have `weeks` or a `map`")
 
     @check

@@ -42,18 +42,8 @@ SULCUS_WIDTH = 0.5
 class Shape:
     """What a phantom's form depends on, in mm.
 
-    Attributes
-    ----------
-    half_length
-        Half the cerebrum's length from front to back.
-    fold_depth, late_fold_depth
-        Depths of the folds that begin before week 21 and after week 27.
-    sylvian_depth
-        Depth of the dent on each side.
-    fissure
-        Width of the interhemispheric fissure.
-    ventricles
-        Size of the lateral ventricles relative to the brain.
+    Half the cerebrum's length from front to back, depths of the folds that begin before week 21 and after week 27 and
+    of the Sylvian dent on each side, the width of the fissure, and the ventricles' size relative to the brain.
     """
 
     half_length: float

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from ..errors import InputError
-from ..geometry.meshlab import pymeshlab
+from ..geometry.remeshing import remesh
 from ..geometry.triangles import TriangleMesh, edges, submesh, unit
 from ..parameters.synthetic import ShapeKind, ShapeSettings
 
@@ -37,19 +37,10 @@ def shape_surface(
 ) -> TriangleMesh:
     """Returns a closed, outward surface of even triangles, its vertices on the shape and its sharp edges kept.
 
-    Parameters
-    ----------
-    kind
-        "sphere" and "ellipsoid" are centred on the origin; "half-ellipsoid" is the half above a flat base at z = 0;
-        "slab" is a box from its base at z = 0 upwards, centred on x = y = 0.
-    size_mm
-        Semi-axes along x, y, z; of a slab its whole extents.
-    edge_length_mm
-        Length of the triangles' edges.
-    noise_mm, seed
-        Root mean square height of smooth bumps along the normal, which folding needs to start from, and the seed of
-        their pattern, which does not depend on the edge length. The base and the sides of a slab stay flat.
-
+    "sphere" and "ellipsoid" are centred on the origin; "half-ellipsoid" is the half above a flat base at z = 0; "slab"
+    is a box from its base at z = 0 upwards, centred on x = y = 0. `size_mm` are semi-axes along x, y, z, of a slab its
+    whole extents. Smooth bumps along the normal, which folding needs to start from, have the root mean square height
+    `noise_mm`; their pattern follows from `seed`, not from the edge length. The base and the sides of a slab stay flat.
     InputError where the edges are too long for the shape.
     """
     size = np.array(size_mm, dtype=float)
@@ -106,16 +97,7 @@ def _directions(count: int, upper: bool) -> Floats:
 def _even_hull(points: Floats, edge_length_mm: float) -> TriangleMesh:
     """Returns the convex hull with triangles close to equilateral, its sharp edges and corners where they were."""
     hull = trimesh.convex.convex_hull(points)
-    document = pymeshlab.MeshSet(verbose=False)
-    document.add_mesh(pymeshlab.Mesh(hull.vertices, hull.faces))
-    document.meshing_isotropic_explicit_remeshing(
-        iterations=REMESHING_ROUNDS,
-        targetlen=pymeshlab.PureValue(edge_length_mm),
-        featuredeg=SHARP_DEG,
-        checksurfdist=False,
-    )
-    even = document.current_mesh()
-    return TriangleMesh(even.vertex_matrix(), even.face_matrix())
+    return remesh(TriangleMesh(hull.vertices, hull.faces), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG)
 
 
 def _with_base(dome: TriangleMesh, edge_length_mm: float) -> TriangleMesh:

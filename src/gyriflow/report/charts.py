@@ -1,245 +1,353 @@
-"""Charts of metrics, solver steps and mesh quality."""
+"""Charts over the weeks: metrics of brains and of their regions, norms, and the spectra of folds."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
-import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike
+from matplotlib.patches import Patch
+from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..parameters.terms import ELEMENTS_NEEDED, SIDES
+from ..parameters.terms import FOLD_BANDS, SIDES
+from .labels import METRICS, week_label, with_unit
+from .pictures import region_colours
 from .style import (
-    FULL_WIDTH_IN,
     MEASURED,
     MUTED_COLOUR,
+    NEUTRAL_COLOUR,
     REAL_BRAIN,
     REAL_COLOUR,
     RUN_COLOURS,
-    SINGLE_COLUMN_IN,
-    add_letters,
-    chosen_colours,
+    Shown,
     from_zero,
     light_grid,
-    new_figure,
     run_legend,
-    shown_number,
-    shown_unit,
+    run_panels,
+    runs_by_name,
+    simulated_runs,
+    star,
     styled,
     week_axis,
 )
 
-METRIC_TITLES = {
-    "volume": "volume",
-    "area": "pial area",
-    "gyrification_index": "gyrification index, hulls",
-    "gyrification_index_envelope": "gyrification index, envelopes",
-    "mean_curvedness": "mean curvedness",
-    "mean_shape_index": "mean shape index",
-    "mean_sulcal_depth": "mean depth below the hull",
-    "folding_index": "folding index",
-    "mean_thickness": "mean cortical thickness",
-}
-"""The metrics of the overview and their titles."""
-HEMISPHERE_LINES: Mapping[str, Literal["-", "--", ":"]] = {"whole": "-", "left": "--", "right": ":"}
-QUALITY_TITLES = {
-    "radius_ratio": "radius ratio (1 = regular)",
-    "min_dihedral_deg": "smallest dihedral angle (°)",
-    "max_dihedral_deg": "largest dihedral angle (°)",
-    "volume_mm3": "volume (mm³)",
-}
-QUALITY_GATES = {
-    "radius_ratio": "min_radius_ratio",
-    "min_dihedral_deg": "min_dihedral_deg",
-    "max_dihedral_deg": "max_dihedral_deg",
-    "volume_mm3": "min_volume_mm3",
-}
+OVERVIEW = (
+    *("volume", "area", "gyrification_index", "gyrification_index_envelope", "mean_curvedness", "mean_shape_index"),
+    *("mean_sulcal_depth", "folding_index", "mean_thickness"),
+)
+WITH_NORMS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness", "mean_thickness")
+OF_REGIONS = ("area", "mean_sulcal_depth", "mean_curvature", "mean_local_gyrification_index", "mean_thickness")
+"""The metrics of each chart, in their order."""
+NOT_FROM_ZERO = ("mean_curvature", "mean_local_gyrification_index")
+LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
+HEMISPHERE_LINES = dict(zip(("whole", *SIDES), LINES, strict=True))
+_FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
+_HATCH = "//////"
 
 
-def _metric_panel(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> set[str]:
-    """Draws one metric, of the whole brain where it is known, else per hemisphere; returns the hemispheres drawn."""
-    drawn: set[str] = {"whole"} if (rows["hemisphere"] == "whole").any() else set(SIDES)
-    for (run, hemisphere), group in rows[rows["hemisphere"].isin(drawn)].groupby(["run", "hemisphere"], sort=False):
-        ordered = group.sort_values("week")
-        if run == MEASURED:
-            open_star = hemisphere == "right"
-            axes.plot(
-                ordered["week"],
-                ordered["value"],
-                "*",
-                color=REAL_COLOUR,
-                markersize=7,
-                markerfacecolor="white" if open_star else REAL_COLOUR,
-                zorder=3,
-            )
-        else:
-            axes.plot(
-                ordered["week"],
-                ordered["value"],
-                "o",
-                linestyle=HEMISPHERE_LINES[str(hemisphere)],
-                markersize=2.5,
-                color=colours[str(run)],
-            )
-    return drawn
+def _present(metrics: pd.DataFrame, names: Sequence[str]) -> list[str]:
+    """Returns the names of the metrics that a table has; InputError where it has none of them."""
+    present = [name for name in names if (metrics["metric"] == name).any()]
+    if not present:
+        raise InputError("no metric to draw", found=sorted(set(metrics["metric"])), expected=list(names))
+    return present
+
+
+def _title(axes: Axes, rows: pd.DataFrame, behind: str = "") -> None:
+    axes.set_title(with_unit(METRICS[rows["metric"].iloc[0]], rows["unit"].iloc[0]) + behind)
+
+
+def _name_of_real(rows: pd.DataFrame, shown: Shown) -> str:
+    """Returns what the measured brains of a table are called, nothing where it has none."""
+    return shown.get("measured", REAL_BRAIN) if MEASURED in set(rows["run"]) else ""
+
+
+def _stars(axes: Axes, rows: pd.DataFrame, colour: Any = REAL_COLOUR, *, column: str = "value", **look: Any) -> None:
+    if len(rows):
+        axes.plot(rows["week"], rows[column], "*", **{"color": colour, "markersize": 7, "zorder": 3} | look)
 
 
 @styled
-def metrics_chart(
-    metrics: pd.DataFrame,
-    *,
-    names: Sequence[str] = tuple(METRIC_TITLES),
-    runs: Sequence[str] = (),
-    measured: str = REAL_BRAIN,
-    synthetic: bool = False,
-) -> Figure:
+def metrics_chart(metrics: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
     """Returns a panel per metric over weeks: runs as lines, measured brains as black stars.
 
     A metric that is known for the hemispheres only has dashed lines and full stars for the left one, dotted lines and
-    open stars for the right one.
+    open stars for the right one. Metrics that the table lacks are left out.
 
     Parameters
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
-        `run` is "real" for measured brains.
-    names
-        Metrics to show, in this order; those that the table lacks are left out.
-    runs
-        All runs of the study, which settle the colours.
-
-    Raises
-    ------
-    InputError
-        If the table has none of the metrics.
+        `run` is "real" for measured brains; InputError if the table has none of the metrics.
     """
-    present = [name for name in names if (metrics["metric"] == name).any()]
-    if not present:
-        raise InputError("no metric to draw", found=sorted(set(metrics["metric"])), expected=list(names))
-    columns = min(3, len(present))
-    lines = -(-len(present) // columns)
-    width, height = FULL_WIDTH_IN * max(columns, 2) / 3, 0.7 + 1.9 * lines
-    figure = new_figure(width, height, synthetic=synthetic, measured=measured)
-    grid = figure.subplots(lines, columns, squeeze=False)
-    colours = chosen_colours(metrics["run"], runs)
-    hemispheres: set[str] = set()
-    for axes, name in zip(grid.flat, present, strict=False):
+    metrics = runs_by_name(metrics)
+    present = _present(metrics, OVERVIEW)
+    figure, panels, colours = run_panels(len(present), metrics["run"], shown)
+    drawn: set[str] = set()
+    for axes, name in zip(panels, present, strict=True):
         rows = metrics[metrics["metric"] == name]
-        hemispheres |= _metric_panel(axes, rows, colours)
-        unit = shown_unit(rows["unit"].iloc[0])
-        axes.set_title(METRIC_TITLES.get(name, name.replace("_", " ")) + (f" ({unit})" if unit else ""))
+        sides = {"whole"} if (rows["hemisphere"] == "whole").any() else set(SIDES)
+        drawn |= sides
+        for (run, side), group in rows[rows["hemisphere"].isin(sides)].groupby(["run", "hemisphere"], sort=False):
+            ordered = group.sort_values("week")
+            if run == MEASURED:
+                _stars(axes, ordered, markerfacecolor="white" if side == "right" else REAL_COLOUR)
+            else:
+                look: dict[str, Any] = {"linestyle": HEMISPHERE_LINES[str(side)], "marker": "o", "markersize": 2.5}
+                axes.plot(ordered["week"], ordered["value"], color=colours[str(run)], **look)
+        _title(axes, rows)
         week_axis(axes, metrics["week"])
         light_grid(axes)
-    for axes in grid.flat[len(present) :]:
-        axes.remove()
-    add_letters(grid.flat[: len(present)])
     extra = [
         Line2D([], [], color=MUTED_COLOUR, linestyle=HEMISPHERE_LINES[side], label=f"{side} hemisphere")
         for side in SIDES
-        if side in hemispheres
+        if side in drawn
     ]
-    run_legend(figure, colours, measured=measured if MEASURED in set(metrics["run"]) else "", extra=extra)
+    run_legend(figure, colours, measured=_name_of_real(metrics, shown), extra=extra)
     return figure
 
 
 @styled
-def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> Figure:
-    """Returns what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
-
-    Parameters
-    ----------
-    steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, elements_through_cortex, radius_ratio_01, rung,
-        seconds
-        One row per accepted step. Steps on another rung than the most frequent one are marked.
-    order
-        Of the elements: it says how many through the cortex are enough.
-    """
-    figure = new_figure(SINGLE_COLUMN_IN, 8.4, synthetic=synthetic)
-    panels = figure.subplots(7, 1, sharex=True)
-    week = steps["week"]
-    dots = {"markersize": 2.0, "linewidth": 0.8, "marker": "o"}
-    series: list[tuple[str, list[tuple[str, str]]]] = [
-        ("Newton\niterations", [("newton", "")]),
-        ("CG iterations", [("krylov", "")]),
-        ("smallest\ndet F", [("min_J", "")]),
-        ("|u| per step\n(mm)", [("max_u_mm", "max"), ("mean_u_mm", "mean")]),
-        ("elements through\nthe cortex", [("elements_through_cortex", "")]),
-        ("radius ratio,\n1 % quantile", [("radius_ratio_01", "")]),
-        ("time per step\n(s)", [("seconds", "")]),
-    ]
-    for axes, (label, columns) in zip(panels, series, strict=True):
-        for (column, name), colour in zip(columns, RUN_COLOURS, strict=False):
-            axes.plot(week, steps[column], color=colour, label=name or None, **dots)
-        axes.set_ylabel(label)
-        light_grid(axes)
-        if len(columns) > 1:
-            from_zero(axes)
-            axes.legend(loc="lower right", ncols=len(columns), bbox_to_anchor=(1.0, 0.98), borderaxespad=0)
-    for axes in panels[:2]:
-        from_zero(axes)
-        axes.yaxis.get_major_locator().set_params(integer=True, nbins=5)
-    panels[2].axhline(0, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
-    panels[4].axhline(ELEMENTS_NEEDED[order], color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
-    for axes in panels[4:]:
-        from_zero(axes)
-    figure.align_ylabels(panels)
-    add_letters(panels)
-    week_axis(panels[-1], week)
-    unusual = steps[steps["rung"] != steps["rung"].mode().iloc[0]]
-    for colour, (rung, rows) in zip(RUN_COLOURS[1:], unusual.groupby("rung", sort=False), strict=False):
-        panels[0].plot(rows["week"], rows["newton"], "D", color=colour, markersize=3.5, label=f"rung: {rung}")
-    if len(unusual):
-        panels[0].legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 0.98), borderaxespad=0)
-    return figure
-
-
-@styled
-def quality_histogram(
-    quality: pd.DataFrame | Mapping[str, Mapping[str, ArrayLike]],
+def norms_chart(
+    metrics: pd.DataFrame,
+    curves: pd.DataFrame,
+    norms: pd.DataFrame,
     *,
-    gates: Mapping[str, float] | None = None,
-    surface: str = "",
-    synthetic: bool = False,
+    reference: Sequence[str],
+    **shown: Unpack[Shown],
 ) -> Figure:
-    """Returns histograms of the tetrahedra's radius ratio, dihedral angles and volumes.
+    """Returns a panel per metric of whole brains: reference brains, the curve through them, and the others.
+
+    The band holds 90 % of further brains by Student's distribution; quantiles are drawn as bars where a week has five
+    brains or more. Stars are measured brains, of the reference black, others coloured; lines are runs.
 
     Parameters
     ----------
-    quality : DataFrame with one row per element, or {column: {"edges": (k + 1,), "counts": (k,)}}
-        Columns radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3; others are left out.
-    gates : {min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3: limit}
-        The gates of the configuration, drawn as lines; others are left out.
-    surface
-        What is to be said of the mesh's surface, under the histograms.
+    metrics : columns subject, run, week, hemisphere, metric, value, unit
+    curves : columns hemisphere, metric, week, expected, low, high
+    norms : columns hemisphere, metric, week, brains, q05, q50, q95
+    reference
+        Subjects that the curves go through.
+
+    InputError where none of the metrics is there.
     """
-    figure = new_figure(FULL_WIDTH_IN, 2.5, synthetic=synthetic)
-    panels = figure.subplots(1, len(QUALITY_TITLES), sharey=False)
-    for axes, (column, label) in zip(panels, QUALITY_TITLES.items(), strict=True):
-        if isinstance(quality, pd.DataFrame):
-            counts, edges = np.histogram(quality[column], bins=50)
-        else:
-            counts, edges = np.asarray(quality[column]["counts"]), np.asarray(quality[column]["edges"])
-        axes.stairs(counts, edges, fill=True, color=RUN_COLOURS[0])
-        # a few bad elements decide: a linear axis would hide them
-        axes.set_yscale("log")
-        axes.set_ylim(bottom=0.7)
-        axes.set_xlabel(label)
-        filled = np.flatnonzero(counts)
-        said = f"{edges[filled[0]]:.3g} to {edges[filled[-1] + 1]:.3g}"
-        limit = (gates or {}).get(QUALITY_GATES.get(column, ""))
-        if limit is not None:
-            # a least volume far below all others would stretch their axis: it is only told
-            if column != "volume_mm3" or limit >= edges[0]:
-                axes.axvline(limit, color=RUN_COLOURS[1], linestyle="--")
-            said += f", limit {shown_number(limit)}"
-        axes.set_title(said, fontsize=7)
+    whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
+    present = _present(whole, WITH_NORMS)
+    figure, panels, colours = run_panels(len(present), whole["run"], shown, panel_in=2.0, foot_in=0.6)
+    others = False
+    for axes, name in zip(panels, present, strict=True):
+        rows = whole[whole["metric"] == name]
+        # a table without rows has no numbers to draw
+        if len(band := curves[(curves["hemisphere"] == "whole") & (curves["metric"] == name)]):
+            axes.fill_between(band["week"], band["low"], band["high"], color=NEUTRAL_COLOUR, linewidth=0)
+            axes.plot(band["week"], band["expected"], color=MUTED_COLOUR)
+        bars = norms[(norms["hemisphere"] == "whole") & (norms["metric"] == name)].dropna(subset=["q50"])
+        for low, middle, high, week in bars[["q05", "q50", "q95", "week"]].to_numpy():
+            axes.plot([week, week], [low, high], color=REAL_COLOUR, linewidth=1.0)
+            axes.plot(week, middle, "_", color=REAL_COLOUR, markersize=7)
+        for (run, _), brain in rows[rows["run"] != MEASURED].groupby(["run", "subject"], sort=False):
+            ordered = brain.sort_values("week")
+            axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
+        real = rows[rows["run"] == MEASURED]
+        known = real["subject"].isin(reference)
+        _stars(axes, real[known], markersize=6)
+        _stars(axes, real[~known], RUN_COLOURS[-1])
+        others |= bool((~known).any())
+        _title(axes, rows)
+        week_axis(axes, rows["week"])
         light_grid(axes)
-    panels[-1].set_xscale("log")
-    add_letters(panels)
-    count = f"{int(counts.sum()):,}".replace(",", "\u2009")
-    panels[0].set_ylabel(f"elements (of {count})")
-    if surface:
-        figure.supxlabel(surface, fontsize=7)
+    extra: list[Artist] = [star("other measured brains", RUN_COLOURS[-1])] if others else []
+    if len(curves):
+        extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
+    run_legend(figure, colours, measured=shown.get("measured", REAL_BRAIN), extra=extra)
+    return figure
+
+
+@styled
+def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
+    """Returns a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
+
+    Measured brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
+
+    Parameters
+    ----------
+    regions : columns subject, run, week, hemisphere, region, metric, value, unit
+    asymmetry : columns subject, run, week, region, metric, asymmetry_index
+    """
+    regions, asymmetry = runs_by_name(regions), runs_by_name(asymmetry)
+    colours = region_colours(regions["region"])
+    present = _present(regions, OF_REGIONS)
+    lines = dict(zip(simulated_runs(regions["run"]), LINES, strict=False))
+    figure, panels, _ = run_panels(len(present) + 1, (), shown, foot_in=0.75)
+    for axes, name in zip(panels, present, strict=False):
+        rows = regions[regions["metric"] == name]
+        sides = rows.groupby(["subject", "run", "week", "region"], sort=False)["value"]
+        _region_lines(axes, (sides.sum() if name == "area" else sides.mean()).reset_index(), colours, lines)
+        _title(axes, rows, ", both sides" * (name == "area"))
+        if name not in NOT_FROM_ZERO:
+            from_zero(axes)
+    rows = asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)]
+    _region_lines(panels[-1], rows.rename(columns={"asymmetry_index": "value"}), colours, lines)
+    panels[-1].axhline(0, color=MUTED_COLOUR, linewidth=0.8)
+    panels[-1].set_title("asymmetry of area, 2 (L − R)/(L + R)")
+    extra = [Line2D([], [], color=c, marker="s", linestyle="none", label=name) for name, c in colours.items()]
+    extra += [Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run) for run, line in lines.items()]
+    run_legend(figure, {}, extra=[*extra, star(shown.get("measured", REAL_BRAIN), MUTED_COLOUR)])
+    return figure
+
+
+def _region_lines(
+    axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], lines: Mapping[str, Literal["-", "--", ":"]]
+) -> None:
+    """Draws the value of each region over the weeks."""
+    for (region, run), rows in values.groupby(["region", "run"], sort=False):
+        ordered = rows.sort_values("week")
+        if run == MEASURED:
+            _stars(axes, ordered, colours[region], markersize=6)
+        elif run in lines:
+            axes.plot(ordered["week"], ordered["value"], lines[str(run)], color=colours[region], linewidth=1.1)
+    week_axis(axes, values["week"])
+    light_grid(axes)
+
+
+def _of_bands(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
+    """Returns the rows of the bands, written as 4 or "B4", with whole numbers and a column `trusted`."""
+    numbers = spectra["band"].astype(str).str.removeprefix("B").astype(int)
+    trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
+    return spectra.assign(band=numbers, trusted=trusted)[numbers.isin(bands)]
+
+
+def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0) -> None:
+    said = "beyond the\nmodes computed"
+    axes.text(x, 0.5, said, transform=transform, ha="center", va="center", rotation=rotation)
+
+
+def _spectra_legend(
+    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], shown: Shown, *, bars: bool
+) -> None:
+    """Draws the legend of a chart of bands, with what is drawn of bands that are cut off or not resolved."""
+    untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
+    of_real = set((untrusted["run"] == MEASURED).to_list())
+    label = "cut off or not resolved, or a share of such"
+    extra: list[Artist] = []
+    if False in of_real:
+        hatched = Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label)
+        hollow = star(label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white")
+        extra.append(hatched if bars else hollow)
+    if True in of_real:
+        said = "the same, of the real brain" if extra else label
+        extra.append(star(said, markersize=8, markerfacecolor="white"))
+    run_legend(figure, colours, measured=_name_of_real(rows, shown), bars=bars, extra=extra)
+
+
+def _sides_of(rows: pd.DataFrame) -> list[str]:
+    """Returns the hemispheres that some brain of a table has, left first."""
+    return [side for side in SIDES if (rows["hemisphere"] == side).any()]
+
+
+@styled
+def spectra_chart(
+    spectra: pd.DataFrame,
+    *,
+    week: float,
+    bands: Sequence[int] = FOLD_BANDS,
+    colours: Mapping[str, Any] | None = None,
+    **shown: Unpack[Shown],
+) -> Figure:
+    """Returns the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
+
+    Bars of bands that are cut off or not resolved by the surface are hatched, such stars open, and so are all where a
+    band that they are shares of is cut off. A band without any power is said to be beyond the modes.
+
+    Parameters
+    ----------
+    spectra : columns subject, run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
+    week
+        Week in GW; InputError if the table has no such band then.
+    colours : {run: colour}
+        Other colours than those of the study, in this order.
+    """
+    rows = _of_bands(runs_by_name(spectra), bands)
+    rows = rows[(rows["week"] - week).abs() < 1e-6]
+    if rows.empty:
+        raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
+    sides = _sides_of(rows)
+    figure, panels, own = run_panels(len(sides), rows["run"], shown, per_row=2, panel_in=2.3, sharey=True)
+    colours = own if colours is None else colours
+    width = 0.8 / max(len(colours), 1)
+    for axes, hemisphere in zip(panels, sides, strict=True):
+        side = rows[rows["hemisphere"] == hemisphere]
+        for index, (run, colour) in enumerate(colours.items()):
+            of_run = side[side["run"] == run]
+            position = [bands.index(band) - 0.4 + (index + 0.5) * width for band in of_run["band"]]
+            bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colour)
+            for bar, trusted in zip(bars, of_run["trusted"], strict=True):
+                if not trusted:
+                    bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
+        for _, real in side[side["run"] == MEASURED].iterrows():
+            centre = bands.index(real["band"])
+            axes.hlines(real["relative_power"], centre - 0.42, centre + 0.42, color=REAL_COLOUR, linewidth=0.9)
+            face = REAL_COLOUR if real["trusted"] else "white"
+            axes.plot(centre, real["relative_power"], "*", color=REAL_COLOUR, markerfacecolor=face, markersize=8)
+        for place, band in enumerate(bands):
+            if not side.loc[side["band"] == band, "relative_power"].notna().any():
+                _beyond_the_modes(axes, place, axes.get_xaxis_transform(), rotation=90.0)
+        axes.set_xticks(range(len(bands)), [f"B{band}\n{_FOLDS.get(band, '')}" for band in bands])
+        axes.set_xlabel("SpAnGy band, and the folds that go with it")
+        axes.set_xlim(-0.5, len(bands) - 0.5)
+        axes.set_title(f"{hemisphere} hemisphere")
+        light_grid(axes)
+    panels[0].set_ylabel("relative power")
+    from_zero(panels[0])
+    _spectra_legend(figure, rows, colours, shown, bars=True)
+    return figure
+
+
+@styled
+def spectra_weeks_chart(spectra: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
+    """Returns the relative power of the bands of the folds over weeks: a row per hemisphere, a column per band.
+
+    Runs are lines, measured brains black stars; bands that are cut off, are shares of such, or are not resolved have
+    open markers.
+
+    Parameters
+    ----------
+    spectra : as for `spectra_chart`
+    """
+    bands = FOLD_BANDS
+    rows = _of_bands(runs_by_name(spectra), bands)
+    sides = _sides_of(rows)
+    layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
+    figure, panels, colours = run_panels(len(sides) * len(bands), rows["run"], shown, **layout)
+    places = ((hemisphere, band) for hemisphere in sides for band in bands)
+    for axes, (hemisphere, band) in zip(panels, places, strict=True):
+        here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
+        for run in [*colours, MEASURED]:
+            series = here[here["run"] == run].sort_values("week")
+            colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
+            if run != MEASURED:
+                axes.plot(series["week"], series["relative_power"], color=colour)
+            for trusted, part in series.groupby("trusted"):
+                look: dict[str, Any] = {
+                    "color": colour,
+                    "markerfacecolor": colour if trusted else "white",
+                    "markersize": size,
+                }
+                axes.plot(part["week"], part["relative_power"], marker, **look)
+        week_axis(axes, rows["week"])
+        light_grid(axes)
+        if not here["relative_power"].notna().any():
+            _beyond_the_modes(axes, 0.5, axes.transAxes)
+            axes.set_yticks([])
+        if hemisphere == sides[0]:
+            axes.set_title(f"B{band}, {_FOLDS[band]} folds" if band in _FOLDS else f"B{band}")
+        if hemisphere != sides[-1]:
+            axes.set_xlabel("")
+        if band == bands[0]:
+            axes.set_ylabel(f"{hemisphere} hemisphere\nrelative power")
+    for axes in panels[: len(bands)]:
+        from_zero(axes)
+    _spectra_legend(figure, rows, colours, shown, bars=False)
     return figure

@@ -96,7 +96,7 @@ def panel_grid(
     columns: Sequence[str],
     rows: Sequence[Row],
     *,
-    synthetic: bool,
+    synthetic: bool = False,
     measured: str = PHANTOM,
     colour_bars: Sequence[tuple[ScalarMappable, str]] = (),
     legend: Sequence[Patch] = (),

@@ -1,23 +1,26 @@
-"""Quality control before the solve: one page for each brain, which a lab looks through, and a verdict."""
+"""Quality control before the solve: a page and a verdict for each brain, and the table of all brains of a study."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-import matplotlib as mpl
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from ..geometry.alignment import angle_deg
+from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.schemes import LabelScheme
-from .overlay import BRIGHTEST, draw_outline, plane_grid
+from .labels import plain
 from .scene import VIEWS, View, colour_scale, half_extents, hemisphere_faces, paint, render, restricted, uniform_colours
-from .sections import PLANES
+from .sections import PLANES, SCALE_BAR_MM, draw_image, draw_outline, plane_grid, voxel_index
 from .style import FULL_WIDTH_IN, REAL_SURFACE_COLOUR, styled, synthetic_note, wrap
 
 Verdict = Literal["fine", "look", "refused"]
@@ -37,10 +40,20 @@ SHAPE_VIEWS = ("left", "right", "top", "bottom")
 THICKNESS_VIEWS = ("left", "right", "left medial", "right medial")
 OTHER_VIEWS = ("front", "back", "left medial", "right medial")
 MOST_LINES, LINE_LETTERS = 8, 138
-SCALE_BAR_MM = 20.0
 # in inches, from the top of the page
 HEAD_IN, PLANES_IN, VIEWS_IN, FOOT_IN = 0.62, 2.4, 1.42, 1.45
 PIXELS_PER_INCH = 200
+
+
+COLUMNS = (
+    *("subject", "week", "population", "source", "sides", "verdict", "cause", "warning_count", "warnings"),
+    *("area_cm2", "area_left_cm2", "area_right_cm2", "volume_ml", "share_of_expected_volume"),
+    *("mean_thickness_mm", "thickness_measured_share", "pose_by", "rotation_deg", "asymmetry_mm", "page"),
+)
+"""The columns; the first three, `source` and `sides` are of the configuration, the others of the surface stage."""
+SHOWN = ("subject", "week", "verdict", "cause", "warnings", "area_cm2", "volume_ml", "mean_thickness_mm", "page")
+SEPARATOR = " | "
+"""Between the warnings of a brain in its row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +105,6 @@ def tissue_groups(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
     groups[np.isin(labels, scheme.cortex)] = 1
     groups[np.isin(labels, scheme.ventricles)] = 3
     return groups
-
-
-def verdict_of(warnings: Sequence[str]) -> Verdict:
-    """Returns "fine" for a brain without warnings, else "look"."""
-    return "look" if warnings else "fine"
 
 
 @styled
@@ -174,7 +182,7 @@ def _draw_planes(figure: Figure, brain: Brain, *, top: float) -> None:
         wide, tall = inches * (extent[1] - extent[0]), inches * (extent[3] - extent[2])
         box = (left / FULL_WIDTH_IN, (top - 0.17 - tall) / height, wide / FULL_WIDTH_IN, tall / height)
         axes = figure.add_axes(box)
-        keys = _draw_volumes(axes, brain.volumes, points, extent)
+        keys = _draw_volumes(axes, brain.volumes, points, extent, (plane, at[plane], low, high))
         if brain.white is not None:
             draw_outline(axes, brain.white, plane, at[plane], INNER_COLOUR)
         draw_outline(axes, brain.pial, plane, at[plane], PIAL_COLOUR)
@@ -211,26 +219,26 @@ def _places(brain: Brain, low: Floats, high: Floats) -> dict[str, float]:
 
 
 def _draw_volumes(
-    axes: Axes, volumes: Sequence[Volume], points: Floats, extent: tuple[float, float, float, float]
+    axes: Axes,
+    volumes: Sequence[Volume],
+    points: Floats,
+    extent: tuple[float, float, float, float],
+    where: tuple[str, float, Floats, Floats],
 ) -> list[Patch]:
     """Draws the image, or else the labels, and the inner border of the cortex where there are labels."""
     keys: list[Patch] = []
     image = next((volume for volume in volumes if volume.image is not None), None)
     if image is not None and image.image is not None:
-        values = image.image
-        lit = values[np.isfinite(values) & (values > 0)]
-        brightest = float(np.quantile(lit, BRIGHTEST)) if lit.size else 1.0
-        grey = map_coordinates(np.nan_to_num(values), _index(points, image.affine), order=1)
-        axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, origin="lower", extent=extent, interpolation="none")
+        draw_image(axes, image.image, image.affine, *where)
     for volume in volumes:
         if volume.tissues is None:
             continue
-        index = _index(points, volume.affine)
+        index = voxel_index(points, volume.affine)
         groups = map_coordinates(volume.tissues, index, order=0, mode="constant")
         if image is None:
             colours = np.ones((len(TISSUES) + 1, 3))
             for code, (name, colour) in TISSUES.items():
-                colours[code] = mpl.colors.to_rgb(colour)
+                colours[code] = to_rgb(colour)
                 keys += [Patch(color=colour, label=name)] if (volume.tissues == code).any() else []
             axes.imshow(colours[groups], origin="lower", extent=extent, interpolation="none")
         if (volume.tissues == 1).any():
@@ -240,12 +248,6 @@ def _draw_volumes(
             if inside.min() < 0.5 < inside.max():
                 axes.contour(right, up, inside, levels=[0.5], colors=INNER_COLOUR, linewidths=0.6)
     return keys
-
-
-def _index(points: Floats, affine: Floats) -> Floats:
-    """Returns the (3, rows, columns) indices of voxels at (rows, columns, 3) places."""
-    inverse = np.linalg.inv(affine)
-    return np.moveaxis(points @ inverse[:3, :3].T + inverse[:3, 3], -1, 0)
 
 
 def _draw_views(figure: Figure, brain: Brain, colours: Floats, names: Sequence[str], top: float) -> None:
@@ -273,3 +275,89 @@ def _draw_views(figure: Figure, brain: Brain, colours: Floats, names: Sequence[s
         axes.set_title(view.name, fontsize=6.5, pad=1)
         for x, end in zip((0.05, 0.95), view.ends, strict=True):
             axes.text(x, 0.97, end, transform=axes.transAxes, ha="center", va="top", fontsize=6, color="#767676")
+
+
+def quality_row(
+    labels: Mapping[str, Any],
+    report: Mapping[str, Any],
+    thickness: Mapping[str, Any],
+    warnings: Sequence[str],
+    expected_ml: float,
+) -> dict[str, Any]:
+    """Returns the row of a brain whose surface was made; its verdict is "fine", or "look" where there are warnings.
+
+    Parameters
+    ----------
+    labels
+        subject, week, population, source, sides and page.
+    report, thickness
+        What the surface stage and the thickness say, as in `surface.json` and `thickness.json`.
+    expected_ml
+        The coarse volume of a cerebrum of the week; of one side alone half of it is expected.
+    """
+    area, sides = report["area_cm2"], str(labels["sides"]).split()
+    pose = pose_from(report["pose"])
+    return {
+        **labels,
+        "verdict": "look" if warnings else "fine",
+        "cause": "",
+        "warning_count": len(warnings),
+        "warnings": SEPARATOR.join(warnings),
+        "area_cm2": area["whole"],
+        "area_left_cm2": area.get("left"),
+        "area_right_cm2": area.get("right"),
+        "volume_ml": report["volume_mL"],
+        "share_of_expected_volume": report["volume_mL"] / expected_ml * 2 / len(sides),
+        "mean_thickness_mm": thickness.get("mean_mm"),
+        "thickness_measured_share": thickness.get("measured_area_share"),
+        "pose_by": pose.by,
+        "rotation_deg": angle_deg(pose.of_file()[:3, :3]),
+        "asymmetry_mm": report.get("asymmetry_mm"),
+    }
+
+
+def quality_table(
+    rows: Sequence[Mapping[str, Any]], refused: Sequence[Mapping[str, Any]], order: Sequence[str]
+) -> pd.DataFrame:
+    """Returns the rows of all brains in an order of their ids.
+
+    Parameters
+    ----------
+    rows
+        What `quality_row` returns.
+    refused
+        labels and cause of the brains that were refused.
+    """
+    every = [dict(row) for row in rows] + [{**row, "verdict": "refused", "warning_count": 0} for row in refused]
+    table = pd.DataFrame(every, columns=list(COLUMNS))
+    rank = {name: number for number, name in enumerate(order)}
+    return table.sort_values("subject", key=lambda names: names.map(rank)).reset_index(drop=True)
+
+
+def shown_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Returns the table as it is shown in pages: fewer columns, brains to look at first."""
+    rank = table["verdict"].map({"refused": 0, "look": 1, "fine": 2})
+    shown = table.loc[rank.sort_values(kind="stable").index, list(SHOWN)]
+    return shown.rename(columns={name: plain(name) for name in SHOWN})
+
+
+def facts(row: Mapping[str, Any]) -> dict[str, str]:
+    """Returns what stands in the head of a brain's page, by name."""
+    both = " + ".join(f"{row[f'area_{side}_cm2']:.1f}" for side in str(row["sides"]).split())
+    found = {
+        "source": str(row["source"]),
+        "hemispheres": str(row["sides"]),
+        "area": f"{row['area_cm2']:.1f} cm² ({both})",
+        "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of that expected)",
+        "pose": f"by {row['pose_by']}, turned by {row['rotation_deg']:.1f}°",
+    }
+    if _known(row["asymmetry_mm"]):
+        found["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
+    if _known(row["mean_thickness_mm"]):
+        share = 100 * row["thickness_measured_share"]
+        found["thickness"] = f"{row['mean_thickness_mm']:.2f} mm (measured on {share:.0f} %)"
+    return found
+
+
+def _known(value: object) -> bool:
+    return isinstance(value, int | float) and bool(np.isfinite(value))

@@ -2,11 +2,11 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from functools import wraps
 from string import ascii_lowercase
-from typing import Any
+from typing import Any, TypedDict
 
 import matplotlib as mpl
 import pandas as pd
@@ -15,6 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+
+from ..parameters.terms import run_names
 
 SINGLE_COLUMN_IN = 3.5
 """Width of one column of a journal page, in inches."""
@@ -41,7 +43,6 @@ REAL_BRAIN, PHANTOM = "real brain", "phantom"
 """What brains that were not simulated are called where their population is not known."""
 SYNTHETIC_NAMES = frozenset((PHANTOM, "simple shape", "sphere", "ellipsoid", "half-ellipsoid", "slab"))
 """What brains are called that the workflow made itself."""
-_UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -70,6 +71,21 @@ _SETTINGS: dict[Any, Any] = {
     "grid.color": "#E2E2E2",
     "grid.linewidth": 0.5,
 }
+
+
+class Shown(TypedDict, total=False):
+    """What charts are told besides their data.
+
+    Attributes
+    ----------
+    runs : all runs of the study, which settle the colours
+    measured : what the measured brains are called, "real brain" unless it is said
+    synthetic : whether the folded brains are phantoms
+    """
+
+    runs: Sequence[str]
+    measured: str
+    synthetic: bool
 
 
 def style() -> AbstractContextManager[None]:
@@ -102,6 +118,48 @@ def new_figure(width_in: float, height_in: float, *, synthetic: bool, measured: 
     if synthetic:
         figure.suptitle(synthetic_note(measured))
     return figure
+
+
+def panel_figure(
+    count: int,
+    *,
+    per_row: int = 3,
+    panel_in: float = 1.9,
+    foot_in: float = 0.7,
+    synthetic: bool = False,
+    measured: str = PHANTOM,
+    **grid: Any,
+) -> tuple[Figure, list[Axes]]:
+    """Returns a figure with so many panels, row after row, and the panels, with their letters.
+
+    Parameters
+    ----------
+    per_row
+        Panels of a full row, which is as wide as a page.
+    panel_in, foot_in
+        Height of a row, and what is left for the legend, in inches.
+    synthetic, measured : as for `new_figure`
+    grid
+        What else `Figure.subplots` takes.
+    """
+    columns = min(per_row, count)
+    lines = -(-count // columns)
+    width = FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row)
+    figure = new_figure(width, foot_in + panel_in * lines, synthetic=synthetic, measured=measured)
+    panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
+    for spare in panels[count:]:
+        spare.remove()
+    add_letters(panels[:count])
+    return figure, panels[:count]
+
+
+def run_panels(
+    count: int, present: Iterable[str], shown: Shown, **layout: Any
+) -> tuple[Figure, list[Axes], dict[str, Any]]:
+    """Returns `panel_figure` for runs that are present, and the colours of these."""
+    told: dict[str, Any] = {"synthetic": shown.get("synthetic", False), "measured": shown.get("measured", PHANTOM)}
+    figure, panels = panel_figure(count, **told, **layout)
+    return figure, panels, chosen_colours(present, shown.get("runs", ()))
 
 
 def add_letters(panels: Iterable[Axes]) -> None:
@@ -138,38 +196,6 @@ def wrap(text: str, letters: int) -> str:
     return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.split("\n"))
 
 
-def shown_unit(unit: object) -> str:
-    """Returns a unit of the tables as shown, for example "cm²"; empty where there is none."""
-    return _UNITS.get(unit, unit) if isinstance(unit, str) else ""
-
-
-def shown_number(value: float) -> str:
-    """Returns a number with at most three digits, a very large or small one with its power of ten, as in 2·10⁻⁷."""
-    digits, _, power = f"{value:.3g}".replace("-", "−").partition("e")
-    if not power:
-        return digits
-    factor = "" if digits == "1" else f"{digits}·"
-    return f"{factor}10$^{{{int(power.replace('−', '-'))}}}$"
-
-
-def week_label(week: float) -> str:
-    """Returns a gestational week as shown, for example "21 GW" or "21.5 GW"."""
-    return f"{week:g} GW"
-
-
-def column_label(key: Hashable) -> str:
-    """Returns the heading of a column: a week, an interval of two weeks, or a name as it is."""
-    match key:
-        case str():
-            return key
-        case (first, last):
-            return f"{first:g}–{last:g} GW"
-        case float() | int():
-            return week_label(key)
-        case _:
-            return str(key)
-
-
 def simulated_runs(runs: Iterable[str]) -> list[str]:
     """Returns the names of the simulated runs, each once, in the order given."""
     return [run for run in dict.fromkeys(runs) if run != MEASURED]
@@ -180,13 +206,6 @@ def chosen_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str
     simulated = simulated_runs(present)
     colours = run_colours([*runs, *simulated])
     return {run: colour for run, colour in colours.items() if run in simulated}
-
-
-def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
-    """Returns what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
-    pairs = [(run, brain) for run, brain in folded]
-    several = {run for run, _ in pairs if sum(run == other for other, _ in pairs) > 1}
-    return [f"{run} · {brain}" if run in several else run for run, brain in pairs]
 
 
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
@@ -233,6 +252,12 @@ def light_grid(axes: Axes, axis: str = "y") -> None:
     axes.grid(visible=True, axis=axis)  # type: ignore[arg-type]
 
 
+def star(label: str, colour: str = REAL_COLOUR, **look: Any) -> Line2D:
+    """Returns the entry of a legend for measured brains."""
+    usual: dict[str, Any] = {"marker": "*", "markersize": 7, "linestyle": "none"}
+    return Line2D([], [], color=colour, label=label, **{**usual, **look})
+
+
 def run_legend(
     figure: Figure,
     colours: Mapping[str, Any],
@@ -243,7 +268,8 @@ def run_legend(
 ) -> None:
     """Draws below the panels a legend of the runs, of the measured brains where they have a name, and of what else.
 
-    Runs are keyed as they are drawn, as lines or as `bars`. The legend has as many columns as its longest label allows.
+    Runs are keyed as they are drawn, as lines or as `bars`. The legend has as many columns as its longest label allows,
+    and the figure grows by its lines.
 
     Parameters
     ----------
@@ -254,7 +280,7 @@ def run_legend(
         for run, colour in colours.items()
     ]
     if measured:
-        handles.append(Line2D([], [], color=REAL_COLOUR, marker="*", markersize=7, linestyle="none", label=measured))
+        handles.append(star(measured))
     handles.extend(extra)
     # a letter of the legend is about 0.065 in wide, the line before it and the gap behind 0.5 in
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)

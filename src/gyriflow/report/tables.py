@@ -1,76 +1,32 @@
 """Tables of a study, and any table as HTML."""
 
-from collections.abc import Hashable, Mapping
-from hashlib import sha256
-from html import escape
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from jinja2 import Environment
+from markupsafe import Markup
 
-from .style import MEASURED, PHANTOM, REAL_BRAIN, shown_unit, synthetic_note
+from .charts import WITH_NORMS
+from .labels import METRICS, plain, with_unit
+from .solve import displacement_summary
+from .style import MEASURED, PHANTOM, REAL_BRAIN, runs_by_name, simulated_runs, synthetic_note
 
-
-def growth_table(rates: pd.DataFrame) -> pd.DataFrame:
-    """Returns the growth rates with headings and units for print, one row per interval.
-
-    Parameters
-    ----------
-    rates : columns series, from_week, to_week, area_ratio, rate_per_s, volume_ratio, core_rate_per_s
-        The series is shown where there are several.
-    """
-    several = len(set(rates["series"])) > 1
-    return pd.DataFrame(
-        ({"series": rates["series"]} if several else {})
-        | {
-            "from (GW)": rates["from_week"],
-            "to (GW)": rates["to_week"],
-            "area ratio": rates["area_ratio"].round(4),
-            "tangential rate (10⁻⁷ s⁻¹)": (1e7 * rates["rate_per_s"]).round(3),
-            "volume ratio": rates["volume_ratio"].round(4),
-            "core rate (10⁻⁷ s⁻¹)": (1e7 * rates["core_rate_per_s"]).round(3),
-        }
-    )
+VERDICTS = ("fine", "look", "refused")
+_WORD, _SENTENCE = 12, 60
+_TABLE = Environment(autoescape=True).from_string(
+    "<table>{% if caption %}<caption>{{ caption }}</caption>{% endif %}"
+    "<thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr></thead>\n<tbody>"
+    '{% for row in rows %}<tr>{% for kind, text in row %}<td class="{{ kind }}">{{ text }}</td>{% endfor %}</tr>\n'
+    "{% endfor %}</tbody></table>"
+)
 
 
-def sizes_table(areas: pd.DataFrame) -> pd.DataFrame:
-    """Returns areas and volumes per week of each series of brains, and how far each is from the first one in %.
-
-    Parameters
-    ----------
-    areas : columns series, week, area_cm2, volume_ml
-        Brains of one week and series count as their mean.
-    """
-    names = list(dict.fromkeys(areas["series"]))
-    columns: dict[str, pd.Series] = {}
-    for column, heading, unit in (("area_cm2", "pial area", "cm²"), ("volume_ml", "volume", "mL")):
-        wide = areas.pivot_table(index="week", columns="series", values=column, aggfunc="mean")
-        columns |= {f"{heading} ({unit}): {name}": wide[name] for name in names}
-        for name in names[1:]:
-            columns[f"{heading}: {name} − {names[0]} (%)"] = (100 * (wide[name] / wide[names[0]] - 1)).round(1)
-    return pd.DataFrame(columns).rename_axis("week (GW)")
-
-
-def agreement_table(agreement: pd.DataFrame) -> pd.DataFrame:
-    """Returns how far the growth rates of series agree, in 10⁻⁷ s⁻¹: a row per interval, their mean, the mean size.
-
-    Parameters
-    ----------
-    agreement : columns series, reference, from_week, to_week, difference_per_s, core_difference_per_s
-    """
-    differences = {"difference_per_s": "tangential rate", "core_difference_per_s": "core rate"}
-    parts = []
-    for series, rows in agreement.groupby("series", sort=False):
-        weeks = [f"{a:g}–{b:g}" for a, b in zip(rows["from_week"], rows["to_week"], strict=True)]
-        part = pd.DataFrame({"compared": f"{series} − {rows['reference'].iloc[0]}", "interval (GW)": weeks})
-        values = (1e7 * rows[list(differences)]).reset_index(drop=True)
-        part = part.join(values)
-        for label, summary in (("mean", values.mean()), ("mean size", values.abs().mean())):
-            part.loc[len(part)] = [part["compared"].iloc[0], label, *summary]
-        parts.append(part)
-    table = pd.concat(parts, ignore_index=True)
-    # a sum with 0 takes the sign from a rounded −0
-    table[list(differences)] = table[list(differences)].round(3) + 0.0
-    return table.rename(columns={name: f"{text}, difference (10⁻⁷ s⁻¹)" for name, text in differences.items()})
+def _named(rows: pd.DataFrame) -> pd.Series:
+    """Returns the metric of each row as words, with its unit."""
+    pairs = zip(rows["metric"], rows["unit"], strict=True)
+    return pd.Series([with_unit(plain(metric), unit) for metric, unit in pairs], index=rows.index, dtype=object)
 
 
 def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.DataFrame:
@@ -78,7 +34,7 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
 
     Parameters
     ----------
-    metrics : columns run, week, hemisphere, metric, value, unit
+    metrics : columns subject, run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; several measured brains of a week give their mean.
     measured
         Heading of the measured brains' column.
@@ -87,15 +43,14 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     -------
     DataFrame indexed by metric (with its unit) and week; cells without a value are NaN
     """
-    rows = metrics[metrics["hemisphere"] == "whole"]
-    units = rows["unit"].map(shown_unit)
-    names = rows["metric"].str.replace("_", " ") + [f" ({unit})" if unit else "" for unit in units]
+    rows = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
+    names = _named(rows)
     order = list(dict.fromkeys(names))
     wide = rows.assign(metric=names).pivot_table(
         index=["metric", "week"], columns="run", values="value", aggfunc="mean", sort=True
     )
     wide = wide.reindex(order, level="metric")
-    runs = [run for run in dict.fromkeys(rows["run"]) if run != MEASURED]
+    runs = simulated_runs(rows["run"])
     real = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
     columns = {measured: real}
     for run in runs:
@@ -113,19 +68,47 @@ def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame
     asymmetry : columns subject, run, week, region, metric, asymmetry_index
     """
     index = ["subject", "run", "week", "region"]
-    units = regions["unit"].map(shown_unit)
-    names = regions["metric"].str.replace("_", " ") + [f" ({unit})" if unit else "" for unit in units]
+    regions, asymmetry = runs_by_name(regions), runs_by_name(asymmetry)
+    names = _named(regions)
     left_right = regions.assign(column=names + ", " + regions["hemisphere"])
     wide = left_right.pivot_table("value", index, "column", aggfunc="first")
     of_regions = asymmetry[asymmetry["region"].isin(set(regions["region"]))]
     indices = of_regions.pivot_table("asymmetry_index", index, "metric", aggfunc="first")
     order = []
     for metric, name in dict(zip(regions["metric"], names, strict=True)).items():
-        heading = f"{metric.replace('_', ' ')}, asymmetry"
+        heading = f"{plain(metric)}, asymmetry"
         wide[heading] = indices.get(metric, np.nan)
         order += [f"{name}, left", f"{name}, right", heading]
     brains = pd.MultiIndex.from_frame(regions[index].drop_duplicates())
     return wide.reindex(index=brains, columns=order).rename_axis(["brain", "run", "week (GW)", "region"])
+
+
+def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
+    """Returns the centiles of whole brains: a row per brain and week, a column per metric, with the number of brains.
+
+    Parameters
+    ----------
+    centiles : columns subject, run, week, hemisphere, metric, z, centile, brains, brains_of_week, flag
+
+    Returns
+    -------
+    DataFrame indexed by brain, run and week (GW): "centile (z)" of the metrics of the chart, brains compared with,
+    those of the same week, and the note that goes with them
+    """
+    centiles = runs_by_name(centiles)
+    rows = centiles[(centiles["hemisphere"] == "whole") & centiles["metric"].isin(WITH_NORMS)]
+    text = [
+        f"{centile:.0f} ({z:+.1f})" if np.isfinite(centile) else "–"
+        for centile, z in zip(rows["centile"], rows["z"], strict=True)
+    ]
+    index = ["subject", "run", "week"]
+    wide = rows.assign(text=text).pivot_table("text", index, "metric", aggfunc="first")
+    brains = pd.MultiIndex.from_frame(rows[index].drop_duplicates())
+    wide = wide.reindex(index=brains, columns=[name for name in WITH_NORMS if name in wide])
+    wide = wide.rename(columns=METRICS)
+    first = rows.drop_duplicates(index).set_index(index)
+    wide["brains"], wide["of the week"], wide["note"] = first["brains"], first["brains_of_week"], first["flag"]
+    return wide.rename_axis(["brain", "run", "week (GW)"])
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
@@ -145,36 +128,58 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     return shown.loc[[*shown.index[differs], *shown.index[~differs]]].rename_axis("parameter")
 
 
-def html_table(
-    table: pd.DataFrame, *, caption: str, digits: int = 4, synthetic: bool = False, measured: str = PHANTOM
-) -> str:
-    """Returns the table as HTML with its own look, ready to be put in a page.
+def metrics_page(metrics: pd.DataFrame, *, measured: str, **shown: bool) -> str:
+    """Returns `metrics_table` as HTML."""
+    table = metrics_table(metrics, measured=measured)
+    return html_table(table, caption="Metrics of whole brains", measured=measured, **shown)
 
-    Numbers have `digits` significant digits, missing values are dashes, and all text is escaped. The index is shown
-    where it has a name.
+
+def regions_page(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Any) -> str:
+    """Returns `region_table` as HTML."""
+    return html_table(region_table(regions, asymmetry), caption="Metrics by region", **shown)
+
+
+def centiles_page(centiles: pd.DataFrame, **shown: Any) -> str:
+    """Returns `centiles_table` as HTML."""
+    return html_table(centiles_table(centiles), caption="Centiles (z) among the measured brains", **shown)
+
+
+def displacement_page(displacement: pd.DataFrame, **shown: Any) -> str:
+    """Returns `displacement_summary` as HTML."""
+    caption = "Largest / mean norm of the displacement (mm)"
+    return html_table(displacement_summary(displacement), caption=caption, **shown)
+
+
+def html_table(
+    table: pd.DataFrame, *, caption: str = "", digits: int = 4, synthetic: bool = False, measured: str = PHANTOM
+) -> Markup:
+    """Returns the table as HTML, ready to be put in a page, with a caption if one is given.
+
+    Text is escaped, numbers have `digits` significant digits and stand at the right, missing values are dashes. The
+    index is shown where it has a name.
     """
     named = any(name is not None for name in table.index.names)
     flat = table.reset_index() if named else table
-    heading = caption + (f" ({synthetic_note(measured)})" if synthetic else "")
-    styler = (
-        flat.style.format(lambda value: _shown(value, digits), na_rep="–", escape="html")
-        .format_index(lambda name: str(name), axis=1, escape="html")
-        .hide(axis="index")
-        .set_caption(escape(heading))
-        .set_table_styles(_LOOK)
-        .set_table_attributes('class="gyriflow"')
-        .set_uuid(sha256(f"{heading}{flat.columns}".encode()).hexdigest()[:8])
-    )
-    numeric: list[Hashable] = [name for name in flat.columns if pd.api.types.is_numeric_dtype(flat[name])]
-    return styler.set_properties(subset=numeric, **{"text-align": "right"}).to_html()
+    rows = [
+        [
+            (_kind(name, value, text), text)
+            for name, value in zip(flat, row, strict=True)
+            for text in [_shown(value, digits)]
+        ]
+        for row in flat.itertuples(index=False, name=None)
+    ]
+    note = f" ({synthetic_note(measured)})" if synthetic else ""
+    return Markup(_TABLE.render(caption=caption and caption + note, heads=list(flat), rows=rows))
 
 
-_LOOK: list = [
-    {"selector": "", "props": "border-collapse: collapse; font: 13px sans-serif; margin: 1em 0"},
-    {"selector": "caption", "props": "caption-side: top; text-align: left; font-weight: bold; padding: 4px 0"},
-    {"selector": "th", "props": "text-align: left; border-bottom: 1px solid #444; padding: 3px 10px"},
-    {"selector": "td", "props": "border-bottom: 1px solid #ddd; padding: 3px 10px"},
-]
+def _kind(name: object, value: object, text: str) -> str:
+    """Returns the class of a cell, by which the style sheet lays it out."""
+    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+        return "number"
+    if name == "verdict" and text in VERDICTS:
+        return f"verdict {text}"
+    # columns of sentences are wide, single words and numbers stay on one line
+    return "wide" if len(text) > _SENTENCE else "whole" if len(text) <= _WORD else ""
 
 
 def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:

@@ -13,18 +13,16 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
-from ..parameters.measures import SHAPE_MEASURES
-from .renders import magnitude_scale, scale_of
-from .style import MAGNITUDES, REAL_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
+from .labels import DISPLACEMENT, MAPS, PRESSURES
+from .pictures import Halves, scale_of, whole_maps
+from .style import REAL_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
 
 BUDGET_BYTES = 12_000_000
 """What the surfaces may take in the page."""
 MOST_VERTICES = 8000
 """Vertices of a surface in the view; more would not be seen."""
 FEWEST_VERTICES = 500
-DISPLACEMENT, THICKNESS = "displacement_mm", "thickness_mm"
-OTHER_LABELS = {DISPLACEMENT: "displacement since the start (mm)", THICKNESS: "cortical thickness (mm)"}
-LABELS = {name: measure.label for name, measure in SHAPE_MEASURES.items()} | OTHER_LABELS
+LABELS = {name: label for name, label in MAPS.items() if name not in PRESSURES}
 """The maps of the view, with the labels of their colour bars."""
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
@@ -39,6 +37,19 @@ class TimedSurface:
     week: float
     mesh: TriangleMesh
     maps: Mapping[str, Floats]
+
+
+def surfaces_view(
+    runs: Mapping[str, Sequence[tuple[float, Halves]]], real: Sequence[tuple[float, Halves]], *, measured: str
+) -> dict[str, Any]:
+    """Returns `view_data` of simulated and measured brains, each a week with its hemispheres and their maps."""
+    simulated = {name: with_displacement([_timed(*frame) for frame in frames]) for name, frames in runs.items()}
+    return view_data(simulated, [_timed(*frame) for frame in real], measured=measured)
+
+
+def _timed(week: float, halves: Halves) -> TimedSurface:
+    mesh, maps = whole_maps(halves)
+    return TimedSurface(week, mesh, {name: values for name, values in maps.items() if name in LABELS})
 
 
 def with_displacement(surfaces: Sequence[TimedSurface]) -> list[TimedSurface]:
@@ -139,8 +150,7 @@ def _vertices_within(
 
 def _scale(name: str, surfaces: Sequence[TimedSurface]) -> ScalarMappable:
     values = np.concatenate([surface.maps[name] for surface in surfaces if name in surface.maps])
-    values = values[np.isfinite(values)]
-    return scale_of(name, values) if name in SHAPE_MEASURES else magnitude_scale(values, MAGNITUDES)
+    return scale_of(name, values[np.isfinite(values)])
 
 
 def _described(name: str, scale: ScalarMappable) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The pial surface of a mask of voxels, as an isosurface of the smoothed mask."""
+"""Masks of voxels, their topology made that of balls, what hangs on them by stalks cut off, and isosurfaces."""
 
 from typing import Any
 
@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.special import ndtr
-from skimage.measure import marching_cubes
+from skimage.measure import euler_number, marching_cubes
 
 from ..errors import MeshError
 from ..geometry.triangles import TriangleMesh, signed_volume, transformed
-from .topology import euler_gain, unambiguous, without_handles
 
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 PAD_VOXELS = 6
 LEVEL = 0.5
 # slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
@@ -20,9 +21,26 @@ EDGE_SLOPE = 0.4
 LEAST_SLIT_VOXELS = 20
 # a part of this size of the largest is kept: two hemispheres that do not touch
 COMPARABLE = 0.2
+# voxels inside are joined through faces only, voxels outside through edges and corners as well
+FACES = 1
+INSIDE = ndimage.generate_binary_structure(3, 1)
+OUTSIDE = ndimage.generate_binary_structure(3, 3)
+EDGE_NEIGHBOURS = ndimage.generate_binary_structure(3, 2)
+# radii in voxels of the openings and closings that find what joins or pierces the mask
+REACHES = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
+# distance from the level of one half at which changed voxels are put
+STEP = 0.2
+# stalks are thinner than twice this
+NECK_RADIUS_MM = 1.6
+# the stalk's cross-section, and the part that hangs on it: larger ones are no polyps but parts of a brain
+MOST_NECK_MM2 = 12.0
+MOST_SHARE = 0.05
+LEAST_MM3 = 15.0
+# how far from the hanging part its stalk is cut away with it
+REACH_MM = 4.0
 
 
-def crop(mask: NDArray[np.bool_]) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
+def crop(mask: Mask) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
     """Returns the slices that cut an (i, j, k) volume to the mask's contents, and the (3,) first index of the cut
     volume once it has been padded with `PAD_VOXELS`.
     """
@@ -30,20 +48,20 @@ def crop(mask: NDArray[np.bool_]) -> tuple[tuple[slice, ...], NDArray[np.int64]]
     return box, np.array([side.start for side in box]) - PAD_VOXELS
 
 
-def shifted_affine(affine: NDArray[np.float64], first: NDArray[np.int64]) -> NDArray[np.float64]:
+def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
     """Returns the affine of a volume that was cut (or padded) so that it begins at voxel `first`."""
     moved = np.array(affine, dtype=float)
     moved[:3, 3] += moved[:3, :3] @ first
     return moved
 
 
-def smooth_mask(mask: NDArray[np.bool_], smoothing_voxels: float) -> NDArray[np.float32]:
+def smooth_mask(mask: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
     """Returns the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
 def remove_bridges(
-    mask: NDArray[np.bool_], field: NDArray[np.float32], smoothing_voxels: float, left_shut: NDArray[np.bool_]
+    mask: Mask, field: NDArray[np.float32], smoothing_voxels: float, left_shut: Mask
 ) -> tuple[NDArray[np.float32], int]:
     """Returns a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
 
@@ -69,7 +87,7 @@ def remove_bridges(
     return np.where(slits, np.float32(1.0 - beside), field), int(slits.sum())
 
 
-def refine(field: NDArray, affine: NDArray[np.float64], factor: int) -> tuple[NDArray, NDArray[np.float64]]:
+def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats]:
     """Returns an (i, j, k) field on voxels `factor` times smaller, linear in between, and their affine."""
     if factor == 1:
         return field, affine
@@ -80,7 +98,7 @@ def refine(field: NDArray, affine: NDArray[np.float64], factor: int) -> tuple[ND
     return ndimage.zoom(field, factor, order=1, grid_mode=True, mode="nearest"), fine
 
 
-def main_parts(mask: NDArray[np.bool_], comparable: float = COMPARABLE) -> tuple[NDArray[np.bool_], int, int]:
+def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
     """Returns the mask's largest part and those of comparable size, filled, without the other parts.
 
     The second and third value are the number of parts dropped and the number of voxels in them.
@@ -109,20 +127,12 @@ def make_simple(
         )
     kept, parts, voxels = main_parts(inside, comparable)
     field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)).astype(np.float32)
-    repair = without_handles(field)
-    return unambiguous(repair.field), {
-        "parts_dropped": parts,
-        "voxels_dropped": voxels,
-        "voxels_filled": int((kept & ~inside).sum()),
-        "bridges_cut": repair.bridges_cut,
-        "voxels_cut_from_bridges": repair.voxels_cut,
-        "tunnels_filled": repair.tunnels_filled,
-        "voxels_filled_in_tunnels": repair.voxels_filled,
-        "handles_left": repair.handles_left,
-    }
+    field, handles_repaired = without_handles(field)
+    dropped = {"parts_dropped": parts, "voxels_dropped": voxels, "voxels_filled": int((kept & ~inside).sum())}
+    return unambiguous(field), dropped | handles_repaired
 
 
-def isosurface(field: NDArray[np.float32], affine: NDArray[np.float64]) -> TriangleMesh:
+def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
     """Returns the outward surface in mm where an (i, j, k) field falls below one half.
 
     MeshError where it encloses no volume.
@@ -133,3 +143,182 @@ def isosurface(field: NDArray[np.float32], affine: NDArray[np.float64]) -> Trian
     if signed_volume(mesh) <= 0:
         raise MeshError("the surface of the mask encloses no volume", found=f"{signed_volume(mesh):.3g} mm³")
     return mesh
+
+
+def handles(mask: Mask) -> int:
+    """Returns the number of handles of an (i, j, k) mask: parts plus cavities minus Euler number."""
+    parts = ndimage.label(mask, INSIDE)[1]
+    cavities = ndimage.label(~np.pad(mask, 1), OUTSIDE)[1] - 1
+    return parts + cavities - int(euler_number(mask, connectivity=FACES))
+
+
+def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, int]]:
+    """Returns the (i, j, k) field with the handles of its level set above one half cut or filled, and the counts.
+
+    Patches that an opening takes away or a closing adds are tried from the smallest to the largest. One that removes
+    a handle is kept, less all voxels that can be given back without a change of topology (simple points, Bertrand and
+    Malandain 1994, doi 10.1016/0167-8655(94)90046-9).
+    """
+    original = field > 0.5
+    mask = original.copy()
+    left = handles(mask)
+    counts = {False: 0, True: 0}
+    for reach in REACHES:
+        if left == 0:
+            break
+        for fills, box, patch in _patches(mask, reach):
+            now = mask[box]
+            # an earlier change may have touched this patch
+            patch = patch & (now != fills)
+            changed = np.where(patch, fills, now)
+            if left == 0 or not patch.any() or euler_gain(now, changed) <= 0:
+                continue
+            trial = mask.copy()
+            trial[box] = _least_change(now, changed, field[box])
+            trial = ndimage.binary_fill_holes(trial)
+            remaining = handles(trial)
+            same_parts = ndimage.label(trial, INSIDE)[1] == ndimage.label(mask, INSIDE)[1]
+            if remaining < left and same_parts:
+                mask, left = trial, remaining
+                counts[fills] += 1
+    added, cut = mask & ~original, original & ~mask
+    changed = np.where(added, 0.5 + STEP, np.where(cut, 0.5 - STEP, field)).astype(field.dtype)
+    return changed, {
+        "bridges_cut": counts[False],
+        "voxels_cut_from_bridges": int(cut.sum()),
+        "tunnels_filled": counts[True],
+        "voxels_filled_in_tunnels": int(added.sum()),
+        "handles_left": left,
+    }
+
+
+def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Returns the field with diagonal neighbours set apart, so that its isosurface joins voxels by faces only.
+
+    Where inside and outside voxels alternate around a square, or two opposite corners of a cube differ from the
+    other six, marching cubes decides by the values what is joined; these values are moved so that it never is the
+    inside.
+    """
+    mask = field > 0.5
+    doubtful = np.zeros_like(mask)
+    for first, second in ((0, 1), (0, 2), (1, 2)):
+        inside = np.moveaxis(mask, (first, second), (0, 1))
+        flags = np.moveaxis(doubtful, (first, second), (0, 1))
+        a, b, c, d = inside[:-1, :-1], inside[1:, :-1], inside[1:, 1:], inside[:-1, 1:]
+        alternating = (a == c) & (b == d) & (a != b)
+        for view in (flags[:-1, :-1], flags[1:, :-1], flags[1:, 1:], flags[:-1, 1:]):
+            view |= alternating
+    ends = (slice(None, -1), slice(1, None))
+    count = sum(mask[i, j, k].astype(np.int8) for i in ends for j in ends for k in ends)
+    for j in (0, 1):
+        for k in (0, 1):
+            low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
+            opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
+            for corner in np.ndindex(2, 2, 2):
+                doubtful[tuple(ends[side] for side in corner)] |= opposite
+    apart = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
+    return np.where(doubtful, apart, field).astype(np.float32)
+
+
+def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
+    """Returns (fills, box, patch) for what a closing adds and an opening takes, the smallest first."""
+    far_outside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(~mask) <= reach) > reach
+    far_inside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(mask) > reach) == 0
+    opened = ndimage.distance_transform_edt(far_inside) <= reach
+    found = []
+    for fills, difference in ((True, far_outside & ~mask), (False, mask & ~opened)):
+        number, _ = ndimage.label(difference, OUTSIDE)
+        for index, tight in enumerate(ndimage.find_objects(number), start=1):
+            box = tuple(
+                slice(max(side.start - 1, 0), min(side.stop + 1, n)) for side, n in zip(tight, mask.shape, strict=True)
+            )
+            patch = number[box] == index
+            found.append((int(patch.sum()), fills, box, patch))
+    found.sort(key=lambda item: item[0])
+    return [(fills, box, patch) for _, fills, box, patch in found]
+
+
+def euler_gain(before: Mask, after: Mask) -> int:
+    """Returns by how much the Euler number rises; inside a box that holds the change with a margin of one voxel."""
+    return int(euler_number(after, connectivity=FACES) - euler_number(before, connectivity=FACES))
+
+
+def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
+    """Returns `after` with every voxel set back to `before` that does not change the topology.
+
+    The clearest voxels go back first, so that what stays changed lies where the field is closest to one half.
+    """
+    mask = np.pad(after, 1)
+    places = np.argwhere(before != after)
+    places = places[np.argsort(-np.abs(field[tuple(places.T)] - 0.5), kind="stable")] + 1
+    given_back = True
+    while given_back and len(places):
+        waiting = []
+        for i, j, k in places:
+            around = mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2]
+            if _is_simple(around):
+                mask[i, j, k] = ~mask[i, j, k]
+            else:
+                waiting.append((i, j, k))
+        given_back = len(waiting) < len(places)
+        places = np.array(waiting)
+    return mask[1:-1, 1:-1, 1:-1]
+
+
+def _is_simple(around: Mask) -> bool:
+    """Returns whether the centre of a (3, 3, 3) neighbourhood can change sides without a change of topology."""
+    inside, outside = around & EDGE_NEIGHBOURS, ~around
+    inside[1, 1, 1] = outside[1, 1, 1] = False
+    number, _ = ndimage.label(inside, INSIDE)
+    touching = np.unique(number[INSIDE & inside])
+    return len(touching) == 1 and ndimage.label(outside, OUTSIDE)[1] == 1
+
+
+def hanging_parts(mask: Mask, size_mm: Floats) -> Mask:
+    """Returns which voxels of an (i, j, k) mask hang on it by thin stalks, these included.
+
+    A part hangs where a ball of 3.2 mm across cannot pass from the rest to it, and no more than 12 mm² join it to the
+    rest: a gyrus, which may be as thin, is joined along its length. `size_mm` (3,) are the voxels' edges.
+    """
+    hanging = np.zeros_like(mask)
+    depth = ndimage.distance_transform_edt(mask, sampling=size_mm)
+    number, count = ndimage.label(depth > NECK_RADIUS_MM, INSIDE)
+    if count < 2:
+        return hanging
+    sizes = np.bincount(number.ravel())[1:]
+    main = np.isin(number, np.flatnonzero(sizes >= MOST_SHARE * sizes.sum()) + 1)
+    solid = mask & (ndimage.distance_transform_edt(~main, sampling=size_mm) <= NECK_RADIUS_MM)
+    for part in np.flatnonzero(sizes < MOST_SHARE * sizes.sum()) + 1:
+        ball = number == part
+        near = ndimage.distance_transform_edt(~ball, sampling=size_mm) <= NECK_RADIUS_MM + REACH_MM
+        loose, _ = ndimage.label(mask & ~solid & near, INSIDE)
+        cut = np.isin(loose, np.setdiff1d(loose[ball], 0))
+        large_enough = cut.sum() * size_mm.prod() >= LEAST_MM3 and cut.sum() < MOST_SHARE * mask.sum()
+        if large_enough and 0 < _contact_mm2(cut, mask & ~cut, size_mm) <= MOST_NECK_MM2:
+            hanging |= cut
+    return hanging
+
+
+def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
+    """Returns the (i, j, k) mask without what hangs on it by stalks, and each part's volume, stalk and place in mm."""
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    number, count = ndimage.label(hanging_parts(mask, size), INSIDE)
+    left = mask & (number == 0)
+    return left, [
+        {
+            "volume_mm3": float(part.sum() * size.prod()),
+            "stalk_mm2": _contact_mm2(part, left, size),
+            "place_mm": (affine[:3, :3] @ np.argwhere(part).mean(axis=0) + affine[:3, 3]).round(1).tolist(),
+        }
+        for part in (number == n for n in range(1, count + 1))
+    ]
+
+
+def _contact_mm2(one: Mask, other: Mask, size_mm: Floats) -> float:
+    """Returns the area in mm² of the faces between voxels of two masks."""
+    total = 0.0
+    for axis in range(3):
+        a, b = np.moveaxis(one, axis, 0), np.moveaxis(other, axis, 0)
+        faces = (a[:-1] & b[1:]).sum() + (b[:-1] & a[1:]).sum()
+        total += float(faces * np.prod(np.delete(size_mm, axis)))
+    return total

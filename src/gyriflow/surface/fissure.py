@@ -1,19 +1,46 @@
-"""The interhemispheric fissure as a curved surface, and its opening where labels of the two sides touch."""
+"""The mid-sagittal plane, the fissure as a curved surface, opened where labels touch, and left and right beside it."""
 
 from dataclasses import dataclass
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, sparse
+from scipy.optimize import minimize
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
-from ..geometry.triangles import TriangleMesh
+from ..errors import InputError
+from ..geometry.alignment import motion
+from ..geometry.matching import nearest_on
+from ..geometry.triangles import (
+    Ints,
+    TriangleMesh,
+    corners,
+    face_areas,
+    face_components,
+    submesh,
+    vertex_areas,
+    vertex_normals,
+)
 from ..parameters.schemes import LabelScheme
-from .extraction import EDGE_SLOPE
-from .orientation import MidPlane, fissure_points
+from .extraction import EDGE_SLOPE, Floats, Mask
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
+SAMPLES = 600
+DIRECTIONS = 400
+STARTS = 5
+# the left-right axis is looked for within this angle of the world's x axis
+SEARCH_DEG = 60.0
+# smaller tilts are left as they are: the plane is not known better than this
+LEAST_TILT_DEG = 0.5
+# of the distances to the mirror image, those above this quantile count as asymmetry
+TRIMMED = 0.8
+FISSURE_BAND = 0.2
+WIDEST_FISSURE = 0.25
+FEWEST_FISSURE_POINTS = 60
+# the plane of symmetry is kept where the fissure fits it nearly as well as a plane of its own
+CLEARLY_BETTER_MM = 0.02
 SPACING_MM = 0.5
 MARGIN_MM = 5.0
 # the mid-surface follows the walls over this distance, and returns to the plane where there are none
@@ -27,22 +54,188 @@ SHIFTED_MM = 5.0
 SHOWN_CELLS = 8
 # cortex that stays on the tissue which joins the hemispheres
 FLOOR_MM = 1.2
+# hemispheres that overlap by more are not moved apart
+FURTHEST_APART_MM = 10.0
+# a second closed piece of this part of the largest is a hemisphere
+COMPARABLE_PIECE = 0.1
+# and has this part of its area, or more, on its own side of the fissure, as the largest has: a whole brain has half
+ON_ITS_SIDE = 0.75
+# of a cut surface, patches on the wrong side of the cut up to this share are bulges over the fissure
+MOST_GIVEN_BACK = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class MidPlane:
+    """The mid-sagittal plane, the points p with normal·p = offset in mm; the unit normal (3,) is from left to right.
+
+    `asymmetry_mm` is the mean distance from the surface to its image in the plane of best symmetry, without the largest
+    fifth; `fissure_points` the number of places between facing walls of the fissure that the plane was fitted to, 0
+    where too few were found and it is that of mirror symmetry; `scatter_mm` their root mean square distance to it.
+    """
+
+    normal: Floats
+    offset: float
+    asymmetry_mm: float
+    fissure_points: int
+    scatter_mm: float
+
+
+def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG) -> MidPlane:
+    """Returns the mid-sagittal plane of a closed, outward surface whose left-right axis is within an angle of x.
+
+    Planes of mirror symmetry are the candidates; each is fitted to the fissure, that is, to the middle between medial
+    walls that face each other. The best has both little asymmetry and much fissure. In an asymmetric brain the plane
+    of symmetry and the fissure differ, and the fissure decides.
+    """
+    weights = vertex_areas(mesh)
+    chosen = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
+    sample, tree = mesh.vertices[chosen], cKDTree(mesh.vertices)
+    candidates = [_fit_to_fissure(mesh, *plane) for plane in _symmetry_planes(sample, tree, search_deg)]
+    return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))
+
+
+def _fit_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry: float) -> MidPlane:
+    """Returns the plane fitted to the fissure near a plane of symmetry, or that plane where it fits nearly as well."""
+    middle = fissure_points(mesh, normal, offset)
+    fitted = _plane_through(middle, normal, offset)
+    if fitted is None:
+        return MidPlane(normal, offset, asymmetry, 0, float("nan"))
+    # the first band may have been beside the fissure
+    middle = fissure_points(mesh, *fitted)
+    fitted = _plane_through(middle, *fitted) or fitted
+    count, scatter = _scatter(middle, *fitted)
+    before, by_symmetry = _scatter(middle, normal, offset)
+    if before > 0.95 * count and by_symmetry < scatter + CLEARLY_BETTER_MM:
+        return MidPlane(normal, offset, asymmetry, before, by_symmetry)
+    return MidPlane(*fitted, asymmetry, count, scatter)
+
+
+def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
+    """Returns (k, 3) places half-way between walls that face each other across the interhemispheric fissure.
+
+    Only walls in a band around the plane normal·p = offset are looked at: a fifth of the brain's width to each side.
+    """
+    height = mesh.vertices @ normal - offset
+    width = np.ptp(height)
+    facing = vertex_normals(mesh) @ normal
+    near = np.abs(height) < FISSURE_BAND * width
+    left, right = np.flatnonzero(near & (facing > 0.5)), np.flatnonzero(near & (facing < -0.5))
+    if len(left) < 8 or len(right) < 8:
+        return np.empty((0, 3))
+    return np.concatenate([_middles(mesh, height, left, right, normal), _middles(mesh, -height, right, left, -normal)])
+
+
+def _middles(mesh: TriangleMesh, height: Floats, wall: Ints, opposite: Ints, normal: Floats) -> Floats:
+    """Returns the places half-way from vertices of one wall to the nearest of the opposite wall straight above."""
+    across = np.outer(height, normal)
+    in_plane = mesh.vertices - across
+    # distances along the plane count five times those across it
+    squeezed = in_plane + 0.2 * across
+    _, found = cKDTree(squeezed[opposite]).query(squeezed[wall], k=min(8, len(opposite)))
+    met = opposite[found]
+    gap = height[met] - height[wall][:, None]
+    aside = np.linalg.norm(in_plane[met] - in_plane[wall][:, None], axis=-1)
+    gap = np.where((gap > 0) & (gap < WIDEST_FISSURE * np.ptp(height)) & (aside < 2.0), gap, np.inf)
+    best = np.argmin(gap, axis=1)
+    rows = np.flatnonzero(np.isfinite(gap[np.arange(len(wall)), best]))
+    return 0.5 * (mesh.vertices[wall[rows]] + mesh.vertices[met[rows, best[rows]]])
+
+
+def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
+    """Returns the (4, 4) rotation about `centre` that turns the plane to x = const, and its angle in degrees.
+
+    It is the smallest such rotation, so that anterior and superior stay as the world coordinates have them.
+    Below half a degree it is none.
+    """
+    angle = float(np.degrees(np.arccos(np.clip(plane.normal[0], -1.0, 1.0))))
+    if angle < LEAST_TILT_DEG:
+        return np.eye(4), 0.0
+    axis = np.cross(plane.normal, [1.0, 0.0, 0.0])
+    turn = Rotation.from_rotvec(np.radians(angle) * axis / np.linalg.norm(axis)).as_matrix()
+    return motion(turn, centre - turn @ centre), angle
+
+
+def _symmetry_planes(sample: Floats, tree: cKDTree, search_deg: float) -> list[tuple[Floats, float, float]]:
+    """Returns normal, offset and asymmetry (mm) of planes of mirror symmetry with normals within an angle of x."""
+    centre = sample.mean(axis=0)
+    # a Fibonacci lattice on the cap of directions around x
+    index = np.arange(DIRECTIONS) + 0.5
+    along = 1.0 - (1.0 - np.cos(np.radians(search_deg))) * index / DIRECTIONS
+    turn = np.pi * (1.0 + 5.0**0.5) * index
+    radius = np.sqrt(1.0 - along**2)
+    directions = np.stack([along, radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+    scores = np.array([_mirror_distance(n, float(n @ centre), sample[::3], tree) for n in directions])
+    planes = []
+    for start in _apart(directions, scores):
+        base, aside = directions[start], np.linalg.svd(directions[start][None])[2][1:]
+        found = minimize(
+            lambda x, *frame: _mirror_distance(*_plane_near(x, *frame), sample, tree),
+            np.zeros(3),
+            args=(base, aside, centre),
+            method="Nelder-Mead",
+            options={"initial_simplex": np.vstack([np.zeros(3), 0.1 * np.eye(3)]), "xatol": 1e-4, "fatol": 1e-4},
+        )
+        planes.append((*_plane_near(found.x, base, aside, centre), float(found.fun)))
+    return planes
+
+
+def _plane_near(x: Floats, base: Floats, aside: Floats, centre: Floats) -> tuple[Floats, float]:
+    """Returns the plane with its normal turned from `base` by x[:2] radians, and moved from `centre` by 10 x[2] mm."""
+    normal = np.asarray(base + x[:2] @ aside, dtype=float)
+    normal /= np.linalg.norm(normal)
+    return normal, float(normal @ centre) + 10.0 * float(x[2])
+
+
+def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]:
+    """Returns how many points are within 3 mm of the plane, and their root mean square distance to it."""
+    distance = points @ normal - offset
+    near = distance[np.abs(distance) < 3.0]
+    return len(near), float(np.sqrt(np.mean(near**2))) if len(near) else float("inf")
+
+
+def _apart(directions: Floats, scores: Floats) -> list[int]:
+    """Returns the numbers of the best directions that are at least 20° from each other."""
+    chosen: list[int] = []
+    for number in np.argsort(scores):
+        if all(abs(directions[number] @ directions[other]) < np.cos(np.radians(20.0)) for other in chosen):
+            chosen.append(int(number))
+        if len(chosen) == STARTS:
+            break
+    return chosen
+
+
+def _mirror_distance(normal: Floats, offset: float, sample: Floats, tree: cKDTree) -> float:
+    """Returns the mean distance in mm from the mirrored sample to the surface, without the largest ones."""
+    mirrored = sample - 2.0 * np.outer(sample @ normal - offset, normal)
+    distance, _ = tree.query(mirrored)
+    return float(np.sort(distance)[: int(TRIMMED * len(distance))].mean())
+
+
+def _plane_through(points: Floats, normal: Floats, offset: float) -> tuple[Floats, float] | None:
+    """Returns the plane fitted to points with Tukey weights of shrinking scale, or None where they fix none."""
+    for scale in (10.0, 6.0, 4.0, 3.0, 2.0, 2.0, 2.0):
+        distance = points @ normal - offset
+        weights = np.where(np.abs(distance) < scale, (1.0 - (distance / scale) ** 2) ** 2, 0.0)
+        if np.count_nonzero(weights) < FEWEST_FISSURE_POINTS:
+            return None
+        centre = np.average(points, axis=0, weights=weights)
+        spread, axes = np.linalg.eigh(np.cov(points.T, aweights=weights))
+        # along a single line of points the plane could still turn
+        if np.sqrt(spread[1]) < 3.0:
+            return None
+        fitted = axes[:, 0] * np.sign(axes[:, 0] @ normal)
+        if fitted @ normal < np.cos(np.radians(25.0)):
+            return None
+        normal, offset = fitted, float(fitted @ centre)
+    return normal, offset
 
 
 @dataclass(frozen=True, eq=False)
 class Fissure:
     """The mid-surface of the interhemispheric fissure: heights in mm above the mid-sagittal plane.
 
-    Attributes
-    ----------
-    plane
-        The mid-sagittal plane.
-    axes : (2, 3) float
-        Unit vectors in the plane.
-    corner : (2,) float
-        In-plane coordinates of the first height.
-    heights : (a, b) float
-        Heights every 0.5 mm.
+    `axes` (2, 3) are unit vectors in the plane, `heights` (a, b) lie every 0.5 mm along them, the first at the in-plane
+    coordinates `corner` (2,).
     """
 
     plane: MidPlane
@@ -150,7 +343,7 @@ def open_fissure(
 
 
 def _index(places: Floats, affine: Floats) -> Floats:
-    """Returns the (3, a, b) indices of voxels at (a, b, 3) places in mm."""
+    """Returns the (3, …) indices of voxels at (…, 3) places in mm."""
     inverse = np.linalg.inv(affine)
     return np.moveaxis(places @ inverse[:3, :3].T + inverse[:3, 3], -1, 0)
 
@@ -169,8 +362,7 @@ def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Float
 
 def sample(field: Floats, affine: Floats, points: Floats) -> Floats:
     """Returns the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
-    inverse = np.linalg.inv(affine)
-    return ndimage.map_coordinates(field, (points @ inverse[:3, :3].T + inverse[:3, 3]).T, order=1, mode="nearest")
+    return ndimage.map_coordinates(field, _index(points, affine), order=1, mode="nearest")
 
 
 def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
@@ -194,14 +386,8 @@ def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
 def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fissure:
     """Returns the mid-surface moved to half-way between the labels of the two sides.
 
-    Where that is more than 5 mm away, it stays the mid-surface between facing walls, `fissure`.
-
-    Parameters
-    ----------
-    side : (i, j, k) float
-        What `to_the_right` returns.
-    affine : (4, 4) float
-        Voxel index to position in mm.
+    Where that is more than 5 mm away, it stays the mid-surface between facing walls, `fissure`. `side` (i, j, k) is
+    what `to_the_right` returns, for voxels of the (4, 4) affine.
     """
     plane = fissure.plane
     steps = np.arange(-FURTHEST_MM, FURTHEST_MM + SPACING_MM, SPACING_MM)
@@ -217,3 +403,129 @@ def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fi
     weight = ndimage.gaussian_filter(found.astype(float), bend)
     total = ndimage.gaussian_filter(np.where(found, move, 0.0), bend)
     return Fissure(plane, fissure.axes, fissure.corner, fissure.heights + total / (weight + 0.02))
+
+
+def doubts_of_shift(fissure: Fissure) -> list[str]:
+    """Returns what is doubtful about a mid-surface that bends far from its plane."""
+    shift = float(np.abs(fissure.heights).max())
+    bends = f"the fissure bends away from its plane by up to {shift:.0f} mm: check it"
+    return [bends] if shift > SHIFTED_MM else []
+
+
+def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
+    """Returns the (m,) mask of the faces of the left hemisphere.
+
+    `heights` (m,) are the distances of the faces from the fissure, negative on the left. Two comparable closed pieces
+    that lie mostly on different sides are the hemispheres, though they may reach over the fissure. Else patches that
+    bulge over the fissure are given back to the hemisphere that surrounds them, so that each is in one piece.
+    InputError where such patches are too large: a cut there would not part the hemispheres.
+    """
+    surface = face_components(mesh)
+    areas = face_areas(mesh)
+    side = heights < 0
+    sizes = np.bincount(surface, weights=areas)
+    on_left = np.bincount(surface, weights=areas * side) / sizes
+    if len(sizes) > 1 and sizes[1] >= COMPARABLE_PIECE * sizes[0]:
+        # a detached lump is no second hemisphere: the brain beside it lies on both sides
+        low, high = sorted(on_left[:2])
+        if low <= 1 - ON_ITS_SIDE and high >= ON_ITS_SIDE:
+            middles = np.bincount(surface, weights=areas * heights) / sizes
+            return np.asarray(middles < 0)[surface]
+    a, b = igl.facet_adjacency_matrix(mesh.faces).nonzero()
+    given_back = np.zeros(len(side), dtype=bool)
+    # what is given back may join pieces of the other side
+    for _ in range(3):
+        within = side[a] == side[b]
+        graph = sparse.coo_matrix((np.ones(within.sum()), (a[within], b[within])), shape=(len(side),) * 2)
+        piece = connected_components(graph, directed=False)[1]
+        area = np.bincount(piece, weights=areas)
+        largest = [
+            piece[side == left][area[piece[side == left]].argmax()] for left in (True, False) if (side == left).any()
+        ]
+        strays = ~np.isin(piece, largest)
+        if not strays.any():
+            break
+        given_back ^= strays
+        side = side ^ strays
+    share = float(areas[given_back].sum() / areas.sum())
+    if share > MOST_GIVEN_BACK:
+        raise InputError(
+            "the surface cannot be parted at the fissure",
+            found=f"a left and a right part in several pieces, {100 * share:.0f} % of the area beside the largest two",
+            expected=f"one piece for each hemisphere, {100 * MOST_GIVEN_BACK:.0f} % beside them",
+            remedy="Is the left-right axis that of the coordinates? Give the hemispheres as two closed surfaces.",
+        )
+    return side
+
+
+def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> Mask:
+    """Returns the (m,) mask of the faces that lie on the left hemisphere, of a surface close to that of both.
+
+    A face belongs to the hemisphere whose given surface is nearer to its centroid: where a connected brain was cut
+    along a curved fissure, so is `mesh`. Stray patches are given back as in `left_faces`.
+    """
+    centres = corners(mesh).mean(axis=1)
+    away, back = (nearest_on(centres, side)[0] for side in (left, right))
+    return left_faces(mesh, away - back)
+
+
+def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
+    """Returns the left and the right hemisphere's pial surfaces; together they have every face of `mesh` once.
+
+    The fissure is the plane x = `fissure_x_mm` in RAS+. The parts are open where a connected brain is cut.
+    """
+    return cut_sides(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
+
+
+def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMesh]:
+    """Returns the surfaces of the faces where the (m,) mask holds, and of the others.
+
+    InputError where one of the two has no face.
+    """
+    if left.all() or not left.any():
+        raise InputError(
+            "the brain lies on one side of the interhemispheric fissure",
+            found=f"{int(left.sum())} of {len(left)} faces on the left",
+            expected="two hemispheres",
+            remedy="Give both hemispheres, in RAS+ or LPS coordinates as named in the config.",
+        )
+    return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
+
+
+def least_gap(left: TriangleMesh, right: TriangleMesh) -> float:
+    """Returns the least distance in mm between two closed surfaces, negative by the depth where they overlap."""
+    gaps = []
+    for one, other in ((left, right), (right, left)):
+        inward = igl.fast_winding_number(other.vertices, other.faces, one.vertices) > 0.5
+        distance, _, _ = nearest_on(one.vertices, other)
+        gaps.append(float(np.where(inward, -distance, distance).min()))
+    return min(gaps)
+
+
+def set_apart(
+    left: TriangleMesh, right: TriangleMesh, gap_mm: float, to_right: Floats
+) -> tuple[TriangleMesh, TriangleMesh, float]:
+    """Returns the hemispheres moved apart, each by the same, until they are `gap_mm` from each other.
+
+    They move along the direction `to_right` (3,), a unit vector from left to right.
+
+    The third value is the distance in mm by which each was moved; 0 where the gap was there already.
+    InputError where more than 10 mm would be needed.
+    """
+    moved = 0.0
+    gap = least_gap(left, right)
+    while gap < gap_mm:
+        # the shortest way out of an overlap is rarely along this direction, so more than one step may be needed
+        step = max(0.5 * (gap_mm - gap), 0.05)
+        moved += step
+        if moved > FURTHEST_APART_MM:
+            raise InputError(
+                "the hemispheres overlap too much to be of one brain in one pose",
+                found=f"an overlap beyond {2 * FURTHEST_APART_MM:g} mm",
+                expected="hemispheres side by side",
+                remedy="Give both hemispheres of one subject and week, in the same coordinates.",
+            )
+        left = TriangleMesh(left.vertices - step * to_right, left.faces)
+        right = TriangleMesh(right.vertices + step * to_right, right.faces)
+        gap = least_gap(left, right)
+    return left, right, moved

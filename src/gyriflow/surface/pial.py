@@ -1,24 +1,312 @@
-"""What the surfaces of all kinds of brains go through: even triangles, a pose, two sides, measures."""
+"""A brain's pial surface from label volumes, from surface files or from a simple shape, posed, with its report."""
 
 import logging
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.triangles import TriangleMesh, area, transformed
-from .even_triangles import make_even
-from .hemispheres import DOUBTFUL_RATIO, cut_sides, split
-from .orientation import MidPlane, upright
-from .outcome import PialSurface, describe, faults, require_sound
-from .rebuilding import rebuild
+from ..errors import InputError
+from ..geometry.alignment import angle_deg, motion
+from ..geometry.poses import CONVENTIONS, Pose
+from ..geometry.triangles import (
+    TriangleMesh,
+    area,
+    corners,
+    euler_number,
+    mean_edge_length,
+    merged,
+    signed_volume,
+    transformed,
+)
+from ..parameters.schemes import LabelScheme
+from ..parameters.terms import SIDES
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .extraction import (
+    COMPARABLE,
+    LEVEL,
+    PAD_VOXELS,
+    Floats,
+    Mask,
+    crop,
+    isosurface,
+    main_parts,
+    make_simple,
+    refine,
+    remove_bridges,
+    shifted_affine,
+    smooth_mask,
+)
+from .fissure import (
+    Fissure,
+    MidPlane,
+    between,
+    cut_sides,
+    doubts_of_shift,
+    fissure_between,
+    fissure_between_labels,
+    least_gap,
+    left_faces,
+    mid_plane,
+    open_fissure,
+    plane_between_labels,
+    sample,
+    set_apart,
+    split,
+    to_the_right,
+    upright,
+)
+from .labels import LEAST_CORTEX_OUTSIDE, TOLD_LOSS, Labels, border_share, read_cerebrum, require_sides
+from .plausible import (
+    DOUBTFUL_BRAIN,
+    DOUBTFUL_RATIO,
+    USUAL,
+    Limits,
+    narrowness,
+    require_common_pose,
+    require_one,
+    require_pair,
+    require_plausible_size,
+    require_whole,
+)
+from .pose import doubts_of_hemispheres, pair_by_shape, pose_of_hemisphere, pose_of_labels, pose_surface_by_shape, poses
+from .repair import KEPT, after_repairs, make_sound, pieces, require_sound, sound_pieces, with_volume
 
 log = logging.getLogger(__name__)
 
+Coordinates = Literal["auto", "ras", "lps"]
+Side = Literal["left", "right"]
+
+# slits this near to the mid-surface belong to the fissure
+FISSURE_REACH_MM = 3.0
+# cosine between the mid-plane's normal and the line from left to right labels: 45°
+SAME_AXIS = 0.7
+# of the larger hemisphere's volume
+SMALLEST_HEMISPHERE = 0.04
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
-# a loss beyond this fraction of a brain is reported
-TOLD_LOSS = 0.005
+# the distance of the medial wall of a hemisphere that is alone from the mid-sagittal plane
+BESIDE_MM = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class PialSurface:
+    """A posed pial surface in RAS+ mm.
+
+    `whole` is closed and outward, of one piece or one for each hemisphere. `left` and `right` are its parts, open where
+    a connected brain is cut at the fissure, the plane x = `fissure_x_mm`; None for one that is not there. The pose is
+    that from the files of the brain; the report has it, and what was found and done, in plain values for JSON.
+    """
+
+    whole: TriangleMesh
+    left: TriangleMesh | None
+    right: TriangleMesh | None
+    fissure_x_mm: float
+    pose: Pose
+    report: dict[str, Any]
+
+
+def from_labels(
+    labels: Labels,
+    affine: Floats,
+    scheme: LabelScheme,
+    side: Side | None = None,
+    *,
+    week: float,
+    smoothing_voxels: float = 1.0,
+    edge_length_mm: float = 1.0,
+    smoothing_iterations: int = 10,
+    fissure_mm: float = 1.5,
+) -> PialSurface:
+    """Returns the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
+
+    A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say. The cerebrum's mask is smoothed
+    (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an isosurface, which is smoothed, remeshed to
+    `edge_length_mm` and turned so that the mid-sagittal plane is x = const, and set outwards by what smoothing took of
+    the volume. Where the scheme separates cortex from the tissue inside and cortex labels of both sides touch, the
+    fissure is opened there to `fissure_mm` (0: left shut). It is half-way between the labels of the two sides where the
+    scheme has them. With `side` the volume holds that hemisphere only, which is posed as `from_surface` does.
+
+    InputError for labels that don't fit the scheme or the week, for one hemisphere alone without `side`, and for a
+    whole brain or labels of the other hemisphere with it. MeshError where the surface stays tangled.
+    """
+    # the wall of a hemisphere towards the side that is not there may have no cortex
+    cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else LEAST_CORTEX_OUTSIDE)
+    warnings, tissue = told(cerebrum.warnings), cerebrum.tissue
+    pose = Pose() if side else pose_of_labels(labels, affine, scheme)
+    warnings += told(pose.warnings)
+    if side:
+        _require_no_other(tissue, scheme, side)
+    affine = pose.world @ affine
+    mask = np.isin(tissue, scheme.cerebrum)
+    volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
+    box, first = crop(mask)
+    extents = np.linalg.norm(affine[:3, :3], axis=0) * [along.stop - along.start for along in box]
+    warnings += told(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
+    share, cut = border_share(mask)
+    warnings += told(cut)
+    report = {"scheme": scheme.name, **cerebrum.report, "mask_volume_mL": volume * ML_PER_MM3, "border_share": share}
+    mask, tissue, affine = np.pad(mask[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS), shifted_affine(affine, first)
+    field = smooth_mask(mask, smoothing_voxels)
+    grid, to_right, opened = affine, None, {}
+    if not side:
+        core = mask & ~np.isin(tissue, scheme.cortex)
+        warnings += told(_require_both(tissue, scheme, field, affine, share))
+        # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
+        walls = isosurface(smooth_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
+        plane = mid_plane(walls)
+        to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
+        if to_right is not None and abs(plane.normal @ _between_sides(tissue, scheme, affine)) < SAME_AXIS:
+            plane = plane_between_labels(to_right, affine, mask)
+            mirror = "the hemispheres are no mirror images of each other: the mid-plane is that of their labels"
+            warnings += told([mirror])
+        require_sides(tissue, scheme, affine, plane.normal)
+        fissure = fissure_between(walls, plane)
+        if to_right is not None:
+            fissure = fissure_between_labels(to_right, affine, fissure)
+        warnings += told(doubts_of_shift(fissure))
+        opens = bool(scheme.cortex) and fissure_mm > 0
+        # what smoothing would shut, and reopened slits leave shut, is not shown
+        slit, _ = remove_bridges(mask, field, smoothing_voxels, np.zeros_like(mask))
+        hidden = fissure.hidden(slit > LEVEL, affine, fissure_mm)
+        # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
+        left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if opens else np.zeros_like(mask)
+        field, report["slit_voxels_reopened"] = remove_bridges(mask, field, smoothing_voxels, left_shut)
+        if opens:
+            field, affine, opened["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
+    # where labels say which side is which, a hemisphere may be far smaller than the other one
+    field, topology = make_simple(field, COMPARABLE if to_right is None else SMALLEST_HEMISPHERE)
+    rough = isosurface(field, affine)
+    if side:
+        require_one(rough)
+    dropped = topology["voxels_dropped"] * float(abs(np.linalg.det(affine[:3, :3])))
+    if dropped > TOLD_LOSS * volume:
+        told_loss = f"{dropped * ML_PER_MM3:.2f} mL, {100 * dropped / volume:.1f} % of it"
+        warnings += told([f"{topology['parts_dropped']} parts apart from the brain were dropped: {told_loss}"])
+    even = make_sound(rough, smoothing_iterations, edge_length_mm)
+    warnings += told(even.warnings)
+    expected = after_repairs(volume, topology, affine) - opened.get("fissure_opened_mL", 0.0) / ML_PER_MM3
+    mesh, smoothing = with_volume(even.mesh, expected, area(rough))
+    if abs(change := smoothing["volume_change"]) > KEPT:
+        lost = f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it"
+        warnings += told([lost])
+    report |= {**opened, "topology": topology, **even.report, "smoothing": smoothing}
+    if side:
+        pose = pose_of_hemisphere(mesh, side, "auto", of_volume=True)
+        warnings += told(pose.warnings)
+        return _single_hemisphere(mesh, side, pose, week, {"source": "hemisphere", "side": side, **report}, warnings)
+    centres = corners(mesh).mean(axis=1)
+    # between the walls of the surface itself: cortex may be thicker on one side than on the other
+    heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
+    return _upright(mesh, left_faces(mesh, heights), plane, pose, week, {"source": "labels", **report}, warnings)
+
+
+def from_hemispheres(
+    left: TriangleMesh,
+    right: TriangleMesh,
+    pose: Pose | None = None,
+    *,
+    week: float,
+    coordinates: Coordinates = "ras",
+    gap_mm: float = 0.5,
+    edge_length_mm: float = 1.0,
+    smoothing_iterations: int = 10,
+    max_hole_mm: float = 3.0,
+    limits: Limits = USUAL,
+) -> PialSurface:
+    """Returns the pial surface of a brain from closed surfaces of its hemispheres.
+
+    The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
+    together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
+    other. With coordinates "auto" each may be in any rigid pose; `pose` is then what brings each to RAS+, if it is
+    known already, as from all brains of a study. A shape that contradicts coordinates that are named is told.
+    InputError where the pose cannot be determined, or the hemispheres are swapped, of different size or not of the
+    week's size; MeshError where one can't be made a closed surface without handles and intersections.
+    """
+    given = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
+    sides = [sound_pieces(transformed(mesh, given), max_hole_mm, one=True) for mesh in (left, right)]
+    warnings = told(warning for side in sides for warning in side.warnings)
+    left, right = (side.mesh for side in sides)
+    volume = signed_volume(left) + signed_volume(right)
+    warnings += told(require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week))
+    if coordinates == "auto":
+        pose = pose or poses([pair_by_shape(left, right, limits)], [False])[0]
+        left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
+        warnings += told(pose.warnings)
+    else:
+        pose = Pose(files=dict.fromkeys((*SIDES, "whole"), given), by="configuration")
+    length = float(np.ptp(merged(left, right).vertices, axis=0).max())
+    warnings += told(require_pair(left, right, limits, coordinates))
+    if coordinates != "auto":
+        warnings += told(doubts_of_hemispheres(left, right, coordinates))
+    even = [make_sound(mesh, smoothing_iterations, edge_length_mm) for mesh in (left, right)]
+    warnings += told(warning for side in even for warning in side.warnings)
+    left, right = (side.mesh for side in even)
+    plane = mid_plane(merged(left, right))
+    require_common_pose(plane.asymmetry_mm, length, limits)
+    gap, to_right = least_gap(left, right), plane.normal
+    left, right, moved = set_apart(left, right, gap_mm, to_right)
+    if moved > 0:
+        warnings += told([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm"])
+        plane = mid_plane(merged(left, right))
+    apart = {side: motion(shift=sign * moved * to_right) for side, sign in zip(SIDES, (-1.0, 1.0), strict=True)}
+    pose = pose.each({side: shift @ pose.of_file(side) for side, shift in apart.items()})
+    measures = {"gap_before_mm": gap, "moved_apart_mm": moved}
+    report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates, **measures}
+    for name, *found in zip(SIDES, sides, even, strict=True):
+        report |= {f"{key}_{name}": value for one in found for key, value in one.report.items() if key != "stalks"}
+    if stalks := [stalk for side in sides for stalk in side.report.get("stalks", [])]:
+        report["stalks"] = stalks
+    mesh = merged(left, right)
+    return _upright(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, pose, week, report, warnings)
+
+
+def from_surface(
+    mesh: TriangleMesh,
+    side: Side | None = None,
+    *,
+    week: float,
+    coordinates: Coordinates = "ras",
+    edge_length_mm: float = 1.0,
+    smoothing_iterations: int = 10,
+    max_hole_mm: float = 3.0,
+) -> PialSurface:
+    """Returns the pial surface of a brain, or of the only hemisphere that there is, from one closed surface.
+
+    It is repaired (holes up to `max_hole_mm`), smoothed and remeshed to `edge_length_mm`. A whole brain, of one piece
+    or one for each hemisphere, is turned so that the mid-sagittal plane is x = const. With `side` it is that hemisphere
+    alone, whose medial wall is set upright beside x = `fissure_x_mm`. With coordinates "auto" the pose follows from the
+    shape. InputError where it is a whole brain instead of a hemisphere or the reverse, of the other side, or not of the
+    week's size; MeshError where it can't be made closed and free of handles and intersections.
+    """
+    clean = sound_pieces(mesh, max_hole_mm, one=side is not None)
+    warnings = told(clean.warnings)
+    volume, extents = signed_volume(clean.mesh), np.ptp(clean.mesh.vertices, axis=0)
+    warnings += told(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
+    if side:
+        require_one(clean.mesh)
+    even = make_sound(clean.mesh, smoothing_iterations, edge_length_mm)
+    warnings += told(even.warnings)
+    if side:
+        pose = pose_of_hemisphere(even.mesh, side, coordinates)
+    else:
+        warnings += told(require_whole(even.mesh, "surface"))
+        pose = pose_surface_by_shape(even.mesh, coordinates)
+    warnings += told(pose.warnings)
+    # "lps" where these were found, else what the user has named
+    found = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
+    report = {"coordinates": found, **clean.report, **even.report}
+    if side:
+        report = {"source": "hemisphere", "side": side, **report}
+        return _single_hemisphere(even.mesh, side, pose, week, report, warnings)
+    mesh = transformed(even.mesh, pose.of_file())
+    plane = mid_plane(mesh)
+    fissure = fissure_between(mesh, plane)
+    warnings += told(doubts_of_shift(fissure))
+    left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
+    return _upright(mesh, left, plane, pose, week, {"source": "pial", **report}, warnings)
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
@@ -28,39 +316,56 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
     not closed or cuts itself.
     """
     require_sound(mesh)
-    pose = {"pose": np.eye(4).tolist(), "rotation_deg": 0.0}
-    return describe(mesh, *split(mesh, 0.0), 0.0, {"source": "shape", **pose}, week)
+    return _pial_surface(mesh, *split(mesh, 0.0), 0.0, Pose(), week, {"source": "shape", "rotation_deg": 0.0})
 
 
-def make_sound(
-    mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float, report: dict[str, Any], name: str = "mesh"
-) -> TriangleMesh:
-    """Returns the surface smoothed and remeshed, each piece a sphere that does not cut itself.
-
-    Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length.
-    """
-    smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
-    if faults(smooth):
-        warn(report, f"the surface was rebuilt through voxels, since it had {faults(smooth)}")
-        mesh, report[name.replace("mesh", "remade")] = rebuild(mesh, 0.5 * edge_length_mm)
-        smooth, report[name] = make_even(mesh, smoothing_iterations, edge_length_mm)
-    require_sound(smooth)
-    return smooth
+def told(warnings: Iterable[str]) -> list[str]:
+    """Returns warnings after they have been logged."""
+    found = list(warnings)
+    for warning in found:
+        log.warning(warning)
+    return found
 
 
-def pose_surface(
-    mesh: TriangleMesh,
-    is_left: NDArray[np.bool_],
-    plane: MidPlane,
-    report: dict[str, Any],
+def _pial_surface(
+    whole: TriangleMesh,
+    left: TriangleMesh | None,
+    right: TriangleMesh | None,
+    fissure_x: float,
+    pose: Pose,
     week: float,
-    rotation: NDArray[np.float64] | None = None,
+    report: Mapping[str, Any],
+    warnings: Iterable[str] = (),
 ) -> PialSurface:
-    """Returns the surface with its mid-sagittal plane turned to x = const, its hemispheres and the whole report.
+    """Returns the surface with the whole report: what was found and done on the way, its pose, and its measures."""
+    parts = {"whole": whole, "left": left, "right": right}
+    measures = {
+        "pose": pose.plain(),
+        "week": week,
+        "fissure_x_mm": fissure_x,
+        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items() if part},
+        "volume_mL": signed_volume(whole) * ML_PER_MM3,
+        "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
+        "vertices": len(whole.vertices),
+        "faces": len(whole.faces),
+        "mean_edge_mm": mean_edge_length(whole),
+        "pieces": len(pieces(whole)),
+        "euler_number": euler_number(whole),
+        "warnings": list(warnings),
+    }
+    return PialSurface(whole, left, right, fissure_x, pose, {**report, **measures})
 
-    `rotation` (3, 3) is what brought the file's coordinates to those of the surface; the report's pose is for those
-    of the file.
-    """
+
+def _upright(
+    mesh: TriangleMesh,
+    is_left: Mask,
+    plane: MidPlane,
+    pose: Pose,
+    week: float,
+    report: Mapping[str, Any],
+    warnings: Iterable[str],
+) -> PialSurface:
+    """Returns the surface, posed so far by `pose`, with its mid-sagittal plane turned to x = const, and its sides."""
     matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
     whole = transformed(mesh, matrix)
     left, right = cut_sides(whole, is_left)
@@ -68,32 +373,100 @@ def pose_surface(
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
     fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
-    width = float(np.ptp(whole.vertices[:, 0]))
+    doubts = []
     if plane.fissure_points == 0:
-        warn(report, "no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
-    if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * width:
-        warn(report, f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
+        doubts.append("no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
+    if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
+        doubts.append(f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
     areas = sorted((area(left), area(right)))
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
-        warn(report, f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
-    report |= {
-        "pose": (matrix @ motion(rotation)).tolist(),
+        doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
+    facts = {
         "rotation_deg": angle,
         "fissure_points": plane.fissure_points,
         "fissure_scatter_mm": plane.scatter_mm,
         "asymmetry_mm": plane.asymmetry_mm,
     }
-    return describe(whole, left, right, fissure_x, report, week)
+    warnings = [*warnings, *told(doubts)]
+    return _pial_surface(whole, left, right, fissure_x, pose.then(matrix), week, {**report, **facts}, warnings)
 
 
-def motion(rotation: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """Returns a (3, 3) rotation as a (4, 4) motion about the origin; the identity for None."""
-    matrix = np.eye(4)
-    if rotation is not None:
-        matrix[:3, :3] = rotation
-    return matrix
+def _single_hemisphere(
+    mesh: TriangleMesh, side: Side, pose: Pose, week: float, report: Mapping[str, Any], warnings: Iterable[str]
+) -> PialSurface:
+    """Returns the surface of a hemisphere that is alone, posed with its medial wall beside the mid-sagittal plane."""
+    whole = transformed(mesh, pose.of_file())
+    x = whole.vertices[:, 0]
+    fissure_x = float(x.max() + BESIDE_MM if side == "left" else x.min() - BESIDE_MM)
+    left, right = (whole, None) if side == "left" else (None, whole)
+    report = {**report, "rotation_deg": angle_deg(pose.of_file()[:3, :3])}
+    return _pial_surface(whole, left, right, fissure_x, pose, week, report, warnings)
 
 
-def warn(report: dict[str, Any], message: str) -> None:
-    log.warning(message)
-    report.setdefault("warnings", []).append(message)
+def _require_no_other(tissue: Labels, scheme: LabelScheme, side: Side) -> None:
+    """Raises InputError where a volume of one hemisphere has cortex of the other one."""
+    others = np.intersect1d(scheme.right if side == "left" else scheme.left, scheme.cortex)
+    if len(others) and np.isin(tissue, others).any():
+        raise InputError(
+            f"the volume holds labels of another hemisphere than the {side} one",
+            found=", ".join(scheme.labels[n] for n in others if (tissue == n).any()),
+            expected=f"those of the {side} hemisphere",
+            remedy="Set its side; or give the whole brain as labels.",
+        )
+
+
+def _between_sides(tissue: Labels, scheme: LabelScheme, affine: Floats) -> Floats:
+    """Returns the unit vector (3,) from the middle of the left labels to that of the right ones."""
+    left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
+    vector = affine[:3, :3] @ (right - left)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _require_both(
+    tissue: Labels, scheme: LabelScheme, field: NDArray[np.float32], affine: Floats, border_share: float
+) -> list[str]:
+    """Returns what is doubtful about both sides; InputError where there is one only, by its labels or by its shape."""
+    sides = {
+        name: bool(np.isin(tissue, np.intersect1d(numbers, scheme.cortex or scheme.cerebrum)).any())
+        for name, numbers in (("left", scheme.left), ("right", scheme.right))
+    }
+    # a part that is left out below, for its size, makes no second hemisphere
+    parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
+    cerebrum = isosurface(smooth_mask(parts, 1.0), affine)
+    if scheme.left and sum(sides.values()) == 1:
+        side, other = ("left", "right") if sides["left"] else ("right", "left")
+        # as a hemisphere that is alone it would be refused for its width
+        if (shape := narrowness(cerebrum)) > DOUBTFUL_BRAIN:
+            raise InputError(
+                f"a whole brain has labels of the {side} hemisphere only",
+                found=f"a cerebrum whose narrowest extent is {shape:.2f} of its longest",
+                expected=f"labels of the {other} hemisphere's {'cortex' if scheme.cortex else 'cerebrum'} too",
+                remedy="Give each hemisphere its own labels; or choose a scheme without left and right.",
+            )
+        raise InputError(
+            "the volume holds one hemisphere only",
+            found=f"labels of the {side} hemisphere",
+            expected="both hemispheres",
+            remedy="Give a volume with both hemispheres; or the only one under hemisphere, with its side.",
+        )
+    # a brain that the field of view cuts off may be as flat, which has been reported already
+    return require_whole(cerebrum, "volume", refuses=border_share <= TOLD_LOSS)
+
+
+def _with_fissure(
+    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask
+) -> tuple[NDArray[np.float32], Floats, float]:
+    """Returns the field with the fissure opened, its affine, and the volume (mL) that this took.
+
+    Where more than a thousandth of the brain is taken, the fissure was shut; voxels that are too coarse for its new
+    walls are then made finer first.
+    """
+    wide = open_fissure(field, affine, core, fissure, gap_mm, hidden)
+    # an opening of less than two voxels would be lost between them
+    factor = int(np.ceil(1.8 * np.linalg.norm(affine[:3, :3], axis=0).max() / gap_mm))
+    if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
+        solid, _ = refine(core.astype(np.float32), affine, factor)
+        field, affine = refine(field, affine, factor)
+        wide = open_fissure(field, affine, solid > 0.5, fissure, gap_mm, hidden)
+    voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
+    return wide, affine, float((field - wide).sum(dtype=float) * voxel_ml)

@@ -1,17 +1,28 @@
-"""Surfaces from files made clean: manifold, closed, outward, without stray pieces; every repair is counted."""
+"""Surfaces made sound: cleaned, freed of stalks, of even triangles, of the right volume, or rebuilt through voxels.
 
+Every repair is counted.
+"""
+
+import logging
+from dataclasses import dataclass
 from typing import Any
 
 import igl
 import numpy as np
+import pyvista as pv
+from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from ..errors import MeshError
-from ..geometry.meshlab import pymeshlab
-from ..geometry.remeshing import self_intersecting_faces
+from ..geometry.matching import nearest_on
+from ..geometry.remeshing import from_meshlab, in_meshlab, remesh, self_intersecting_faces, untangle
 from ..geometry.triangles import (
     TriangleMesh,
+    area,
     area_vectors,
+    corners,
     edges,
+    euler_number,
     face_areas,
     face_components,
     flipped,
@@ -19,12 +30,131 @@ from ..geometry.triangles import (
     merged,
     signed_volume,
     submesh,
+    vertex_areas,
+    vertex_normals,
 )
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .extraction import EDGE_SLOPE, Floats, isosurface, make_simple, without_stalks
+from .labels import TOLD_LOSS
+
+log = logging.getLogger(__name__)
 
 # vertices closer than this are one vertex
 SAME_MM = 1e-5
 # pieces from this part of the largest area are kept: two hemispheres in one file
 COMPARABLE = 0.3
+# lengths of brains and hemispheres
+SMALLEST_MM, LARGEST_MM = 15.0, 300.0
+# voxels in which a surface is looked at for stalks
+STALK_VOXEL_MM = 0.8
+# cuts follow the triangles, so that they are wider than the stalks
+WIDEST_CUT_MM = 12.0
+# around a surface that is rebuilt
+MARGIN_VOXELS = 6
+# smoothing keeps the volume to this part
+KEPT = 0.01
+# beyond this it has taken structures, not rounded them, and moving the whole surface would not bring them back
+MOST_GIVEN_BACK = 0.05
+ROUNDS = 2
+# how many times walls that would cut each other are held back, with their neighbours
+HELD_BACK = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """A surface after repairs, with what these were, in plain values for JSON, and what is to be told."""
+
+    mesh: TriangleMesh
+    report: dict[str, Any]
+    warnings: list[str]
+
+
+def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> Sound:
+    """Returns a surface of one piece or two, or its largest piece, repaired and without parts that hang on stalks."""
+    mesh, repairs = clean(mesh, max_hole_mm)
+    if one:
+        mesh, *others = pieces(mesh)
+        dropped = repairs["area_dropped_mm2"] + sum(area(piece) for piece in others)
+        repairs |= {"pieces": 1, "pieces_dropped": repairs["pieces_dropped"] + len(others), "area_dropped_mm2": dropped}
+    warnings, dropped, kept = [], repairs["area_dropped_mm2"], area(mesh)
+    if dropped > TOLD_LOSS * kept:
+        warnings.append(
+            f"{repairs['pieces_dropped']} pieces apart from the brain or inside it were dropped: "
+            f"{100 * dropped / (kept + dropped):.1f} % of the area"
+        )
+    mesh, stalks = surface_without_stalks(mesh)
+    warnings += [
+        f"a part of {stalk['volume_mm3']:.0f} mm³ hung on a stalk of {stalk['stalk_mm2']:.0f} mm²: cut off"
+        for stalk in stalks
+    ]
+    return Sound(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
+
+
+def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:
+    """Returns the surface smoothed and remeshed, each piece a sphere that does not cut itself.
+
+    Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length. The report has
+    what `make_even` says as "mesh", and what `rebuild` says as "remade".
+    """
+    smooth, report = make_even(mesh, smoothing_iterations, edge_length_mm)
+    remade: dict[str, Any] = {}
+    warnings = []
+    if found := faults(smooth):
+        warnings.append(f"the surface was rebuilt through voxels, since it had {found}")
+        mesh, remade["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
+        smooth, report = make_even(mesh, smoothing_iterations, edge_length_mm)
+    require_sound(smooth)
+    return Sound(smooth, {"mesh": report} | remade, warnings)
+
+
+def require_sound(mesh: TriangleMesh) -> None:
+    """Raises MeshError where the surface is not made of closed spheres without intersections."""
+    found = faults(mesh)
+    if found:
+        raise MeshError(
+            "the surface could not be made good",
+            found=found,
+            expected="closed pieces of Euler number 2 that do not cut themselves",
+            remedy="Look at the labels or the surface there; more smoothing or shorter edges may help.",
+        )
+
+
+def faults(mesh: TriangleMesh) -> str:
+    """Returns what keeps the surface from being closed spheres without intersections; empty where nothing does."""
+    euler = [euler_number(piece) for piece in pieces(mesh)]
+    cutting = int(self_intersecting_faces(mesh).sum())
+    found = [
+        "edges without two faces" if not is_closed(mesh) else "",
+        f"Euler numbers {euler}" if any(number != 2 for number in euler) else "",
+        f"{cutting} faces that cut others" if cutting else "",
+    ]
+    return ", ".join(fault for fault in found if fault)
+
+
+def smooth_taubin(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
+    """Returns the surface after Taubin smoothing, which keeps volume (Taubin 1995, λ = 0.5, μ = −0.53)."""
+    if iterations == 0:
+        return mesh
+    document = in_meshlab(mesh)
+    document.apply_coord_taubin_smoothing(stepsmoothnum=iterations)
+    return from_meshlab(document)
+
+
+def make_even(
+    mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float
+) -> tuple[TriangleMesh, dict[str, Any]]:
+    """Returns the surface smoothed, remeshed and untangled, and the number of cutting faces before and after."""
+    even = remesh(smooth_taubin(mesh, smoothing_iterations), edge_length_mm)
+    before = int(self_intersecting_faces(even).sum())
+    if before:
+        even = untangle(even)
+    after = int(self_intersecting_faces(even).sum()) if before else 0
+    return even, {
+        "smoothing_iterations": smoothing_iterations,
+        "edge_length_mm": edge_length_mm,
+        "self_intersections_before": before,
+        "self_intersections_after": after,
+    }
 
 
 def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
@@ -34,14 +164,15 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
     `max_hole_mm` across closed, faces turned outward, small pieces and pieces inside others dropped.
     MeshError for larger holes and for surfaces that stay open.
     """
-    report: dict[str, Any] = {}
-    mesh = _drop_doubles(mesh, report)
+    mesh, doubles = _drop_doubles(mesh)
     # not before: faces that meet in several copies of a vertex would count
-    report["faces_that_cut_others"] = int(self_intersecting_faces(mesh).sum())
-    mesh = _make_manifold(mesh, report)
-    mesh = _main_pieces(mesh, report)
-    mesh = _fill_holes(mesh, max_hole_mm, report)
-    mesh = _turn_outward(mesh, report)
+    cutting = int(self_intersecting_faces(mesh).sum())
+    mesh, opened = _make_manifold(mesh)
+    mesh, dropped = _main_pieces(mesh)
+    mesh, holes = _fill_holes(mesh, max_hole_mm)
+    found = pieces(mesh)
+    inward = [signed_volume(piece) < 0 for piece in found]
+    mesh = merged(*(flipped(piece) if turn else piece for piece, turn in zip(found, inward, strict=True)))
     if not is_closed(mesh):
         _, counts = edges(mesh)
         raise MeshError(
@@ -50,7 +181,8 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
             expected="a closed surface",
             remedy="Repair the surface by hand, or make it anew from a label volume.",
         )
-    return mesh, report
+    turned = {"pieces_turned_outward": int(sum(inward))}
+    return mesh, {**doubles, "faces_that_cut_others": cutting, **opened, **dropped, **holes, **turned}
 
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
@@ -59,61 +191,56 @@ def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
     return [submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
 
 
-def _drop_doubles(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
+def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     vertices, _, _, faces = igl.remove_duplicate_vertices(mesh.vertices, mesh.faces, SAME_MM)
     used = len(np.unique(mesh.faces))
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    report["degenerate_faces_removed"] = int(flat.sum())
-    report["double_faces_removed"] = len(faces) - len(first)
     result, kept = submesh(TriangleMesh(vertices, faces[np.sort(first)]), np.ones(len(first), dtype=bool))
-    report["duplicate_vertices_joined"] = max(used - len(kept), 0)
-    report["zero_area_faces"] = int((face_areas(result) < 1e-10).sum())
-    return result
+    return result, {
+        "degenerate_faces_removed": int(flat.sum()),
+        "double_faces_removed": len(faces) - len(first),
+        "duplicate_vertices_joined": max(used - len(kept), 0),
+        "zero_area_faces": int((face_areas(result) < 1e-10).sum()),
+    }
 
 
-def _make_manifold(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
-    _, counts = edges(mesh)
-    bad = int((counts > 2).sum())
-    report["non_manifold_edges_opened"] = bad
-    document = pymeshlab.MeshSet(verbose=False)
-    document.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces))
+def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
+    bad = int((edges(mesh)[1] > 2).sum())
+    document = in_meshlab(mesh)
     if bad:
         document.meshing_repair_non_manifold_edges(method="Remove Faces")
-    measures = document.get_topological_measures()
-    report["non_manifold_vertices_split"] = int(measures["non_two_manifold_vertices"])
-    if bad or report["non_manifold_vertices_split"]:
+    split = int(document.get_topological_measures()["non_two_manifold_vertices"])
+    if bad or split:
         document.meshing_repair_non_manifold_vertices(vertdispratio=0.0)
-        current = document.current_mesh()
-        mesh = TriangleMesh(current.vertex_matrix(), current.face_matrix())
+        mesh = from_meshlab(document)
     faces, _ = igl.bfs_orient(mesh.faces)
     agree = np.einsum("ij,ij->i", area_vectors(mesh), area_vectors(TriangleMesh(mesh.vertices, faces))) >= 0
-    report["faces_turned_to_agree"] = int(min((~agree).sum(), agree.sum()))
-    return TriangleMesh(mesh.vertices, faces)
+    return TriangleMesh(mesh.vertices, faces), {
+        "non_manifold_edges_opened": bad,
+        "non_manifold_vertices_split": split,
+        "faces_turned_to_agree": int(min((~agree).sum(), agree.sum())),
+    }
 
 
-def _main_pieces(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
+def _main_pieces(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     found = pieces(mesh)
-    areas = [float(face_areas(piece).sum()) for piece in found]
+    areas = [area(piece) for piece in found]
     kept = [found[0]]
     for piece, size in zip(found[1:], areas[1:], strict=True):
         inside = np.median(np.abs(igl.fast_winding_number(found[0].vertices, found[0].faces, piece.vertices))) > 0.5
         if size >= COMPARABLE * areas[0] and not inside:
             kept.append(piece)
-    report["pieces"] = len(kept)
-    report["pieces_dropped"] = len(found) - len(kept)
-    report["area_dropped_mm2"] = sum(areas) - sum(float(face_areas(piece).sum()) for piece in kept)
-    return merged(*kept)
+    dropped = {"pieces_dropped": len(found) - len(kept), "area_dropped_mm2": sum(areas) - sum(map(area, kept))}
+    return merged(*kept), {"pieces": len(kept)} | dropped
 
 
-def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, report: dict[str, Any]) -> TriangleMesh:
-    """Returns the surface with a fan over each hole up to `max_hole_mm` across."""
+def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+    """Returns the surface with a fan over each hole up to `max_hole_mm` across, and how many there were."""
     loops = [np.asarray(loop) for loop in igl.boundary_loop_all(mesh.faces)]
     sizes = [float(np.ptp(mesh.vertices[loop], axis=0).max()) for loop in loops]
-    report["holes_closed"] = len(loops)
-    report["largest_hole_mm"] = max(sizes, default=0.0)
     if sizes and max(sizes) > max_hole_mm:
         wide = sorted((size for size in sizes if size > max_hole_mm), reverse=True)
         raise MeshError(
@@ -131,11 +258,116 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, report: dict[str, Any]) 
         along = (int(start[0]), int(end[0])) in directed
         faces.append(np.stack([end, start, centre] if along else [start, end, centre], axis=1))
         vertices.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
-    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
+    counts = {"holes_closed": len(loops), "largest_hole_mm": max(sizes, default=0.0)}
+    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces)), counts
 
 
-def _turn_outward(mesh: TriangleMesh, report: dict[str, Any]) -> TriangleMesh:
-    found = pieces(mesh)
-    inward = [signed_volume(piece) < 0 for piece in found]
-    report["pieces_turned_outward"] = int(sum(inward))
-    return merged(*(flipped(piece) if turn else piece for piece, turn in zip(found, inward, strict=True)))
+def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
+    """Returns a closed surface without what hangs on it by stalks, closed where these were cut, and the parts."""
+    if not SMALLEST_MM < np.ptp(mesh.vertices, axis=0).max() < LARGEST_MM:
+        # in another unit, which is reported elsewhere
+        return mesh, []
+    size = np.full(3, STALK_VOXEL_MM)
+    first = mesh.vertices.min(axis=0) - 2.0 * size
+    shape = np.ceil((np.ptp(mesh.vertices, axis=0) + 4.0 * size) / size).astype(int)
+    grid = pv.ImageData(dimensions=shape, spacing=size, origin=first)
+    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
+    image = body.voxelize_binary_mask(reference_volume=grid)
+    mask = np.asarray(image["mask"]).reshape(shape, order="F") > 0
+    affine = np.diag([*size, 1.0])
+    affine[:3, 3] = first
+    left, report = without_stalks(mask, affine)
+    if not report:
+        return mesh, []
+    # which side of the cuts each face is on: that of the nearest voxel inside
+    _, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
+    at = np.clip(np.rint((corners(mesh).mean(axis=1) - first) / size).astype(int), 0, shape - 1)
+    kept = left[tuple(nearest[(slice(None), *at.T)])]
+    open_, _ = submesh(mesh, kept)
+    return clean(open_, WIDEST_CUT_MM)[0], report
+
+
+def after_repairs(mask_mm3: float, topology: dict[str, Any], affine: Floats) -> float:
+    """Returns the volume in mm³ of a mask after the repairs of its topology, with voxels of a (4, 4) affine."""
+    voxels = sum(topology[f"voxels_{key}"] for key in ("filled", "filled_in_tunnels"))
+    voxels -= sum(topology[f"voxels_{key}"] for key in ("dropped", "cut_from_bridges"))
+    return mask_mm3 + voxels * float(abs(np.linalg.det(affine[:3, :3])))
+
+
+def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
+    """Returns a closed surface set along its normals so that it encloses a volume, and a report in plain values.
+
+    Smoothing and remeshing draw a convex surface inwards by some hundredths of a mm: ΔV/A is given back. Walls so near
+    to each other that they would cut stay where they are. So does the whole surface where more than 5 % of the volume
+    is missing, or where it would cut itself even so. `area_mm2` is that of the mask's isosurface before it was smoothed
+    and remeshed.
+    """
+    before = signed_volume(mesh) / volume_mm3 - 1.0
+    moved = _set_along_normals(mesh, volume_mm3) if abs(before) <= MOST_GIVEN_BACK else mesh
+    change = signed_volume(moved) / volume_mm3 - 1.0
+    report = {
+        "volume_expected_mL": volume_mm3 * ML_PER_MM3,
+        "volume_change": change,
+        "volume_change_before_correction": before,
+        "area_before_cm2": area_mm2 * CM2_PER_MM2,
+        "area_change": area(moved) / area_mm2 - 1.0,
+    }
+    log.info("volume changed by %.2f %%, area by %.2f %% through smoothing", 100 * change, 100 * report["area_change"])
+    return moved, report
+
+
+def _set_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+    """Returns the surface set along its normals to a volume, but for walls that would cut; unmoved where others do."""
+    free = np.ones(len(mesh.vertices), dtype=bool)
+    for _ in range(HELD_BACK + 1):
+        moved = mesh
+        for _ in range(ROUNDS):
+            share = float(vertex_areas(moved)[free].sum())
+            offset = (volume_mm3 - signed_volume(moved)) / share * free
+            moved = TriangleMesh(moved.vertices + offset[:, None] * vertex_normals(moved), moved.faces)
+        if not (cutting := self_intersecting_faces(moved)).any():
+            break
+        near = np.isin(mesh.faces, mesh.faces[cutting]).any(axis=1)
+        free[mesh.faces[near]] = False
+        if not free.any():
+            return mesh
+    return mesh if faults(moved) else moved
+
+
+def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+    """Returns the surface of the region that `mesh` winds around, without handles or intersections, and a report.
+
+    The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) separates inside from outside
+    even where the surface cuts itself. Details below the voxel size are lost.
+    """
+    first = mesh.vertices.min(axis=0) - MARGIN_VOXELS * voxel_mm
+    shape = np.ceil(np.ptp(mesh.vertices, axis=0) / voxel_mm).astype(int) + 2 * MARGIN_VOXELS
+    affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
+    affine[:3, 3] = first
+    points = np.indices(shape).reshape(3, -1).T * voxel_mm + first
+    # every face lies within a voxel of one of these points
+    near, _ = cKDTree(_spread_points(mesh, voxel_mm)).query(points, distance_upper_bound=3.0 * voxel_mm, workers=-1)
+    band = np.isfinite(near)
+    distance = np.full(len(points), np.inf)
+    distance[band] = nearest_on(points[band], mesh)[0]
+    wound = np.zeros(len(points), dtype=bool)
+    wound[band] = igl.fast_winding_number(mesh.vertices, mesh.faces, points[band]) > 0.5
+    # where no surface is near, each region is inside or outside as a whole
+    far = ~band.reshape(shape)
+    number, count = ndimage.label(far)
+    one = np.array(ndimage.maximum_position(far, number, np.arange(1, count + 1)), dtype=float)
+    winding = igl.fast_winding_number(mesh.vertices, mesh.faces, one @ affine[:3, :3].T + affine[:3, 3])
+    inside = wound.reshape(shape) | np.concatenate([[False], winding > 0.5])[number]
+    signed = np.where(inside, distance.reshape(shape), -distance.reshape(shape))
+    field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)
+    field, report = make_simple(field)
+    return isosurface(field, affine), {"remade_with_voxels_mm": voxel_mm} | report
+
+
+def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> Floats:
+    """Returns points on the surface, so dense that no place on it is further than about a voxel from one."""
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=-1).max()
+    steps = max(int(np.ceil(longest / voxel_mm)), 1)
+    weights = np.array([(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)]) / steps
+    return np.unique(np.einsum("wk,kfd->wfd", weights, np.stack([a, b, c])).reshape(-1, 3).round(3), axis=0)

@@ -1,21 +1,39 @@
-"""Cortical thickness at the vertices of a pial surface, from labels of the cortex."""
+"""Cortical thickness at the vertices of a pial surface, from labels of the cortex or white surfaces beside it."""
 
-from dataclasses import dataclass
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
+import igl
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..geometry.layers import layer_thickness
-from ..geometry.triangles import TriangleMesh, vertex_areas
-from .extraction import LEVEL, isosurface, main_parts, smooth_mask
+from ..geometry.matching import layer_thickness, nearest_on
+from ..geometry.poses import Pose
+from ..geometry.triangles import TriangleMesh, merged, transformed, vertex_areas
+from ..parameters.schemes import LabelScheme
+from ..parameters.terms import SIDES
+from .extraction import (
+    LEVEL,
+    PAD_VOXELS,
+    Floats,
+    Mask,
+    crop,
+    isosurface,
+    main_parts,
+    shifted_affine,
+    smooth_mask,
+)
 from .fissure import sample
+from .labels import Labels, read_cerebrum
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+log = logging.getLogger(__name__)
+
+# labels of cortex below this many voxels are as thick as the voxels allow, not as the cortex is
+RESOLVED_VOXELS = 1.5
 
 # a vertex has cortex under it where the centre of a voxel of cortex is nearer than this, and lies on the labels' own
 # surface where voxels outside are not much further
@@ -24,20 +42,18 @@ FARTHEST_VOXELS = 1.5
 # a layer thinner than this part of a voxel is none
 THINNEST_VOXELS = 1 / 3
 QUANTILES = (0.05, 0.95)
+# on the medial wall, where there is no cortex, white and pial surfaces meet
+LEAST_MM = 0.3
+# the white surface crosses the pial one where so much of its area is so far outside
+OUTSIDE_MM, MOST_OUTSIDE = 0.5, 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Thickness:
     """Cortical thickness on a surface.
 
-    Attributes
-    ----------
-    values_mm : (n,) float
-        Thickness at each vertex; where it could not be measured, that of the nearest vertex where it could.
-    measured : (n,) bool
-        Where there is cortex and its thickness was measured.
-    report
-        Means and shares, in plain values for JSON.
+    `values_mm` (n,) hold that of the nearest vertex where it was measured for those where it was not, `measured` (n,)
+    says where it was; the report has means and shares, in plain values for JSON.
     """
 
     values_mm: Floats
@@ -61,16 +77,8 @@ def cortical_thickness(
     doi 10.1073/pnas.200033797). It is not measured where the surface has no cortex under it (corpus callosum,
     brainstem), and where a fissure that the labels hide was opened.
 
-    Parameters
-    ----------
-    pial
-        In the coordinates of the affine, in mm.
-    cerebrum, cortex : (i, j, k) bool
-        Where the cerebrum is, and where in it the cortex.
-    affine : (4, 4) float
-        Voxel index to position in mm.
-    smoothing_voxels
-        σ of the Gaussian with which the pial surface was made.
+    `pial` is in mm in the coordinates to which the (4, 4) affine leads from the (i, j, k) masks of the cerebrum and of
+    its cortex; it was made with a Gaussian of σ = `smoothing_voxels`.
     """
     core = smooth_mask(cerebrum & ~cortex, smoothing_voxels)
     kept, _, _ = main_parts(core > LEVEL)
@@ -79,7 +87,11 @@ def cortical_thickness(
     points = pial.vertices
     values = layer_thickness(pial, inner)
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
-    measured = _cortex_under(points, cerebrum, cortex, affine, voxel) & (values >= THINNEST_VOXELS * voxel)
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    to_cortex, to_outside = (ndimage.distance_transform_edt(mask, sampling=size) for mask in (~cortex, cerebrum))
+    at_labels = sample(to_outside, affine, points) < FARTHEST_VOXELS * voxel
+    over_cortex = sample(to_cortex, affine, points) < NEAR_VOXELS * voxel
+    measured = at_labels & over_cortex & (values >= THINNEST_VOXELS * voxel)
     if not measured.any():
         raise InputError(
             "the labels of the cortex lie nowhere at the surface of the cerebrum",
@@ -94,12 +106,32 @@ def cortical_thickness(
     return Thickness(filled, measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
 
 
-def _cortex_under(points: Floats, cerebrum: Mask, cortex: Mask, affine: Floats, voxel_mm: float) -> Mask:
-    """Returns which of (n, 3) points lie at the surface of the cerebrum's labels, with cortex under them."""
-    size = np.linalg.norm(affine[:3, :3], axis=0)
-    to_cortex, to_outside = (ndimage.distance_transform_edt(mask, sampling=size) for mask in (~cortex, cerebrum))
-    near = sample(to_cortex, affine, points) < NEAR_VOXELS * voxel_mm
-    return near & (sample(to_outside, affine, points) < FARTHEST_VOXELS * voxel_mm)
+def thickness_from_labels(
+    labels: Labels,
+    affine: Floats,
+    scheme: LabelScheme,
+    surface: TriangleMesh,
+    pose: Pose,
+    *,
+    smoothing_voxels: float = 1.0,
+) -> Thickness:
+    """Returns the cortical thickness at the vertices of the pial surface that `from_labels` made of the same labels.
+
+    `surface` is the whole one, posed by `pose`; the scheme has to separate cortex from the tissue inside.
+    """
+    affine = pose.world @ affine
+    tissue = read_cerebrum(labels, affine, scheme).tissue
+    box, first = crop(np.isin(tissue, scheme.cerebrum))
+    tissue = np.pad(tissue[box], PAD_VOXELS)
+    cerebrum, cortex = np.isin(tissue, scheme.cerebrum), np.isin(tissue, scheme.cortex)
+    thickness = cortical_thickness(surface, cerebrum, cortex, shifted_affine(affine, first), smoothing_voxels)
+    suggested, voxels = thickness.report["suggested_thickness_mm"], thickness.report["voxels_through_cortex"]
+    log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
+    coarse = f"the cortex's labels are {voxels:.1f} voxels thick: their thickness is a coarse one"
+    warnings = [coarse] if voxels < RESOLVED_VOXELS else []
+    for warning in warnings:
+        log.warning(warning)
+    return replace(thickness, report=thickness.report | {"warnings": warnings})
 
 
 def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
@@ -117,3 +149,52 @@ def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
         "measured_area_share": float(weights.sum() / areas.sum()),
         "suggested_thickness_mm": round(mean, 2),
     }
+
+
+def thickness_from_white(
+    surface: TriangleMesh, pose: Pose, fissure_x_mm: float, whites: Mapping[str, TriangleMesh]
+) -> Thickness:
+    """Returns the cortical thickness on a pial surface: its distance from the white surface, as `cortical_thickness`.
+
+    `surface` is the whole pial surface, `pose` its own and `fissure_x_mm` the place of its fissure. `whites` are the
+    white surfaces in the coordinates of the files that the pial one was made from, by side: "left", "right", or
+    "whole". InputError where that of a side lies on the other one, and where a white surface crosses the pial one.
+    """
+    posed = posed_whites(pose, whites)
+    for side, white in posed.items():
+        areas = vertex_areas(white)
+        middle = float(np.average(white.vertices[:, 0], weights=areas))
+        if side in SIDES and (middle < fissure_x_mm) != (side == "left"):
+            raise InputError(
+                f"the white surface ({side}) lies in the other hemisphere",
+                found=f"its middle at x = {middle:.1f} mm, the fissure at {fissure_x_mm:.1f} mm",
+                expected=f"{'<' if side == 'left' else '>'} {fissure_x_mm:.1f} mm (RAS+)",
+                remedy="Give each side its own white surface: they are swapped, or both are of one side.",
+            )
+        outside = igl.fast_winding_number(surface.vertices, surface.faces, white.vertices) < 0.5
+        distance, _, _ = nearest_on(white.vertices, surface)
+        crossing = outside & (distance > OUTSIDE_MM)
+        share = float(areas[crossing].sum() / areas.sum())
+        if share > MOST_OUTSIDE:
+            raise InputError(
+                f"the white surface ({side}) crosses the pial one",
+                found=f"{100 * share:.0f} % of its area outside, by up to {distance[crossing].max():.1f} mm",
+                expected=f"at most {100 * MOST_OUTSIDE:.0f} % by more than {OUTSIDE_MM} mm",
+                remedy="Give white and pial surfaces of one subject in the same coordinates.",
+            )
+    inner = merged(*posed.values())
+    values = layer_thickness(surface, inner)
+    measured = values >= LEAST_MM
+    if not measured.any():
+        raise InputError(
+            "the white surface is the pial one",
+            found=f"{values.max():.2f} mm between them at most",
+            expected=f"{LEAST_MM} mm and more",
+            remedy="Give the white surfaces under white.",
+        )
+    return Thickness(values, measured, summary(values, measured, vertex_areas(surface)))
+
+
+def posed_whites(pose: Pose, whites: Mapping[str, TriangleMesh]) -> dict[str, TriangleMesh]:
+    """Returns the white surfaces by side, moved as the pial ones were."""
+    return {side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()}

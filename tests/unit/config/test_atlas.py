@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 import yaml
+from configurations import problems
 
 from gyriflow.config import load
-from gyriflow.config.atlas import retrieval_note
-from gyriflow.config.atlas_description import ATLASES, Atlas, shipped_atlases
+from gyriflow.config.atlas import ATLASES, Atlas, retrieval_note, shipped_atlases
 from gyriflow.errors import InputError
-from gyriflow.io.downloads import sha256_of
+from gyriflow.io.downloads import require_checksums, sha256_of
 from gyriflow.io.yaml_files import read_yaml
 
 UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, operated"
@@ -28,12 +28,6 @@ def surfaces(*weeks, inside=""):
 
 def study(atlas, start, **changes):
     return {"atlas": atlas, "start": start, "folding": {"end_week": 26}} | changes
-
-
-def problems(raw, base_dir):
-    with pytest.raises(InputError) as caught:
-        load(raw, base_dir)
-    return [line.strip() for line in str(caught.value).splitlines()[1:-1]]
 
 
 def own_atlas(folder, **changes):
@@ -115,7 +109,7 @@ def test_populations_are_named_and_never_share_a_curve(tmp_path):
     assert config.measured_name([*unoperated, operated[0]]) == both
     assert config.growth_series == {UNOPERATED: unoperated, OPERATED: operated}
     assert config.estimated_from("spina-bifida-unoperated-21") == UNOPERATED
-    assert config.age_reference == unoperated
+    assert config.norm_reference == unoperated
 
 
 def test_a_growth_curve_across_populations_is_refused(tmp_path):
@@ -195,11 +189,17 @@ def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
     known = read_yaml(ATLASES / "crl" / "atlas.yaml")["series"]["normative"]["weeks"]
     section = {"name": "crl", "folder": "mine", "weeks": [21, 22], "accept_licence": True}
     put(tmp_path / "mine", "Other21_Study1/parcellation.nii.gz", "x/HarvardSTA22_Study1/parcellation.nii.gz")
-    (found,) = problems(study(section, "crl-21"), tmp_path)
-    assert found == (
-        f"atlas.folder: {tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz is not the file of crl: its SHA-256 "
-        f"is not {known[22]['labels']['sha256']}. Delete it, and it is fetched; or give a changed file as a brain of "
-        "your own under brains"
+    config = load(study(section, "crl-21"), tmp_path)
+    file = f"{tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz"
+    assert [brain.labels for brain in config.brains][1] == file
+    # which is looked at by the stage that reads it
+    found = {file: config.known_files[file]}
+    assert found == {file: ("crl", known[22]["labels"]["sha256"])}
+    with pytest.raises(InputError) as caught:
+        require_checksums(found)
+    assert str(caught.value) == (
+        f"{file}: is not the file of crl; found another SHA-256; expected {known[22]['labels']['sha256']}. Delete it, "
+        "and it is fetched; or give a changed file as a brain of your own under brains"
     )
 
 
@@ -254,7 +254,6 @@ def test_a_file_that_neither_lies_there_nor_has_an_address_is_named(tmp_path):
     [
         ({"nam": "x"}, "nam: unknown key; did you mean name?"),
         ({"licence": {"name": "x"}}, "licence.terms: is missing"),
-        ({"url": "ftp://x"}, "url: found 'ftp://x'; it should "),
         ({"series": {"scheme": None}}, "have a `scheme`, which says what the labels mean"),
         ({"series": {"weeks": []}}, "series.all.weeks: found []; it should have one week or more"),
         ({"series": {"weeks": [21, 21]}}, "series.all.weeks: found [21, 21]; it should name each week once"),

@@ -1,12 +1,10 @@
 """Maps and estimated growth in a configuration: what the steps of the workflow are handed."""
 
-import numpy as np
 import pytest
+from configurations import problems
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
-from gyriflow.parameters.reading import parameters_from
-from gyriflow.parameters.varying import value_at
 
 BRAINS = [
     {"id": "a", "week": 21, "phantom": {}},
@@ -51,22 +49,6 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     }
     assert config.maps("plain") == {}
     assert config.parameters("plain")["thickness_mm"] == 1e-8
-
-
-def test_the_folding_program_reads_curves_and_maps(tmp_path):
-    (tmp_path / "soft.nii.gz").touch()
-    varying = {
-        "growth_rate_per_s": {"weeks": {"21.5": "1e-7", "22.5": 3e-7}},
-        "shear_modulus_core_pa": {"map": "soft.nii.gz", "weeks": {21: 1.0, 23: 2.0}},
-    }
-    config = load(study(varying), tmp_path)
-    known = {"start_week": 21.0, "output_weeks": config.weeks("reference", "a"), "fissure_x_mm": 0.0}
-    read = parameters_from(known | config.parameters("reference"))
-    assert value_at(read.growth_rate_per_s, 22.0, {}) == pytest.approx(2e-7)
-    assert read.maps == {"shear_modulus_core_pa"}
-    assert value_at(read.shear_modulus_core_pa, 22.0, {"shear_modulus_core_pa": np.array([300.0])}) == pytest.approx(
-        450.0
-    )
 
 
 @pytest.mark.parametrize(
@@ -132,14 +114,7 @@ def test_series_may_be_named(tmp_path):
     ],
 )
 def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
-    raw = both_kinds(tmp_path, (21, 22)) | {"growth": growth, "folding": ESTIMATED}
-    with pytest.raises(InputError) as caught:
-        load(raw, tmp_path)
-    assert [line.strip() for line in str(caught.value).splitlines()[1:-1]] == found
-
-
-def test_brains_of_one_week_give_no_growth():
-    assert load({"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 22}}).growth_series == {}
+    assert problems(both_kinds(tmp_path, (21, 22)) | {"growth": growth, "folding": ESTIMATED}, tmp_path) == found
 
 
 @pytest.mark.parametrize(
@@ -161,15 +136,6 @@ def test_brains_that_give_no_growth_rate_are_refused(growth, settings, found):
     assert problems({"brains": BRAINS, "start": "a", "growth": growth, "folding": settings}) == found
 
 
-def problems(raw, base_dir="."):
-    """Returns the lines of the message with which a configuration is refused, none where it is not."""
-    try:
-        load(raw, base_dir)
-    except InputError as error:
-        return [line.strip() for line in str(error).splitlines()[1:-1]]
-    return []
-
-
 def test_an_estimate_without_two_weeks_is_refused_where_it_stands():
     reason = "can't be estimated: found brains of 1 week; a growth rate needs two or more"
     alone = {"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 24}}
@@ -184,3 +150,23 @@ def test_a_mesh_for_the_end_of_the_runs_needs_brains_that_tell_how_far_it_is_str
     alone = {"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 24}, "mesh": {"sized_for": "end"}}
     with pytest.raises(InputError, match=r"(?s)mesh.sized_for.*`end` needs brains of other weeks that belong with a"):
         load(alone, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("follow", "told"),
+    [
+        ({"growth_of": "another"}, "growth_of: growth of another population needs loop: closed"),
+        ({"loop": "closed", "known_until_gw": 22}, "known_until_gw: has no meaning where growth leads to whole shapes"),
+        ({"loop": "closed", "growth_of": "another"}, ""),
+        ({"loop": "open", "known_until_gw": 22}, ""),
+    ],
+)
+def test_growth_towards_shapes_knows_whole_shapes(follow, told):
+    found = problems(study({"follow": follow}))
+    assert not found if not told else [line for line in found if told in line]
+
+
+def test_what_is_expected_is_a_preset():
+    folding = load(study({"preset": "expected"})).run("reference")
+    assert (folding.follow.loop, folding.follow.growth_of) == ("closed", "another")
+    assert folding.shear_modulus_cortex_pa == folding.shear_modulus_core_pa

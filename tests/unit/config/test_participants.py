@@ -1,6 +1,7 @@
 """A cohort's table becomes brains; rows that can't be used are problems, or left out with their cause."""
 
 import pytest
+from configurations import refusal, study
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
@@ -140,10 +141,7 @@ def test_more_files_than_are_used_are_refused(folder, files, side, said):
 
 def test_a_hemisphere_is_a_surface_or_labels_with_a_scheme(folder):
     def problems(**keys):
-        brain = {"id": "a", "week": 24} | keys
-        with pytest.raises(InputError) as caught:
-            load({"brains": [brain], "start": "a", "folding": FOLDING}, folder / "bids")
-        return str(caught.value)
+        return refusal(study([{"id": "a", "week": 24} | keys], folding=FOLDING), folder / "bids")
 
     labels = {"file": "a.nii.gz", "side": "left"}
     assert "brains[0].scheme: is missing" in problems(hemisphere=labels)

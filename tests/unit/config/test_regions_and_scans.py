@@ -64,19 +64,18 @@ def test_scans_of_a_subject_by_week():
         load(study([*brains, {"id": "d", "week": 24, "subject": "one", "phantom": {}}]))
 
 
-def test_what_growth_was_made_to_follow():
-    runs = {
-        "reference": {},
-        "measured": {"preset": "measured"},
-        "estimated": {"growth_rate_per_s": "estimated"},
-    }
-    config = load(study(runs=runs))
-    assert [config.followed(run) for run in runs] == [[], ["area", "volume"], ["area"]]
-
-
 def test_the_norm_is_of_all_measured_brains_of_one_kind():
     assert load(study()).norm_reference == ["p21", "p22", "p25"]
     assert load(study(norm_reference=["p22"])).norm_reference == ["p22"]
+
+
+def test_the_norm_is_of_real_brains_where_there_are_any_and_never_of_simple_shapes(tmp_path):
+    (tmp_path / "a.stl").touch()
+    real = [{"id": f"r{week}", "week": week, "pial": str(tmp_path / "a.stl")} for week in (21, 22)]
+    shapes = [{"id": f"s{week}", "week": week, "shape": {"kind": "sphere"}} for week in (21, 22)]
+    assert load(study([*BRAINS, *real])).norm_reference == ["r21", "r22"]
+    assert load(study([*BRAINS, *real], norm_reference=["p22", "r21"])).norm_reference == ["p22", "r21"]
+    assert load(study(shapes) | {"start": "s21"}).norm_reference == []
 
 
 def test_the_norm_is_of_brains_with_the_hemispheres_of_the_start(volume):

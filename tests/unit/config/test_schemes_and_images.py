@@ -1,29 +1,23 @@
 """Label schemes of one's own, images and their segmentation in the configuration."""
 
+import configurations
 import pytest
+from configurations import problems, touched
 
 from gyriflow.config import load
-from gyriflow.errors import InputError
-from gyriflow.parameters.schemes import SCHEMES, LabelScheme
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.parameters.schemes import LabelScheme
 
 MINE = {"cerebrum": [1, 2], "cortex": [2], "known": {9: "outer CSF"}}
 
 
 def study(brain, **changes):
-    return {"brains": [{"id": "a", "week": 21} | brain], "start": "a", "folding": {"end_week": 22}} | changes
-
-
-def problems(raw, base_dir):
-    with pytest.raises(InputError) as caught:
-        load(raw, base_dir)
-    return [line.strip() for line in str(caught.value).splitlines()[1:-1]]
+    return configurations.study([{"id": "a", "week": 21} | brain], folding={"end_week": 22}) | changes
 
 
 @pytest.fixture
 def folder(tmp_path):
-    for name in ("labels.nii.gz", "t2w.nii.gz"):
-        (tmp_path / name).touch()
-    return tmp_path
+    return touched(tmp_path, "labels.nii.gz", "t2w.nii.gz")
 
 
 def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
@@ -48,23 +42,26 @@ def test_all_mistakes_in_schemes_are_named_at_once(folder):
     schemes = {
         "feta-7": MINE,
         "a": {"cerebrum": [1, 2, 2], "cortex": [3], "left": [1], "right": [1]},
-        "b": {"cerebrum": [1], "cortex": [1], "left": [1], "cortx": []},
-        "c": {"cerebrum": [0], "left": ["x"]},
+        "b": {"cerebrum": [1], "cortex": [1], "left": [1]},
+        "c": {"cerebrum": [0], "left": ["x"], "cortx": []},
         "e": {"cerebrum": []},
     }
     assert problems(study({"labels": "labels.nii.gz", "scheme": "d"}, schemes=schemes), folder) == [
         "schemes.a.cerebrum: found 2 more than once",
         "schemes.a.cortex: found 3; it should have labels of the cerebrum only",
         "schemes.a.right: found 1, which are in left too",
-        "schemes.b.cortx: unknown key; did you mean cortex?",
         "schemes.b.cortex: found all of the cerebrum; the tissue inside the cortex is missing",
         "schemes.b.right: is missing; the hemispheres are separated by both left and right",
         "schemes.c.cerebrum[0]: found 0; it should be greater than or equal to 1",
         "schemes.c.left[0]: found 'x'; it should be a valid integer, unable to parse string as an integer",
+        "schemes.c.cortx: unknown key; did you mean cortex?",
         "schemes.e.cerebrum: found no labels; it should have one or more",
+    ]
+    right = {"feta-7": MINE, "a": MINE}
+    assert problems(study({"labels": "labels.nii.gz", "scheme": "d"}, schemes=right), folder) == [
         "schemes.feta-7: the name is that of a scheme of gyriflow; choose another",
-        "brains[0].scheme: found 'd'; expected one of spina-bifida-atlas, dhcp-19, feta-7, drawem-9, multi-bounti-43, "
-        "freesurfer, crl, binary, a, b, c, e, or a name of schemes",
+        "brains[0].scheme: found 'd'; expected one of binary, crl, dhcp-19, drawem-9, feta-7, freesurfer, "
+        "multi-bounti-43, spina-bifida-atlas, a, or a name of schemes",
     ]
 
 
@@ -127,8 +124,7 @@ def test_a_mistake_around_a_segmentation_is_named(folder, brain, found):
 
 @pytest.mark.fault(15)
 def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
-    for name in ("week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz"):
-        (tmp_path / name).touch()
+    touched(tmp_path, "week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz")
     (line,) = problems(study({"labels": "week30_labels.nii.gz", "scheme": "binary"}), tmp_path)
     assert line == (
         f"brains[0].labels: no such file: {tmp_path / 'week30_labels.nii.gz'}; "

@@ -5,27 +5,19 @@ from typing import get_args
 
 import pytest
 import yaml
+from configurations import problems, study
 
 from gyriflow.config import load
-from gyriflow.errors import InputError
-from gyriflow.parameters.synthetic import SHAPE_SIZES, ShapeKind
+from gyriflow.parameters.synthetic import ShapeKind
 from gyriflow.phantom.shapes import shape_surface
 
 EXAMPLE = Path(__file__).parents[3] / "config" / "examples" / "simple-shapes.yaml"
 
 
-def study(*shapes, **others):
+def shapes(*settings):
     """Returns a configuration of shapes that are called a, b, ... at week 21."""
-    brains = [{"id": name, "week": 21, "shape": shape} for name, shape in zip("abcd", shapes, strict=False)]
-    return {"brains": brains, "start": "a", "folding": {"end_week": 22}} | others
-
-
-def problems(raw):
-    """Returns the lines of the message with which a configuration is refused."""
-    with pytest.raises(InputError) as caught:
-        load(raw)
-    _, *lines, _ = str(caught.value).splitlines()
-    return [line.strip() for line in lines]
+    brains = [{"id": name, "week": 21, "shape": shape} for name, shape in zip("abcdef", settings, strict=False)]
+    return study(brains)
 
 
 @pytest.mark.parametrize(
@@ -40,7 +32,7 @@ def problems(raw):
     ],
 )
 def test_a_shape_has_the_size_of_its_kind(shape, size):
-    (brain,) = load(study(shape)).brains
+    (brain,) = load(shapes(shape)).brains
     assert (brain.source, brain.shape.size_mm) == ("shape", size)
     assert brain.synthetic
     assert (brain.shape.noise_mm, brain.shape.seed) == (0.05, 0)
@@ -49,11 +41,13 @@ def test_a_shape_has_the_size_of_its_kind(shape, size):
 
 def test_all_mistakes_in_shapes_are_named_at_once():
     found = problems(
-        study(
+        shapes(
             {"kind": "cube"},
             {"radius_mm": 20},
-            {"kind": "sphere", "radius_mm": 200, "semi_axes_mm": [20, 20, 20], "noise": 0.1},
-            {"kind": "slab", "extent_mm": [40, 40], "radius_mm": 10, "noise_mm": -0.1},
+            {"kind": "sphere", "radius_mm": 200, "noise": 0.1},
+            {"kind": "slab", "extent_mm": [40, 40], "noise_mm": -0.1},
+            {"kind": "sphere", "semi_axes_mm": [20, 20, 20]},
+            {"kind": "slab", "radius_mm": 10},
         )
     )
     assert found == [
@@ -61,16 +55,16 @@ def test_all_mistakes_in_shapes_are_named_at_once():
         "brains[1].shape.kind: is missing",
         "brains[2].shape.radius_mm: found 200; it should be less than or equal to 150",
         "brains[2].shape.noise: unknown key; did you mean noise_mm?",
-        "brains[2].shape.semi_axes_mm: has no meaning with kind sphere, whose size is radius_mm",
         "brains[3].shape.extent_mm[2]: is missing",
         "brains[3].shape.noise_mm: found -0.1; it should be greater than or equal to 0",
-        "brains[3].shape.radius_mm: has no meaning with kind slab, whose size is extent_mm",
+        "brains[4].shape.semi_axes_mm: has no meaning with kind sphere, whose size is radius_mm",
+        "brains[5].shape.radius_mm: has no meaning with kind slab, whose size is extent_mm",
     ]
 
 
 def test_axes_too_unequal_and_bumps_too_high_are_refused_with_the_bound():
     found = problems(
-        study(
+        shapes(
             {"kind": "ellipsoid", "semi_axes_mm": [10, 21, 12]},
             {"kind": "slab", "extent_mm": [40, 40, 10], "noise_mm": 0.3},
             {"kind": "half-ellipsoid", "noise_mm": 0.45},
@@ -88,13 +82,14 @@ def test_axes_too_unequal_and_bumps_too_high_are_refused_with_the_bound():
 def test_a_shape_is_the_only_source_of_its_brain_and_takes_no_keys_of_others():
     brains = [
         {"id": "a", "week": 21, "shape": {"kind": "sphere"}, "phantom": {}},
-        {"id": "b", "week": 50, "shape": {"kind": "sphere"}, "coordinates": "lps"},
+        {"id": "b", "week": 50, "shape": {"kind": "sphere"}},
+        {"id": "c", "week": 20, "shape": {"kind": "sphere"}, "coordinates": "lps"},
     ]
     assert problems(study(brains=brains)) == [
         "brains[0]: found phantom and shape as its source; expected exactly one of labels, segmentation, hemispheres, "
         "hemisphere, pial, phantom, shape",
         "brains[1].week: found 50; it should be less than or equal to 45",
-        "brains[1].coordinates: has no meaning with shape; only with hemispheres or hemisphere or pial",
+        "brains[2].coordinates: has no meaning with shape; only with hemispheres or hemisphere or pial",
     ]
 
 
@@ -104,35 +99,9 @@ def test_a_shape_may_be_of_any_week(week):
     assert load(study(brains=brains, folding={"end_week": week + 1})).weeks("reference", "a")[0] == week
 
 
-@pytest.mark.parametrize(
-    ("shown", "name"),
-    [
-        (["ball"], "sphere"),
-        (["ball", "slab"], "simple shape"),
-        (["ball", "phantom"], "phantom or sphere"),
-        (["real", "slab"], "real brain or slab"),
-        (["real", "ball", "phantom", "slab"], "real brain or phantom or simple shape"),
-    ],
-)
-def test_a_shape_is_never_called_a_real_brain(tmp_path, shown, name):
-    (tmp_path / "a.stl").touch()
-    brains = [
-        {"id": "ball", "week": 21, "shape": {"kind": "sphere"}},
-        {"id": "slab", "week": 21, "shape": {"kind": "slab"}},
-        {"id": "phantom", "week": 22, "phantom": {}},
-        {"id": "real", "week": 22, "pial": "a.stl"},
-    ]
-    config = load({"brains": brains, "start": "ball", "folding": {"end_week": 22}}, tmp_path)
-    assert config.measured_name(shown) == name
-
-
-def test_every_kind_has_a_size():
-    assert set(SHAPE_SIZES) == set(get_args(ShapeKind))
-
-
 @pytest.mark.parametrize("kind", get_args(ShapeKind))
 def test_defaults_can_be_made_with_the_default_edge_length(kind):
-    config = load(study({"kind": kind}))
+    config = load(shapes({"kind": kind}))
     settings = config.brains[0].shape
     mesh = shape_surface(kind, settings.size_mm, edge_length_mm=3 * config.surface.edge_length_mm)
     assert len(mesh.faces) > 100

@@ -4,6 +4,7 @@ import os
 
 import pytest
 import yaml
+from configurations import phantoms, refusal, study
 
 from gyriflow.config.loading import load
 from gyriflow.errors import InputError
@@ -16,17 +17,6 @@ NAMES = [
 ]  # fmt: skip
 
 
-def study(**changes):
-    brain = {"id": "a", "week": 21, "phantom": {}}
-    return {"brains": [brain], "start": "a", "folding": {"end_week": 22}} | changes
-
-
-def refusal(raw, folder="."):
-    with pytest.raises(InputError) as error:
-        load(raw, folder)
-    return str(error.value)
-
-
 @pytest.mark.fault(56)
 @pytest.mark.parametrize("name", NAMES)
 def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
@@ -34,14 +24,14 @@ def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
     assert "brains[0].id" in refusal(study(brains=[brain], start=name))
     assert f"runs.{name}: " in refusal(study(runs={name: {}}))
     vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
-    later = {"id": "b", "week": 22, "phantom": {}}
-    assert "studies" in refusal(study(studies={name: vary}, brains=[*study()["brains"], later]))
+    later = phantoms(21, 22)
+    assert "studies" in refusal(study(studies={name: vary}, brains=later))
 
 
 def test_the_study_without_such_a_name_is_valid():
     vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
-    later = {"id": "b", "week": 22, "phantom": {}}
-    assert load(study(studies={"a": vary}, runs={"größe": {}, "reference": {}}, brains=[*study()["brains"], later]))
+    later = phantoms(21, 22)
+    assert load(study(studies={"a": vary}, runs={"größe": {}, "reference": {}}, brains=later))
 
 
 @pytest.mark.fault(56)

@@ -2,16 +2,44 @@
 
 import numpy as np
 import pytest
+from ellipsoid import RUN, SEMI_AXES
 from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.errors import InputError, MeshError
-from gyriflow.folding.zone_checks import refuse_impossible, zone_report, zone_warnings
-from gyriflow.folding.zones import find_zones, inside_ellipsoid
-from gyriflow.geometry.tetrahedra import TetrahedralMesh
-from gyriflow.parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, LEFT_CONTACT, MEDIAL_WALL, RIGHT_CONTACT
+from gyriflow.folding.checks import refuse_impossible, zone_report, zone_warnings
+from gyriflow.folding.layers import PialSearch, cortical_weight
+from gyriflow.folding.zones import brain_box, cell_tags, facet_tags, inside_ellipsoid, zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from gyriflow.parameters.folding import NoGrowth, parameters_from
+from gyriflow.parameters.terms import (
+    BASE,
+    BETWEEN_PLANES,
+    BRIDGE,
+    CLAMPED,
+    CORE,
+    CORTEX,
+    LEFT,
+    LEFT_CONTACT,
+    MEDIAL_WALL,
+    RIGHT,
+    RIGHT_CONTACT,
+)
 
 OPEN = {"contact": False}
 DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift_y": 0.05, "shift_z": -0.15, "semi_axes": (0.35, 0.40, 0.50)}
+ELLIPSOID = NoGrowth(**{key: DEFAULTS[key] for key in ("shift_y", "shift_z", "semi_axes")})
+
+
+def find_zones(mesh, *, gap_mm, contact, grows_everywhere=False, wall_held=False, fissure_x_mm, **given):
+    """Returns the zones of a run by the settings that decide them."""
+    no_growth = {key: given.pop(key) for key in ("shift_y", "shift_z", "semi_axes")}
+    values = {
+        "contact": {"gap_mm": gap_mm, "kind": "planes" if contact else "none"},
+        "no_growth": no_growth | {"kind": "none" if grows_everywhere else "ellipsoid"},
+        "medial_wall": "held" if wall_held else "sliding",
+        "fissure_x_mm": fissure_x_mm,
+    }
+    return zones_of_run(mesh, parameters_from(RUN | values | given))
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +52,7 @@ def test_the_ellipsoid_stands_where_the_model_puts_it():
     centre = np.array([0.0, 0.05 * 40, -0.15 * 60])
     tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])
     points = np.concatenate([box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)])
-    inside = inside_ellipsoid(points, 0.05, -0.15, (0.35, 0.40, 0.50))
+    inside = inside_ellipsoid(points, ELLIPSOID, *brain_box(points))
     assert inside.tolist() == [False, False, True, True, True, False, False, False]
 
 
@@ -50,7 +78,7 @@ def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
     zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
     clamped = zones.vertices_of(CLAMPED)
     assert len(clamped)
-    assert inside_ellipsoid(brain.vertices, 0.05, -0.15, (0.35, 0.40, 0.50))[clamped].all()
+    assert inside_ellipsoid(brain.vertices, ELLIPSOID, *brain_box(brain.vertices))[clamped].all()
     assert (zones.growth[clamped] == 0).all()
 
 
@@ -82,7 +110,7 @@ def test_walls_between_the_planes_and_a_coarse_cortex_are_warned_of(brain):
         return zone_warnings(zone_report(brain, zones, thickness_mm))
 
     assert warnings(2.5, 8.0) == []
-    assert any("feels no contact" in text for text in warnings(30.0, 8.0))
+    assert any("feels no contact" in text for text in warnings(20.0, 8.0))
     assert any("fewer than two elements" in text for text in warnings(2.5, 1.0))
 
 
@@ -196,9 +224,9 @@ def test_the_medial_wall_of_a_single_hemisphere_slides_or_is_held(side, held):
 
 
 def test_the_ellipsoid_of_a_single_hemisphere_is_that_of_the_brain_with_its_mirror_image(brain):
-    whole = inside_ellipsoid(brain.vertices, 0.05, -0.15, (0.35, 0.40, 0.50))
+    whole = inside_ellipsoid(brain.vertices, ELLIPSOID, *brain_box(brain.vertices))
     mesh = half("left")
-    alone = inside_ellipsoid(mesh.vertices, 0.05, -0.15, (0.35, 0.40, 0.50), "left")
+    alone = inside_ellipsoid(mesh.vertices, ELLIPSOID, *brain_box(mesh.vertices, "left"))
     same = {tuple(place) for place in brain.vertices[whole].round(6)}
     assert {tuple(place) in same for place in mesh.vertices[alone].round(6)} == {True}
     assert alone.sum() == sum(x <= 1e-6 for x, _, _ in same)
@@ -216,3 +244,46 @@ def test_a_sliding_wall_alone_leaves_no_rigid_motion():
     assert np.linalg.matrix_rank(fixed) == 6
     assert zones.fixed[:, 1:].sum() == 3
     refuse_impossible(mesh, zones)
+
+
+@pytest.fixture(scope="module")
+def tagged():
+    mesh = ellipsoid_mesh(12, SEMI_AXES)
+    zones = zones_of_run(mesh, parameters_from(RUN))
+    weight = cortical_weight(PialSearch(mesh.vertices, zones.facets).distance(mesh.vertices), 4.0)
+    return mesh, zones, cell_tags(mesh, zones, weight)
+
+
+def test_elements_are_left_right_or_between_the_planes(tagged):
+    mesh, _, tags = tagged
+    x = mesh.vertices[mesh.tets, 0].mean(axis=1)
+    # the planes stand a quarter of the gap to both sides
+    np.testing.assert_array_equal(tags["hemisphere"] == LEFT, x <= -2.0)
+    np.testing.assert_array_equal(tags["hemisphere"] == RIGHT, x >= 2.0)
+    assert (np.abs(x[tags["hemisphere"] == BRIDGE]) < 2.0).all()
+    volumes = signed_volumes(mesh)
+    left, right = (volumes[tags["hemisphere"] == side].sum() for side in (LEFT, RIGHT))
+    assert left == pytest.approx(right)
+
+
+def test_cortex_is_the_outer_layer_of_its_thickness(tagged):
+    mesh, _, tags = tagged
+    volumes = signed_volumes(mesh)
+    inner = np.prod([axis - 4.0 for axis in SEMI_AXES]) / np.prod(SEMI_AXES)
+    assert volumes[tags["layer"] == CORE].sum() / volumes.sum() == pytest.approx(inner, abs=0.05)
+    assert set(tags["layer"]) == {CORTEX, CORE}
+
+
+def test_an_element_grows_where_one_of_its_vertices_does(tagged):
+    mesh, zones, tags = tagged
+    growing = zones.growth[mesh.tets]
+    np.testing.assert_array_equal(tags["growing"] == 0, (growing == 0).all(axis=1))
+    assert 0 < tags["growing"].sum() < len(mesh.tets)
+
+
+def test_facets_have_their_zone_and_their_hemisphere(tagged):
+    mesh, zones, _ = tagged
+    x, y = mesh.vertices[zones.facets].mean(axis=1)[:, :2].T
+    tags = facet_tags(zones, x < 0.2 * y)
+    np.testing.assert_array_equal(tags["zone"], zones.facet_zone)
+    np.testing.assert_array_equal(tags["hemisphere"], np.where(x < 0.2 * y, LEFT, RIGHT))

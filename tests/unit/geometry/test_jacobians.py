@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from shapes import box_mesh
 
-from gyriflow.geometry.curved_faces import finer_surface
 from gyriflow.geometry.jacobians import NODES, PARTS, jacobians, lower_bounds, shape_slopes, shape_values
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_faces,
     boundary_surface,
     connected_parts,
+    finer_surface,
     quadratic,
     signed_volumes,
     whole_faces,

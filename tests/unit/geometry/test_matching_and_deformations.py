@@ -1,8 +1,7 @@
 import igl
 import numpy as np
 import pytest
-import trimesh
-from shapes import box_mesh, ellipsoid_mesh
+from shapes import box, box_mesh, ellipsoid_mesh, sphere
 
 from gyriflow.geometry.deformations import Deformation, carry, carry_back, determinants, transform_points
 from gyriflow.geometry.diffusion import diffuse, vertex_sizes
@@ -49,10 +48,7 @@ def test_determinant_is_the_growth_of_volume():
 
 def walls() -> TriangleMesh:
     """Returns two boxes with a gap of 1 mm between their facing walls x = -0.5 and x = 0.5."""
-    boxes = [trimesh.creation.box(extents=[10, 10, 10]).subdivide().subdivide() for _ in range(2)]
-    for side, box in zip((-1, 1), boxes, strict=True):
-        box.apply_translation([side * 5.5, 0, 0])
-    return merged(*(TriangleMesh(box.vertices, box.faces) for box in boxes))
+    return merged(*(box((10, 10, 10), (side * 5.5, 0, 0), 2) for side in (-1, 1)))
 
 
 def test_the_other_wall_is_not_matched():
@@ -66,8 +62,7 @@ def test_the_other_wall_is_not_matched():
 
 
 def test_values_are_linear_in_faces_and_labels_those_of_the_nearest_corner():
-    ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
-    mesh = TriangleMesh(ball.vertices, ball.faces)
+    mesh = sphere()
     directions = mesh.vertices[mesh.faces[:100]].mean(axis=1)
     match = match_points(directions, directions / np.linalg.norm(directions, axis=1)[:, None], mesh)
     assert values_at(match, mesh.vertices @ [1.0, 2.0, 3.0]) == pytest.approx(directions @ [1.0, 2.0, 3.0], abs=1e-6)
@@ -76,10 +71,10 @@ def test_values_are_linear_in_faces_and_labels_those_of_the_nearest_corner():
 
 
 def test_diffusion_on_a_sphere_damps_a_harmonic_as_the_heat_equation_does():
-    ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
+    ball = sphere()
     z = ball.vertices[:, 2] / 10
     second = 1.5 * z**2 - 0.5
-    smooth = diffuse(np.asarray(ball.vertices), np.asarray(ball.faces), np.stack([second, np.ones(len(z))], 1), 4.0)
+    smooth = diffuse(ball.vertices, ball.faces, np.stack([second, np.ones(len(z))], 1), 4.0)
     # eigenvalue l(l + 1)/R² = 0.06, time σ²/2 = 8; eight implicit steps instead of the exponential
     assert smooth[:, 0] @ second / (second @ second) == pytest.approx((1 + 0.06) ** -8, rel=0.01)
     assert smooth[:, 1] == pytest.approx(np.ones(len(z)))

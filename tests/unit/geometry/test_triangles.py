@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import trimesh
+import shapes
 
 from gyriflow.geometry.triangles import (
     TriangleMesh,
@@ -24,14 +24,12 @@ from gyriflow.geometry.triangles import (
 
 @pytest.fixture(scope="module")
 def box():
-    shape = trimesh.creation.box((2.0, 3.0, 4.0))
-    return TriangleMesh(shape.vertices, shape.faces)
+    return shapes.box((2.0, 3.0, 4.0))
 
 
 @pytest.fixture(scope="module")
 def ball():
-    shape = trimesh.creation.icosphere(subdivisions=4, radius=5.0)
-    return TriangleMesh(shape.vertices, shape.faces)
+    return shapes.sphere(5.0)
 
 
 def test_measures_of_a_box(box):
@@ -39,9 +37,6 @@ def test_measures_of_a_box(box):
     assert signed_volume(box) == pytest.approx(24.0)
     assert euler_number(box) == 2
     assert is_closed(box)
-
-
-def test_a_flipped_box_has_negative_volume(box):
     assert signed_volume(flipped(box)) == pytest.approx(-24.0)
 
 
@@ -53,8 +48,7 @@ def test_measures_of_a_ball_near_those_of_the_sphere(ball):
 
 
 def test_a_torus_has_euler_number_zero():
-    shape = trimesh.creation.torus(3.0, 1.0)
-    assert euler_number(TriangleMesh(shape.vertices, shape.faces)) == 0
+    assert euler_number(shapes.torus(3.0, 1.0)) == 0
 
 
 def test_edges_count_their_faces(box):

@@ -15,13 +15,17 @@ AREAS = pd.DataFrame(
 ).assign(thickness_mm=np.nan)
 
 
-def curves():
-    (fits,) = fits_of_series(AREAS).values()
-    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=np.nan)
+MEASURED = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": None, "thickness_mm": None}
+
+
+def curves(areas=AREAS, until=None):
+    (fits,) = fits_of_series(areas, until=until).values()
+    known = np.nan if until is None else until
+    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=known)
 
 
 def test_measured_sizes_are_followed_every_quarter_of_a_week():
-    follow = {"area_cm2": "measured", "volume_ml": {21: 40.0, 25: 80.0}, "known_until_gw": None, "thickness_mm": None}
+    follow = MEASURED | {"volume_ml": {21: 40.0, 25: 80.0}}
     sizes = followed_sizes(follow, curves(), "volume", [21.0, 22.0, 23.0], False)
     assert list(sizes["area_cm2"])[:3] == [21.0, 21.25, 21.5]
     assert max(sizes["area_cm2"]) >= 23.0
@@ -30,19 +34,13 @@ def test_measured_sizes_are_followed_every_quarter_of_a_week():
 
 
 def test_a_brain_without_a_series_has_no_measured_curve():
-    follow = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": None, "thickness_mm": None}
     for table, series in ((None, None), (curves(), "surface")):
         with pytest.raises(InputError, match="no measured curve of area_cm2"):
-            followed_sizes(follow, table, series, [21.0, 22.0], False)
+            followed_sizes(MEASURED, table, series, [21.0, 22.0], False)
 
 
 def test_a_given_table_shrinks_only_where_that_is_allowed():
-    follow = {
-        "area_cm2": {21: 90.0, 25: 80.0},
-        "volume_ml": {21: 40.0, 25: 80.0},
-        "known_until_gw": None,
-        "thickness_mm": None,
-    }
+    follow = MEASURED | {"area_cm2": {21: 90.0, 25: 80.0}, "volume_ml": {21: 40.0, 25: 80.0}}
     with pytest.raises(InputError, match="area_cm2 shrinks"):
         followed_sizes(follow, None, None, [21.0, 22.0], False)
     assert followed_sizes(follow, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
@@ -66,9 +64,8 @@ def test_local_growth_is_a_multiple_of_the_whole():
 
 
 def test_thickness_follows_its_measured_curve_and_may_shrink():
-    (fits,) = fits_of_series(AREAS.assign(thickness_mm=2.4 - 0.1 * (WEEKS - 21))).values()
-    table = curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=np.nan)
-    follow = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": None, "thickness_mm": "measured"}
+    table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (WEEKS - 21)))
+    follow = MEASURED | {"thickness_mm": "measured"}
     assert followed_sizes(follow, table, "volume", [21.0, 22.0], False)["thickness_mm"][22.0] == pytest.approx(
         2.3, 5e-3
     )
@@ -76,23 +73,16 @@ def test_thickness_follows_its_measured_curve_and_may_shrink():
 
 def test_a_prediction_knows_no_brain_after_its_week():
     grown_late = AREAS.assign(area_cm2=np.where(WEEKS > 23, 500.0, AREAS["area_cm2"]))
-    tables = [
-        curve_table({name: fit.curve for name, fit in fits["volume"].items()}).assign(
-            series="volume", known_until_gw=week
-        )
-        for week, fits in ((np.nan, fits_of_series(grown_late)), (23.0, fits_of_series(grown_late, until=23.0)))
-    ]
-    follow = {"area_cm2": "measured", "volume_ml": "measured", "known_until_gw": 23.0, "thickness_mm": None}
-    sizes = followed_sizes(follow, pd.concat(tables), "volume", [23.0, 24.0, 25.0], False)
+    table, follow = pd.concat([curves(grown_late), curves(grown_late, until=23.0)]), MEASURED | {"known_until_gw": 23.0}
+    sizes = followed_sizes(follow, table, "volume", [23.0, 24.0, 25.0], False)
     assert sizes["area_cm2"][25.0] == pytest.approx(90 * 1.1**4, rel=0.01)
     with pytest.raises(InputError, match="up to 22 GW"):
-        followed_sizes(follow | {"known_until_gw": 22.0}, pd.concat(tables), "volume", [23.0, 24.0], False)
+        followed_sizes(follow | {"known_until_gw": 22.0}, table, "volume", [23.0, 24.0], False)
 
 
 def test_ventricles_have_a_curve_where_labels_know_them_and_may_shrink():
-    (fits,) = fits_of_series(AREAS.assign(ventricles_ml=8.0 - 0.5 * (WEEKS - 21))).values()
-    table = curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume", known_until_gw=np.nan)
-    follow = {"area_cm2": "measured", "volume_ml": "measured", "ventricles_ml": "measured", "known_until_gw": None}
+    table = curves(AREAS.assign(ventricles_ml=8.0 - 0.5 * (WEEKS - 21)))
+    follow = MEASURED | {"ventricles_ml": "measured"}
     assert followed_sizes(follow, table, "volume", [21.0, 23.0], False)["ventricles_ml"][23.0] == pytest.approx(
         7.0, 0.01
     )

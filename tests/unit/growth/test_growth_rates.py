@@ -7,10 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-import trimesh
+from shapes import sphere
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.rates import FOLDING_RATES, agreement, growth_rates, rate_curve, rates_of_series
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
@@ -24,16 +23,8 @@ def test_rates_are_those_the_areas_were_made_with() -> None:
     areas = [9000.0, 9000.0 * (1 + rate * WEEK_S) ** 2]
     volumes = [45_000.0, 45_000.0 * (1 + core_rate * WEEK_S) ** 3]
     table = growth_rates([21, 22], areas, volumes)
-    assert table.columns.tolist() == [
-        "from_week",
-        "to_week",
-        "area_ratio",
-        "rate_per_s",
-        "compound_rate_per_s",
-        "volume_ratio",
-        "core_rate_per_s",
-        "core_compound_rate_per_s",
-    ]
+    ends, area, volume = ("from_week", "to_week"), ("area_ratio", "rate_per_s"), ("volume_ratio", "core_rate_per_s")
+    assert [*table] == [*ends, *area, "compound_rate_per_s", *volume, "core_compound_rate_per_s"]
     row = table.iloc[0]
     assert row["rate_per_s"] == pytest.approx(rate)
     assert row["core_rate_per_s"] == pytest.approx(core_rate)
@@ -52,10 +43,6 @@ def test_weeks_in_any_order() -> None:
     assert table["to_week"].tolist() == [22, 23]
     np.testing.assert_allclose(table["rate_per_s"], [0.1 / WEEK_S, (12 / 11 - 1) / WEEK_S])
     np.testing.assert_allclose(table["volume_ratio"], [2.0, 1.5])
-
-
-def test_shrinking_is_negative() -> None:
-    assert growth_rates([21, 22], [121.0, 100.0], [1.0, 1.0])["rate_per_s"][0] < 0
 
 
 @pytest.mark.parametrize("weeks", [1.0, 4.0])
@@ -150,9 +137,8 @@ def test_one_series_or_one_common_week_has_no_agreement_but_its_columns() -> Non
 def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(tmp_path) -> None:
     files = []
     for number, radius_mm in enumerate((20.0, 22.0, 20.0, 21.0)):
-        ball = trimesh.creation.icosphere(subdivisions=2, radius=radius_mm)
         files.append(tmp_path / f"{number}.gii")
-        write_surface(files[-1], TriangleMesh(ball.vertices, ball.faces))
+        write_surface(files[-1], sphere(radius_mm, 2))
     thickness = tmp_path / "thickness.json"
     thickness.write_text('{"mean_mm": 1.8}')
     reports = [tmp_path / f"{name}.json" for name in "abcd"]

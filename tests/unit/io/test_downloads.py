@@ -90,9 +90,8 @@ def test_a_broken_connection_is_gone_on_with(tmp_path, server):
     assert 200_000 - downloads.CHUNK_BYTES <= start <= 200_000
 
 
-@pytest.mark.parametrize("lacking", ["ranges", "versions"])
-def test_a_server_that_sends_no_parts_sends_all_again(tmp_path, server, lacking):
-    setattr(server, lacking, False)
+def test_a_server_that_sends_no_parts_sends_all_again(tmp_path, server):
+    server.ranges = False
     server.broken_after[LONG] = [200_000]
     fetched(tmp_path, server, LONG)
     assert files_in(tmp_path) == {LONG: LABELS}
@@ -109,9 +108,8 @@ def test_half_a_file_is_not_there_under_its_name_and_the_next_call_goes_on(tmp_p
     server.broken_after[LONG] = [150_000, *[0] * (downloads.TRIES - 1)]
     with pytest.raises(StorageError, match="cannot be fetched"):
         fetched(tmp_path, server, LONG)
-    left = files_in(tmp_path)
-    part = left.pop(HALF)
-    assert set(left) == {f"{HALF}.version"}
+    ((left, part),) = files_in(tmp_path).items()
+    assert left == HALF
     assert 0 < len(part) < len(LABELS)
     assert LABELS.startswith(part)
     server.asked.clear()
@@ -134,15 +132,26 @@ def test_a_process_that_is_killed_leaves_its_half_file_alone(tmp_path, server, m
     assert seen == [".part.labels.nii.gz"]
 
 
-def test_half_a_file_of_another_version_is_not_gone_on_with(tmp_path, server):
-    server.broken_after[LONG] = [150_000, *[0] * (downloads.TRIES - 1)]
+@pytest.mark.parametrize("name", [LONG, SHORT])
+@pytest.mark.parametrize("known", [True, False], ids=["with its checksum", "without"])
+def test_half_a_file_of_another_version_is_not_kept(tmp_path, server, name, known):
+    before, after = {LONG: (LABELS, packed(300_000, seed=1)), SHORT: (SURFACE, gifti(seed=5))}[name]
+    server.broken_after[name] = [len(before) // 2, *[0] * (downloads.TRIES - 1)]
     with pytest.raises(StorageError):
-        fetched(tmp_path, server, LONG)
-    server.files[LONG] = packed(300_000, seed=1)
-    fetched(tmp_path, server, LONG)
-    assert files_in(tmp_path) == {LONG: server.files[LONG]}
+        fetched(tmp_path, server, name)
+    server.files[name] = after
+    fetched(tmp_path, server, name, **({"sha256": sha256(after)} if known else {}))
+    assert files_in(tmp_path) == {name: after}
 
 
+def test_a_whole_file_that_was_not_renamed_is_kept_in_the_end(tmp_path, server):
+    (tmp_path / HALF).parent.mkdir()
+    (tmp_path / HALF).write_bytes(LABELS)
+    fetched(tmp_path, server, LONG, sha256=sha256(LABELS))
+    assert files_in(tmp_path) == {LONG: LABELS}
+
+
+@pytest.mark.fault(40)
 def test_another_checksum_is_refused_and_nothing_kept(tmp_path, server):
     with pytest.raises(StorageError, match="something else than the file; found the SHA-256") as caught:
         fetched(tmp_path, server, LONG, sha256="0" * 64)
@@ -152,12 +161,13 @@ def test_another_checksum_is_refused_and_nothing_kept(tmp_path, server):
     assert files_in(tmp_path) == {}
 
 
+@pytest.mark.fault(40)
 @pytest.mark.parametrize("name", [LONG, SHORT])
 def test_a_page_in_the_place_of_a_file_is_refused(tmp_path, server, name):
     server.files[name] = b"<!DOCTYPE html><title>Log in</title>"
     with pytest.raises(StorageError, match="the server sent something else than the file; found no whole") as caught:
         fetched(tmp_path, server, name, sha256="0" * 64)
-    assert "<!DOCTYPE html>" in str(caught.value)
+    assert "it begins with b'<!DOCTYPE html>" in str(caught.value)
     assert files_in(tmp_path) == {}
 
 

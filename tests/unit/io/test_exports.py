@@ -3,13 +3,19 @@
 import numpy as np
 import pandas as pd
 import pytest
+from shapes import hemisphere
 
 from gyriflow.errors import InputError
 from gyriflow.io.exports import ExportedBrain, export_bids, export_plain
 from gyriflow.io.files import read_json
-from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
-from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface, write_vertex_maps
-from tests.shapes import hemisphere
+from gyriflow.io.surfaces import (
+    read_surface,
+    read_vertex_labels,
+    read_vertex_maps,
+    write_surface,
+    write_vertex_labels,
+    write_vertex_maps,
+)
 
 TABLES = {"metrics_wide": pd.DataFrame({"subject": ["case_1"], "area": [3.5], "depth": [np.nan]})}
 
@@ -70,3 +76,11 @@ def test_plain_names_are_those_of_the_results(tmp_path, brain):
         f"{side}.{end}" for side in ("left", "right") for end in ("pial.surf.gii", "shape.gii", "regions.label.gii")
     }
     assert (folder / "metrics_wide.csv").exists()
+
+
+def test_a_hemisphere_that_is_alone_and_maps_of_any_name_are_exported(tmp_path, brain):
+    left, maps = {"left": brain.surfaces["left"]}, {"left": str(tmp_path / "own.shape.gii")}
+    write_vertex_maps(maps["left"], {"distance_to_pial_mm": np.zeros(3)})
+    export_bids(tmp_path / "bids", [ExportedBrain("case_1", "real", 22.43, "case_1", left, maps, {})], {}, "1")
+    names = {path.name.removeprefix("sub-case1_ses-2243w_") for path in (tmp_path / "bids").glob("sub-*/*/anat/*")}
+    assert names == {"hemi-L_pial.surf.gii", "hemi-L_desc-DistanceToPialMm_shape.shape.gii"}

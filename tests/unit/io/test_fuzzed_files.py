@@ -10,26 +10,31 @@ import nibabel as nib
 import numpy as np
 import pytest
 import pyvista as pv
-import trimesh
 from fuzzing import BOUNDED, MANY, damaged, outcome
 from hypothesis import example, given
 from hypothesis import strategies as st
 from nibabel.freesurfer.io import write_geometry
+from shapes import sphere
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_json, read_tab_separated, read_table, read_text
-from gyriflow.io.label_files import read_vertex_labels, write_vertex_labels
 from gyriflow.io.maps import read_maps, read_surface_map, read_volume_map, write_maps
-from gyriflow.io.surfaces import declared, read_surface, read_vertex_maps, write_surface, write_vertex_maps
+from gyriflow.io.surfaces import (
+    declared,
+    read_surface,
+    read_vertex_labels,
+    read_vertex_maps,
+    write_surface,
+    write_vertex_labels,
+    write_vertex_maps,
+)
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_yaml
 
 pytestmark = pytest.mark.fault(12, 13, 62)
 
 LABELS = np.random.default_rng(3).integers(0, 9, (5, 6, 7)).astype(np.int16)
-BODY = trimesh.creation.icosphere(subdivisions=1)
-BALL = TriangleMesh(np.array(BODY.vertices) * 20.0, np.array(BODY.faces))
+BALL = sphere(20.0, 1)
 
 
 class Wholes(dict):
@@ -69,6 +74,19 @@ def tried(tmp_path, name, data, read):
 
 def is_sound(mesh):
     return np.isfinite(mesh.vertices).all() and mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)
+
+
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [("a.surf.gii", read_surface), ("a.stl", read_surface), ("a.ply", read_surface), ("lh.pial", read_surface),
+     ("a.nii", read_label_volume), ("a.nii.gz", read_volume_map), ("a.shape.gii", read_vertex_maps),
+     ("a.label.gii", read_vertex_labels), ("a.h5", read_maps)],
+)  # fmt: skip
+def test_missing_foreign_and_truncated_files_are_named(tmp_path, wholes, name, read):
+    whole = gzip.compress(wholes["a.nii"]) if name == "a.nii.gz" else wholes[name]
+    assert outcome(read, tmp_path / name) is None
+    for content in (b"of another kind", *(whole[: int(kept * len(whole))] for kept in (0.05, 0.5, 0.95))):
+        assert tried(tmp_path, name, content, read) is None
 
 
 @pytest.mark.parametrize(("name", "header"), [("a.nii", 352), ("a.mgh", 284)])

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gyriflow.io.figures import as_printed, write_printed
 from gyriflow.io.files import read_table
-from gyriflow.io.printed_tables import as_printed, write_printed
 
 TABLE = pd.DataFrame({"rate (1/s)": [2.0e-7, np.nan], "a_b": ["50 % & more", ""], "n": [1234567, 3]})
 

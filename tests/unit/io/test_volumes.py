@@ -5,7 +5,7 @@ import logging
 import nibabel as nib
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from shapes import rigid
 
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
@@ -44,8 +44,7 @@ def test_storage_order_does_not_move_the_brain(tmp_path, labels, order):
 
 
 def test_oblique_affine_is_kept_whole(tmp_path, labels):
-    oblique = np.eye(4)
-    oblique[:3, :3] = Rotation.from_euler("xyz", [20, -30, 40], degrees=True).as_matrix() @ AFFINE[:3, :3]
+    oblique = rigid(20, -30, 40) @ AFFINE
     volume = read_label_volume(saved(tmp_path / "a.nii", labels, oblique))
     assert volume.affine == pytest.approx(oblique, abs=1e-5)
 
@@ -117,7 +116,7 @@ def test_an_image_that_lacks_its_other_file_or_its_end_is_named(tmp_path, labels
     with pytest.raises(InputError, match=r"a\.img: is shorter than its header says"):
         read_label_volume(tmp_path / "a.hdr")
     image.unlink()
-    with pytest.raises(InputError, match=r"a\.img: no such file"):
+    with pytest.raises(InputError, match=r"a\.img: cannot be read as an image: no such file"):
         read_label_volume(tmp_path / "a.hdr")
 
 
@@ -153,22 +152,6 @@ def test_nan_and_infinity_are_counted(tmp_path, labels, value):
     values[0, 0, :3] = value
     with pytest.raises(InputError, match=r"a\.nii.*3 voxels"):
         read_label_volume(saved(tmp_path / "a.nii", values))
-
-
-@pytest.mark.parametrize("kept", [0.2, 0.6, 0.95])
-def test_truncated_file_is_named(tmp_path, kept):
-    values = np.random.default_rng(0).integers(0, 9, (20, 20, 20)).astype(np.int16)
-    whole = saved(tmp_path / "a.nii.gz", values).read_bytes()
-    (tmp_path / "torn.nii.gz").write_bytes(whole[: int(kept * len(whole))])
-    with pytest.raises(InputError, match=r"torn\.nii\.gz"):
-        read_label_volume(tmp_path / "torn.nii.gz")
-
-
-def test_missing_and_foreign_files_are_named(tmp_path):
-    (tmp_path / "text.nii").write_text("no image")
-    for name in ("text.nii", "none.nii"):
-        with pytest.raises(InputError, match=name):
-            read_label_volume(tmp_path / name)
 
 
 def test_flat_voxels_are_used_with_a_warning(tmp_path, labels, caplog):

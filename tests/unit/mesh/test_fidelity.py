@@ -1,28 +1,25 @@
 """Distances between surfaces, faces that cross, and widths of gaps, where they are known."""
 
+from functools import partial
+
 import numpy as np
 import pytest
-import trimesh
+import shapes
+from shapes import moved, sphere
 
-from gyriflow.geometry.crossings import crossing_faces
-from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, transformed
-from gyriflow.mesh.fidelity import gap_kept, gap_summary, gap_walls, surface_distance
+from gyriflow.geometry.matching import crossing_faces
+from gyriflow.geometry.triangles import TriangleMesh, flipped, merged
+from gyriflow.mesh.quality import gap_kept, gap_summary, gap_walls, surface_distance
 
-
-def box(size, centre=(0.0, 0.0, 0.0), subdivisions=3):
-    shape = trimesh.creation.box(size)
-    for _ in range(subdivisions):
-        shape = shape.subdivide()
-    return TriangleMesh(shape.vertices + np.asarray(centre), shape.faces)
+box = partial(shapes.box, subdivisions=3)
 
 
-def moved(mesh, x, y=0.0, z=0.0):
-    return transformed(mesh, [[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
+def pair(gap):
+    return merged(box((4.0, 6.0, 6.0), (-2 - gap / 2, 0, 0)), box((4.0, 6.0, 6.0), (2 + gap / 2, 0, 0)))
 
 
 def test_concentric_spheres_are_as_far_apart_as_their_radii():
-    inner, outer = (trimesh.creation.icosphere(subdivisions=4, radius=radius) for radius in (10.0, 10.5))
-    distance = surface_distance(TriangleMesh(inner.vertices, inner.faces), TriangleMesh(outer.vertices, outer.faces))
+    distance = surface_distance(sphere(10.0), sphere(10.5))
     assert distance["hausdorff99"] == pytest.approx(0.5, abs=0.01)
     assert distance["hausdorff"] == pytest.approx(0.5, abs=0.01)
 
@@ -60,24 +57,18 @@ def test_faces_that_cross_are_counted_once_each():
 
 
 def test_the_gap_between_two_boxes_has_its_width_and_area():
-    boxes = merged(box((4.0, 6.0, 6.0), (-2.25, 0, 0)), box((4.0, 6.0, 6.0), (2.25, 0, 0)))
-    found = gap_summary(gap_walls(boxes))
+    found = gap_summary(gap_walls(pair(0.5)))
     assert found["percentile1"] == pytest.approx(0.5, abs=1e-3)
     assert found["median"] == pytest.approx(0.5, abs=1e-3)
     assert found["area_mm2"] == pytest.approx(2 * 36.0)
 
 
 def test_walls_far_apart_or_thin_tissue_are_no_gap():
-    far = merged(box((4.0, 6.0, 6.0), (-4.0, 0, 0)), box((4.0, 6.0, 6.0), (4.0, 0, 0)))
-    assert gap_summary(gap_walls(far)) == {"percentile1": None, "median": None, "area_mm2": 0.0}
+    assert gap_summary(gap_walls(pair(4.0))) == {"percentile1": None, "median": None, "area_mm2": 0.0}
     plate = box((0.5, 6.0, 6.0))
     assert gap_summary(gap_walls(plate))["area_mm2"] == 0.0
     # inside out, the same plate is a gap
     assert gap_summary(gap_walls(flipped(plate)))["median"] == pytest.approx(0.5, abs=1e-3)
-
-
-def pair(gap):
-    return merged(box((4.0, 6.0, 6.0), (-2 - gap / 2, 0, 0)), box((4.0, 6.0, 6.0), (2 + gap / 2, 0, 0)))
 
 
 # half of the width is the limit: 0.3 of 0.5 mm is open, 0.2 is not, nor are walls that overlap

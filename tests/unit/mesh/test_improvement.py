@@ -5,7 +5,7 @@ import pytest
 from shapes import box_mesh
 
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
-from gyriflow.mesh.improvement import improve
+from gyriflow.mesh.nodes import improve
 from gyriflow.mesh.quality import radius_ratios
 
 BOX = box_mesh((4, 4, 4), (4.0, 4.0, 4.0))

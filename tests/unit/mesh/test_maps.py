@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-import trimesh
-from scipy.spatial.transform import Rotation
-from shapes import box_mesh, ellipsoid_mesh
+from shapes import box_mesh, ellipsoid_mesh, rigid, sphere
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 from gyriflow.mesh.maps import (
-    move_nearest,
+    move_to_mesh,
     require_within,
     ventricle_map,
     vertex_map_on_mesh,
@@ -20,26 +19,12 @@ from gyriflow.parameters.folding import VENTRICLES
 
 RADIUS = 20.0
 SLOPE = np.array([0.3, -0.7, 0.2])
-
-
-def sphere(subdivisions=3, radius=RADIUS):
-    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    return TriangleMesh(ball.vertices, ball.faces)
+SHIFT = (4.0, -3.0, 2.0)
+SPHERE = sphere(RADIUS, 3)
 
 
 def linear(points):
     return 5.0 + points @ SLOPE
-
-
-def pose(*degrees, shift=(4.0, -3.0, 2.0)):
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
-    matrix[:3, 3] = shift
-    return matrix
-
-
-def moved(points, matrix):
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +34,7 @@ def ball():
 
 def test_a_linear_function_on_a_sphere_comes_back_at_pial_vertices(ball):
     facets, _ = boundary_faces(ball)
-    surface = sphere(4)
+    surface = sphere(RADIUS, 4)
     mapped = vertex_map_on_mesh(ball.vertices, facets, surface, linear(surface.vertices))
     pial = np.unique(facets)
     # chords of the surface lie up to 0.03 mm inside the sphere
@@ -69,7 +54,7 @@ def test_inner_vertices_take_the_value_of_the_nearest_pial_vertex(ball):
     facets, _ = boundary_faces(ball)
     pial = np.unique(facets)
     inner = np.setdiff1d(np.arange(len(ball.vertices)), pial)
-    surface = sphere()
+    surface = SPHERE
     mapped = vertex_map_on_mesh(ball.vertices, facets, surface, surface.vertices[:, 2])
     for vertex in inner:
         gaps = np.linalg.norm(ball.vertices[pial] - ball.vertices[vertex], axis=1)
@@ -108,7 +93,7 @@ def test_two_hemispheres_count_as_one_surface():
 
 def test_triangles_without_area_do_no_harm(ball):
     facets, _ = boundary_faces(ball)
-    surface = sphere()
+    surface = SPHERE
     line = TriangleMesh(surface.vertices, np.concatenate([[[0, 0, 1], [2, 2, 2]], surface.faces]))
     values = linear(surface.vertices)
     assert vertex_map_on_mesh(ball.vertices, facets, line, values) == pytest.approx(
@@ -119,14 +104,12 @@ def test_triangles_without_area_do_no_harm(ball):
 @pytest.mark.parametrize(
     ("surface", "found"),
     [
-        (transformed(sphere(), pose(0, 0, 0, shift=(30.0, 0, 0))), "mm for a twentieth"),
+        (transformed(SPHERE, rigid(shift=(30.0, 0, 0))), "mm for a twentieth"),
         (
-            TriangleMesh(
-                sphere().vertices, sphere().faces[sphere().vertices[sphere().faces][:, :, 0].mean(axis=1) < 0]
-            ),
+            TriangleMesh(SPHERE.vertices, SPHERE.faces[SPHERE.vertices[SPHERE.faces][:, :, 0].mean(axis=1) < 0]),
             r"0\.\d mm for half",
         ),
-        (sphere(radius=100.0), "79"),
+        (sphere(100.0, 3), "79"),
     ],
     ids=["elsewhere", "one hemisphere", "inflated"],
 )
@@ -138,25 +121,25 @@ def test_a_surface_that_is_not_this_brains_is_refused_with_its_distance(ball, su
 
 @pytest.mark.parametrize("given_posed", [False, True], ids=["input's coordinates", "posed already"])
 def test_a_turned_brain_takes_its_map_in_either_coordinates(given_posed):
-    matrix = pose(5, 0, 8)
+    matrix = rigid(5, 0, 8, shift=SHIFT)
     brain = ellipsoid_mesh(8, (15.0, 20.0, 12.0))
     facets, _ = boundary_faces(brain)
     surface = TriangleMesh(brain.vertices, facets)
     values = linear(surface.vertices)
-    turned = moved(brain.vertices, matrix)
+    turned = transform_points(brain.vertices, matrix)
     given = transformed(surface, matrix) if given_posed else surface
-    there = move_nearest(turned[np.unique(facets)], given, [matrix, np.eye(4)])
+    there = move_to_mesh(turned[np.unique(facets)], given, matrix)
     assert vertex_map_on_mesh(turned, facets, there, values)[np.unique(facets)] == pytest.approx(
         values[np.unique(facets)]
     )
 
 
 def oblique_volume(shape=(24, 26, 28)):
-    affine = pose(20, -30, 40, shift=(0.0, 0.0, 0.0))
+    affine = rigid(20, -30, 40)
     affine[:3, :3] = affine[:3, :3] @ np.diag([2.0, 2.2, 1.9]) @ [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]
     affine[:3, 3] = -affine[:3, :3] @ ((np.array(shape) - 1) / 2)
     index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
-    return linear(moved(index.reshape(-1, 3), affine)).reshape(shape), affine
+    return linear(transform_points(index.reshape(-1, 3), affine)).reshape(shape), affine
 
 
 def test_a_linear_field_comes_back_through_an_oblique_affine(ball):
@@ -166,8 +149,8 @@ def test_a_linear_field_comes_back_through_an_oblique_affine(ball):
 
 def test_a_volume_follows_the_pose_of_the_brain(ball):
     data, affine = oblique_volume()
-    matrix = pose(10, 5, -15)
-    turned = moved(ball.vertices, matrix)
+    matrix = rigid(10, 5, -15, shift=SHIFT)
+    turned = transform_points(ball.vertices, matrix)
     assert volume_map_on_mesh(turned, data, matrix @ affine) == pytest.approx(linear(ball.vertices))
 
 

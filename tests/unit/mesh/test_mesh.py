@@ -1,18 +1,36 @@
-"""Sizing, quality and tetrahedralisation."""
+"""Sizing, quality and tetrahedralisation; what a user is told when a mesher dies, hangs or is missing."""
 
-import igl
+import os
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-import trimesh
-from shapes import box_mesh
+from shapes import box_mesh, ellipsoid, moved, sphere
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
-from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, transformed
-from gyriflow.mesh.gates import refuse_bad_mesh
-from gyriflow.mesh.quality import dihedral_angles, elements_through, quality_summary, radius_ratios
-from gyriflow.mesh.sizing import background_mesh, edge_length_at, edge_length_for, finer
-from gyriflow.mesh.tetrahedralisation import tetrahedralise
+from gyriflow.geometry.matching import nearest_on
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
+from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, signed_volume
+from gyriflow.io.files import read_json
+from gyriflow.io.surfaces import write_surface
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.mesh.nodes import curve_edges
+from gyriflow.mesh.quality import (
+    dihedral_angles,
+    jacobian_ratios,
+    quality_summary,
+    radius_ratios,
+    refuse_bad_mesh,
+)  # fmt: skip
+from gyriflow.mesh.tetrahedralisation import (
+    background_mesh,
+    edge_length_at,
+    even_surface,
+    finer,
+    tetrahedralise,
+)  # fmt: skip
 
 REGULAR = TetrahedralMesh([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 1, 2, 3]])
 GATES = {
@@ -26,11 +44,16 @@ GATES = {
     "min_gap_kept": 0.95,
 }
 SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
-
-
-def ball(radius=8.0, subdivisions=3):
-    shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    return TriangleMesh(shape.vertices, shape.faces)
+SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "tetrahedralise.py"
+OUTPUTS = {"mesh": "brain.xdmf", "data": "brain.h5", "surface": "pial.stl", "quality": "quality.json"}
+STAND_INS = {
+    "pytetwild": ("pytetwild.py", "tetrahedralize"),
+    "tetgen": ("igl/copyleft/tetgen.py", "tetrahedralize"),
+}
+MESHERS = list(STAND_INS)
+EGG = ellipsoid((9.0, 8.0, 6.0))
+"""A surface whose edges have no single length, so that remeshing can make any number of faces of it."""
+BALL = sphere(8.0, 3)
 
 
 def test_the_regular_element_is_best():
@@ -122,13 +145,6 @@ def test_faces_that_cross_are_refused():
         refuse_bad_mesh(box, summary_of(box) | {"crossing_faces": 7}, **GATES)
 
 
-def test_elements_through_a_layer_are_its_thickness_over_the_edge_length():
-    # each of a cube's six tetrahedra has three edges of the cube, two diagonals of faces and that of the cube
-    box = box_mesh((10, 10, 10), (10.0, 10.0, 10.0))
-    mean = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
-    assert elements_through(box, 3.0) == pytest.approx(3.0 / mean)
-
-
 def test_the_summary_counts_every_element_once():
     summary = summary_of(box_mesh((3, 3, 3), (3.0, 3.0, 3.0)))
     assert summary["tets"] == 162
@@ -144,15 +160,8 @@ def test_edge_lengths_grow_with_depth_and_end_at_that_of_the_core():
     np.testing.assert_allclose(edge_length_at(np.array([0.0, 1.0]), 0.4, 2.5, 0.0, 0.6), [0.4, 1.0])
 
 
-def test_the_edge_length_for_a_number_of_faces_is_that_of_equilateral_triangles():
-    icosahedron = trimesh.creation.icosphere(subdivisions=0, radius=1.0)
-    surface = TriangleMesh(icosahedron.vertices, icosahedron.faces)
-    assert edge_length_for(surface, 20) == pytest.approx(mean_edge_length(surface))
-    assert edge_length_for(surface, 80) == pytest.approx(mean_edge_length(surface) / 2)
-
-
 def test_the_background_covers_the_surface_with_positive_elements():
-    grid, lengths = background_mesh(ball(), 1.5, 3.0, 2.5, 0.5)
+    grid, lengths = background_mesh(BALL, 1.5, 3.0, 2.5, 0.5)
     assert (signed_volumes(grid) > 0).all()
     assert (grid.vertices.min(axis=0) < -8).all()
     assert (grid.vertices.max(axis=0) > 8).all()
@@ -161,16 +170,12 @@ def test_the_background_covers_the_surface_with_positive_elements():
 
 @pytest.fixture(scope="module")
 def filled_ball():
-    return tetrahedralise(ball(), **SIZES)
+    return tetrahedralise(BALL, **SIZES)
 
 
 def test_a_ball_is_filled_within_the_envelope(filled_ball):
     surface, _ = boundary_surface(filled_ball)
-    shape = ball()
-    squared = igl.point_mesh_squared_distance(
-        surface.vertices.copy(), shape.vertices.copy(), shape.faces.astype(np.int32).copy()
-    )[0]
-    assert np.sqrt(squared.max()) <= 0.11
+    assert nearest_on(surface.vertices, BALL)[0].max() <= 0.11
     assert (signed_volumes(filled_ball) > 0).all()
     assert mean_edge_length(surface) == pytest.approx(1.5, rel=0.25)
 
@@ -182,13 +187,13 @@ def test_elements_are_coarser_inside(filled_ball):
 
 
 def test_two_hemispheres_stay_two():
-    halves = merged(ball(4.0, 2), transformed(ball(4.0, 2), [[1, 0, 0, 10], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
+    halves = merged(sphere(4.0, 2), moved(sphere(4.0, 2), 10.0))
     mesh = tetrahedralise(halves, **SIZES)
     assert signed_volumes(mesh).sum() == pytest.approx(2 * 4 / 3 * np.pi * 64, rel=0.05)
 
 
 def test_an_open_or_inverted_surface_is_refused():
-    shape = ball(4.0, 2)
+    shape = sphere(4.0, 2)
     with pytest.raises(MeshError, match="closed and face outwards"):
         tetrahedralise(TriangleMesh(shape.vertices, shape.faces[1:]), **SIZES)
     with pytest.raises(MeshError, match="closed and face outwards"):
@@ -199,3 +204,203 @@ def test_a_mesh_that_will_be_stretched_is_made_finer_by_as_much():
     settings = {"surface_edge_mm": 0.9, "core_edge_mm": 3.0, "pial_faces": None, "order": 2}
     assert finer(settings, 1.5) == pytest.approx(settings | {"surface_edge_mm": 0.6, "core_edge_mm": 2.0})
     assert finer(settings | {"pial_faces": 1000}, 1.5)["pial_faces"] == 2250
+
+
+@pytest.fixture
+def stand_in(tmp_path, monkeypatch):
+    """Puts code in the place of a mesher's function, in the mesher's process."""
+
+    def put(mesher, *code):
+        file, function = STAND_INS[mesher]
+        path = tmp_path / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for folder in path.relative_to(tmp_path).parents[:-1]:
+            (tmp_path / folder / "__init__.py").touch()
+        body = "\n".join(f"    {line}" for line in code)
+        path.write_text(f"import os, signal, time\ndef {function}(*arrays, **settings):\n{body}\n")
+        # the mesher's process is given this path
+        monkeypatch.syspath_prepend(tmp_path)
+
+    return put
+
+
+DYING = ("os.write(1, b'99 % of the elements are inverted')", "os.kill(os.getpid(), signal.SIGKILL)")
+HANGING = ("os.write(2, b'thinking')", "time.sleep(600)")
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_a_mesher_that_dies_leaves_its_last_words(stand_in, mesher):
+    stand_in(mesher, *DYING)
+    with pytest.raises(
+        MeshError,
+        match=rf"{mesher} failed with exit code -9; found 99 % of the elements are inverted\. .*memory ran out",
+    ):
+        tetrahedralise(BALL, mesher=mesher, **SIZES)
+
+
+@pytest.mark.promise(12)
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_the_folder_of_a_mesher_is_its_users_only(stand_in, mesher):
+    stand_in(mesher, "mode = os.stat('.').st_mode & 0o777", "os.write(1, f'mode {mode:o}'.encode())", DYING[1])
+    before = os.umask(0)
+    try:
+        with pytest.raises(MeshError, match="found mode 700"):
+            tetrahedralise(BALL, mesher=mesher, **SIZES)
+    finally:
+        os.umask(before)
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesher):
+    stand_in(mesher, *HANGING)
+    said = ""
+    # on a busy machine its process has not begun when a short time is over
+    for limit_s in (4, 20, 100):
+        if "last words: none" in said or not said:
+            with pytest.raises(MeshError, match=rf"{mesher} was stopped after {limit_s} s; found its") as caught:
+                tetrahedralise(BALL, mesher=mesher, **(SIZES | {"time_limit_s": limit_s}))
+            said = str(caught.value)
+    assert "found its last words: thinking" in said
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_a_mesher_that_is_not_installed_is_said_so(stand_in, mesher):
+    stand_in(mesher, "raise ImportError('cannot find its library')")
+    with pytest.raises(MeshError, match=rf"{mesher} is not installed; found cannot find its library\. Install"):
+        tetrahedralise(BALL, mesher=mesher, **SIZES)
+
+
+def mesh_in(folder, mesher, gates=GATES):
+    """Runs the workflow's script on a ball; returns the exit code and the files that it wrote for good."""
+    write_surface(folder / "pial.surf.gii", BALL)
+    outputs = {name: str(folder / file) for name, file in OUTPUTS.items()}
+    settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5, "pial_faces": None}
+    job = SimpleNamespace(
+        input=[str(folder / "pial.surf.gii")],
+        output=SimpleNamespace(**outputs),
+        params=SimpleNamespace(settings=settings, gates=gates, refused=str(folder / "refused"), stretched=None),
+        log=[str(folder / "log")],
+    )
+    code = 0
+    try:
+        runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
+    except SystemExit as end:
+        code = end.code
+    return code, [name for name, path in outputs.items() if Path(path).exists()]
+
+
+@pytest.mark.parametrize("mesher", MESHERS)
+def test_the_step_of_a_mesher_that_dies_ends_in_three_with_all_that_it_printed_in_the_log(
+    stand_in, tmp_path, capsys, mesher
+):
+    stand_in(mesher, "for i in range(300):", "    os.write(2, b'pass %d of the mesher\\n' % i)", *DYING)
+    assert mesh_in(tmp_path, mesher) == (3, [])
+    said, log = capsys.readouterr().err, (tmp_path / "log").read_text()
+    assert "inverted" in said
+    # the message has the last words, the log all of them
+    assert "pass 0 of the mesher" not in said
+    assert [f"{mesher}: pass {i} of the mesher\n" in log for i in range(300)] == [True] * 300
+    assert f"{mesher}: 99 % of the elements are inverted\n" in log
+
+
+def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_attempt(tmp_path, capsys):
+    refused, coarse = tmp_path / "refused", GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.1}
+    assert mesh_in(tmp_path, "tetgen", coarse | {"min_radius_ratio": 0.99}) == (3, [])
+    assert f"{refused}/brain.xdmf: the mesh is not good enough" in capsys.readouterr().err
+    quality, mesh = read_json(refused / "quality.json"), read_tetrahedral_mesh(refused / "brain.xdmf")
+    assert quality["tets"] == len(mesh.tets) == sum(quality["histogram"]["radius_ratio"]["counts"])
+    assert quality["min_radius_ratio"] == pytest.approx(radius_ratios(mesh).min())
+    assert mesh_in(tmp_path, "tetgen", coarse) == (0, list(OUTPUTS))
+    assert not refused.exists()
+
+
+@pytest.fixture(scope="module")
+def even():
+    return even_surface(BALL, 1.2, None)
+
+
+@pytest.fixture(scope="module")
+def filled():
+    return tetrahedralise(BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2}))
+
+
+def test_tetgen_keeps_the_remeshed_surface_exactly(even, filled):
+    own, _ = boundary_surface(filled)
+    assert len(own.faces) == len(even.faces)
+    np.testing.assert_array_equal(*(np.unique(surface.vertices, axis=0) for surface in (own, even)))
+    assert signed_volumes(filled).sum() == pytest.approx(signed_volume(even), rel=1e-12)
+    assert (signed_volumes(filled) > 0).all()
+
+
+def test_a_mesh_of_tetgen_passes_the_gates(filled):
+    summary = quality_summary(filled, BALL)
+    refuse_bad_mesh(filled, summary, **(GATES | {"max_volume_change": 0.01}))
+    assert summary["median_radius_ratio"] > 0.6
+
+
+def test_elements_of_tetgen_grow_inwards_up_to_the_core(filled):
+    depth = 8 - np.linalg.norm(filled.vertices[filled.tets].mean(axis=1), axis=1)
+    volumes = signed_volumes(filled)
+    assert np.median(volumes[depth > 4]) > 1.5 * np.median(volumes[depth < 1])
+    # the regular element with edges of core_edge_mm; a few that touch the surface can't be divided
+    largest = 1.5**3 / (6 * np.sqrt(2))
+    fine = tetrahedralise(BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2, "core_edge_mm": 1.5}))
+    assert np.quantile(signed_volumes(fine), 0.99) <= largest < np.quantile(volumes, 0.7)
+
+
+@pytest.mark.parametrize("wanted", [1500, 4000])
+def test_tetgen_has_about_the_number_of_faces_asked_for(wanted):
+    mesh = tetrahedralise(EGG, mesher="tetgen", pial_faces=wanted, **SIZES)
+    assert len(boundary_surface(mesh)[0].faces) == pytest.approx(wanted, rel=0.03)
+
+
+@pytest.mark.slow
+def test_pytetwild_has_about_the_number_of_faces_asked_for():
+    mesh = tetrahedralise(EGG, mesher="pytetwild", pial_faces=2000, **(SIZES | {"envelope_mm": 0.3}))
+    assert len(boundary_surface(mesh)[0].faces) == pytest.approx(2000, rel=0.25)
+
+
+def test_a_narrow_gap_between_two_parts_stays_open():
+    half = sphere(4.0, 3)
+    apart = moved(half, 8.2)
+    mesh = tetrahedralise(merged(half, apart), mesher="tetgen", **(SIZES | {"surface_edge_mm": 0.6}))
+    left, right = (mesh.vertices[side] for side in (mesh.vertices[:, 0] < 4.1, mesh.vertices[:, 0] > 4.1))
+    assert right[:, 0].min() - left[:, 0].max() == pytest.approx(0.2, abs=0.03)
+    assert radius_ratios(mesh).min() > 0.02
+
+
+def test_a_surface_that_cuts_itself_is_refused():
+    half = sphere(4.0, 2)
+    into = moved(half, 5.0)
+    with pytest.raises(MeshError, match=r"cuts itself and cannot be kept.*cross others|is not the inside of"):
+        tetrahedralise(merged(half, into), mesher="tetgen", **SIZES)
+
+
+@pytest.mark.parametrize("mesher", ["pytetwild", "tetgen"])
+def test_quadratic_elements_follow_the_surface_on_as_many_nodes(mesher):
+    surface = sphere(8.0, 4)
+    meshes = [
+        tetrahedralise(surface, mesher=mesher, order=order, **(SIZES | {"surface_edge_mm": 1.2})) for order in (1, 2)
+    ]
+    linear, bent = (quality_summary(mesh, surface) for mesh in meshes)
+    # pytetwild makes more where its surface is strongly curved, as this one is for elements of 2.4 mm
+    assert 0.5 < bent["vertices"] / linear["vertices"] < 2.6
+    assert bent["tets"] < linear["tets"] / 2
+    assert bent["min_jacobian_ratio"] >= 0.3
+    assert bent["crossing_faces"] == 0
+    assert bent["surface_distance_mm"]["hausdorff99"] < 1.2 * linear["surface_distance_mm"]["hausdorff99"]
+    assert abs(bent["volume_change"]) < 0.002
+
+
+def test_a_node_that_would_fold_its_element_over_stays_back():
+    # a flat corner of a box that is to become round: elements with two faces outside cannot follow
+    cube = box_mesh((3, 3, 3), (2.0, 2.0, 2.0))
+    length = np.linalg.norm(cube.vertices, axis=1, keepdims=True)
+    outer = np.unique(boundary_faces(cube)[0])
+    vertices = cube.vertices.copy()
+    vertices[outer] = 8.0 * vertices[outer] / length[outer]
+    vertices[np.setdiff1d(np.arange(len(vertices)), outer)] *= 4.0
+    mesh = curve_edges(TetrahedralMesh(vertices, cube.tets), sphere(8.0, 4))
+    ratios = jacobian_ratios(mesh)
+    assert 0 < ratios.min() < 0.5
+    assert ratios.max() <= 1.0

@@ -4,6 +4,7 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from shapes import sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import (
@@ -16,13 +17,14 @@ from gyriflow.geometry.triangles import (
     transformed,
     vertex_areas,
 )
-from gyriflow.metrics.depth import convex_hull, sulcal_depth
 from gyriflow.metrics.gyrification import (
     cap,
+    convex_hull,
     envelope,
     gyrification_index,
     local_gyrification_index,
     pieces_over,
+    sulcal_depth,
 )
 
 
@@ -32,11 +34,6 @@ def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
 
 def area_over(around: TriangleMesh, mesh: TriangleMesh) -> float:
     return float(pieces_over(around, mesh).areas.sum())
-
-
-def sphere(radius: float = 25.0) -> TriangleMesh:
-    shape = trimesh.creation.icosphere(subdivisions=4, radius=radius)
-    return TriangleMesh(shape.vertices, shape.faces)
 
 
 def half_sphere(radius: float = 25.0) -> TriangleMesh:
@@ -58,7 +55,7 @@ def dented(depth: float, width: float, subdivisions: int = 5) -> TriangleMesh:
 
 
 def test_sphere_has_no_folds() -> None:
-    mesh = sphere()
+    mesh = sphere(25.0)
     assert index(mesh, convex_hull(mesh)) == pytest.approx(1.0, abs=1e-9)
     assert index(mesh, envelope(mesh)) == pytest.approx(1.0, abs=0.01)
 
@@ -106,13 +103,13 @@ def test_cap_of_half_a_sphere() -> None:
     closed = cap(half)
     assert not is_closed(half)
     assert is_closed(closed)
-    assert signed_volume(closed) == pytest.approx(0.5 * signed_volume(sphere()), rel=1e-3)
+    assert signed_volume(closed) == pytest.approx(0.5 * signed_volume(sphere(25.0)), rel=1e-3)
     assert area(closed) - area(half) == pytest.approx(np.pi * 25.0**2, rel=0.01)
     np.testing.assert_array_equal(closed.faces[: len(half.faces)], half.faces)
 
 
 def test_two_cuts_are_closed_one_by_one() -> None:
-    mesh = sphere()
+    mesh = sphere(25.0)
     slab, _ = submesh(mesh, np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 2]) < 12.0)
     closed = cap(slab)
     assert is_closed(closed)
@@ -121,7 +118,7 @@ def test_two_cuts_are_closed_one_by_one() -> None:
 
 
 def test_closed_surface_needs_no_cap() -> None:
-    mesh = sphere()
+    mesh = sphere(25.0)
     assert cap(mesh) is mesh
 
 

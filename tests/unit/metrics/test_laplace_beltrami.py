@@ -1,37 +1,30 @@
 """Spectra that are known: sphere, rectangle, tori; none missing."""
 
+import igl
 import numpy as np
 import pytest
-import trimesh
 from scipy import linalg, sparse
 from scipy.sparse.linalg import eigsh
+from shapes import ellipsoid, sphere, torus
 
 from gyriflow.errors import MeshError, SolverError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.metrics import laplace_beltrami
 from gyriflow.metrics.laplace_beltrami import count_below, laplacian, lowest_modes, modes_below
 
-
-def ellipsoid(subdivisions: int = 4) -> TriangleMesh:
-    shape = trimesh.creation.icosphere(subdivisions=subdivisions)
-    return TriangleMesh(shape.vertices * [35.0, 25.0, 20.0], shape.faces)
+AXES = (35.0, 25.0, 20.0)
 
 
 def rectangle(nx: int, ny: int, width: float, height: float) -> TriangleMesh:
-    x, y = np.meshgrid(np.linspace(0, width, nx), np.linspace(0, height, ny), indexing="ij")
-    corner = (np.arange(nx - 1)[:, None] * ny + np.arange(ny - 1)).ravel()
-    faces = np.concatenate(
-        [
-            np.stack([corner, corner + ny, corner + ny + 1], axis=1),
-            np.stack([corner, corner + ny + 1, corner + 1], axis=1),
-        ]
+    vertices, faces = igl.triangulated_grid(nx, ny)
+    order = np.lexsort(vertices.T[::-1])
+    return TriangleMesh(
+        np.column_stack([vertices[order] * [width, height], np.zeros(nx * ny)]), np.argsort(order)[faces]
     )
-    return TriangleMesh(np.stack([x.ravel(), y.ravel(), np.zeros(nx * ny)], axis=1), faces)
 
 
 def test_sphere_has_l_times_l_plus_one() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=4, radius=30.0)
-    found = lowest_modes(*laplacian(TriangleMesh(shape.vertices, shape.faces)), 121).eigenvalues
+    found = lowest_modes(*laplacian(sphere(30.0)), 121).eigenvalues
     degree = np.repeat(np.arange(11), 2 * np.arange(11) + 1)  # 2l + 1 equal ones for each degree l
     np.testing.assert_allclose(found, degree * (degree + 1) / 30.0**2, rtol=0.045, atol=1e-12)
 
@@ -55,11 +48,6 @@ def test_flat_torus_has_the_sums_of_two_circles() -> None:
     np.testing.assert_allclose(extrapolated(coarse, fine), exact, rtol=0.01, atol=1e-9)
 
 
-def torus_of_revolution(around: int, across: int, ring_mm: float, tube_mm: float) -> TriangleMesh:
-    shape = trimesh.creation.torus(ring_mm, tube_mm, major_sections=around, minor_sections=across)
-    return TriangleMesh(shape.vertices, shape.faces)
-
-
 def test_torus_of_revolution_has_the_spectrum_of_its_ordinary_equation() -> None:
     ring_mm, tube_mm = 12.0, 5.0
     # u(θ) exp(imφ) with w = R + r cos θ: −(w u')'/(w r²) + m²u/w² = λu, solved with 63 Fourier functions
@@ -71,9 +59,7 @@ def test_torus_of_revolution_has_the_spectrum_of_its_ordinary_equation() -> None
         linalg.eigh(slope.T @ (width[:, None] * slope) + np.diag(m**2 / width), np.diag(width), eigvals_only=True)
         for m in range(-20, 21)
     ]
-    coarse, fine = (
-        lowest_modes(*laplacian(torus_of_revolution(n, n // 2, ring_mm, tube_mm)), 30).eigenvalues for n in (64, 128)
-    )
+    coarse, fine = (lowest_modes(*laplacian(torus(ring_mm, tube_mm, n, n // 2)), 30).eigenvalues for n in (64, 128))
     np.testing.assert_allclose(extrapolated(coarse, fine)[1:], np.sort(np.concatenate(exact))[1:30], rtol=1e-3)
 
 
@@ -85,7 +71,7 @@ def test_open_rectangle_has_a_free_boundary() -> None:
 
 
 def test_slices_equal_a_single_call() -> None:
-    stiffness, mass = laplacian(ellipsoid())
+    stiffness, mass = laplacian(ellipsoid(AXES))
     modes = lowest_modes(stiffness, mass, 250)
     single = eigsh(stiffness, k=250, M=mass, sigma=-1e-3, tol=1e-12, return_eigenvectors=False)
     np.testing.assert_allclose(modes.eigenvalues[1:], np.sort(single)[1:], rtol=1e-8)
@@ -105,14 +91,14 @@ def test_count_below_is_the_number_of_eigenvalues() -> None:
 
 
 def test_small_surface_has_all_its_modes() -> None:
-    stiffness, mass = laplacian(ellipsoid(2))
+    stiffness, mass = laplacian(ellipsoid(AXES, 2))
     modes = lowest_modes(stiffness, mass, 162)
     np.testing.assert_allclose(modes.functions.T @ (mass @ modes.functions), np.eye(162), atol=1e-10)
 
 
 @pytest.mark.parametrize("wrong", [-1, 1])
 def test_modes_other_than_the_inertia_counts_are_an_error(monkeypatch: pytest.MonkeyPatch, wrong: int) -> None:
-    stiffness, mass = laplacian(ellipsoid())
+    stiffness, mass = laplacian(ellipsoid(AXES))
     counted = laplace_beltrami.count_below
     monkeypatch.setattr(laplace_beltrami, "count_below", lambda *arguments: counted(*arguments) + wrong)
     with pytest.raises(SolverError, match="number of modes is wrong"):
@@ -122,20 +108,19 @@ def test_modes_other_than_the_inertia_counts_are_an_error(monkeypatch: pytest.Mo
 def test_a_slice_may_be_empty(monkeypatch: pytest.MonkeyPatch) -> None:
     # slices of one mode: between the few distinct eigenvalues of a sphere many hold none
     monkeypatch.setattr(laplace_beltrami, "MODES_PER_SLICE", 1)
-    shape = trimesh.creation.icosphere(subdivisions=4)
-    found = lowest_modes(*laplacian(TriangleMesh(shape.vertices, shape.faces)), 9).eigenvalues
+    found = lowest_modes(*laplacian(sphere(1.0)), 9).eigenvalues
     np.testing.assert_allclose(found, np.repeat([0, 2, 6], [1, 3, 5]), rtol=0.01, atol=1e-9)
 
 
 def test_all_modes_below_a_value() -> None:
-    stiffness, mass = laplacian(ellipsoid())
+    stiffness, mass = laplacian(ellipsoid(AXES))
     lowest = lowest_modes(stiffness, mass, 200).eigenvalues
     found = modes_below(stiffness, mass, 0.5 * (lowest[120] + lowest[121])).eigenvalues
     np.testing.assert_allclose(found[1:], lowest[1:121], rtol=1e-9)
 
 
 def test_what_slepc_cannot_solve_is_an_error() -> None:
-    stiffness, mass = laplacian(ellipsoid())
+    stiffness, mass = laplacian(ellipsoid(AXES))
     with pytest.raises(SolverError, match="could not be found"):
         modes_below(stiffness, mass, -10.0)  # an interval that ends before it begins
 
@@ -146,6 +131,6 @@ def test_vertex_without_a_face_is_refused() -> None:
 
 
 def test_more_modes_than_a_surface_has_are_refused() -> None:
-    stiffness, mass = laplacian(ellipsoid(2))
+    stiffness, mass = laplacian(ellipsoid(AXES, 2))
     with pytest.raises(SolverError, match="found 163; expected 1 to 162"):
         lowest_modes(stiffness, mass, 163)

@@ -9,16 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import trimesh
+from shapes import ellipsoid, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh, transformed
 from gyriflow.metrics.measure import BrainMetrics, measure_brain
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).resolve().parents[4] / "shared/data"))
-
-
-def shifted(mesh: TriangleMesh, x: float) -> TriangleMesh:
-    return transformed(mesh, [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
 def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
@@ -30,9 +27,7 @@ def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
 @pytest.fixture(scope="module")
 def apart() -> BrainMetrics:
     """A brain of two spheres of 20 and 25 mm."""
-    left, right = (trimesh.creation.icosphere(subdivisions=4, radius=radius) for radius in (20.0, 25.0))
-    left, right = TriangleMesh(left.vertices, left.faces), TriangleMesh(right.vertices, right.faces)
-    left, right = shifted(left, -21.0), shifted(right, 26.0)
+    left, right = sphere(20.0, centre=(-21.0, 0, 0)), sphere(25.0, centre=(26.0, 0, 0))
     known = {"cerebrum": 98.0, "tissue": 90.0, "cortex": 20.0}
     return measure_brain(merged(left, right), left, right, label_volumes_ml=known, spangy_modes=60)
 
@@ -105,9 +100,8 @@ def test_cut_bands_are_no_metrics(apart: BrainMetrics) -> None:
 
 
 def test_processes_change_nothing_but_the_time() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
-    left, right = (shifted(TriangleMesh(shape.vertices * [1, 1, 1.3], shape.faces), x) for x in (-21.0, 21.0))
-    thickness = np.linspace(1.0, 2.0, 2 * len(shape.vertices))
+    left, right = (ellipsoid((20.0, 20.0, 26.0), 3, (x, 0, 0)) for x in (-21.0, 21.0))
+    thickness = np.linspace(1.0, 2.0, 2 * len(left.vertices))
     one, two = (
         measure_brain(merged(left, right), left, right, thickness_mm=thickness, spangy_modes=20, threads=threads)
         for threads in (1, 2)
@@ -115,14 +109,13 @@ def test_processes_change_nothing_but_the_time() -> None:
     pd.testing.assert_frame_equal(one.table, two.table)
     assert value(one, "left", "mean_thickness") < 1.5 < value(one, "right", "mean_thickness")
     assert value(one, "whole", "mean_thickness") == pytest.approx(1.5, abs=0.01)
-    np.testing.assert_allclose(one.maps["left"]["thickness_mm"], thickness[: len(shape.vertices)])
+    np.testing.assert_allclose(one.maps["left"]["thickness_mm"], thickness[: len(left.vertices)])
 
 
 def test_errors_come_out_of_processes() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
-    left, right = (shifted(TriangleMesh(shape.vertices, shape.faces), x) for x in (-21.0, 21.0))
+    left, right, far = (sphere(20.0, 3, (x, 0, 0)) for x in (-21.0, 21.0, 81.0))
     with pytest.raises(MeshError, match="one piece"):
-        measure_brain(merged(left, right), left, merged(right, shifted(right, 60.0)), spangy_modes=10, threads=2)
+        measure_brain(merged(left, right), left, merged(right, far), spangy_modes=10, threads=2)
 
 
 def test_maps_and_spectra(apart: BrainMetrics) -> None:
@@ -163,9 +156,7 @@ def test_table_is_tidy(apart: BrainMetrics) -> None:
 
 
 def test_surfaces_that_cut_each_other_are_counted() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
-    mesh = TriangleMesh(shape.vertices, shape.faces)
-    left, right = shifted(mesh, -18.0), shifted(mesh, 18.0)
+    left, right = (sphere(20.0, 3, (x, 0, 0)) for x in (-18.0, 18.0))
     metrics = measure_brain(merged(left, right), left, right, curvature_radius_mm=6.0, spangy_modes=10)
     # the two spheres meet in a circle of radius √(20² − 18²), which at most a face or two per edge length cross
     circle = 2 * np.pi * np.sqrt(20.0**2 - 18.0**2)
@@ -174,16 +165,14 @@ def test_surfaces_that_cut_each_other_are_counted() -> None:
 
 
 def test_a_radius_that_reaches_the_cut_everywhere_is_refused() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
-    whole = TriangleMesh(shape.vertices, shape.faces)
+    whole = sphere(10.0, 3)
     on_right = whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0
     with pytest.raises(MeshError, match=r"Lower metrics\.curvature_radius_mm"):
         measure_brain(whole, submesh(whole, ~on_right)[0], submesh(whole, on_right)[0], curvature_radius_mm=18.0)
 
 
 def test_inside_out_is_refused() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=2, radius=20.0)
-    mesh = TriangleMesh(shape.vertices, shape.faces)
+    mesh = sphere(20.0, 2)
     with pytest.raises(MeshError, match="look inwards"):
         measure_brain(flipped(mesh), mesh, mesh)
 

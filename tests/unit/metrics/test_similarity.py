@@ -2,32 +2,24 @@
 
 import numpy as np
 import pytest
-import trimesh
 from scipy.spatial.transform import Rotation
+from shapes import ellipsoid, rigid, sphere
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.metrics.alignment import rigid_alignment
-from gyriflow.metrics.similarity import brain_distances, distances, surface_distance
+from gyriflow.metrics.similarity import brain_distances, distances, rigid_alignment, surface_distance
 
 
 def brain_like(subdivisions: int = 4) -> TriangleMesh:
     """Returns an ellipsoid with a bump, so that only one pose fits."""
-    shape = trimesh.creation.icosphere(subdivisions=subdivisions)
+    shape = sphere(1.0, subdivisions)
     direction = shape.vertices
     bump = 1 + 0.25 * np.exp(-8 * ((direction - np.array([0.6, 0.64, 0.48])) ** 2).sum(axis=1))
     return TriangleMesh(direction * bump[:, None] * [20.0, 28.0, 16.0], shape.faces)
 
 
-def sphere(radius: float) -> TriangleMesh:
-    shape = trimesh.creation.icosphere(subdivisions=4, radius=radius)
-    return TriangleMesh(shape.vertices, shape.faces)
-
-
 def motion(degrees: float, shift: list[float]) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_rotvec(np.array([0.3, 0.5, 0.8]) / 0.99 * degrees, degrees=True).as_matrix()
-    matrix[:3, 3] = shift
-    return matrix
+    turn = Rotation.from_rotvec(np.array([0.3, 0.5, 0.8]) / 0.99 * degrees, degrees=True)
+    return rigid(*turn.as_euler("xyz", degrees=True), shift=shift)
 
 
 def test_alignment_takes_a_motion_back() -> None:
@@ -84,9 +76,8 @@ def test_a_wrong_pose_is_put_right_and_said(degrees: float, caplog: pytest.LogCa
 
 
 def test_the_given_pose_is_kept_where_another_fits_as_well(caplog: pytest.LogCaptureFixture) -> None:
-    shape = trimesh.creation.icosphere(subdivisions=4)
     # the same after half a turn about any axis
-    longish = TriangleMesh(shape.vertices * [20.0, 28.0, 16.0], shape.faces)
+    longish = ellipsoid((20.0, 28.0, 16.0))
     result = surface_distance(transformed(longish, motion(10.0, [1.0, 2.0, 3.0])), longish)
     assert result["rotation_deg"] == pytest.approx(10.0, abs=0.5)
     assert result["pose_margin_1"] == pytest.approx(1.0, abs=0.01)
@@ -95,7 +86,7 @@ def test_the_given_pose_is_kept_where_another_fits_as_well(caplog: pytest.LogCap
 
 
 def test_the_margin_compares_poses_that_are_aligned_alike() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=4)
+    shape = sphere(1.0)
     x, y, z = shape.vertices.T
     # folds that closest points take long to bring together; half a turn about z changes nothing
     height = 0.06 * np.sin(8.0 * np.arctan2(y, x)) * (1.0 - z**2) ** 2 + 0.06 * np.cos(8.0 * z)

@@ -1,25 +1,29 @@
-"""Band limits, powers and dominant bands of proxies whose spectrum is known."""
+"""Spectra that are known: numbers of modes, bands and their powers, dominant bands, and distances of spectra."""
 
 import numpy as np
+import pandas as pd
 import pytest
-import trimesh
 from scipy import sparse
+from shapes import ellipsoid, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, area, merged, transformed
 from gyriflow.metrics.laplace_beltrami import Modes, laplacian, lowest_modes
 from gyriflow.metrics.spangy import (
     bands_of_modes,
+    common_modes,
     first_eigenvalue,
+    modes_of,
+    spectral_distances,
     spectrum,
     weyl_number,
+    weyl_numbers,
 )
 
 
 @pytest.fixture(scope="module")
 def shape() -> TriangleMesh:
-    sphere = trimesh.creation.icosphere(subdivisions=4)
-    return TriangleMesh(sphere.vertices * [35.0, 25.0, 20.0], sphere.faces)
+    return ellipsoid((35.0, 25.0, 20.0))
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +80,7 @@ def test_a_band_that_is_cut_off_dominates_nowhere(solved) -> None:
 
 
 def test_parseval_with_all_modes() -> None:
-    sphere = trimesh.creation.icosphere(subdivisions=2)
-    mesh = TriangleMesh(sphere.vertices * [35.0, 25.0, 20.0], sphere.faces)
+    mesh = ellipsoid((35.0, 25.0, 20.0), 2)
     stiffness, mass = laplacian(mesh)
     modes = lowest_modes(stiffness, mass, len(mesh.vertices))
     proxy = np.random.default_rng(1).standard_normal(len(mesh.vertices))
@@ -153,9 +156,9 @@ def test_agrees_with_slam_once_its_slip_is_undone(shape, solved, count: int) -> 
 
 def test_a_sphere_has_its_degrees_in_the_bands() -> None:
     # λ = l(l + 1)/R² and λ1 = 2/R²: B1 holds l = 1 and 2, B2 l = 3 to 5, B3 l = 6 to 10, of 2l + 1 modes each
-    sphere = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
-    stiffness, mass = laplacian(TriangleMesh(sphere.vertices, sphere.faces))
-    x, y, z = (sphere.vertices / 20.0).T
+    mesh = sphere(20.0)
+    stiffness, mass = laplacian(mesh)
+    x, y, z = (mesh.vertices / 20.0).T
     modes = lowest_modes(stiffness, mass, 130)
     harmonics = {
         1: (z, x * y),
@@ -186,11 +189,149 @@ def test_two_pieces_are_refused(shape) -> None:
 
 
 def test_first_eigenvalue_of_a_sphere() -> None:
-    sphere = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
-    assert first_eigenvalue(*laplacian(TriangleMesh(sphere.vertices, sphere.faces))) == pytest.approx(0.02, rel=0.01)
+    assert first_eigenvalue(*laplacian(sphere(10.0))) == pytest.approx(0.02, rel=0.01)
 
 
 def test_modes_are_what_the_bands_are_counted_on() -> None:
     modes = Modes(np.array([0.0, 1.0, 3.9, 4.0]), np.eye(4))
     found = spectrum(np.array([1.0, 2.0, 3.0, 4.0]), modes, sparse.identity(4, format="csc"), edge_length_mm=0.1)
     np.testing.assert_allclose(found.bands["power"][:3], [1.0, 4.0 + 9.0, 16.0])
+
+
+def test_weyl_numbers_of_spheres() -> None:
+    found = weyl_numbers({"left": sphere(20.0), "right": sphere(30.0)}, "textbook").set_index("hemisphere")
+    np.testing.assert_allclose(found["area_mm2"], 4 * np.pi * np.array([20.0, 30.0]) ** 2, rtol=5e-3)
+    np.testing.assert_allclose(found["first_eigenvalue_per_mm2"], 2 / np.array([20.0, 30.0]) ** 2, rtol=5e-3)
+    # the number does not know the size
+    np.testing.assert_allclose(found["weyl_number"], 8192, rtol=5e-3)
+    assert found["vertices"].tolist() == [2562, 2562]
+
+
+def test_the_common_number_is_the_largest_of_each_side() -> None:
+    numbers = pd.DataFrame({"hemisphere": ["left", "right"] * 2, "weyl_number": [700, 810, 790, 640]})
+    assert common_modes(numbers) == {"left": 790, "right": 810}
+
+
+def found(choice, mesh: TriangleMesh) -> tuple[Modes, float]:
+    stiffness, mass = laplacian(mesh)
+    return modes_of(choice, "left", mesh, stiffness, mass, first_eigenvalue(stiffness, mass), "paper")
+
+
+def wanted(choice, mesh: TriangleMesh) -> int:
+    return len(found(choice, mesh)[0].eigenvalues)
+
+
+def test_which_number_is_taken() -> None:
+    mesh = sphere(20.0)  # of 2562 vertices; Weyl's number of a sphere is 1304
+    assert wanted({"left": 200, "right": 3}, mesh) == 200
+    assert wanted({"left": 9000, "right": 3}, mesh) == 2562 // 2
+    assert wanted("own", mesh) == 2562 // 2
+    assert wanted(700, mesh) == 700
+    elongated = ellipsoid((4.0, 120.0, 4.0))
+    first = first_eigenvalue(*laplacian(elongated))
+    assert wanted("own", elongated) == weyl_number(area(elongated), first, "paper") < 2562 // 2
+
+
+def test_a_band_stands_for_all_modes_up_to_its_end_on_a_sphere() -> None:
+    # λ = l(l + 1)/R², λ1 = 2/R²: below 2·4⁴/R² lie l = 0 to 21, each 2l + 1 times, and l = 22 by so little that the
+    # finite elements lift it out
+    assert wanted("B4", sphere(20.0, 5)) == 22**2
+
+
+@pytest.mark.parametrize("last", [4, 5, 6])
+def test_bands_are_held_entirely_with_no_more_modes_than_needed(last: int) -> None:
+    # elongated, so that few modes lie below 4⁶ λ1
+    mesh = ellipsoid((4.0, 36.0, 4.0))
+    modes, reach = found(f"B{last}", mesh)
+    bands = spectrum(mesh.vertices[:, 1], modes, laplacian(mesh)[1], edge_length_mm=1.0, reach=reach).bands
+    assert bands["complete"].tolist() == [band <= last for band in range(7)]
+    assert bands["denominator_complete"].all()
+    # no band holds a mode that only shows that the one before is complete
+    assert bands.loc[last + 1 :, "modes"].tolist() == [0] * (6 - last)
+    assert (bands_of_modes(modes.eigenvalues) >= 0).all()
+
+
+@pytest.mark.parametrize("subdivisions", [2, 3])
+def test_a_coarse_surface_has_no_complete_b6(subdivisions: int) -> None:
+    mesh = sphere(20.0, subdivisions)
+    assert wanted("B6", mesh) == len(mesh.vertices) // 2
+
+
+def written(
+    subject: str, run: str, week: float, powers: list[float], cut_off: int = 7, coarse: int = 7
+) -> pd.DataFrame:
+    """Returns the table of a hemisphere with the powers of B1 to B6, incomplete or unresolved from these bands on."""
+    bands = np.arange(7)
+    return pd.DataFrame(
+        {
+            "subject": subject,
+            "run": run,
+            "week": week,
+            "hemisphere": "left",
+            "band": bands,
+            "power": [100.0, *powers],
+            "complete": bands < cut_off,
+            "resolved": bands < coarse,
+        }
+    )
+
+
+EVEN = [1.0, 1.0, 2.0, 2.0, 2.0, 2.0]
+SHIFTED = [1.0, 1.0, 2.0, 3.0, 3.0, 0.0]
+TO_B4, TO_B5, TO_B6 = "spectral_distance_B4", "spectral_distance_B4_to_B5", "spectral_distance_B4_to_B6"
+
+
+def distances(*spectra: pd.DataFrame) -> pd.DataFrame:
+    rows = spectral_distances(pd.concat(spectra, ignore_index=True)).query("run == 'sim'").set_index("metric")
+    assert rows.index.tolist() == [TO_B4, TO_B5, TO_B6]
+    return rows
+
+
+def test_shares_of_the_bands_up_to_the_last() -> None:
+    rows = distances(written("a", "sim", 22.0, EVEN), written("b", "real", 23.0, SHIFTED))
+    assert rows["value"][TO_B4] == pytest.approx(3 / 7 - 2 / 6)
+    assert rows["value"][TO_B5] == pytest.approx(np.hypot(3 / 10 - 2 / 8, 3 / 10 - 2 / 8))
+    # shares of B4 to B6: 0.2 each against 0.3, 0.3 and 0
+    assert rows["value"][TO_B6] == pytest.approx(np.sqrt(0.1**2 + 0.1**2 + 0.2**2))
+    assert set(rows["flag"]) == {"ok"}
+    assert set(zip(rows["real"], rows["real_week"], rows["unit"], strict=True)) == {("b", 23.0, "1")}
+
+
+def test_size_of_the_power_does_not_count() -> None:
+    rows = distances(written("a", "sim", 22.0, [7 * p for p in EVEN]), written("b", "real", 23.0, EVEN))
+    np.testing.assert_allclose(rows["value"], 0.0, atol=1e-12)
+
+
+def test_a_band_that_is_cut_off_in_one_has_no_distance_and_changes_no_other() -> None:
+    own, real = [1.0, 1.0, 2.0, 4.0, 99.0, 0.0], [2.0, 2.0, 2.0, 2.0, 0.0, 77.0]
+    rows = distances(written("a", "sim", 22.0, own, cut_off=5), written("b", "real", 22.0, real, cut_off=6))
+    assert rows["value"][TO_B4] == pytest.approx(4 / 8 - 2 / 8)
+    assert rows["value"][[TO_B5, TO_B6]].isna().all()
+    assert rows["flag"].tolist() == ["ok", "B5 cut off", "B5 B6 cut off"]
+
+
+def test_a_band_without_modes_is_cut_off() -> None:
+    rows = distances(
+        written("a", "sim", 22.0, [1.0, 1.0, 2.0, 2.0, np.nan, np.nan], cut_off=5), written("b", "real", 22.0, EVEN)
+    )
+    assert rows["value"][TO_B4] == pytest.approx(0.0)
+    assert rows["flag"][TO_B6] == "B5 B6 cut off"
+
+
+def test_bands_finer_than_the_edges_of_one_of_the_two_are_named() -> None:
+    rows = distances(written("a", "sim", 22.0, EVEN, coarse=6), written("b", "real", 22.0, SHIFTED, coarse=5))
+    assert rows["value"].notna().all()
+    assert rows["flag"].tolist() == ["ok", "B5 not resolved", "B5 B6 not resolved"]
+
+
+def test_who_is_compared_with_whom() -> None:
+    right = written("b", "real", 22.0, EVEN).assign(hemisphere="right")
+    known = [written("a", "real", 21.0, EVEN), written("b", "real", 22.0, EVEN), right]
+    table = spectral_distances(pd.concat([written("a", "sim", 22.0, EVEN), *known]))
+    pairs = table["subject"] + " " + table["run"] + " " + table["hemisphere"] + ", " + table["real"]
+    assert sorted(set(pairs)) == ["a real left, b", "a sim left, a", "a sim left, b", "b real left, a"]
+    assert len(table) == 3 * 4
+
+
+def test_a_brain_alone_is_compared_with_none() -> None:
+    assert spectral_distances(written("a", "real", 21.0, EVEN)).empty

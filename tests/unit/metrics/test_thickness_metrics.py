@@ -1,17 +1,17 @@
 """Thickness of simulated brains that are spheres, and thickness and maps by region."""
 
 import numpy as np
-import pandas as pd
 import pytest
-import trimesh
 from scipy.spatial import Delaunay
+from shapes import sphere
 
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
-from gyriflow.metrics.regions import asymmetry, region_metrics
-from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness, thickness_metrics
+from gyriflow.metrics.measure import thickness_rows
+from gyriflow.metrics.regions import region_metrics
+from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness
 
 RADIUS, CORTEX = 20.0, 2.5
 
@@ -19,10 +19,10 @@ RADIUS, CORTEX = 20.0, 2.5
 @pytest.fixture(scope="module")
 def ball() -> tuple[TetrahedralMesh, TriangleMesh]:
     """A ball of concentric icospheres, and its surface (the first vertices of the mesh)."""
-    shells = [trimesh.creation.icosphere(subdivisions=3, radius=radius) for radius in (20.0, 19.0, 17.0, 14.0, 9.0)]
+    shells = [sphere(radius, 3) for radius in (20.0, 19.0, 17.0, 14.0, 9.0)]
     points = np.concatenate([*(shell.vertices for shell in shells), [[0.0, 0.0, 0.0]]])
     tets = Delaunay(points).simplices
-    return TetrahedralMesh(points, tets), TriangleMesh(shells[0].vertices, shells[0].faces)
+    return TetrahedralMesh(points, tets), shells[0]
 
 
 def depth_of(mesh: TetrahedralMesh) -> np.ndarray:
@@ -69,30 +69,26 @@ def test_a_brain_that_is_all_cortex_has_no_border(ball) -> None:
 
 
 def test_values_of_a_part() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=2, radius=RADIUS)
-    whole = TriangleMesh(shape.vertices, shape.faces)
-    part = TriangleMesh(shape.vertices[[5, 3, 8]].astype(np.float32), [[0, 1, 2]])
+    whole = sphere(RADIUS, 2)
+    part = TriangleMesh(whole.vertices[[5, 3, 8]].astype(np.float32), [[0, 1, 2]])
     np.testing.assert_array_equal(at_part(np.arange(162), whole, part), [5, 3, 8])
     with pytest.raises(InputError, match="do not belong"):
-        at_part(np.arange(162), whole, TriangleMesh(shape.vertices[:3] + 1.0, [[0, 1, 2]]))
+        at_part(np.arange(162), whole, TriangleMesh(whole.vertices[:3] + 1.0, [[0, 1, 2]]))
     with pytest.raises(InputError, match="161 values"):
         at_part(np.arange(161), whole, part)
 
 
 def test_thickness_metrics_leave_out_what_was_not_measured() -> None:
-    rows = {
-        name: value for name, value, _ in thickness_metrics(np.array([1.0, 2.0, np.nan]), np.array([3.0, 1.0, 4.0]))
-    }
+    rows = {name: value for name, value, _ in thickness_rows(np.array([1.0, 2.0, np.nan]), np.array([3.0, 1.0, 4.0]))}
     assert rows["mean_thickness"] == pytest.approx(1.25)
     assert rows["thickness_sd"] == pytest.approx(np.sqrt(0.75 * 0.25**2 + 0.25 * 0.75**2))
     assert (rows["thickness_q05"], rows["thickness_q95"]) == (1.0, 2.0)
     assert rows["thickness_measured_share"] == pytest.approx(0.5)
-    assert thickness_metrics(np.full(3, np.nan), np.ones(3)) == []
+    assert thickness_rows(np.full(3, np.nan), np.ones(3)) == []
 
 
 def test_regions_have_their_area_and_means() -> None:
-    shape = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
-    mesh = TriangleMesh(shape.vertices, shape.faces)
+    mesh = sphere(RADIUS)
     top = mesh.vertices[:, 2] > 0
     labels = np.where(top, 7, np.where(mesh.vertices[:, 2] < -10.0, 9, 0))
     thickness = np.where(top, 1.0, 3.0)
@@ -109,18 +105,3 @@ def test_regions_have_their_area_and_means() -> None:
     assert found.set_index("metric").loc["mean_thickness", "unit"].tolist() == ["mm", "mm"]
     with pytest.raises(InputError, match="without a name: 9"):
         region_metrics({"left": mesh}, {"left": maps}, {"left": labels}, {7: "top"})
-
-
-def test_asymmetry_of_sides() -> None:
-    table = pd.DataFrame(
-        [
-            ("left", "frontal", "area", 30.0),
-            ("right", "frontal", "area", 10.0),
-            ("left", "insula", "area", 0.0),
-            ("right", "insula", "area", 0.0),
-        ],
-        columns=["hemisphere", "region", "metric", "value"],
-    )
-    found = asymmetry(table).set_index("region")["asymmetry_index"]
-    assert found["frontal"] == pytest.approx(1.0)
-    assert np.isnan(found["insula"])

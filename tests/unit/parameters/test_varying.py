@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.parameters.reading import parameters_from, require_maps
+from gyriflow.parameters.folding import parameters_from, require_maps
 from gyriflow.parameters.varying import value_at, value_range
 
 RUN = {"start_week": 21.0, "end_week": 31.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 31.0]}

@@ -4,17 +4,12 @@ import nibabel as nib
 import numpy as np
 import pytest
 from scipy import ndimage
+from shapes import phantom
 from skimage.measure import euler_number
 
 from gyriflow.errors import InputError
 from gyriflow.phantom.brain import CENTRE_MM, cerebral_volume_ml, phantom_labels
-
-CEREBRUM = (1, 2, 5, 6, 8)
-
-
-@pytest.fixture(scope="module")
-def week_24():
-    return phantom_labels(24.0, voxel_mm=1.2)
+from gyriflow.phantom.pathologies import CEREBRUM
 
 
 def test_volume_follows_the_published_growth():
@@ -30,15 +25,15 @@ def test_cerebrum_has_the_volume_of_its_week(week, voxel_mm):
     assert volume == pytest.approx(cerebral_volume_ml(week), rel=0.015)
 
 
-def test_storage_is_not_ras_and_the_brain_is_off_the_origin(week_24):
-    labels, affine = week_24
+def test_storage_is_not_ras_and_the_brain_is_off_the_origin():
+    labels, affine = phantom()
     assert "".join(nib.aff2axcodes(affine)) == "PIR"
     centre = affine[:3, :3] @ np.argwhere(np.isin(labels, CEREBRUM)).mean(axis=0) + affine[:3, 3]
     assert np.abs(centre - CENTRE_MM).max() < 4.0
 
 
-def test_all_eight_tissues_are_there_in_their_places(week_24):
-    labels, affine = week_24
+def test_all_eight_tissues_are_there_in_their_places():
+    labels, affine = phantom()
     assert np.unique(labels).tolist() == list(range(9))
     place = {n: affine[:3, :3] @ np.argwhere(labels == n).mean(axis=0) + affine[:3, 3] for n in range(1, 9)}
     # RAS+: the cerebellum is behind and below, the brainstem below, the callosum above the deep grey matter
@@ -48,8 +43,8 @@ def test_all_eight_tissues_are_there_in_their_places(week_24):
     assert place[8][2] > place[6][2] + 3
 
 
-def test_cerebrum_is_one_ball_in_two_hemispheres(week_24):
-    labels, affine = week_24
+def test_cerebrum_is_one_ball_in_two_hemispheres():
+    labels, affine = phantom()
     cerebrum = np.isin(labels, CEREBRUM)
     assert ndimage.label(cerebrum)[1] == 1
     assert euler_number(cerebrum, connectivity=1) == 1
@@ -81,8 +76,8 @@ def test_folds_deepen_with_age():
     assert old > 1.1 * middle
 
 
-def test_seed_decides_the_folds(week_24):
-    labels, _ = week_24
+def test_seed_decides_the_folds():
+    labels, _ = phantom()
     assert np.array_equal(phantom_labels(24.0, voxel_mm=1.2)[0], labels)
     other = phantom_labels(24.0, voxel_mm=1.2, seed=1)[0]
     assert other.shape != labels.shape or (other != labels).any()

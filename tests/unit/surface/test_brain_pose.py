@@ -4,51 +4,39 @@ import re
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from shapes import cerebrum_surface, ellipsoid, phantom, rigid
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.geometry.triangles import transformed
+from gyriflow.io.schemes import SCHEMES
 from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import phantom_labels
-from gyriflow.surface.brain_pose import doubts_of_hemispheres, narrowness, pose_of_labels, pose_surface_by_shape
-from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
+from gyriflow.surface.plausible import narrowness
+from gyriflow.surface.pose import doubts_of_hemispheres, pose_of_labels, pose_surface_by_shape
 
 TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]
 
 
 @pytest.fixture(scope="module")
 def brain():
-    return phantom_labels(24.0, voxel_mm=1.6)
-
-
-def turned(degrees):
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
-    return matrix
-
-
-def surface_of(labels, affine):
-    mask = np.isin(labels, pathologies.CEREBRUM)
-    return isosurface(make_simple(smooth_mask(np.pad(mask, 4), 1.0))[0], affine)
+    return phantom(24.0, 1.6)
 
 
 @pytest.mark.parametrize("degrees", TURNS)
 def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
     labels, affine = brain
-    pose = pose_of_labels(labels, turned(degrees) @ affine, SCHEMES["spina-bifida-atlas"])
+    pose = pose_of_labels(labels, rigid(*degrees) @ affine, SCHEMES["spina-bifida-atlas"])
     assert pose.by == "cerebellum and brainstem"
-    np.testing.assert_allclose(pose.rotation @ turned(degrees)[:3, :3], np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
     assert "the brain was turned by" in pose.warnings[0]
 
 
 @pytest.mark.parametrize("degrees", [(0, 0, 0), (10, 0, 0), (15, 0, 0), (-12, 10, 14)])
 def test_small_tilts_are_the_files_own(brain, degrees):
     labels, affine = brain
-    pose = pose_of_labels(labels, turned(degrees) @ affine, SCHEMES["spina-bifida-atlas"])
+    pose = pose_of_labels(labels, rigid(*degrees) @ affine, SCHEMES["spina-bifida-atlas"])
     assert (pose.by, pose.warnings) == ("file", ())
-    assert np.array_equal(pose.rotation, np.eye(3))
+    assert np.array_equal(pose.world[:3, :3], np.eye(3))
 
 
 @pytest.mark.parametrize(
@@ -56,8 +44,8 @@ def test_small_tilts_are_the_files_own(brain, degrees):
 )
 def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
     labels, affine = brain
-    pose = pose_of_labels(labels, turned(degrees) @ affine, SCHEMES["spina-bifida-atlas"])
-    assert np.array_equal(pose.rotation, np.eye(3))
+    pose = pose_of_labels(labels, rigid(*degrees) @ affine, SCHEMES["spina-bifida-atlas"])
+    assert np.array_equal(pose.world[:3, :3], np.eye(3))
     (warning,) = pose.warnings
     said = re.search(r"cerebellum and brainstem say that the brain is turned by about (\d+)°, which was kept", warning)
     # the hindbrain of this brain is pitched by 7° against that of the atlas
@@ -67,10 +55,10 @@ def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
 @pytest.mark.parametrize("turn", TURNS)
 def test_a_turned_brain_is_turned_and_a_mirrored_one_is_called_so(brain, turn):
     labels, affine = pathologies.add_sides(*brain), brain[1]
-    pose = pose_of_labels(labels, turned(turn) @ affine, SCHEMES["dhcp-19"])
-    np.testing.assert_allclose(pose.rotation @ turned(turn)[:3, :3], np.eye(3), atol=1e-9)
+    pose = pose_of_labels(labels, rigid(*turn) @ affine, SCHEMES["dhcp-19"])
+    np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*turn)[:3, :3], np.eye(3), atol=1e-9)
     with pytest.raises(InputError, match=r"left hemisphere lie on the right.*affine mirrors"):
-        pose_of_labels(labels, turned(turn) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
+        pose_of_labels(labels, rigid(*turn) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
 
 
 @pytest.mark.parametrize("lost", [(10,), (11, 12)], ids=["cerebellum", "brainstem"])
@@ -78,68 +66,66 @@ def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(brai
     labels, affine = pathologies.add_sides(*brain), brain[1]
     labels = np.where(np.isin(labels, lost), 0, labels)
     for turn in TURNS:
-        pose = pose_of_labels(labels, turned(turn) @ affine, SCHEMES["dhcp-19"])
-        np.testing.assert_allclose(pose.rotation @ turned(turn)[:3, :3], np.eye(3), atol=1e-9)
+        pose = pose_of_labels(labels, rigid(*turn) @ affine, SCHEMES["dhcp-19"])
+        np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*turn)[:3, :3], np.eye(3), atol=1e-9)
     for tilt in ((0, 0, 0), (0, 10, 8), (0, -5, 12)):
-        assert pose_of_labels(labels, turned(tilt) @ affine, SCHEMES["dhcp-19"]).by == "file"
+        assert pose_of_labels(labels, rigid(*tilt) @ affine, SCHEMES["dhcp-19"]).by == "file"
         with pytest.raises(InputError, match=r"left hemisphere lie on the right.*affine mirrors"):
-            pose_of_labels(labels, turned(tilt) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
+            pose_of_labels(labels, rigid(*tilt) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
 
 
 def test_labels_without_hindbrain_and_sides_tell_no_pose(brain):
     labels, affine = brain
-    assert pose_of_labels((labels > 0).astype(int), affine, SCHEMES["binary"]) is None
+    pose = pose_of_labels((labels > 0).astype(int), affine, SCHEMES["binary"])
+    assert (pose.by, pose.warnings, pose.world.tolist()) == ("file", (), np.eye(4).tolist())
 
 
 @pytest.mark.parametrize("pathology", [None, "without_callosum", "holoprosencephaly", "wide_hemisphere"])
 def test_the_shape_tells_lps_from_ras(brain, pathology):
     labels, affine = brain
-    mesh = surface_of(getattr(pathologies, pathology)(labels, affine) if pathology else labels, affine)
+    mesh = cerebrum_surface(getattr(pathologies, pathology)(labels, affine) if pathology else labels, affine)
     assert pose_surface_by_shape(mesh, "auto").warnings == ()
-    lps = pose_surface_by_shape(transformed(mesh, turned((0, 0, 180))), "auto")
-    np.testing.assert_allclose(lps.rotation, np.diag([-1.0, -1.0, 1.0]))
+    lps = pose_surface_by_shape(transformed(mesh, rigid(*(0, 0, 180))), "auto")
+    np.testing.assert_allclose(lps.of_file()[:3, :3], np.diag([-1.0, -1.0, 1.0]))
     assert "are LPS" in lps.warnings[0]
 
 
 def test_the_shape_tells_any_pose(brain):
-    mesh = surface_of(*brain)
-    turn = turned((100, 40, -70))
+    mesh = cerebrum_surface(*brain)
+    turn = rigid(*(100, 40, -70))
     pose = pose_surface_by_shape(transformed(mesh, turn), "auto")
-    assert angle_deg(pose.rotation @ turn[:3, :3]) < 5.0
+    assert angle_deg(pose.world[:3, :3] @ turn[:3, :3]) < 5.0
     assert "as its shape says" in pose.warnings[0]
 
 
 def test_coordinates_that_are_named_are_kept_and_doubted(brain):
-    mesh = surface_of(*brain)
-    pose = pose_surface_by_shape(transformed(mesh, turned((180, 0, 0))), "ras")
-    assert np.array_equal(pose.rotation, np.eye(3))
+    mesh = cerebrum_surface(*brain)
+    pose = pose_surface_by_shape(transformed(mesh, rigid(*(180, 0, 0))), "ras")
+    assert np.array_equal(pose.world[:3, :3], np.eye(3))
     assert "turned by 1" in pose.warnings[0]
     assert pose_surface_by_shape(mesh, "ras").warnings == ()
 
 
 def test_a_shape_without_a_pose_is_refused():
-    import trimesh
-
     # neither front nor back, up nor down, and its axes are no file's
-    ball = trimesh.creation.icosphere(subdivisions=4)
-    mesh = transformed(TriangleMesh(ball.vertices * [24, 33, 22], ball.faces), turned((50, 40, 30)))
+    mesh = transformed(ellipsoid((24, 33, 22)), rigid(*(50, 40, 30)))
     with pytest.raises(InputError, match="cannot be determined from its shape"):
         pose_surface_by_shape(mesh, "auto")
 
 
 def test_hemispheres_are_narrow_and_brains_are_not(brain):
     labels, affine = brain
-    assert narrowness(surface_of(labels, affine)) > 0.6
-    assert narrowness(surface_of(pathologies.one_hemisphere(labels, affine), affine)) < 0.45
+    assert narrowness(cerebrum_surface(labels, affine)) > 0.6
+    assert narrowness(cerebrum_surface(pathologies.one_hemisphere(labels, affine), affine)) < 0.45
 
 
 @pytest.mark.fault(9, 10)
 def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted(brain):
-    left, right = (surface_of(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right"))
+    left, right = (cerebrum_surface(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right"))
     assert doubts_of_hemispheres(left, right, "ras") == []
     # files that are swapped, and in the other one of RAS and LPS: back to front
-    about = [transformed(side, turned((0, 0, 180))) for side in (right, left)]
+    about = [transformed(side, rigid(*(0, 0, 180))) for side in (right, left)]
     (doubt,) = doubts_of_hemispheres(*about, "lps")
     assert "behind the middle: are left and right swapped, and the coordinates not LPS?" in doubt
-    (doubt,) = doubts_of_hemispheres(*(transformed(side, turned((180, 0, 0))) for side in (left, right)), "ras")
+    (doubt,) = doubts_of_hemispheres(*(transformed(side, rigid(*(180, 0, 0))) for side in (left, right)), "ras")
     assert "turned by 1" in doubt

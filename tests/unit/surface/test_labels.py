@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.io.schemes import SCHEMES
 from gyriflow.surface.labels import (
     cerebrum_mask,
     missing_tissues,

@@ -2,18 +2,19 @@
 
 import numpy as np
 import pytest
-import trimesh
+from scipy.spatial.transform import Rotation
+from shapes import ellipsoid
 
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas, vertex_normals
-from gyriflow.surface.medial_wall import CUT_ERROR_DEG, FITTED_ERROR_DEG, medial_wall
+from gyriflow.surface.outlines import CUT_ERROR_DEG, FITTED_ERROR_DEG, medial_wall
 
 START = np.array([-1.0, 0.0, 0.0])
 
 
 def half_ellipsoid(bend):
     """Returns half an ellipsoid of about unit volume, its flat side at x = 0 and bent by `bend` in waves."""
-    ball = trimesh.creation.icosphere(subdivisions=5)
-    points = ball.vertices * [0.6, 1.0, 0.75]
+    ball = ellipsoid((0.6, 1.0, 0.75), 5)
+    points = ball.vertices.copy()
     wall = points[:, 0] < 0
     points[wall, 0] = bend * np.sin(3.0 * points[wall, 1]) * np.cos(4.0 * points[wall, 2])
     mesh = TriangleMesh(points, ball.faces)
@@ -23,7 +24,7 @@ def half_ellipsoid(bend):
 @pytest.mark.parametrize("tilt", [0.0, 10.0])
 def test_a_cut_is_found_exactly(tilt):
     points, normals, areas = half_ellipsoid(0.0)
-    turn = trimesh.transformations.rotation_matrix(np.radians(tilt), [0.0, 0.6, 0.8])[:3, :3]
+    turn = Rotation.from_rotvec(np.array([0.0, 0.6, 0.8]) * tilt, degrees=True).as_matrix()
     wall = medial_wall(points @ turn.T, normals @ turn.T, areas, START)
     assert np.degrees(np.arccos(wall.normal @ turn @ START)) < 0.05
     assert wall.offset == pytest.approx(0.0, abs=1e-3)

@@ -2,18 +2,16 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from shapes import LPS, cerebrum_surface, phantom, rigid
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
-from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.io.schemes import SCHEMES
 from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
-from gyriflow.surface.file_poses import volume_pose
-from gyriflow.surface.from_labels import from_labels, hemisphere_from_labels
-from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres
-from gyriflow.surface.white import thickness_from_white
+from gyriflow.phantom.brain import CENTRE_MM
+from gyriflow.surface.pial import from_hemispheres, from_labels, from_surface
+from gyriflow.surface.thickness import thickness_from_white
 
 QUICK = {"week": 24.0, "edge_length_mm": 2.0}
 DHCP = SCHEMES["dhcp-19"]
@@ -21,33 +19,22 @@ DHCP = SCHEMES["dhcp-19"]
 
 @pytest.fixture(scope="module")
 def brain():
-    return phantom_labels(24.0, voxel_mm=1.6)
-
-
-def surface_of(labels, affine):
-    mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
-    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+    return phantom(24.0, 1.6)
 
 
 @pytest.fixture(scope="module")
 def sides(brain):
-    return {side: surface_of(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right")}
-
-
-def turned(*degrees):
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
-    return matrix
+    return {side: cerebrum_surface(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right")}
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize(("degrees", "by"), [((0, 0, 0), "file"), ((0, 0, 180), "file"), ((100, 40, -70), "shape")])
 def test_a_hemisphere_in_any_pose_is_posed(sides, side, degrees, by):
-    turn = turned(*degrees)
-    surface = from_hemisphere(transformed(sides[side], turn), side, **QUICK)
-    assert surface.report["pose_by"] == by
-    rest = np.array(surface.report["pose"])[:3, :3] @ turn[:3, :3]
-    assert np.degrees(Rotation.from_matrix(rest).magnitude()) < 5.0
+    turn = rigid(*degrees)
+    surface = from_surface(transformed(sides[side], turn), side, coordinates="auto", **QUICK)
+    assert surface.pose.by == by
+    rest = surface.pose.of_file()[:3, :3] @ turn[:3, :3]
+    assert angle_deg(rest) < 5.0
     there = getattr(surface, side)
     assert there is surface.whole
     assert getattr(surface, "left" if side == "right" else "right") is None
@@ -57,19 +44,19 @@ def test_a_hemisphere_in_any_pose_is_posed(sides, side, degrees, by):
 
 def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
     with pytest.raises(InputError, match="seems to be the right one"):
-        from_hemisphere(sides["right"], "left", **QUICK)
+        from_surface(sides["right"], "left", coordinates="auto", **QUICK)
     with pytest.raises(InputError, match="this is no single hemisphere"):
-        from_hemisphere(surface_of(*brain), "left", **QUICK)
+        from_surface(cerebrum_surface(*brain), "left", coordinates="auto", **QUICK)
 
 
 def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
     labels, affine = pathologies.add_sides(*brain), brain[1]
     left = pathologies.one_hemisphere(labels, affine, "left")
-    surface = hemisphere_from_labels(left, affine, DHCP, "left", **QUICK)
+    surface = from_labels(left, affine, DHCP, "left", **QUICK)
     assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5
     assert surface.report["volume_mL"] == pytest.approx(surface.report["mask_volume_mL"], rel=0.01)
     with pytest.raises(InputError, match="holds labels of another hemisphere than the right one"):
-        hemisphere_from_labels(left, affine, DHCP, "right", **QUICK)
+        from_labels(left, affine, DHCP, "right", **QUICK)
     with pytest.raises(
         InputError, match=r"one hemisphere only; found labels of the left.*Give a volume with both hemispheres"
     ):
@@ -90,10 +77,10 @@ def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_told_so(brain)
 
 def test_volumes_of_a_hemisphere_whose_affine_is_lps_are_turned_as_its_labels(brain):
     left = pathologies.one_hemisphere(pathologies.add_sides(*brain), brain[1], "left")
-    affine = turned(0, 0, 180) @ brain[1]
-    surface = hemisphere_from_labels(left, affine, DHCP, "left", **QUICK)
+    affine = rigid(0, 0, 180) @ brain[1]
+    surface = from_labels(left, affine, DHCP, "left", **QUICK)
     assert "the shape says that the coordinates are LPS" in surface.report["warnings"]
-    world = volume_pose(surface.report, "a.nii") @ affine
+    world = surface.pose.world @ affine
     voxels = np.argwhere(np.isin(left, DHCP.cerebrum)) @ world[:3, :3].T + world[:3, 3]
     for end in (np.min, np.max):
         assert end(surface.whole.vertices, axis=0) == pytest.approx(end(voxels, axis=0), abs=2.0)
@@ -104,16 +91,16 @@ def inner(mesh, depth_mm):
 
 
 def test_white_surfaces_give_the_thickness_in_any_pose_and_may_not_cross(sides):
-    turn = np.diag([-1.0, -1.0, 1.0, 1.0])
-    moved = [transformed(sides[side], turn) for side in ("left", "right")]
+    moved = [transformed(sides[side], LPS) for side in ("left", "right")]
     surface = from_hemispheres(*moved, coordinates="lps", **QUICK)
+    posed = surface.whole, surface.pose, surface.fissure_x_mm
     whites = {side: inner(mesh, 1.5) for side, mesh in zip(("left", "right"), moved, strict=True)}
-    thickness = thickness_from_white(surface.whole, surface.report, whites)
+    thickness = thickness_from_white(*posed, whites)
     assert thickness.report["mean_mm"] == pytest.approx(1.5, abs=0.15)
     assert thickness.measured.mean() > 0.98
     with pytest.raises(InputError, match=r"the white surface \(left\) crosses the pial one"):
-        thickness_from_white(surface.whole, surface.report, whites | {"left": inner(moved[0], -1.5)})
+        thickness_from_white(*posed, whites | {"left": inner(moved[0], -1.5)})
     with pytest.raises(
         InputError, match=r"the white surface \(right\) lies in the other hemisphere.*both are of one side"
     ):
-        thickness_from_white(surface.whole, surface.report, whites | {"right": whites["left"]})
+        thickness_from_white(*posed, whites | {"right": whites["left"]})

@@ -3,18 +3,17 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from shapes import cerebrum_surface, phantom
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+from gyriflow.phantom.brain import CENTRE_MM
 from gyriflow.surface.extraction import isosurface, smooth_mask
-from gyriflow.surface.fissure import fissure_between, open_fissure
-from gyriflow.surface.orientation import mid_plane, upright
+from gyriflow.surface.fissure import fissure_between, mid_plane, open_fissure, upright
 
 
 @pytest.fixture(scope="module")
 def brain():
-    labels, affine = phantom_labels(24.0, voxel_mm=1.2)
-    mesh = isosurface(smooth_mask(np.isin(labels, (1, 2, 5, 6, 8)), 1.0), affine)
+    mesh = cerebrum_surface(*phantom())
     # the phantom's own centre to the origin: its fissure is x = 0 there
     return TriangleMesh(mesh.vertices - CENTRE_MM, mesh.faces)
 

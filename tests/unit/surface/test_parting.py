@@ -2,48 +2,38 @@
 
 import numpy as np
 import pytest
-import trimesh
+from shapes import cerebrum_surface, ellipsoid, phantom, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged
-from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.io.schemes import SCHEMES
 from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, make_simple, shifted_affine, smooth_mask
-from gyriflow.surface.fissure import fissure_between, open_fissure
-from gyriflow.surface.from_labels import from_labels
-from gyriflow.surface.hemispheres import cut_sides, left_faces
-from gyriflow.surface.orientation import MidPlane, mid_plane
+from gyriflow.phantom.brain import CENTRE_MM
+from gyriflow.surface.extraction import isosurface, smooth_mask
+from gyriflow.surface.fissure import MidPlane, cut_sides, fissure_between, left_faces, mid_plane, open_fissure
+from gyriflow.surface.pial import from_labels
 from gyriflow.surface.repair import pieces
-
-BALL = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
 
 
 @pytest.fixture(scope="module")
 def brain():
-    return phantom_labels(24.0, voxel_mm=1.2)
-
-
-def surface_of(labels, affine):
-    mask = np.pad(np.isin(labels, pathologies.CEREBRUM), 4)
-    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], shifted_affine(affine, np.full(3, -4)))
+    return phantom()
 
 
 def ball_at(*centre):
-    return TriangleMesh(BALL.vertices + centre, BALL.faces)
+    return sphere(10.0, 3, centre)
 
 
 def test_two_closed_pieces_are_the_hemispheres_though_they_reach_over_the_plane():
     mesh = merged(ball_at(-8.0, 0.0, 0.0), ball_at(12.5, 0.0, 0.0))
     left = left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
-    assert left.tolist() == [True] * len(BALL.faces) + [False] * len(BALL.faces)
+    assert left.tolist() == [True] * 1280 + [False] * 1280
 
 
 def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
-    ball = trimesh.creation.icosphere(subdivisions=4)
     # whose middle is a little off the plane, on the other side than the lump
-    brain = TriangleMesh(ball.vertices * [24, 33, 22] + [0.5, 0, 0], ball.faces)
-    lump = TriangleMesh(BALL.vertices * 0.87 + [-38.0, 0.0, 0.0], BALL.faces)
+    brain = ellipsoid((24, 33, 22), centre=(0.5, 0, 0))
+    lump = sphere(8.7, 3, (-38.0, 0.0, 0.0))
     assert 0.1 < area(lump) / area(brain) < 0.12
     mesh = merged(brain, lump)
     with pytest.raises(InputError, match=r"cannot be parted at the fissure.* 10 % of the area beside"):
@@ -53,7 +43,7 @@ def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
 @pytest.mark.parametrize("mm", [3.0, 6.0])
 def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
     labels, affine = brain
-    mesh = surface_of(pathologies.bent_midline(pathologies.apart(labels, affine), affine, mm), affine)
+    mesh = cerebrum_surface(pathologies.bent_midline(pathologies.apart(labels, affine), affine, mm), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
     sides = cut_sides(mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1))))
     assert [len(pieces(side)) for side in sides] == [1, 1]
@@ -63,7 +53,7 @@ def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
 @pytest.mark.parametrize("pathology", ["bent_midline", "without_callosum", "shifted_midline"])
 def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
     labels, affine = brain
-    mesh = surface_of(getattr(pathologies, pathology)(labels, affine), affine)
+    mesh = cerebrum_surface(getattr(pathologies, pathology)(labels, affine), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
     sides = cut_sides(mesh, left)
@@ -127,7 +117,7 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
 
 
 def test_a_narrow_fissure_shown_by_csf_keeps_its_width(brain):
-    labels, affine = phantom_labels(24.0, voxel_mm=0.9)
+    labels, affine = phantom(24.0, 0.9)
     x, _, _ = pathologies.positions(labels, affine)
     cerebrum = np.isin(labels, pathologies.CEREBRUM)
     # one voxel of CSF in the middle, cortex beside it

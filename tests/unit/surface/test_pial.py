@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
+import shapes
 from scipy.spatial.transform import Rotation
+from shapes import LPS, rigid, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import self_intersecting_faces
@@ -22,22 +23,19 @@ from gyriflow.geometry.triangles import (
     submesh,
     transformed,
 )
+from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.mesh.maps import move_to_mesh
-from gyriflow.parameters.schemes import SCHEMES
+from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
-from gyriflow.surface.file_poses import surface_pose, volume_pose
-from gyriflow.surface.from_labels import from_labels
-from gyriflow.surface.from_surfaces import from_hemisphere, from_hemispheres, from_pial
-from gyriflow.surface.hemispheres import least_gap, left_faces, set_apart, split
+from gyriflow.surface.fissure import least_gap, left_faces, set_apart, split
+from gyriflow.surface.pial import from_hemispheres, from_labels, from_surface
+from gyriflow.surface.plausible import expected_volume_ml, require_plausible_size
 from gyriflow.surface.repair import pieces
-from gyriflow.surface.size import expected_volume_ml, require_plausible_size
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
 ATLAS = SCHEMES["spina-bifida-atlas"]
-LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 QUICK = {"edge_length_mm": 1.5}
 
 
@@ -50,7 +48,7 @@ def atlas_volume(week):
 
 @pytest.fixture(scope="module")
 def volume():
-    return phantom_labels(24.0, voxel_mm=1.2)
+    return shapes.phantom()
 
 
 @pytest.fixture(scope="module")
@@ -59,19 +57,9 @@ def phantom(volume):
 
 
 @pytest.fixture(scope="module")
-def halves(volume):
-    """The phantom's left and right hemispheres as closed surfaces a millimetre apart, in RAS+."""
-    labels, affine = volume
-    x = affine[0, 2] * np.arange(labels.shape[2]) + affine[0, 3] - CENTRE_MM[0]
-    sides = []
-    for keep in (x < -0.6, x > 0.6):
-        mask = np.isin(labels, ATLAS.cerebrum) & keep
-        sides.append(from_binary(mask, affine))
-    return sides
-
-
-def from_binary(mask, affine):
-    return isosurface(make_simple(smooth_mask(mask, 1.0))[0], affine)
+def halves():
+    """The phantom's left and right hemispheres as closed surfaces a millimetre apart, where its volume has them."""
+    return [transformed(half, rigid(shift=CENTRE_MM)) for half in shapes.phantom_halves()]
 
 
 def require_sound(surface, surfaces=1):
@@ -114,13 +102,12 @@ def test_phantoms_of_all_ages_are_sound_and_fold():
 @pytest.mark.parametrize("turn", [(0, 0, 45), (20, -30, 10)])
 def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom, turn):
     labels, affine = volume
-    oblique = np.eye(4)
-    oblique[:3, :3] = Rotation.from_euler("xyz", turn, degrees=True).as_matrix()
+    oblique = rigid(*turn)
     turned = from_labels(labels, oblique @ affine, ATLAS, week=24.0, **QUICK)
     require_sound(turned)
     for part in ("whole", "left", "right"):
         assert turned.report["area_cm2"][part] == pytest.approx(phantom.report["area_cm2"][part], rel=0.005)
-    normal = np.array(turned.report["pose"])[:3, :3] @ oblique[:3, 0]
+    normal = turned.pose.world[:3, :3] @ oblique[:3, 0]
     assert np.degrees(np.arccos(normal[0])) < 1.0
 
 
@@ -142,7 +129,7 @@ def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, unit):
     with pytest.raises(InputError, match=f"seems to be in {unit}"):
         from_labels(labels, scale @ affine, ATLAS, week=24.0)
     with pytest.raises(InputError, match=f"seems to be in {unit}"):
-        from_pial(transformed(phantom.whole, scale), week=24.0, max_hole_mm=3.0)
+        from_surface(transformed(phantom.whole, scale), week=24.0, max_hole_mm=3.0)
     with pytest.raises(InputError, match=f"seems to be in {unit}"):
         from_hemispheres(*(transformed(half, scale) for half in halves), week=24.0)
 
@@ -163,7 +150,7 @@ def test_a_surface_in_voxel_indices_is_told(phantom):
     assert not any("voxel indices" in warning for warning in phantom.report["warnings"])
     # voxels of 0.7 mm
     indices = transformed(phantom.whole, np.diag([1 / 0.7] * 3 + [1.0]))
-    surface = from_pial(indices, week=24.0, edge_length_mm=3.0)
+    surface = from_surface(indices, week=24.0, edge_length_mm=3.0)
     assert any("not in voxel indices?" in warning for warning in surface.report["warnings"])
 
 
@@ -199,18 +186,18 @@ def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain(halves
     world = merged(*halves)
     sides, whole = [transformed(half, LPS) for half in halves], transformed(world, LPS)
     surfaces = {
-        "pial": from_pial(whole, week=24.0, coordinates="lps", **QUICK),
-        "pial, found": from_pial(whole, week=24.0, coordinates="auto", **QUICK),
-        "hemisphere, found": from_hemisphere(sides[1], "right", week=24.0, coordinates="auto", **QUICK),
+        "pial": from_surface(whole, week=24.0, coordinates="lps", **QUICK),
+        "pial, found": from_surface(whole, week=24.0, coordinates="auto", **QUICK),
+        "hemisphere, found": from_surface(sides[1], "right", week=24.0, coordinates="auto", **QUICK),
         "hemispheres": from_hemispheres(*sides, week=24.0, coordinates="lps", **QUICK),
         "hemispheres, found": from_hemispheres(*sides, week=24.0, coordinates="auto", **QUICK),
     }
     for source, surface in surfaces.items():
         points, one = surface.whole.vertices, source.startswith("hemisphere,")
         given, there = (sides[1], halves[1]) if one else (whole, world)
-        moved = move_to_mesh(points, given, surface_pose(surface.report))
+        moved = move_to_mesh(points, given, surface.pose.of_file())
         # a volume knows the brain in the world, which is RAS+
-        voxels = transformed(there, volume_pose(surface.report, "a.nii"))
+        voxels = transformed(there, surface.pose.of_volume("a.nii"))
         for found in (moved, voxels):
             for end in (np.min, np.max):
                 assert np.abs(end(found.vertices, axis=0) - end(points, axis=0)).max() < 1.5, source
@@ -253,7 +240,7 @@ def test_hemispheres_in_different_poses_are_refused(halves):
 def test_pial_surface_with_a_small_hole_is_closed(phantom):
     near = np.linalg.norm(phantom.whole.vertices[phantom.whole.faces].mean(axis=1) - phantom.whole.vertices[0], axis=1)
     holed, _ = submesh(phantom.whole, near > 1.5)
-    surface = from_pial(transformed(holed, LPS), week=24.0, coordinates="lps", max_hole_mm=6.0, **QUICK)
+    surface = from_surface(transformed(holed, LPS), week=24.0, coordinates="lps", max_hole_mm=6.0, **QUICK)
     require_sound(surface)
     assert surface.report["repair"]["holes_closed"] == 1
     assert area(surface.whole) == pytest.approx(area(phantom.whole), rel=0.02)
@@ -269,7 +256,7 @@ def test_pial_surface_that_cuts_itself_is_made_anew(phantom):
     vertices[wall, 0] += 4.0
     tangled = TriangleMesh(vertices, phantom.whole.faces)
     assert self_intersecting_faces(tangled).sum() > 20
-    surface = from_pial(tangled, week=24.0, **QUICK)
+    surface = from_surface(tangled, week=24.0, **QUICK)
     require_sound(surface)
     assert signed_volume(surface.whole) == pytest.approx(signed_volume(tangled), rel=0.03)
 
@@ -295,11 +282,8 @@ def test_face_on_each_side_belongs_to_that_side():
 
 
 def test_gap_between_balls_is_known():
-    sphere = trimesh.creation.icosphere(subdivisions=3, radius=5.0)
-    one = TriangleMesh(sphere.vertices - [6.0, 0, 0], sphere.faces)
-    other = TriangleMesh(sphere.vertices - [-6.0, 0, 0], sphere.faces)
+    one, other, closer = (sphere(5.0, 3, (x, 0.0, 0.0)) for x in (-6.0, 6.0, 2.0))
     assert least_gap(one, other) == pytest.approx(2.0, abs=0.05)
-    closer = TriangleMesh(other.vertices - [4.0, 0, 0], other.faces)
     assert least_gap(one, closer) == pytest.approx(-2.0, abs=0.1)
     apart_one, apart_other, moved = set_apart(one, closer, 1.0, np.array([1.0, 0, 0]))
     assert moved == pytest.approx(1.5, abs=0.1)
@@ -307,22 +291,12 @@ def test_gap_between_balls_is_known():
 
 
 def test_sides_of_a_scheme_that_contradict_the_affine_are_refused(volume):
-    labels, affine = volume
-    x = affine[0, 2] * np.arange(labels.shape[2]) + affine[0, 3] - CENTRE_MM[0]
+    labels, affine = pathologies.add_sides(*volume), volume[1]
     scheme = SCHEMES["dhcp-19"]
-    twins = {1: (5, 6), 2: (7, 8), 5: (3, 4), 6: (14, 15)}
-    sided = np.zeros_like(labels)
-    for number, (left, right) in twins.items():
-        sided = np.where(labels == number, np.where(x < 0, left, right), sided)
-    sided[labels == 8] = 5
-    # the tissues that the phantom does not have, a voxel each
-    inner = np.argwhere(sided == 5)[:: max(1, int((sided == 5).sum()) // 10)]
-    for number, place in zip(sorted(set(scheme.cerebrum) - set(np.unique(sided))), inner, strict=False):
-        sided[tuple(place)] = number
-    assert from_labels(sided, affine, scheme, week=24.0, **QUICK).fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.5)
+    assert from_labels(labels, affine, scheme, week=24.0, **QUICK).fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.5)
     mirrored = np.diag([-1.0, 1.0, 1.0, 1.0]) @ affine
     with pytest.raises(InputError, match="left hemisphere lie on the right"):
-        from_labels(sided, mirrored, scheme, week=24.0, **QUICK)
+        from_labels(labels, mirrored, scheme, week=24.0, **QUICK)
 
 
 @pytest.mark.slow

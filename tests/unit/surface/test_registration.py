@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import unit
-from gyriflow.surface.outline_fit import Target, register, register_deformed
-from gyriflow.surface.outlines import reference
+from gyriflow.surface.outlines import Target, reference, register, register_deformed
 
 
 def bent(outline, seed):

@@ -2,22 +2,19 @@
 
 import numpy as np
 import pytest
-import trimesh
+from shapes import sphere, torus
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.remeshing import remesh, self_intersecting_faces, untangle
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume, submesh
-from gyriflow.surface.even_triangles import make_even, smooth_taubin
-from gyriflow.surface.rebuilding import rebuild
-from gyriflow.surface.repair import clean, pieces
+from gyriflow.surface.repair import clean, make_even, pieces, rebuild, smooth_taubin
 
 RADIUS = 10.0
 VOLUME = 4 / 3 * np.pi * RADIUS**3
 
 
 def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
-    sphere = trimesh.creation.icosphere(subdivisions=4, radius=radius)
-    return TriangleMesh(sphere.vertices + centre, sphere.faces)
+    return sphere(radius, centre=centre)
 
 
 def test_sound_surface_stays_as_it_is():
@@ -137,8 +134,7 @@ def test_overlapping_balls_are_made_one_surface():
 
 
 def test_handle_of_a_torus_is_closed_when_remade():
-    ring = trimesh.creation.torus(major_radius=10.0, minor_radius=7.5, major_sections=60, minor_sections=40)
-    mesh, report = clean(TriangleMesh(ring.vertices, ring.faces), 3.0)
+    mesh, report = clean(torus(10.0, 7.5, 60, 40), 3.0)
     assert euler_number(mesh) == 0
     simple, report = rebuild(remesh(mesh, 1.0), 0.8)
     assert euler_number(simple) == 2

@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from shapes import phantom, sphere
 
 from gyriflow.geometry.remeshing import self_intersecting_faces
-from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged, signed_volume
-from gyriflow.parameters.schemes import SCHEMES, LabelScheme
-from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.surface.from_labels import from_labels
-from gyriflow.surface.shrinkage import after_repairs, with_volume
+from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.phantom.brain import CENTRE_MM
+from gyriflow.surface.pial import from_labels
+from gyriflow.surface.repair import after_repairs, with_volume
 
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
 
@@ -16,7 +18,7 @@ SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=
 @pytest.fixture(scope="module")
 def bent():
     """A phantom whose sides meet at a surface bent by 4 mm, cortex on both sides of it and no gap between."""
-    labels, affine = phantom_labels(24.0, voxel_mm=1.2)
+    labels, affine = phantom()
     index = np.stack(np.indices(labels.shape), axis=-1)
     x, y, _ = np.moveaxis(index @ affine[:3, :3].T + affine[:3, 3] - CENTRE_MM, -1, 0)
     cerebrum = np.isin(labels, (1, 2, 5, 6, 8))
@@ -33,7 +35,7 @@ def bent():
 def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet(bent):
     sided, affine, _ = bent
     surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=1.5)
-    inverse = np.array(surface.report["pose"])
+    inverse = surface.pose.world
     expected = {"left": -1, "right": 1}
     for name, sign in expected.items():
         part = getattr(surface, name)
@@ -49,7 +51,7 @@ def test_a_scheme_of_ones_own_names_its_tissues():
 
 
 def test_smoothing_keeps_volume_and_area(bent):
-    labels, affine = phantom_labels(22.0, voxel_mm=1.2)
+    labels, affine = phantom(22.0)
     surface = from_labels(labels, affine, SCHEMES["spina-bifida-atlas"], week=22.0, edge_length_mm=1.5)
     smoothing = surface.report["smoothing"]
     assert abs(smoothing["volume_change"]) < 1e-4 < abs(smoothing["volume_change_before_correction"])
@@ -60,9 +62,7 @@ def test_smoothing_keeps_volume_and_area(bent):
 
 
 def test_a_volume_that_is_far_off_is_told_and_not_hidden():
-    from trimesh.creation import icosphere
-
-    ball = TriangleMesh(*(np.array(a) for a in (icosphere(3, 20.0).vertices, icosphere(3, 20.0).faces)))
+    ball = sphere(20.0, 3)
     volume = signed_volume(ball)
     near, report = with_volume(ball, 1.02 * volume, area(ball))
     assert signed_volume(near) == pytest.approx(1.02 * volume, rel=1e-5)
@@ -73,11 +73,9 @@ def test_a_volume_that_is_far_off_is_told_and_not_hidden():
 
 
 def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
-    from trimesh.creation import icosphere
-
-    one = icosphere(3, 20.0)
+    one = sphere(20.0, 3)
     shift = np.array([2 * one.vertices[:, 0].max() + 0.1, 0.0, 0.0])
-    balls = merged(*(TriangleMesh(np.array(one.vertices + k * shift), np.array(one.faces)) for k in (0, 1)))
+    balls = merged(*(sphere(20.0, 3, k * shift) for k in (0, 1)))
     wider, report = with_volume(balls, 1.02 * signed_volume(balls), area(balls))
     assert report["volume_change"] == pytest.approx(0.0, abs=1e-4)
     assert not self_intersecting_faces(wider).any()

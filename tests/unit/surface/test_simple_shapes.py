@@ -19,7 +19,7 @@ def test_a_shape_is_left_as_it_is_and_cut_at_x_0():
     surface = from_shape(slab, week=21.0)
     assert np.array_equal(surface.whole.vertices, slab.vertices)
     assert surface.fissure_x_mm == surface.report["fissure_x_mm"] == 0.0
-    assert surface.report["pose"] == np.eye(4).tolist()
+    assert surface.pose.world.tolist() == np.eye(4).tolist()
     assert (surface.report["source"], surface.report["week"], surface.report["warnings"]) == ("shape", 21.0, [])
     assert corners(surface.left)[:, :, 0].mean(axis=1).max() < 0 < corners(surface.right)[:, :, 0].mean(axis=1).min()
     assert area(surface.left) + area(surface.right) == pytest.approx(area(slab))

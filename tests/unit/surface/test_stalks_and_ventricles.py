@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
+from shapes import phantom
 
 from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
-from gyriflow.parameters.schemes import SCHEMES, LabelScheme
-from gyriflow.phantom.brain import phantom_labels
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
-from gyriflow.surface.extraction import isosurface, smooth_mask
-from gyriflow.surface.stalks import surface_without_stalks, without_stalks
-from gyriflow.surface.ventricles import outside_ventricles
+from gyriflow.surface.extraction import isosurface, smooth_mask, without_stalks
+from gyriflow.surface.labels import outside_ventricles
+from gyriflow.surface.repair import surface_without_stalks
 
 AFFINE = np.diag([0.8, 0.8, 0.8, 1.0])
 
@@ -63,7 +64,7 @@ def test_surfaces_without_stalks_are_the_same_objects():
 
 @pytest.fixture(scope="module")
 def brain():
-    return phantom_labels(24.0, voxel_mm=1.2)
+    return phantom()
 
 
 def test_the_fourth_ventricle_is_outside_and_the_third_is_not(brain):

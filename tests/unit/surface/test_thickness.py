@@ -8,8 +8,8 @@ from skimage.measure import marching_cubes
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import transformed
-from gyriflow.surface.even_triangles import make_even
 from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
+from gyriflow.surface.repair import make_even
 from gyriflow.surface.thickness import cortical_thickness
 
 FOLDS_MM = 2.0

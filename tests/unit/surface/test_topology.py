@@ -6,8 +6,7 @@ from scipy import ndimage
 from skimage.measure import euler_number as euler_number_of_mask
 
 from gyriflow.geometry.triangles import euler_number
-from gyriflow.surface.extraction import isosurface
-from gyriflow.surface.topology import handles, unambiguous, without_handles
+from gyriflow.surface.extraction import handles, isosurface, unambiguous, without_handles
 
 
 def two_blocks():
@@ -37,10 +36,10 @@ def test_thin_bridge_across_a_sulcus_is_cut():
     mask = two_blocks()
     mask[16, 9, 8:12] = True
     assert handles(mask) == 1
-    repair = without_handles(field(mask))
-    assert (repair.handles_left, repair.bridges_cut, repair.tunnels_filled) == (0, 1, 0)
-    assert repair.voxels_cut == 1
-    assert (repair.field > 0.5)[16, 9, 8:12].sum() == 3
+    repaired, counts = without_handles(field(mask))
+    assert (counts["handles_left"], counts["bridges_cut"], counts["tunnels_filled"]) == (0, 1, 0)
+    assert counts["voxels_cut_from_bridges"] == 1
+    assert (repaired > 0.5)[16, 9, 8:12].sum() == 3
 
 
 def test_narrow_tunnel_is_filled():
@@ -48,24 +47,24 @@ def test_narrow_tunnel_is_filled():
     mask[4:16, 4:16, 8:12] = True
     mask[9:11, 9:11, 8:12] = False
     assert handles(mask) == 1
-    repair = without_handles(field(mask))
-    assert (repair.handles_left, repair.bridges_cut, repair.tunnels_filled) == (0, 0, 1)
+    _, counts = without_handles(field(mask))
+    assert (counts["handles_left"], counts["bridges_cut"], counts["tunnels_filled"]) == (0, 0, 1)
     # one layer of the tunnel's four voxels closes it
-    assert repair.voxels_filled == 4
+    assert counts["voxels_filled_in_tunnels"] == 4
 
 
 def test_mask_without_handles_is_not_touched():
     smooth = ndimage.gaussian_filter(two_blocks().astype(np.float32), 1.0)
-    assert np.array_equal(without_handles(smooth).field, smooth)
+    assert np.array_equal(without_handles(smooth)[0], smooth)
 
 
 def test_several_handles_are_all_removed():
     mask = two_blocks()
     mask[12, 6, 8:12] = mask[16, 9:11, 8:12] = mask[18, 13, 8:12] = True
     assert handles(mask) == 3
-    repair = without_handles(field(mask))
-    assert repair.handles_left == 0
-    assert euler_number(isosurface(unambiguous(repair.field), np.eye(4))) == 2
+    repaired, counts = without_handles(field(mask))
+    assert counts["handles_left"] == 0
+    assert euler_number(isosurface(unambiguous(repaired), np.eye(4))) == 2
 
 
 @pytest.mark.parametrize("seed", range(5))

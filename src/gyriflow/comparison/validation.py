@@ -1,0 +1,315 @@
+"""What a study's simulations are worth: a row per run and week, what these say in short and by horizon.
+
+Beside them how the surface moves and how much it is folded, each against the real brain.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from ..errors import InputError
+from ..geometry.alignment import rigid_fit, without_rigid_motion
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area, face_components, signed_volume, vertex_areas
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .placement import MEASURES, SKILLED_FROM, placement
+from .shapes import Shape, against_real, fold_measures
+
+type Kind = Literal["explained", "predicted"]
+"""Whether growth came from the weeks that are compared, or from another brain, atlas or only earlier weeks."""
+
+GAINS = [f"{name}_{measure}" for name in ("gain", "gain_low", "gain_high", "skill") for measure in MEASURES]
+MOVES = ["displacement_r", "displacement_slope", "displacement_r_scaling"]
+AGREEMENT = ("gyrification_index", "gyrification_index_envelope", "mean_sulcal_depth", "mean_curvedness")
+"""What is compared of the table of metrics."""
+BAND = "spangy_share_B"
+"""What the names of the spectrum's shares begin with: relative power of a band."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Which simulated brain is compared: weeks are those that the run began at, and that is compared.
+
+    The seed is that of the noise of the run's start, and of the bootstrap.
+    """
+
+    run: str
+    kind: Kind
+    start_week: float
+    week: float
+    seed: int = 0
+
+    @property
+    def horizon(self) -> float:
+        """Weeks from the start to the one compared."""
+        return self.week - self.start_week
+
+
+def validation_row(
+    comparison: Comparison,
+    *,
+    simulated: TriangleMesh,
+    real_brain: TriangleMesh,
+    curve: tuple[float, float] | None,
+    run: Shape,
+    real: Shape,
+    start: Shape,
+    adjacent: Shape | None,
+) -> dict[str, Any]:
+    """Returns a row of validation.csv.
+
+    Columns: run, kind, start_week, week, horizon, seed; area_cm2, volume_ml and the same with real_ and curve_ in
+    front; area_error and volume_error against the curve and area_difference and volume_difference from the real brain,
+    as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
+    `placement.placement`, `folds.against_real` and `folds.fold_measures`, the latter for the real brain with real_ in
+    front.
+
+    `simulated` and `real_brain` are closed surfaces in mm as they are; `curve` the area (mm²) and volume (mm³) that the
+    run was to follow in this week, if any; the shapes are ready and laid onto the real brain, as for `placement`.
+    """
+    sizes = {"": _sizes(simulated), "real_": _sizes(real_brain)}
+    wanted = (np.nan, np.nan) if curve is None else (curve[0] * CM2_PER_MM2, curve[1] * ML_PER_MM3)
+    row: dict[str, Any] = asdict(comparison) | {"horizon": comparison.horizon}
+    row |= {f"{who}{name}": value for who, size in sizes.items() for name, value in size.items()}
+    row |= {"curve_area_cm2": wanted[0], "curve_volume_ml": wanted[1]}
+    for name, unit, aim in (("area", "cm2", wanted[0]), ("volume", "ml", wanted[1])):
+        row[f"{name}_error"] = row[f"{name}_{unit}"] / aim - 1
+        row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"real_{name}_{unit}"] - 1
+    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=comparison.seed)
+    row |= against_real(run, real)
+    measures = {"": fold_measures(run), "real_": fold_measures(real)}
+    # relative area is that of the surfaces as they are
+    return {f"{who}{name}": value for who, found in measures.items() for name, value in found.items()} | row
+
+
+def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """Returns rows of `validation_row` as a table, what is compared first, by run, start, seed and week."""
+    first = ["run", "kind", "start_week", "week", "horizon", "seed"]
+    table = pd.DataFrame(rows)
+    return table[[*first, *table.columns.difference(first, sort=False)]].sort_values(
+        ["run", "start_week", "seed", "week"], ignore_index=True
+    )
+
+
+def summary(validation: pd.DataFrame, displacement: pd.DataFrame) -> dict[str, dict[str, Any]]:
+    """Returns what the tables say of each run, by its name.
+
+    Validation are rows of `validation_row`; displacement those of `displacement_table` with the columns run, start_week
+    and seed, and may be empty.
+
+    Returns
+    -------
+    dict
+        For each run: kind; worst_area_error and worst_volume_error (largest fractions against the curve, of all weeks);
+        skill_shape_index, skill_mean_curvature, curvature_rms_ratio, last_week (the last week compared, means over
+        seeds and starts); displacement_r, displacement_slope (of the last interval up to that week);
+        skill_by_horizon for each measure, {weeks since the start: mean}, with the gain r − r(start) at horizon 1, where
+        there is no skill; gain_by_horizon; horizon, the same by kind, so that explained and predicted weeks of several
+        starts are not mixed (`by_kind`). None where there is no number.
+
+    InputError where a column is missing.
+    """
+    of_measures = {kind: [f"{kind}_{measure}" for measure in MEASURES] for kind in ("skill", "gain")}
+    _require(
+        validation,
+        ["run", "kind", "week", "horizon", "area_error", *of_measures["skill"], *of_measures["gain"]],
+        "validation",
+    )
+    if len(displacement):
+        _require(displacement, ["run", "to_week", *MOVES[:2]], "displacement")
+    found = {}
+    for name, rows in validation.groupby("run", sort=False):
+        last = rows[rows["week"] == rows["week"].max()]
+        run: dict[str, Any] = {
+            "kind": str(rows["kind"].iloc[0]),
+            "last_week": float(last["week"].iloc[0]),
+            "worst_area_error": _number(rows["area_error"].abs().max()),
+            "worst_volume_error": _number(rows["volume_error"].abs().max()),
+        }
+        run |= {column: _number(last[column].mean()) for column in [*of_measures["skill"], "curvature_rms_ratio"]}
+        moves = displacement[displacement["run"] == name] if len(displacement) else displacement
+        final = moves[moves["to_week"] == moves["to_week"].max()] if len(moves) else None
+        run |= {column: None if final is None else _number(final[column].mean()) for column in MOVES[:2]}
+        means = rows.groupby("horizon")[[*of_measures["skill"], *of_measures["gain"]]].mean()
+        skills, gains = (
+            {
+                measure: {f"{at:g}": _number(row[f"{kind(at)}_{measure}"]) for at, row in means.iterrows()}
+                for measure in MEASURES
+            }
+            for kind in (lambda at: "gain" if at <= SKILLED_FROM else "skill", lambda _: "gain")
+        )
+        found[str(name)] = run | {"skill_by_horizon": skills, "gain_by_horizon": gains, "horizon": by_kind(rows)}
+    return found
+
+
+def by_kind(rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
+    """Returns {kind: {measure: {horizon: gain, skill and number of starts}}} of rows of one run's validation."""
+    return {
+        str(kind): {
+            measure: {
+                f"{horizon:g}": {name: _number(at[f"{name}_{measure}"].mean()) for name in ("gain", "skill")}
+                | {"starts": at["start_week"].nunique()}
+                for horizon, at in of_kind.groupby("horizon")
+            }
+            for measure in MEASURES
+        }
+        for kind, of_kind in rows.groupby("kind")
+    }
+
+
+def horizon_table(
+    validation: pd.DataFrame,
+    displacement: pd.DataFrame,
+    models: Mapping[str, str],
+    known_until_gw: Mapping[str, float | None],
+) -> pd.DataFrame:
+    """Returns what each model is worth by start week and by horizon, explained and predicted weeks apart.
+
+    Parameters
+    ----------
+    validation, displacement
+        As for `summary`.
+    models
+        What runs are called that differ in their start, their seed or in what is known only, by run.
+    known_until_gw
+        The week up to which the brains of a run's growth are known, by run; None for all.
+
+    Returns
+    -------
+    DataFrame
+        model, kind, known_gw (weeks after the start that growth is known for, NaN for all), start_week, horizon, week,
+        runs (how many rows are averaged: seeds and starts of one week); gain_…, gain_low_…, gain_high_… and skill_… of
+        each measure; displacement_r, displacement_slope and displacement_r_scaling of the interval that ends there.
+    """
+    rows = validation.assign(
+        model=validation["run"].map(models).fillna(validation["run"]),
+        known_gw=validation["run"].map({run: week for run, week in known_until_gw.items() if week is not None}),
+    )
+    rows["known_gw"] = (rows["known_gw"].astype(float) - rows["start_week"]).clip(lower=0)
+    if len(displacement):
+        ends = displacement.rename(columns={"to_week": "week"})
+        same = ["run", "start_week", "seed", "week"]
+        rows = rows.merge(ends[[*same, *MOVES]].groupby(same, as_index=False).mean(), on=same, how="left")
+    else:
+        rows = rows.assign(**dict.fromkeys(MOVES, np.nan))
+    keys = ["model", "kind", "known_gw", "start_week", "horizon", "week"]
+    groups = rows.groupby(keys, dropna=False, sort=True)
+    table = groups[[*GAINS, *MOVES]].mean().reset_index()
+    table.insert(len(keys), "runs", groups.size().to_numpy())
+    return table
+
+
+def over_starts(horizons: pd.DataFrame) -> pd.DataFrame:
+    """Returns the means over the start weeks of a table of `horizon_table`, with how many there are in `starts`."""
+    groups = horizons.groupby(["model", "kind", "known_gw", "horizon"], dropna=False, sort=True)
+    table = groups[[*(name for name in GAINS if "low" not in name and "high" not in name), *MOVES]].mean().reset_index()
+    table.insert(4, "starts", groups["start_week"].nunique().to_numpy())
+    return table
+
+
+def _sizes(mesh: TriangleMesh) -> dict[str, float]:
+    surface, volume = area(mesh), signed_volume(mesh)
+    return {
+        "area_cm2": surface * CM2_PER_MM2,
+        "volume_ml": volume * ML_PER_MM3,
+        "relative_area": surface / volume ** (2 / 3),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _require(table: pd.DataFrame, columns: list[str], name: str) -> None:
+    missing = [column for column in columns if column not in table.columns]
+    if missing:
+        raise InputError(
+            f"the {name} table lacks columns",
+            found=", ".join(map(str, table.columns)),
+            expected=", ".join(missing),
+            remedy="It was written by another version: make it again.",
+        )
+
+
+def vector_agreement(one: Floats, measured: Floats, weights: Floats) -> tuple[float, float]:
+    """Returns correlation and slope of (n, 3) vectors against measured ones.
+
+    r = Σ w u·v/√(Σ w u² Σ w v²) and slope Σ w u·v/Σ w v²: 1 and 1 where they are equal. NaN where nothing moves.
+    """
+    both, own, other = (
+        float(np.einsum("i,ij,ij->", weights, *pair)) for pair in ((one, measured), (one, one), (measured, measured))
+    )
+    if own <= 0 or other <= 0:
+        return float("nan"), float("nan")
+    return both / np.sqrt(own * other), both / other
+
+
+def displacement_table(weeks: Sequence[float], simulated: Floats, measured: Floats, faces: Ints) -> pd.DataFrame:
+    """Returns how the displacement of the pial vertices agrees with the measured one, a row per interval of weeks.
+
+    The rigid part of each interval is removed from both, and the simulated vectors are turned as the simulated brain
+    lies to the measured one. Beside it stands uniform scaling: all vertices of the measured surface moved away from its
+    centroid so that the volume grows as measured. All this is done piece by piece where the surface has several:
+    nothing joins hemispheres that are bodies of their own, so that growth does not say how they lie to each other.
+
+    Weeks ascend; simulated and measured are (w, n, 3) positions in mm of the same vertices, of the run and carried
+    along the registration; faces the (m, 3) triangles of the closed surface.
+
+    Returns
+    -------
+    DataFrame
+        from_week, to_week, displacement_r, displacement_slope, displacement_r_scaling, displacement_slope_scaling,
+        rms_mm, measured_rms_mm (root mean square by area, of the interval).
+    """
+    if len(weeks) < 2 or simulated.shape != measured.shape or len(simulated) != len(weeks):
+        raise InputError(
+            "displacements are those of the same vertices in the same weeks",
+            found=f"{len(weeks)} weeks, positions {simulated.shape} and {measured.shape}",
+            expected="two or more weeks, equal shapes",
+        )
+    component = face_components(TriangleMesh(measured[0], faces))
+    pieces = [np.unique(faces[component == number]) for number in range(component.max() + 1)]
+    rows = []
+    for number in range(len(weeks) - 1):
+        shape = TriangleMesh(measured[number], faces)
+        weights = vertex_areas(shape)
+        grown = signed_volume(TriangleMesh(measured[number + 1], faces)) / signed_volume(shape)
+        own, real, scaling = (np.zeros_like(shape.vertices) for _ in range(3))
+        for piece in pieces:
+            (first, then), (was, became) = (
+                (places[number, piece], places[number + 1, piece]) for places in (simulated, measured)
+            )
+            turn = rigid_fit(first, was, weights[piece])[:3, :3]
+            own[piece] = without_rigid_motion(first, then, weights[piece]) @ turn.T
+            real[piece] = without_rigid_motion(was, became, weights[piece])
+            scaling[piece] = (np.cbrt(grown) - 1) * (was - np.average(was, axis=0, weights=weights[piece]))
+        r, slope = vector_agreement(own, real, weights)
+        r_scaling, slope_scaling = vector_agreement(scaling, real, weights)
+        sizes = [float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights))) for vectors in (own, real)]
+        rows.append((weeks[number], weeks[number + 1], r, slope, r_scaling, slope_scaling, *sizes))
+    columns = ["displacement_r", "displacement_slope", "displacement_r_scaling", "displacement_slope_scaling"]
+    return pd.DataFrame(rows, columns=["from_week", "to_week", *columns, "rms_mm", "measured_rms_mm"])
+
+
+def folding_agreement(
+    metrics: pd.DataFrame, spectra: pd.DataFrame, pairs: Sequence[tuple[str, str, float, str]]
+) -> pd.DataFrame:
+    """Returns metrics of simulated brains beside those of the real ones, a row per brain, week, hemisphere and metric.
+
+    Metrics have the columns subject, run ("real" for real brains), week, hemisphere, metric, value; spectra subject,
+    run, week, hemisphere, band, relative_power; pairs are (run, start brain, week, real brain). Columns run, subject,
+    week, real, hemisphere, metric (of `AGREEMENT`, and `BAND` with a number), value, real_value, difference (value less
+    real_value). Metrics that one of the two lacks are left out.
+    """
+    shares = spectra.dropna(subset="relative_power")
+    shares = shares.assign(metric=BAND + shares["band"].astype(str), value=shares["relative_power"])
+    keys = ["run", "subject", "week", "hemisphere", "metric", "value"]
+    both = pd.concat([table[keys] for table in (metrics[metrics["metric"].isin(AGREEMENT)], shares)])
+    wanted = pd.DataFrame(pairs, columns=["run", "subject", "week", "real"])
+    real = both[both["run"] == "real"].drop(columns=["run", "week"])
+    real = real.rename(columns={"subject": "real", "value": "real_value"})
+    table = wanted.merge(both, on=["run", "subject", "week"]).merge(real, on=["real", "hemisphere", "metric"])
+    table = table.assign(difference=table["value"] - table["real_value"])
+    return table[["run", "subject", "week", "real", "hemisphere", "metric", "value", "real_value", "difference"]]

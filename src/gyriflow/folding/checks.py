@@ -1,0 +1,141 @@
+"""What a user should know of a run before its first step: a report, warnings, refusals."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InputError, MeshError
+from ..geometry.jacobians import lower_bounds
+from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
+from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
+from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ELEMENTS_NEEDED, MEDIAL_WALL, ZONE_NAMES
+from .zones import Zones
+
+NAMES_OF_NEEDED = {1: "two elements", 2: f"{ELEMENTS_NEEDED[2]:g} quadratic elements"}
+"""What the elements that `ELEMENTS_NEEDED` asks for are called, by their order."""
+MUCH_BETWEEN_PLANES = 0.05
+"""Share of the pial area between the contact planes above which a user is warned."""
+LARGEST_POISSON_RATIO = 0.46
+"""Above this linear elements are clearly too stiff: at 0.45 the fastest wave of the slab grows 32 % too slowly with two
+of them through the cortex, at 0.48 40 %, at 0.49 47 %, at 0.499 69 %, the peak elsewhere."""
+
+
+def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
+    """Returns what a user should see before the first step.
+
+    Facets and area per zone, the clamped share of each hemisphere's facets, the initial penetration of the planes
+    in mm (0 by construction) and the number of elements through the cortical thickness.
+    """
+    pial = TriangleMesh(mesh.vertices, zones.facets)
+    areas = face_areas(pial)
+    centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
+    clamped = np.isin(zones.facet_zone, (CLAMPED, BASE, *((MEDIAL_WALL,) if zones.wall_held else ())))
+    sides = {"left": centroid_x < zones.fissure_x_mm, "right": centroid_x >= zones.fissure_x_mm}
+    return {
+        "zones": {
+            name: {"facets": int((zones.facet_zone == i).sum()), "area_mm2": float(areas[zones.facet_zone == i].sum())}
+            for i, name in enumerate(ZONE_NAMES)
+        },
+        "clamped_share": {
+            side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
+        },
+        "order": mesh.order,
+        "growing_vertices": int((zones.growth > 0).sum()),
+        "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
+        "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
+    }
+
+
+def zone_warnings(report: dict) -> list[str]:
+    """Returns what a user should know of the zones, from their report, before trusting a run."""
+    warnings = []
+    through, order = report["elements_through_cortex"], report["order"]
+    if through < ELEMENTS_NEEDED[order]:
+        warnings.append(
+            f"fewer than {NAMES_OF_NEEDED[order]} through the cortex ({through:.2f}): folds may be mesh noise"
+        )
+    areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
+    share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
+    if share > MUCH_BETWEEN_PLANES:
+        warnings.append(
+            f"{share:.0%} of the pial area lies between the contact planes and feels no contact, so the hemispheres "
+            "may cross: lower folding.contact.gap_mm below twice the fissure's width, or raise surface.gap_mm"
+        )
+    return warnings
+
+
+def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
+    """Returns the mean edge length in mm of the elements whose centroid lies in the cortex."""
+    centroids = mesh.vertices[mesh.corners].mean(axis=1)
+    depth = cKDTree(mesh.vertices[np.unique(zones.cortex_facets)]).query(centroids)[0]
+    cortex = mesh.corners[depth <= thickness_mm]
+    if not len(cortex):
+        cortex = mesh.corners
+    pairs = cortex[:, [0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3]].reshape(-1, 2)
+    return mean_length(mesh.vertices, pairs)
+
+
+def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
+    """Raises an error for a brain that cannot be folded with these zones.
+
+    Raises
+    ------
+    InputError
+        Where nothing grows, there is no cortex, no facet is clamped, or the fissure lies outside the brain.
+    MeshError
+        Where elements are inside out, the pial surface is not closed, or a part of the brain has no clamped facet and
+        would float.
+    """
+    if mesh.order == 2:
+        folded = np.flatnonzero(lower_bounds(mesh.vertices, mesh.tets) <= 0)
+        if len(folded):
+            place = np.round(mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1).tolist()
+            raise MeshError(
+                "the mesh has curved elements that are folded over",
+                found=f"{len(folded)} of {len(mesh.tets)}, one at {place} mm",
+                remedy="Move the nodes on their edges towards the middles of the edges.",
+            )
+    low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
+    alone = (zones.facet_zone == MEDIAL_WALL).any()
+    if not alone and not low < zones.fissure_x_mm < high:
+        raise InputError(
+            "the fissure lies outside the brain",
+            found=f"fissure_x_mm {zones.fissure_x_mm:.2f}",
+            expected=f"a value between {low:.2f} and {high:.2f} mm",
+        )
+    _, uses = edges(TriangleMesh(mesh.vertices, zones.facets))
+    if (uses % 2).any():
+        raise MeshError("the boundary of the mesh is not closed", found=f"{int((uses % 2).sum())} open edges")
+    if not len(zones.cortex_facets):
+        raise InputError("no facet has cortex under it", remedy="Choose another folding.support.")
+    if not (zones.growth > 0).any():
+        raise InputError("no vertex grows", remedy="Make the no-growth ellipsoid smaller (folding.no_growth).")
+    if zones.free:
+        return
+    # a wall that slides holds what else would turn away
+    clamped = zones.vertices_of(CLAMPED, BASE, *((MEDIAL_WALL,) if zones.wall_held or zones.anchors else ()))
+    if not len(clamped):
+        raise InputError(
+            "no facet is clamped, so the brain would drift",
+            expected="pial facets inside the no-growth ellipsoid, outside the contact zones, or a flat base",
+            remedy="Make or move the ellipsoid so that it cuts the pial surface (folding.no_growth), or choose another "
+            "folding.support.",
+        )
+    part = connected_parts(mesh)
+    parts = part.max() + 1
+    floating = np.setdiff1d(np.arange(parts), part[clamped])
+    if len(floating):
+        raise MeshError(
+            "parts of the brain have no clamped facet and would float",
+            found=f"{len(floating)} of {parts} parts, the largest with {np.bincount(part)[floating].max()} vertices",
+            remedy="Drop small parts in the surface stage, or make the no-growth ellipsoid reach every part.",
+        )
+
+
+def stiffness_warning(poisson_ratio: float) -> str:
+    """Returns what to say of a Poisson's ratio that linear elements are too stiff for; empty where they are not."""
+    if poisson_ratio <= LARGEST_POISSON_RATIO:
+        return ""
+    return (
+        f"folding.poisson_ratio {poisson_ratio:g} is nearer to incompressible than linear elements follow: above "
+        f"{LARGEST_POISSON_RATIO:g} they lock, and folds grow too slowly and at wrong lengths (docs/verification.md)"
+    )

@@ -1,0 +1,96 @@
+"""What a step says of itself: contact, resolution and worst places for the step table, warnings and messages."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
+from ..parameters.terms import ELEMENTS_NEEDED
+from ..units import MM_PER_M
+from .contact import SelfContact
+from .domain import Domain
+from .newton import NewtonSolver
+from .zones import Zones
+
+Floats = NDArray[np.float64]
+EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+WORST = 0.01
+"""Part of the elements whose quality the step table tells."""
+
+
+def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
+    """Returns a thickness below the pial surface in mean edges of the present elements in it; NaN where there are none.
+
+    Parameters
+    ----------
+    distance : (k,) float
+        Of the local nodes to the pial surface, in m as the thickness.
+    """
+    inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
+    nodes = domain.local(domain.positions)
+    lengths = sum(float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum()) for i, j in EDGES)
+    total, count = domain.comm.allreduce(np.array([lengths, len(EDGES) * len(inside)]))
+    return float(thickness * count / total) if count else math.nan
+
+
+def worst_quality(domain: Domain) -> float:
+    """Returns the radius ratio that all but the worst hundredth of the present elements are above."""
+    ratios = radius_ratios(TetrahedralMesh(domain.local(domain.positions), domain.cells))
+    return float(np.quantile(domain.gathered_cells(ratios[:, None]), WORST))
+
+
+def resolution_warning(rows: Sequence[dict], order: int) -> str:
+    """Returns what to say where the cortex has just come to be resolved too coarsely; empty where it has not."""
+    # not a number where no element has its centre in the cortex: none lies through it
+    found = [0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]]
+    now, before = found[-1], found[0] if len(found) > 1 else math.inf
+    if not now < ELEMENTS_NEEDED[order] <= before:
+        return ""
+    return (
+        f"from GW {rows[-1]['week']:.2f} on fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the cortex, "
+        "since it grows: folds may be mesh noise; "
+        "a smaller mesh.surface_edge_mm, or mesh.sized_for: end, resolves it to a later week"
+    )
+
+
+def unconverged_warning(row: dict) -> str:
+    """Returns what to say of a step that ended above the tolerance; empty of others."""
+    if row["converged"]:
+        return ""
+    return (
+        f"step {row['step']} ends at {row['residual']:.1e} of its first residual, above "
+        "folding.solver.newton_tolerance: nothing was left to gain but round-off"
+    )
+
+
+def contact_row(contact: SelfContact | None, zones: Zones, positions: Floats) -> dict[str, float]:
+    """Returns what the step table says of contact right after a solve that led to (n, 3) positions in m."""
+    if contact is None:
+        return {"plane_penetration_mm": zones.penetration_mm(positions * MM_PER_M)}
+    distance = contact.smallest_distance_mm()
+    return {
+        "contact_distance_mm": contact.distance_mm,
+        "contact_stiffness_pa": contact.stiffness_pa,
+        "contact_pairs": contact.pair_count(),
+        # what is farther apart than the barrier reaches is not looked for
+        "min_distance_mm": distance if distance < math.inf else math.nan,
+    }
+
+
+def worst_places(solver: NewtonSolver) -> str:
+    """Returns where the last solve stood worst: the most compressed element and the largest residual, in mm."""
+    problem, domain = solver.problem, solver.problem.domain
+    before = domain.local(domain.positions)
+    ratios = problem.volume_ratios() if solver.inverting is None else solver.inverting
+    residual = problem.new_vector()
+    problem.residual(residual)
+    forces = -np.linalg.norm(residual.array_r.reshape(-1, 3), axis=1)
+    centres = before[domain.corners].mean(axis=1) * MM_PER_M
+    ratio, tet, centre = domain.least(ratios.min(axis=1), domain.tet_of_cell, centres)
+    force, vertex, place = domain.least(forces, domain.vertex_of_node, before * MM_PER_M)
+    return (
+        f"smallest det F {ratio:.3g} in element {tet} at {np.round(centre, 1).tolist()} mm, "
+        f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(place, 1).tolist()} mm"
+    )

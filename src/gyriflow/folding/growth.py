@@ -1,0 +1,229 @@
+"""Growth: what the solver knows of it, its tensor G in a step, and growth by rates and in measured directions.
+
+A growth model says how tissue grows in each step, from where the brain is at its start. A new one is a subclass of
+`Growth` with its model, and a line in `growth_models`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces, volumes_between
+from ..geometry.triangles import TriangleMesh, area, signed_volume
+from ..parameters.folding import STRAIN, VENTRICLES, FoldingParameters
+from ..parameters.varying import Maps, value_at
+from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
+from .layers import Tissue
+from .stress import unpacked
+from .zones import Zones
+
+Floats = NDArray[np.float64]
+NO_GROWTH = 1e-10
+"""Growth increment of a step that counts as none, a hundred-millionth of what the cortex grows."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """The size of a brain: of the surface under which cortex lies, of all that the surface encloses, of the ventricles.
+
+    The last is 0 where they are not known.
+    """
+
+    area_mm2: float
+    volume_mm3: float
+    ventricles_mm3: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class GrowthInputs:
+    """What growth depends on besides shape and time.
+
+    Attributes
+    ----------
+    pieces : (p, 4) int
+        Linear tetrahedra between the vertices of the mesh.
+    zones, maps
+        Those of the run, at all vertices.
+    """
+
+    pieces: NDArray[np.int64]
+    zones: Zones
+    maps: Maps
+
+    @classmethod
+    def of(cls, mesh: TetrahedralMesh, zones: Zones, maps: Maps) -> "GrowthInputs":
+        """Returns the inputs for a mesh."""
+        return cls(linear_pieces(mesh), zones, maps)
+
+    def size(self, positions_mm: Floats) -> Size:
+        """Returns the size of the brain, for (n, 3) positions of all vertices."""
+        ventricles = 0.0
+        if VENTRICLES in self.maps:
+            parts = self.maps[VENTRICLES][self.pieces].mean(axis=1)
+            ventricles = float(parts @ volumes_between(positions_mm, self.pieces))
+        return Size(
+            area(TriangleMesh(positions_mm, self.zones.measured_facets)),
+            signed_volume(TriangleMesh(positions_mm, self.zones.facets)),
+            ventricles,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class StepStart:
+    """What a growth model is told of a step.
+
+    Attributes
+    ----------
+    positions_mm : (n, 3) float
+        Of all vertices at the step's start, equal on every rank.
+    time_s, step_s
+        Time since the start of the run, and the length of the step.
+    learnt
+        What the steps before have taught, None where there was none.
+    """
+
+    positions_mm: Floats
+    time_s: float
+    step_s: float
+    learnt: Sequence[float] | None = None
+
+    def week(self, p: FoldingParameters, part: float) -> float:
+        """Returns the gestational week at a part of the step, of 0 at its start to 1 at its end."""
+        return p.start_week + (self.time_s + part * self.step_s) / SECONDS_PER_GW
+
+
+@dataclass(frozen=True, eq=False)
+class Growth(ABC):
+    """How tissue grows in one step.
+
+    Attributes
+    ----------
+    parameters
+        Those of the run, with the rates of this step: what frames show of growth.
+    start
+        Where the step begins.
+    """
+
+    parameters: FoldingParameters
+    start: StepStart
+
+    @abstractmethod
+    def inverse(self, tissue: Tissue) -> Floats:
+        """Returns G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
+
+    def again(self, after: Size) -> "Growth | None":
+        """Returns how a step that has led to a size is to be done again, None where it need not or cannot be."""
+        return None
+
+    def learnt(self, after: Size) -> tuple[float, ...] | None:
+        """Returns what a step that has led to a size teaches the next ones, None where that is nothing."""
+        return None
+
+    def row(self, after: Size) -> dict[str, Any]:
+        """Returns what the step table says of growth after the step has led to a size."""
+        return {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
+
+
+class GrowthModel(Protocol):
+    """Says how tissue grows in each step."""
+
+    def growth(self, start: StepStart) -> Growth:
+        """Returns the growth of a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class GrowthByRates(Growth):
+    """Growth by the parameters' rates of cortex and core, as in the middle of the step, and in measured directions."""
+
+    def inverse(self, tissue: Tissue) -> Floats:
+        p, start = self.parameters, self.start
+        dg, dr = increments_at(p, tissue.weight, tissue.growing, tissue.maps, start.week(p, 0.5), start.step_s)
+        # the direction matters only where growth differs along and across it
+        chosen, normals = tissue.normals(np.abs(dg - dr) > NO_GROWTH)
+        result = layered_inverse(tissue.at_points(dg), tissue.at_points(dr), chosen, normals)
+        strain = strain_at(p, tissue.maps, start.week(p, 1.0))
+        if strain is None:
+            return result
+        of_step = start.step_s / SECONDS_PER_GW * tissue.at_points(strain * tissue.growing)
+        return undone(np.moveaxis(of_step, 0, -1)) @ result
+
+
+def increments(
+    w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float, *, across: Any = 0.0
+) -> tuple[Any, Any]:
+    """Returns the increments dg along the pial surface and dr across it, as stretches less 1.
+
+    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = ((α_RAD + α_CORE)(1 − w) + α_ACROSS w) · g · Δt.
+
+    Parameters
+    ----------
+    w
+        Cortical weight: 1 in the cortex, 0 in the core.
+    g
+        1 where tissue grows, 0 where it does not.
+    tangential, radial, core
+        The rates α_TAN of the cortex along its surface, α_RAD of the core along the normal, and α_CORE of the core in
+        all directions, in 1/s.
+    step_s
+        Length of the step in s.
+    across
+        Rate α_ACROSS of the cortex along the normal, 0 in the paper.
+    """
+    isotropic = core * (1 - w)
+    return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + across * w + isotropic) * (g * step_s)
+
+
+def increments_at(
+    p: FoldingParameters, w: Floats, g: Floats, maps: Maps, week: float, step_s: float
+) -> tuple[Floats, Floats]:
+    """Returns the increments of a step by the parameters' rates at a week, at points where maps have their values."""
+    tangential, radial, core = (
+        value_at(rate, week, maps)
+        for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
+    )
+    if p.with_ventricles:
+        core = core + maps[VENTRICLES] * (p.ventricle_growth_rate_per_s - core)
+    # where directions are measured, the rates are those of volume
+    across = tangential if p.regional_strain else 0.0
+    return increments(w, g, tangential, radial, core, step_s, across=across)
+
+
+def layered_inverse(dg: Floats, dr: Floats, chosen: NDArray[np.bool_], normals: Floats) -> Floats:
+    """Returns G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
+
+    Parameters
+    ----------
+    dg, dr : (c, q) float
+        Increments along the surface and across it.
+    chosen : (c,) bool
+        The elements with a direction; others grow by dg in all.
+    normals : (w, q, 3) float
+        Unit normals N of those.
+    """
+    inverse = (1 / (1 + dg))[..., None, None] * np.eye(3)
+    across = normals[..., :, None] * normals[..., None, :]
+    inverse[chosen] = (np.eye(3) - across) / (1 + dg[chosen])[..., None, None]
+    inverse[chosen] += across / (1 + dr[chosen])[..., None, None]
+    return inverse
+
+
+def strain_at(p: FoldingParameters, maps: Maps, week: float) -> Floats | None:
+    """Returns the (6, n) measured strain per week that holds at a week, None where growth has no directions."""
+    name = map_at(p.regional_strain, week)
+    return None if name is None else np.stack([maps[f"{name}_{part}"] for part in STRAIN])
+
+
+def undone(strain: Floats) -> Floats:
+    """Returns the (..., 3, 3) inverse of growth by small (..., 6) strains, which leaves volumes as they are."""
+    inverse = np.linalg.inv(np.eye(3) + unpacked(strain))
+    return np.asarray(inverse / np.cbrt(np.linalg.det(inverse))[..., None, None])
+
+
+def map_at(maps: Mapping[float, str], week: float) -> str | None:
+    """Returns the name of the map that holds at a week: that of the last week before it, or else the first."""
+    before = [start for start in maps if start < week]
+    return maps[max(before)] if before else next(iter(maps.values()), None)

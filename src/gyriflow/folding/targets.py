@@ -1,0 +1,126 @@
+"""Growth towards known shapes: in each step, what takes the brain from where it is to where it should be.
+
+This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the result, and mechanics tells whether
+such growth is possible. What smoothing and mechanics leave undone in a step, the next ones make up for.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..geometry.alignment import rigid_fit
+from ..geometry.diffusion import cell_sizes, diffuse, vertex_sizes
+from ..parameters.folding import AXES, FoldingParameters
+from ..units import SECONDS_PER_GW
+from .growth import Floats, Growth, GrowthInputs, Size, StepStart
+from .layers import Tissue
+from .stress import packed, unpacked
+
+MOST_STRAIN = 0.3
+"""Largest logarithmic growth in any direction in a step: more belongs to elements that the target folds over."""
+SOON_GW = 1e-6
+"""Time before which a target is taken to be reached."""
+
+
+@dataclass(frozen=True, eq=False)
+class TargetGrowth(Growth):
+    """Growth of a step towards a shape.
+
+    Attributes
+    ----------
+    strain : (6, n) float
+        Logarithm of G at all vertices.
+    away_mm
+        Root mean square distance from the shape at the step's start, without rigid motion.
+    """
+
+    strain: Floats
+    away_mm: float
+
+    def inverse(self, tissue: Tissue) -> Floats:
+        return inverse_exponential(unpacked(np.moveaxis(tissue.from_vertices(self.strain), 0, -1)))
+
+    def row(self, after: Size) -> dict[str, Any]:
+        return super().row(after) | {"to_target_mm": self.away_mm}
+
+
+@dataclass(frozen=True, eq=False)
+class GrowthToTargets:
+    """The model of growth towards shapes of the whole mesh at later weeks.
+
+    Attributes
+    ----------
+    parameters, inputs
+        Of the run.
+    targets : {week: (n, 3) float}
+        Positions of all vertices in mm; only the shape counts, not its pose.
+    smoothing_mm
+        Standard deviation that growth is smoothed with.
+    """
+
+    parameters: FoldingParameters
+    inputs: GrowthInputs
+    targets: Mapping[float, Floats]
+    smoothing_mm: float
+
+    @classmethod
+    def of(cls, p: FoldingParameters, inputs: GrowthInputs) -> "GrowthToTargets":
+        """Returns the model of a run whose maps hold the targets that its parameters name."""
+        assert p.follow is not None
+        targets = {
+            week: np.stack([inputs.maps[f"{name}_{axis}"] for axis in AXES], axis=1) for week, name in p.targets.items()
+        }
+        if max(targets) < p.end_week - SOON_GW:
+            raise InputError(
+                "the shapes that the run grows towards end before it does",
+                found=f"shapes up to {max(targets):g} GW and a run to {p.end_week:g} GW",
+                remedy="End the run earlier, or add brains of later weeks.",
+            )
+        return cls(p, inputs, targets, p.follow.smoothing_mm)
+
+    def growth(self, start: StepStart) -> Growth:
+        """Returns the growth of a step: its part of what is left to the next target."""
+        week, places = start.week(self.parameters, 0.0), start.positions_mm
+        ahead = min((known for known in self.targets if known > week + SOON_GW), default=max(self.targets))
+        left = max(ahead - week, SOON_GW)
+        sizes = vertex_sizes(places, self.inputs.pieces)
+        motion = rigid_fit(self.targets[ahead], places, sizes)
+        missing = self.targets[ahead] @ motion[:3, :3].T + motion[:3, 3] - places
+        part = min(1.0, start.step_s / SECONDS_PER_GW / left)
+        strain = log_growth(places, self.inputs.pieces, part * missing, self.smoothing_mm)
+        away = float(np.sqrt(np.average((missing**2).sum(axis=1), weights=sizes)))
+        growing = self.inputs.zones.growth[:, None]
+        return TargetGrowth(self.parameters, start, (strain * growing).T, away)
+
+
+def log_growth(positions: Floats, pieces: np.ndarray, displacement: Floats, smoothing_mm: float) -> Floats:
+    """Returns the (n, 6) logarithm ln U of the stretch of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
+
+    Parameters
+    ----------
+    positions, displacement : (n, 3) float
+        In mm.
+    pieces : (p, 4) int
+        Linear tetrahedra.
+    """
+    after = positions + displacement
+    edges = [np.swapaxes(at[pieces[:, 1:]] - at[pieces[:, :1]], 1, 2) for at in (positions, after)]
+    F = edges[1] @ np.linalg.inv(edges[0])
+    squares, axes = np.linalg.eigh(np.swapaxes(F, 1, 2) @ F)
+    logs = np.clip(0.5 * np.log(np.maximum(squares, 1e-12)), -MOST_STRAIN, MOST_STRAIN)
+    parts = packed((axes * logs[:, None, :]) @ np.swapaxes(axes, 1, 2)) * (cell_sizes(positions, pieces) / 4)[:, None]
+    sums = [np.bincount(pieces.ravel(), np.repeat(part, 4), minlength=len(positions)) for part in parts.T]
+    sizes = vertex_sizes(positions, pieces)
+    mean = np.stack(sums, axis=1) / np.where(sizes > 0, sizes, 1.0)[:, None]
+    return diffuse(positions, pieces, mean, smoothing_mm, steps=1)
+
+
+def inverse_exponential(logs: Floats) -> Floats:
+    """Returns exp(−L) of small (..., 3, 3) matrices to fourth order in L: to 1e-7 for growth of a tenth."""
+    result = np.eye(3) - logs / 4
+    for order in (3, 2, 1):
+        result = np.eye(3) - logs @ result / order
+    return result

@@ -1,0 +1,103 @@
+"""How the files of a brain lie to its posed surface: one record, with its inverse and what it was judged by."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .alignment import motion
+from .triangles import Floats
+
+LPS_TO_RAS: Floats = np.diag([-1.0, -1.0, 1.0, 1.0])
+CONVENTIONS: dict[str, Floats] = {"ras": np.eye(4), "lps": LPS_TO_RAS}
+"""Axes of files, as motions (4, 4) to RAS+."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Rigid motions (4, 4) in mm that pose a brain, and what they were judged by.
+
+    `world` leads from the world of the brain's volumes, RAS+, to its surface; brains correspond in these worlds.
+    `files` lead from the coordinates of its surface files, whatever they are: by side ("left", "right") where there are
+    hemispheres, and of the "whole". `by` is what the pose was judged by: "file", "shape", "configuration", "default",
+    or parts of the labels. `together` is whether one motion holds for the whole brain; else the hemispheres were posed
+    separately. `evidence` are angles, residuals and distances that it rests on, in plain values for JSON, and
+    `warnings` what is doubtful about it.
+    """
+
+    world: Floats = field(default_factory=lambda: np.eye(4))
+    files: Mapping[str, Floats] = field(default_factory=dict)
+    by: str = "file"
+    together: bool = True
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def inverse(self) -> Floats:
+        """The (4, 4) motion from the surface to the world of the brain's volumes."""
+        return np.asarray(np.linalg.inv(self.world))
+
+    def of_file(self, side: str = "whole") -> Floats:
+        """Returns the (4, 4) motion from the coordinates of a surface file to the surface."""
+        return self.files.get(side, self.files.get("whole", self.world))
+
+    def of_volume(self, path: str) -> Floats:
+        """Returns the (4, 4) motion from the brain's volumes to its surface.
+
+        InputError, with the path of the volume, where the hemispheres were posed separately: it cannot follow two
+        motions.
+        """
+        if self.together:
+            return self.world
+        raise InputError(
+            "a volume cannot belong to a brain whose hemispheres were posed separately",
+            path=path,
+            found="one motion for the left and another for the right hemisphere (pose in surface.json)",
+            expected="hemispheres that lie in the coordinates of one brain",
+            remedy="Give the values per vertex (GIFTI), on surfaces of the brain, or hemispheres posed as one brain.",
+        )
+
+    def then(self, matrix: Floats) -> "Pose":
+        """Returns the pose with a (4, 4) motion after it."""
+        files = {name: matrix @ one for name, one in self.files.items()}
+        return replace(self, world=matrix @ self.world, files=files)
+
+    def each(self, files: Mapping[str, Floats]) -> "Pose":
+        """Returns the pose with the motions of some files in the place of theirs."""
+        return replace(self, files={**self.files, **files})
+
+    def plain(self) -> dict[str, Any]:
+        """Returns the pose in plain values for JSON."""
+        return {
+            "by": self.by,
+            "together": self.together,
+            "world": self.world.tolist(),
+            "files": {name: one.tolist() for name, one in self.files.items()},
+            "evidence": dict(self.evidence),
+            "warnings": list(self.warnings),
+        }
+
+
+def pose_from(plain: Mapping[str, Any]) -> Pose:
+    """Returns the pose that plain values hold; InputError where they are a refusal, for its reason."""
+    if "refused" in plain:
+        raise InputError(plain["refused"])
+    return Pose(
+        np.array(plain["world"]),
+        {name: np.array(one) for name, one in plain["files"].items()},
+        plain["by"],
+        plain["together"],
+        plain["evidence"],
+        tuple(plain["warnings"]),
+    )
+
+
+def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) -> Pose:
+    """Returns the pose of a file that a (3, 3) rotation about the origin brings to RAS+.
+
+    Volumes of the brain are in RAS+, whatever the `coordinates` of its surface file.
+    """
+    whole = motion(rotation)
+    return Pose(whole @ CONVENTIONS[coordinates], {"whole": whole}, by, warnings=warnings)

@@ -1,0 +1,90 @@
+"""What is carried from brain to brain: points over the weeks, regions to another brain's surface.
+
+Brains correspond by registration, which carries any point, or by surfaces with matched vertices, which carry surfaces
+and meshes.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, carry_back, transform_points
+from ..geometry.matching import labels_at, match_points
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
+from .matched_surfaces import follow_inside, follow_surfaces
+
+OUTSIDE = 0.001
+"""Largest share of points that may lie beyond the grid that a displacement is known on."""
+
+
+def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:
+    """Returns the (w + 1, n, 3) positions of (n, 3) points, the first as given, carried through w deformations in turn.
+
+    InputError where points leave the grids that the deformations are known on.
+    """
+    positions = [points]
+    for number, deformation in enumerate(deformations):
+        _require_on_grid(deformation, positions[-1], f"interval {number + 1} of {len(deformations)}")
+        positions.append(carry(deformation, positions[-1]))
+    return np.stack(positions)
+
+
+def carry_back_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:
+    """Returns the (w + 1, n, 3) positions of points of the last week, carried back; the first week's come first."""
+    positions = [points]
+    for deformation in reversed(deformations):
+        positions.append(carry_back(deformation, positions[-1]))
+    return np.stack(positions[::-1])
+
+
+def carry_mesh(mesh: TetrahedralMesh, earlier: Sequence[Correspondence], later: Sequence[Correspondence]) -> Floats:
+    """Returns the (w, n, 3) positions of a mesh's vertices in all weeks: carried back, as given, and carried on.
+
+    Along matched surfaces its boundary follows them, and the inside harmonically.
+    """
+    matched = [pair for pair in (*earlier, *later) if isinstance(pair, MatchedSurfaces)]
+    if matched:
+        return follow_inside(mesh, matched, own=len(earlier))
+    back, on = ([pair for pair in pairs if isinstance(pair, Deformation)] for pairs in (earlier, later))
+    return np.concatenate([carry_back_over_weeks(mesh.vertices, back), carry_over_weeks(mesh.vertices, on)[1:]])
+
+
+def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floats:
+    """Returns the (n, 3) positions of a surface's vertices in the last brain, those given where there is no other."""
+    if not between:
+        return mesh.vertices
+    matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
+    if matched:
+        return np.asarray(follow_surfaces(mesh, matched)[-1])
+    return np.asarray(carry_over_weeks(mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)])[-1])
+
+
+def carry_regions(
+    labels: NDArray[np.integer], source: TriangleMesh, target: TriangleMesh, between: Correspondence
+) -> Ints:
+    """Returns the region labels of the (n,) vertices of `source` at those of `target`.
+
+    The source is carried into the target's space; each vertex of the target takes the label of the nearest point whose
+    normal agrees.
+    """
+    if isinstance(between, Deformation):
+        _require_on_grid(between, source.vertices, "the surface")
+    shape = TriangleMesh(carry_surface(source, [between]), source.faces)
+    return labels_at(match_points(target.vertices, vertex_normals(target), shape), labels)
+
+
+def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> None:
+    index = transform_points(points, np.linalg.inv(deformation.affine))
+    last = np.array(deformation.displacement.shape[:3]) - 1
+    beyond = ((index < 0) | (index > last)).any(axis=1)
+    if beyond.mean() > OUTSIDE:
+        away = np.linalg.norm((index - np.clip(index, 0, last)) @ deformation.affine[:3, :3].T, axis=1)
+        raise InputError(
+            f"points lie beyond the grid that the registration knows ({what})",
+            found=f"{np.count_nonzero(beyond)} of {len(points)} points, up to {away.max():.3g} mm",
+            expected="points inside the brain that was registered",
+            remedy="The surface or mesh is not in the pose of the volume that was registered, or of another brain.",
+        )

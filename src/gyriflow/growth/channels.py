@@ -1,0 +1,147 @@
+"""What volumes of two brains are compared by: smoothed masks and intensities on a grid of their own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import affine_transform, gaussian_filter
+
+from ..errors import InputError
+from ..geometry.deformations import transform_points
+from ..geometry.triangles import Floats
+
+SMOOTHING_MM = 0.8
+"""Standard deviation of the Gaussian that both masks are smoothed with."""
+
+MARGIN_MM = 6.0
+"""Room round the cerebrum."""
+
+CEREBRUM, CORTEX = 1, 2
+
+BRIGHT = 0.99
+"""Quantile of the intensity inside the cerebrum that counts as 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """A brain on a grid of cubic voxels along the axes of RAS+.
+
+    Attributes
+    ----------
+    affine : (4, 4) float
+        Index to RAS+ position in mm.
+    tissue : (i, j, k) uint8
+        Bits of the masks as they are: `CEREBRUM` and `CORTEX`.
+    cerebrum : (i, j, k) float32
+        Smoothed mask, from 0 to 1.
+    cortex, intensity : (i, j, k) float32, optional
+        The same of the cortex; intensity of the image, about 1 where the cerebrum is brightest.
+    """
+
+    affine: Floats
+    tissue: NDArray[np.uint8]
+    cerebrum: NDArray[np.float32]
+    cortex: NDArray[np.float32] | None = None
+    intensity: NDArray[np.float32] | None = None
+
+    @property
+    def voxel_mm(self) -> float:
+        """Edge of a voxel."""
+        return float(self.affine[0, 0])
+
+
+def channels(
+    labels: NDArray[np.integer],
+    affine: Floats,
+    *,
+    cerebrum: Sequence[int],
+    cortex: Sequence[int] = (),
+    image: tuple[NDArray[np.number], Floats] | None = None,
+    voxel_mm: float | None = None,
+) -> Channels:
+    """Returns the channels of a brain from its label volume, and from its image where there is one.
+
+    Parameters
+    ----------
+    labels, affine
+        (i, j, k) tissue labels and the (4, 4) matrix from index to RAS+ mm; any grid, turned or sheared.
+    cerebrum, cortex
+        Numbers that make them.
+    image
+        Intensities and their own affine.
+    voxel_mm
+        Edge of the grid that is made; the volume's smallest one if None.
+
+    InputError where no voxel belongs to the cerebrum, where the cortex is named and missing, where the cerebrum is cut
+    by the edge of the volume, and where the image does not reach over it.
+    """
+    inside = np.isin(labels, cerebrum)
+    if not inside.any():
+        raise InputError("no voxel belongs to the cerebrum", found="other labels only", expected=f"labels {cerebrum}")
+    _require_whole(inside)
+    sizes = np.linalg.norm(affine[:3, :3], axis=0)
+    voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
+    centres = transform_points(np.argwhere(inside), affine)
+    low, high = centres.min(axis=0) - MARGIN_MM, centres.max(axis=0) + MARGIN_MM
+    # on a voxel's centre, so that a grid that needs no resampling gets none
+    low = transform_points(np.rint(transform_points(low, np.linalg.inv(affine))), affine)
+    shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
+    grid = np.diag([voxel, voxel, voxel, 1.0])
+    grid[:3, 3] = low
+
+    masks = {CEREBRUM: inside}
+    if cortex:
+        masks[CORTEX] = np.isin(labels, cortex)
+        if not masks[CORTEX].any():
+            raise InputError("no voxel belongs to the cortex", found="other labels only", expected=f"labels {cortex}")
+    tissue = np.zeros(shape, dtype=np.uint8)
+    smoothed = {}
+    for bit, mask in masks.items():
+        solid = mask.astype(np.float32)
+        tissue[_resample(solid, affine, grid, shape) > 0.5] |= bit
+        smoothed[bit] = _resample(gaussian_filter(solid, SMOOTHING_MM / sizes), affine, grid, shape)
+    intensity = _intensity(image, grid, shape, tissue & CEREBRUM > 0) if image else None
+    return Channels(grid, tissue, smoothed[CEREBRUM], smoothed.get(CORTEX), intensity)
+
+
+def _require_whole(inside: NDArray[np.bool_]) -> None:
+    sides = {
+        f"{'ijk'[axis]} = {'last' if end else 0}": int(np.count_nonzero(np.take(inside, end, axis=axis)))
+        for axis in range(3)
+        for end in (0, -1)
+    }
+    cut = {side: count for side, count in sides.items() if count > 0.02 * np.count_nonzero(inside) ** (2 / 3)}
+    if cut:
+        raise InputError(
+            "the cerebrum is cut by the edge of the volume, so that it cannot be registered",
+            found=", ".join(f"{count} voxels at {side}" for side, count in cut.items()),
+            expected="a whole cerebrum",
+            remedy="Leave this brain out of the registration.",
+        )
+
+
+def _intensity(
+    image: tuple[NDArray[np.number], Floats], grid: Floats, shape: tuple[int, ...], inside: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    values, affine = image
+    finite = np.nan_to_num(np.asarray(values, dtype=np.float32), nan=0.0, posinf=0.0, neginf=0.0)
+    intensity = _resample(finite, affine, grid, shape)
+    bright = float(np.quantile(intensity[inside], BRIGHT))
+    covered = float((intensity[inside] != 0).mean())
+    if bright <= 0 or covered < 0.9:
+        raise InputError(
+            "the image does not show the cerebrum that the labels name",
+            found=f"{covered:.0%} of the cerebrum with an intensity, 99 % quantile {bright:.3g}",
+            expected="positive intensities all over",
+            remedy="Check that the image belongs to the labels, or register by the labels alone.",
+        )
+    return intensity / np.float32(bright)
+
+
+def _resample(values: NDArray[np.float32], affine: Floats, grid: Floats, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Returns values of a volume at the points of another grid, linear in between, 0 outside."""
+    index = np.linalg.inv(affine) @ grid
+    return np.asarray(
+        affine_transform(values, index[:3, :3], index[:3, 3], output_shape=shape, order=1), dtype=np.float32
+    )

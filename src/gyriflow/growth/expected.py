@@ -1,0 +1,177 @@
+"""What is to be expected of a brain: its mesh carried sharply through an atlas' weeks, with what sets it apart kept."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from ..geometry.alignment import rigid_fit
+from ..geometry.deformations import Correspondence, MatchedSurfaces, carry
+from ..geometry.diffusion import cell_sizes, continue_harmonically, diffuse, vertex_sizes
+from ..geometry.matching import match_points, values_at
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
+from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
+from ..parameters.following import BEFORE_GW
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .carrying import carry_mesh
+from .matched_surfaces import follow_surfaces
+
+PULL_MM = (4.0, 3.0, 2.0, 1.5, 1.0, 1.0, 1.0)
+"""Standard deviations that the pull towards a surface is smoothed with, round by round."""
+REACH_MM = 4.0
+"""Largest distance over which a surface pulls."""
+OWN_MM = 8.0
+"""Standard deviation of the Gaussian that what sets a brain apart from the atlas is smoothed with.
+
+What is smaller than a gyrus says nothing of folds that are still to come.
+"""
+FADING_GW = 1.0
+"""Time in which what is smaller fades."""
+
+
+def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
+    """Returns the (n, 3) vertices of a surface moved smoothly onto another one that lies near it, in mm.
+
+    Each round pulls the vertices to the nearest points of the other surface whose normals agree, and to those vertices
+    of the other surface that find their nearest point beside them, so that the fundus of a sulcus pulls although no
+    vertex is nearest to it. The pull is smoothed along the moving surface.
+    """
+    vertices, faces = moving.vertices, moving.faces
+    normals, areas = vertex_normals(surface), vertex_areas(surface)
+    for length in PULL_MM:
+        now = TriangleMesh(vertices, faces)
+        own = vertex_areas(now)
+        there = match_points(vertices, vertex_normals(now), surface)
+        weight = own * (there.agrees & (there.distance_mm < REACH_MM))
+        pull = (values_at(there, surface.vertices) - vertices) * weight[:, None]
+        back = match_points(surface.vertices, normals, now)
+        shares = back.weights * (areas * (back.agrees & (back.distance_mm < REACH_MM)))[:, None]
+        missing = surface.vertices - values_at(back, vertices)
+        np.add.at(weight, back.corners, shares)
+        np.add.at(pull, back.corners, shares[..., None] * missing[:, None])
+        smooth = diffuse(vertices, faces, np.column_stack([pull, weight]) / np.maximum(own, 1e-9)[:, None], length)
+        vertices = vertices + smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
+    return np.asarray(vertices)
+
+
+def carry_sharply(mesh: TetrahedralMesh, pairs: Sequence[Correspondence], surfaces: Sequence[TriangleMesh]) -> Floats:
+    """Returns the (w + 1, n, 3) positions of a mesh's vertices carried through w brains, its boundary on theirs.
+
+    Registration smooths: it carries a surface to within half a millimetre of the brain's own and flattens its folds. So
+    the boundary is fitted onto that brain's surface week by week, and the inside goes along harmonically. Matched
+    surfaces need no fit.
+
+    Parameters
+    ----------
+    mesh
+        Of the first brain, in the world that brains correspond in.
+    pairs
+        Leading from each brain to the next.
+    surfaces
+        The pial surfaces of the others in the same world.
+    """
+    boundary, used = boundary_surface(mesh)
+    pieces = linear_pieces(mesh)
+    positions = [mesh.vertices]
+    for pair, surface in zip(pairs, surfaces, strict=True):
+        before = positions[-1]
+        if isinstance(pair, MatchedSurfaces):
+            places = before
+            moved = follow_surfaces(TriangleMesh(before[used], boundary.faces), [pair])[-1]
+        else:
+            places = carry(pair, before)
+            moved = fit_onto_surface(TriangleMesh(places[used], boundary.faces), surface)
+        positions.append(places + continue_harmonically(mesh.vertices, pieces, used, moved - places[used]))
+    return np.stack(positions)
+
+
+def expected_positions(
+    mesh: TetrahedralMesh, start_week: float, atlas: Floats, weeks: Sequence[float], *, own_mm: float = OWN_MM
+) -> tuple[list[float], Floats]:
+    """Returns the weeks from the start on, and the (w, n, 3) positions in which a mesh is expected then, in mm.
+
+    A brain moves as the atlas does from where the atlas is at its week, and keeps what sets it apart from the atlas, in
+    proportion to the size, as far as that is smooth (`own_mm`); what is finer fades (`FADING_GW`).
+
+    Parameters
+    ----------
+    mesh
+        The start brain's, in mm.
+    atlas
+        (k, n, 3) positions of its vertices in the atlas' weeks.
+    weeks
+        Those k weeks, ascending.
+    own_mm
+        What sets the brain apart is smoothed by this much; with 0 all of it is kept.
+
+    InputError where the start is long before the first week or not before the last one.
+    """
+    if len(weeks) < 2 or not weeks[0] - BEFORE_GW <= start_week < weeks[-1]:
+        raise InputError(
+            "the atlas does not tell how a brain of this week grows",
+            found=f"a start at {start_week:g} GW and an atlas of {weeks[0]:g} to {weeks[-1]:g} GW",
+            expected=f"two weeks or more, and a start from {weeks[0] - BEFORE_GW:g} GW to before {weeks[-1]:g} GW",
+        )
+    pieces = linear_pieces(mesh)
+    sizes = vertex_sizes(mesh.vertices, pieces)
+
+    def laid_onto(places: Floats, onto: Floats) -> Floats:
+        motion = rigid_fit(places, onto, sizes)
+        return np.asarray(places @ motion[:3, :3].T + motion[:3, 3])
+
+    first = int(np.clip(np.searchsorted(np.asarray(weeks), start_week, side="right") - 1, 0, len(weeks) - 2))
+    part = (start_week - weeks[first]) / (weeks[first + 1] - weeks[first])
+    now = (1 - part) * atlas[first] + part * laid_onto(atlas[first + 1], atlas[first])
+    now = laid_onto(now, mesh.vertices)
+    apart = mesh.vertices - now
+    smooth = diffuse(mesh.vertices, pieces, apart, own_mm)
+    size = cell_sizes(now, pieces).sum()
+    found = {start_week: mesh.vertices}
+    for week, places in zip(weeks, atlas, strict=True):
+        if week > start_week + 1e-6:
+            scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
+            fading = np.exp((start_week - week) / FADING_GW)
+            found[float(week)] = laid_onto(places, now) + scale * (smooth + fading * (apart - smooth))
+    return list(found), np.stack(list(found.values()))
+
+
+def foretell(
+    mesh: TetrahedralMesh,
+    start_week: float,
+    pairs: Sequence[Correspondence],
+    surfaces: Sequence[TriangleMesh],
+    weeks: Sequence[float],
+) -> tuple[list[float], Floats, dict[str, list[Floats]]]:
+    """Returns the weeks from the start on, the (w, n, 3) positions in which a mesh is expected, and its boundary's.
+
+    The latter are where simpler ways put the boundary's vertices: `atlas_deformed`, the atlas' brain with all that sets
+    the start apart from it, and `displaced`, the start moved as registration alone sees the atlas move.
+
+    Parameters
+    ----------
+    mesh
+        The start brain's, in the world that brains correspond in.
+    pairs
+        Leading from the start to the atlas' first week, and from each of these weeks to the next.
+    surfaces, weeks
+        The atlas' pial surfaces, and their weeks.
+    """
+    carried = carry_sharply(mesh, pairs, surfaces)[1:]
+    known, positions = expected_positions(mesh, start_week, carried, weeks)
+    used = boundary_surface(mesh)[1]
+    ways = {"atlas_deformed": carried, "displaced": carry_mesh(mesh, [], pairs)[1:]}
+    others = {
+        name: [places[used] for places in expected_positions(mesh, start_week, way, weeks, own_mm=0)[1]]
+        for name, way in ways.items()
+    }
+    return known, positions, others
+
+
+def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats]) -> dict[str, Floats]:
+    """Returns the area_cm2 and volume_ml (w,) that a mesh's boundary has and encloses at w positions (n, 3)."""
+    boundary, used = boundary_surface(mesh)
+    surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
+    return {
+        "area_cm2": np.array([area(surface) * CM2_PER_MM2 for surface in surfaces]),
+        "volume_ml": np.array([signed_volume(surface) * ML_PER_MM3 for surface in surfaces]),
+    }

@@ -1,0 +1,115 @@
+"""Correspondence from surfaces that have the same vertices in every week, such as a surface atlas."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.alignment import angle_deg, rigid_fit
+from ..geometry.deformations import MatchedSurfaces
+from ..geometry.diffusion import continue_harmonically
+from ..geometry.matching import match_points, values_at
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
+from ..geometry.triangles import Floats, TriangleMesh, flipped, signed_volume, vertex_areas, vertex_normals
+
+AWAY_MM = 2.0
+"""Largest mean distance of a mesh's surface from the matched surface that it is to follow."""
+MOST_TURN_DEG = 30.0
+"""Largest turn between the matched vertices of two posed brains."""
+MOST_SCATTER = 0.3
+"""Largest root mean square distance of matched vertices, laid onto each other and scaled, as a share of the size."""
+
+
+def outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns a surface whose triangles are seen counter-clockwise from outside, whatever their order was."""
+    return flipped(mesh) if signed_volume(mesh) < 0 else mesh
+
+
+def match_surfaces(first: TriangleMesh, second: TriangleMesh) -> tuple[MatchedSurfaces, dict[str, float]]:
+    """Returns the surfaces of two posed brains as matched, and how far their vertices are from being the same places.
+
+    Triangles may be listed in any order and seen from either side. The numbers are vertices, turn_deg, scatter (root
+    mean square distance of the vertices after a similarity, as a share of the root mean square radius) and area_ratio.
+
+    InputError where vertices or triangles differ, and where the vertices with the same number are other places: equal
+    triangles alone are no correspondence.
+    """
+    if len(first.vertices) != len(second.vertices) or not np.array_equal(_triangles(first), _triangles(second)):
+        raise InputError(
+            "the surfaces have other vertices or triangles",
+            found=f"{len(second.vertices)} vertices and {len(second.faces)} triangles",
+            expected=f"the same {len(first.vertices)} vertices and {len(first.faces)} triangles in both",
+            remedy="Set growth.matched_surfaces to false, or leave out the brain that differs.",
+        )
+    first = outward(first)
+    weights = vertex_areas(first)
+    motion = rigid_fit(first.vertices, second.vertices, weights)
+    one = (first.vertices - np.average(first.vertices, axis=0, weights=weights)) @ motion[:3, :3].T
+    other = second.vertices - np.average(second.vertices, axis=0, weights=weights)
+    sizes = [np.sqrt(np.average((places**2).sum(axis=1), weights=weights)) for places in (one, other)]
+    away = np.average(((one / sizes[0] - other / sizes[1]) ** 2).sum(axis=1), weights=weights)
+    numbers = {
+        "vertices": float(len(first.vertices)),
+        "turn_deg": angle_deg(motion[:3, :3]),
+        "scatter": float(np.sqrt(away)),
+        "area_ratio": float(vertex_areas(TriangleMesh(second.vertices, first.faces)).sum() / weights.sum()),
+    }
+    if numbers["turn_deg"] > MOST_TURN_DEG or numbers["scatter"] > MOST_SCATTER:
+        raise InputError(
+            "the surfaces have the same triangles, but vertices of one number are not the same place in both",
+            found=f"a turn of {numbers['turn_deg']:.0f}° between them, and a scatter of {numbers['scatter']:.2f}",
+            expected=f"at most {MOST_TURN_DEG:g}° between posed brains, and {MOST_SCATTER:g} of the size",
+            remedy="Set growth.matched_surfaces to false, or give surfaces whose vertices are matched.",
+        )
+    return MatchedSurfaces(first, second.vertices), numbers
+
+
+def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces], *, own: int = 0) -> Floats:
+    """Returns the (w + 1, n, 3) positions of a surface's vertices that go along w pairs of matched surfaces.
+
+    Each vertex keeps its place beside the point of its own week's matched surface that is nearest with an agreeing
+    normal, turned as the whole surface is, and moves as that point does.
+
+    Parameters
+    ----------
+    mesh
+        A surface of the week with the index `own`: of the same brain, with other triangles.
+    chain
+        Pairs of successive weeks.
+
+    InputError where the surface lies elsewhere.
+    """
+    faces = chain[0].first.faces
+    surfaces = np.stack([chain[0].first.vertices, *(pair.second for pair in chain)])
+    start = TriangleMesh(surfaces[own], faces)
+    match = match_points(mesh.vertices, vertex_normals(mesh), start)
+    if match.distance_mm.mean() > AWAY_MM:
+        raise InputError(
+            "the surface is not that of the matched surfaces' own week",
+            found=f"{match.distance_mm.mean():.2f} mm from it on average, {match.distance_mm.max():.2f} mm at most",
+            expected=f"at most {AWAY_MM:g} mm on average",
+            remedy="Both must be in one pose and of one week.",
+        )
+    beside, weights = mesh.vertices - values_at(match, start.vertices), vertex_areas(start)
+    turns = [rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces]
+    return np.stack(
+        [values_at(match, surface) + beside @ turn.T for surface, turn in zip(surfaces, turns, strict=True)]
+    )
+
+
+def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces], *, own: int = 0) -> Floats:
+    """Returns the (w + 1, n, 3) positions of a tetrahedral mesh's vertices that go along matched surfaces.
+
+    Its boundary follows them; the displacement inside is harmonic, as smooth as the boundary allows.
+    """
+    boundary, used = boundary_surface(mesh)
+    along = follow_surfaces(boundary, chain, own=own)
+    moves = (along - boundary.vertices).transpose(1, 0, 2).reshape(len(used), -1)
+    inside = continue_harmonically(mesh.vertices, linear_pieces(mesh), used, moves)
+    return np.asarray(mesh.vertices + inside.reshape(len(mesh.vertices), len(along), 3).transpose(1, 0, 2))
+
+
+def _triangles(mesh: TriangleMesh) -> NDArray[np.integer]:
+    """Returns the triangles with their corners, and themselves, in ascending order."""
+    return np.unique(np.sort(mesh.faces, axis=1), axis=0)

@@ -1,0 +1,88 @@
+"""The code that a program depends on: the modules of this package that it imports, directly or through others."""
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def code_hash(program: Path, *modules: Path, function: str | None = None) -> str:
+    """Returns a hash of all modules of this package that a Python program imports, the program itself left out.
+
+    Data files beside the modules count too, and further `modules`, which the program imports by a name that it is
+    given. Of its functions, a single one counts where each job calls another one. As a parameter of a rule the hash
+    makes a change of the code rerun exactly what depends on it.
+    """
+    files = modules_behind(program, function).union(modules, *map(modules_behind, modules))
+    files |= {data for folder in {module.parent for module in files} for data in _data_in(folder)}
+    named = sorted((path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files)
+    return hashlib.sha256(repr(named).encode()).hexdigest()[:12]
+
+
+def modules_behind(program: Path, function: str | None = None) -> set[Path]:
+    """Returns the files of all modules of this package that a Python program imports, directly or through others."""
+    reached: set[Path] = set()
+    waiting = set(imported_modules(program, function))
+    while waiting:
+        module = waiting.pop()
+        reached.add(module)
+        waiting |= imported_modules(module) - reached
+    return reached - {program}
+
+
+@cache
+def imported_modules(source: Path, function: str | None = None) -> frozenset[Path]:
+    """Returns the files of the modules of this package that a source file imports, at the top or inside functions.
+
+    With a `function`, other functions of the file do not count.
+    """
+    inside = source.resolve().is_relative_to(PACKAGE)
+    here = [PACKAGE.name, *source.resolve().relative_to(PACKAGE).parts[:-1]] if inside else []
+    names: list[str] = []
+    code = ast.parse(source.read_bytes())
+    if function is not None:
+        code.body = [node for node in code.body if getattr(node, "name", function) == function]
+    for node in _statements(code):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = here[: len(here) - node.level + 1] if node.level else []
+            start = ".".join([*base, *([node.module] if node.module else [])])
+            names += [start, *(f"{start}.{alias.name}" for alias in node.names)]
+    return frozenset(file for name in names for file in _files_of(name))
+
+
+def room_of(module: Path) -> str:
+    """Returns the room that a source file belongs to: the folder, or the single module, directly under the package."""
+    return module.resolve().relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+@cache
+def _files_of(name: str) -> list[Path]:
+    """Returns the file of a module and those of the packages around it; none for other packages' modules."""
+    package, *parts = name.split(".")
+    if package != PACKAGE.name:
+        return []
+    around = [PACKAGE.joinpath(*parts[:count], "__init__.py") for count in range(len(parts) + 1)]
+    return [path for path in (*around, PACKAGE.joinpath(*parts).with_suffix(".py")) if path.is_file()]
+
+
+def _statements(block: ast.AST) -> Iterator[ast.AST]:
+    """Yields the statements in a module or a compound statement, without a look into expressions, which are most."""
+    for part in ("body", "handlers", "cases", "orelse", "finalbody"):
+        for statement in getattr(block, part, ()):
+            yield statement
+            yield from _statements(statement)
+
+
+@cache
+def _data_in(folder: Path) -> list[Path]:
+    return [path for path in folder.iterdir() if path.suffix in (".yaml", ".json", ".csv")]
+
+
+@cache
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

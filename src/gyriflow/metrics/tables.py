@@ -1,0 +1,132 @@
+"""Tables of a study made of those of its brains: all in one, left beside right, change between scans and weeks."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from ..errors import InputError
+from ..geometry.triangles import Floats, Ints
+from ..parameters.terms import SIDES
+
+BRAIN = ["subject", "run", "week"]
+"""The columns that name a brain."""
+
+MEASURED = "real"
+"""The run of measured brains."""
+
+OF_THE_ANALYSIS = (
+    *("crossing_faces", "curvature_radius", "spangy_modes", "spangy_captured_share", "weyl_number"),
+    "thickness_measured_share",
+)
+"""Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
+
+SAME_WEEK_GW = 0.005
+"""Weeks in file names have two decimals."""
+
+
+def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Returns tables of metrics, of whole hemispheres and of regions, as one, a row per number.
+
+    Columns subject, run, week, hemisphere, region ("" for whole hemispheres), metric, value, unit.
+    """
+    both = pd.concat([table.assign(region=table.get("region", "")) for table in tables])
+    columns = [*BRAIN, "hemisphere", "region", "metric", "value", "unit"]
+    return both[columns].reset_index(drop=True)
+
+
+def wide_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Returns a table as of `long_table` with a row per brain, run and week.
+
+    The columns are named by hemisphere, region, metric and unit, such as `left_frontal_area_cm2`; numbers without a
+    unit have none in their name.
+    """
+    unit = table["unit"].astype(str).replace({"1": "", "nan": ""}).str.replace("/", "_per_")
+    parts = [table["hemisphere"], table["region"].fillna(""), table["metric"], unit]
+    names = ["_".join(part for part in row if part).replace(" ", "-") for row in zip(*parts, strict=True)]
+    wide = table.assign(column=names).pivot_table("value", BRAIN, "column", aggfunc="first")
+    brains = pd.MultiIndex.from_frame(table[BRAIN].drop_duplicates())
+    return wide.reindex(index=brains, columns=list(dict.fromkeys(names))).reset_index().rename_axis(columns=None)
+
+
+def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
+    """Returns the asymmetry index 2 (left − right)/(|left| + |right|) of each metric, of each region where there are.
+
+    Between −2 and 2, positive where the left side has more; NaN where both are 0 or one is not known. Metrics have the
+    columns hemisphere, metric, value, and any others that rows of both sides have alike, such as region; these stay.
+    """
+    keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
+    sides = metrics[metrics["hemisphere"].isin(SIDES)]
+    # of a hemisphere that is alone nothing can be said
+    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(columns=list(SIDES))
+    wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
+    total = wide["left"].abs() + wide["right"].abs()
+    index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)
+    return index.rename("asymmetry_index").reset_index()
+
+
+def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str]]) -> pd.DataFrame:
+    """Returns how metrics change between successive scans of a subject, and between the same weeks of simulations.
+
+    Metrics have the columns subject (the brain), run, week, hemisphere, metric, value, unit, and region where they are
+    of regions; scans are the brains of each subject, by week.
+
+    Returns
+    -------
+    DataFrame
+        subject, run ("real", or a run that began at the earlier scan), from_brain, to_brain, from_week, to_week,
+        hemisphere, region ("" for whole hemispheres), metric, unit, from_value, to_value, change, change_per_week,
+        relative_change (change/abs(from_value)), measured_change (between the scans), difference (to_value less that of
+        the later scan; 0 for the scans themselves).
+    """
+    table = metrics.assign(region=metrics["region"].fillna("") if "region" in metrics else "")
+    what = ["hemisphere", "region", "metric", "unit"]
+    columns = ["subject", "run", "from_brain", "to_brain", "from_week", "to_week", *what, "from_value", "to_value"]
+    columns += ["change", "change_per_week", "relative_change", "measured_change", "difference"]
+    parts = [pd.DataFrame(columns=columns)]
+    for subject, brains in scans.items():
+        for first, second in pairwise(brains):
+            later = table[(table["subject"] == second) & (table["run"] == MEASURED)]
+            began = table[table["subject"] == first]
+            from_week = float(began.loc[began["run"] == MEASURED, "week"].iloc[0])
+            to_week = float(later["week"].iloc[0])
+            starts = began[(began["week"] - from_week).abs() < SAME_WEEK_GW]
+            ends = began[(began["run"] != MEASURED) & ((began["week"] - to_week).abs() < SAME_WEEK_GW)]
+            part, start = (
+                rows[["run", *what, "value"]].rename(columns={"value": name})
+                for name, rows in (("to_value", pd.concat([later, ends])), ("from_value", starts))
+            )
+            part = part.merge(start, on=["run", *what]).dropna(subset=["from_value", "to_value"])
+            keys = pd.MultiIndex.from_frame(part[what])
+            real = [rows.set_index(what)["value"] for rows in (later, starts[starts["run"] == MEASURED])]
+            part["change"] = part["to_value"] - part["from_value"]
+            part["change_per_week"] = part["change"] / (to_week - from_week)
+            part["relative_change"] = part["change"] / part["from_value"].abs().replace(0.0, np.nan)
+            part["measured_change"] = (real[0] - real[1]).reindex(keys).to_numpy()
+            part["difference"] = part["to_value"] - real[0].reindex(keys).to_numpy()
+            part = part.assign(subject=subject, from_brain=first, to_brain=second)
+            parts.append(part.assign(from_week=from_week, to_week=to_week)[columns])
+    return pd.concat(parts[1:] or parts, ignore_index=True)
+
+
+def weekly_norms(weeks: Sequence[float], positions: Sequence[Floats], pial: Ints) -> pd.DataFrame:
+    """Returns the largest and the mean length of the displacement between successive weeks, as in the paper's table.
+
+    Positions in mm are (n, 3) of the same nodes in each of the ascending weeks, `pial` the (k,) indices of the nodes on
+    the pial surface. Columns from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm; two rows per pair of weeks.
+    InputError where weeks and positions do not go together.
+    """
+    if len(weeks) != len(positions):
+        raise InputError("each week needs its positions", found=f"{len(weeks)} weeks, {len(positions)} positions")
+    if (np.diff(weeks) <= 0).any():
+        raise InputError("weeks are not ascending", found=list(weeks))
+    shapes = {np.shape(nodes) for nodes in positions}
+    if len(shapes) > 1:
+        raise InputError("positions of different nodes", found=sorted(shapes), expected="the same nodes in every week")
+    rows = []
+    for weeks_of, (before, after) in zip(pairwise(weeks), pairwise(positions), strict=True):
+        length = np.linalg.norm(np.asarray(after) - np.asarray(before), axis=1)
+        for nodes, of in (("all", length), ("pial", length[pial])):
+            rows.append((*weeks_of, nodes, of.max(), of.mean()))
+    return pd.DataFrame(rows, columns=["from_week", "to_week", "nodes", "max_mm", "mean_mm"])

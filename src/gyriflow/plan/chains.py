@@ -1,0 +1,209 @@
+"""Which brains correspond: whose growth is measured, and through which real brains a start brain's mesh is carried."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+from ..config.root import Config
+from ..parameters.following import Follow
+from .brains import Brains
+from .paths import CARRIED_MESH, MATCHED, PIAL, REGISTERED, region_files
+from .runs import Runs
+
+
+@dataclass(frozen=True)
+class Chains:
+    """The growth series of a configuration, and the chains of brains in them."""
+
+    config: Config
+    brains: Brains
+    runs: Runs
+
+    @cached_property
+    def series(self) -> list[tuple[str, str]]:
+        """The series and id of every brain that growth is measured on, the earliest of each series first."""
+        return [
+            (series, brain)
+            for series, brains in self.config.growth_series.items()
+            for brain in sorted(brains, key=self.brains.week)
+        ]
+
+    @property
+    def grown(self) -> list[str]:
+        """The brains that growth is measured on."""
+        return [brain for _, brain in self.series]
+
+    @property
+    def with_thickness(self) -> list[str]:
+        """The brains whose cortical thickness gives a curve, where some run follows it."""
+        followed = any(self.runs.follows_measured(run, "thickness_mm") for run in self.config.runs)
+        return [brain for brain in self.grown if followed and brain in self.brains.with_thickness]
+
+    @property
+    def known_until_gw(self) -> list[float]:
+        """The weeks up to which predictions know the brains."""
+        known = {self.runs.followed(run, "known_until_gw") for run in self.config.runs}
+        return sorted(known - {None})
+
+    @cached_property
+    def matched_series(self) -> dict[str, set[str]]:
+        """The brains of each growth series of surfaces that have the same vertices."""
+        return self.config.matched_surfaces
+
+    @cached_property
+    def unmatched_starts(self) -> dict[str, str]:
+        """Why the surfaces of a growth series with a start brain are not matched, by the series' name."""
+        return {
+            series: cause
+            for series, cause in self.config.unmatched_surfaces.items()
+            if set(self.config.growth_series[series]) & set(self.config.start_brains)
+        }
+
+    def unmatched(self, brain: str) -> str | None:
+        """Returns why the surfaces of a start brain's growth series are not matched, None where they are."""
+        return self.config.unmatched_surfaces.get(self.config.estimated_from(brain) or "")
+
+    def matched(self, *brains: str) -> bool:
+        """Returns whether brains have surfaces with the same vertices."""
+        return any(set(brains) <= known for known in self.matched_series.values())
+
+    def later(self, brain: str) -> list[str]:
+        """Returns a start brain and the brains of its growth series up to where its runs end, one a week.
+
+        All have label volumes, or surfaces with the same vertices.
+        """
+        start, end = self.brains.week(brain), self.config.last_week(brain)
+        # the first brain past the end tells of growth up to it
+        past = [week for week in map(self.brains.week, self._series_of(brain)) if week >= end]
+        last = min(past, default=end)
+        return self._one_a_week(brain, lambda week: start < week <= last)
+
+    def earlier(self, brain: str) -> list[str]:
+        """Returns the brains of a start brain's growth series up to it, one a week, where a run predicts from them."""
+        predicts = any(follow.known_until_gw is not None for follow in self._regional_from(brain))
+        return self._one_a_week(brain, lambda week: predicts and week < self.brains.week(brain))
+
+    def chain(self, brain: str) -> list[str]:
+        """Returns the brains, one a week, that a start brain's mesh is carried through, itself among them."""
+        return self.earlier(brain)[:-1] + self.later(brain)
+
+    def weeks(self, brain: str) -> list[float]:
+        """Returns the weeks of the brains that a start brain's mesh is carried through."""
+        return [self.brains.week(name) for name in self.chain(brain)]
+
+    def later_weeks(self, brain: str) -> list[float]:
+        """Returns the weeks of a start brain and of the real ones that follow it."""
+        return [self.brains.week(name) for name in self.later(brain)]
+
+    @cached_property
+    def carried(self) -> list[str]:
+        """Start brains that real ones of later weeks follow."""
+        return [brain for brain in self.config.start_brains if len(self.later(brain)) > 1]
+
+    @cached_property
+    def with_chain(self) -> list[str]:
+        """Start brains that real ones of any week are registered with."""
+        return [brain for brain in self.config.start_brains if len(self.chain(brain)) > 1]
+
+    def correspondence(self, earlier: str, later: str) -> str:
+        """Returns the file that says where one brain's points are in another: by matched vertices, or registration."""
+        return (MATCHED if self.matched(earlier, later) else REGISTERED).format(earlier=earlier, later=later)
+
+    def between(self, chain: list[str]) -> list[str]:
+        """Returns the files that say how each brain of a chain corresponds to the next."""
+        return [self.correspondence(*pair) for pair in pairwise(chain)]
+
+    def registered(self, earlier: str, later: str) -> list[dict[str, Any]]:
+        """Returns for two brains that are registered the image, which affine of its files is used, and the scheme."""
+        return [
+            {
+                "image": self.config.brain(brain).image,
+                "affine_from": self.config.brain(brain).affine_from,
+                "scheme": self.brains.registered_scheme(brain),
+            }
+            for brain in (earlier, later)
+        ]
+
+    def carried_mesh(self, run: str, brain: str) -> str | list[str]:
+        """Returns the carried mesh where a run's growth differs between regions.
+
+        Where no brains tell of local growth there is none; the run's parameters say why.
+        """
+        known = self.runs.regional(run) and brain in self.with_chain
+        return CARRIED_MESH.format(brain=brain) if known else []
+
+    def regional_weeks(self, run: str, brain: str) -> list[float]:
+        """Returns the weeks between which a run has regional growth."""
+        return self.weeks(brain) if self.runs.regional(run) else []
+
+    def stretched(self, brain: str) -> dict[str, Any] | None:
+        """Returns what tells how far a mesh will be stretched if it is made for the end of the runs, else nothing."""
+        if self.config.mesh.sized_for == "start":
+            return None
+        end = self.config.last_week(brain)
+        return {"series": self.config.estimated_from(brain), "week": self.brains.week(brain), "end_week": end}
+
+    @property
+    def folding_rate_per_s(self) -> Any:
+        """The folding's growth rate: a number, {week: number}, `estimated`, or None where it has a map."""
+        rate = self.config.folding.growth_rate_per_s
+        if isinstance(rate, (float, str)):
+            return rate
+        return dict(rate.weeks or {}) if rate.map is None else None
+
+    def given_regions(self, brain: str) -> dict[str, str]:
+        """Returns the regions that a brain gets, with the surfaces that they are given on, and what carries them."""
+        given = self.config.regions_from(brain)
+        assert given is not None
+        surfaces = {f"given_{name}": PIAL[name] for name in ("left", "right", "report")}
+        files = {**region_files(f"results/brains/{given}/metrics"), **surfaces}
+        return {
+            **{name: path.format(brain=given) for name, path in files.items()},
+            "correspondence": self.correspondence(given, brain),
+        }
+
+    def posed(self, brain: str) -> list[bool]:
+        """Returns whether the brain of the regions and the brain that gets them correspond in the surfaces' pose.
+
+        Masks of surfaces do; other brains correspond in the world of their files.
+        """
+        pair = self.config.regions_from(brain) or brain, brain
+        return [not self.config.brain(name).has_labels and not self.matched(*pair) for name in pair]
+
+    def correspondences_earlier(self, brain: str) -> list[str]:
+        """Returns these files from each brain of a start brain's chain to the next, up to the start."""
+        return self.between(self.earlier(brain))
+
+    def correspondences_later(self, brain: str) -> list[str]:
+        """Returns these files from the start brain on."""
+        return self.between(self.later(brain))
+
+    def with_strain(self, brain: str) -> bool:
+        """Returns whether a run from a start brain grows in measured directions."""
+        return any(follow.directional > 0 for follow in self._regional_from(brain))
+
+    def smoothing_mm(self, brain: str) -> list[float]:
+        """Returns the smoothing lengths that runs from a start brain ask for."""
+        return sorted({follow.smoothing_mm for follow in self._regional_from(brain)})
+
+    def _series_of(self, brain: str) -> list[str]:
+        return self.config.growth_series.get(self.config.estimated_from(brain) or "", [])
+
+    def _correspond(self, brain: str, other: str) -> bool:
+        """Returns whether local growth is known between a start brain and another one of its growth series."""
+        volumes = self.config.brain(brain).has_labels and self.config.brain(other).has_labels
+        return volumes or {brain, other} <= self.matched_series.get(self.config.estimated_from(brain) or "", set())
+
+    def _one_a_week(self, brain: str, within: Callable[[float], bool]) -> list[str]:
+        """Returns a start brain and those of its series that correspond to it and are of some weeks, by week."""
+        chosen = {self.brains.week(brain): brain}
+        for other in self._series_of(brain):
+            if within(self.brains.week(other)) and self._correspond(brain, other):
+                chosen.setdefault(self.brains.week(other), other)
+        return [chosen[week] for week in sorted(chosen)]
+
+    def _regional_from(self, brain: str) -> list[Follow]:
+        runs = {run for run, start in self.runs.folded if start == brain and self.runs.regional(run)}
+        return [follow for run in runs if (follow := self.config.run(run).follow) is not None]

@@ -1,0 +1,782 @@
+"""The figures and tables of a study: what each is called, is made from and shows, and for which runs and brains."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+from ..config.root import Config
+from ..parameters.measures import SHAPE_MEASURES
+from ..parameters.terms import ELEMENTS_NEEDED, run_names
+from ..units import week_tag
+from .brains import Brains
+from .chains import Chains
+from .measuring import Measured, Measuring
+from .paths import BRAIN, CALIBRATION, FOLDING, GROWTH, MESH, PARAMETERS, PIAL, REGIONS, RUN, STUDY
+from .runs import Runs
+from .studying import Studying
+from .validating import Validating
+
+Wildcards = Mapping[str, str]
+STUDY_FIGURES = f"{STUDY}/figures"
+INFLUENCE = f"{STUDY}/{{study}}/figures"
+
+
+def nothing(**_: str) -> dict[str, Any]:
+    """Returns no inputs or options."""
+    return {}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A row of the registry: a figure, or a table of the report.
+
+    Attributes
+    ----------
+    name
+        Name of its rule.
+    section, title, caption
+        Where it stands in the report, its heading, and what is said of it: reStructuredText, in which wildcards stand
+        in braces; a caption may name the `week` of a study, and what a map `shows`.
+    path
+        The file, a PNG or an HTML page, with wildcards. A PDF stands beside each PNG.
+    draw
+        The function that draws it, as `module.function` of `gyriflow.report`; empty for what another rule makes.
+    inputs
+        From the wildcards to the files that the function takes, by its parameters: a file, or lists and dictionaries
+        of files.
+    options
+        From the wildcards to what else it takes.
+    of
+        The wildcards of all that is made.
+    target
+        The target that asks for it.
+    paper
+        Whether the target `paper` does, too.
+    """
+
+    name: str
+    section: str
+    title: str
+    path: str
+    draw: str = ""
+    caption: str = ""
+    inputs: Callable[..., dict[str, Any]] = nothing
+    options: Callable[..., dict[str, Any]] = nothing
+    of: tuple[Wildcards, ...] = ({},)
+    target: str = "figures"
+    paper: bool = False
+
+    @property
+    def module(self) -> str:
+        """The module of the function that draws it."""
+        return self.draw.rpartition(".")[0]
+
+    @property
+    def function(self) -> str:
+        """The name of the function that draws it."""
+        return self.draw.rpartition(".")[2]
+
+    @property
+    def outputs(self) -> list[str]:
+        """The files that are written, with wildcards."""
+        return [self.path, self.path.removesuffix("png") + "pdf"] if self.path.endswith(".png") else [self.path]
+
+    def made(self) -> list[str]:
+        """Returns all files that are asked for."""
+        return [output.format(**wildcards) for wildcards in self.of for output in self.outputs]
+
+    def files(self, **wildcards: str) -> list[str]:
+        """Returns the files that one of them is made from, each once."""
+        return list(dict.fromkeys(_files(self.inputs(**wildcards))))
+
+
+def _files(inputs: Any) -> Iterator[str]:
+    if isinstance(inputs, str):
+        yield inputs
+    elif isinstance(inputs, Mapping | list | tuple):
+        for item in inputs.values() if isinstance(inputs, Mapping) else inputs:
+            yield from _files(item)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The registry for a configuration."""
+
+    config: Config
+    brains: Brains
+    runs: Runs
+    chains: Chains
+    measuring: Measuring
+    validating: Validating
+    studying: Studying
+    reaches: Callable[[str, str, float], bool] = lambda run, brain, week: True
+    """Whether a run from a brain has come to a week, which is known once it is solved."""
+
+    @cached_property
+    def all(self) -> tuple[Figure, ...]:
+        """The rows, in the order of the report."""
+        return (
+            *self._of_brains,
+            *self._of_growth,
+            *self._of_folding,
+            *self._of_metrics,
+            *self._of_validation,
+            *self._of_studies,
+            *self._of_calibration,
+            *self._of_resources,
+        )
+
+    @property
+    def drawn(self) -> list[Figure]:
+        """The rows that have rules of their own."""
+        return [figure for figure in self.all if figure.draw]
+
+    def target(self, *names: str) -> list[str]:
+        """Returns the files that targets ask for, those of the paper for "paper"."""
+        return [
+            file for row in self.all if row.target in names or (row.paper and "paper" in names) for file in row.made()
+        ]
+
+    def entries(self) -> list[dict[str, Any]]:
+        """Returns what the report says of each figure and table: file, section, title and caption."""
+        return [
+            {
+                "file": figure.path.format(**wildcards),
+                "section": figure.section,
+                "title": self._title(figure, wildcards),
+                "caption": self._caption(figure, wildcards),
+            }
+            for figure in self.all
+            if figure.section
+            for wildcards in figure.of
+        ]
+
+    def _title(self, figure: Figure, wildcards: Wildcards) -> str:
+        title = figure.title.format(**wildcards)
+        named = [value for key, value in wildcards.items() if key in ("run", "brain", "study")]
+        return " · ".join([title[0].upper() + title[1:], *named])
+
+    def _caption(self, figure: Figure, wildcards: Wildcards) -> str:
+        values: dict[str, Any] = dict(wildcards)
+        if "measure" in wildcards:
+            values["shows"] = SHAPE_MEASURES[wildcards["measure"]].caption
+        if "study" in wildcards:
+            values["week"] = f"{self.studying.week(wildcards['study']):g}"
+        # names in captions of the study may have braces
+        return " ".join((figure.caption.format(**values) if values else figure.caption).split())
+
+    @cached_property
+    def last_week(self) -> str | None:
+        """The last week of which every run has a surface, as in file names, where there is one."""
+        weeks = [set(self.runs.week_tags(*pair)) for pair in self.runs.folded]
+        return max(set.intersection(*weeks), default=None) if weeks else None
+
+    @cached_property
+    def first(self) -> str | None:
+        """The figure that stands on the first page of the report: the weeks of the first run."""
+        if not self.runs.folded:
+            return None
+        run, brain = self.runs.folded[0]
+        return f"{RUN}/figures/weekly.png".format(run=run, brain=brain)
+
+    def _synthetic(self, *brains: str) -> dict[str, Any]:
+        return {"synthetic": all(self.config.brain(brain).synthetic for brain in brains)}
+
+    def _of_start(self, run: str, brain: str, **_: str) -> dict[str, Any]:
+        return self._synthetic(brain)
+
+    def _beside(self, run: str, brain: str, **_: str) -> dict[str, Any]:
+        """Returns the options of figures that show simulated beside measured brains."""
+        measured = self.config.measured_name(self.measuring.beside(run, brain).values())
+        return {**self._synthetic(brain), "measured": measured}
+
+    def _of_study(self, *brains: str) -> dict[str, Any]:
+        """Returns the options of charts of all runs, beside measured brains that are called by some of them."""
+        synthetic = self._synthetic(*self.config.start_brains)
+        return {**synthetic, "measured": self.config.measured_name(brains or self.brains.ids)}
+
+    @property
+    def _runs(self) -> dict[str, Any]:
+        return {"runs": run_names(self.runs.folded)}
+
+    def _surfaces(self, run: str, brain: str) -> dict[float, Measured]:
+        """Returns a run's simulated brains by week."""
+        rows = [self.measuring.simulated_at(run, brain, week) for week in self.config.weeks(run, brain)]
+        return {row.week: row for row in rows}
+
+    def _real_beside(self, run: str, brain: str) -> dict[float, Measured]:
+        """Returns the measured brains beside a run by week."""
+        real = {row.subject: row for row in self.measuring.real}
+        return {float(week): real[name] for week, name in self.measuring.beside(run, brain).items()}
+
+    def _each_brain(self, brains: list[str]) -> tuple[Wildcards, ...]:
+        return tuple({"brain": brain} for brain in brains)
+
+    @property
+    def _each_run(self) -> tuple[Wildcards, ...]:
+        return tuple({"run": run, "brain": brain} for run, brain in self.runs.folded)
+
+    def _each_run_with(self, chosen: Callable[[str], bool]) -> tuple[Wildcards, ...]:
+        return tuple(wildcards for wildcards in self._each_run if chosen(wildcards["run"]))
+
+    @property
+    def gates(self) -> dict[str, float]:
+        """The limits of the quality of elements."""
+        settings = self.config.mesh.model_dump()
+        return {key: value for key, value in settings.items() if key.startswith(("min_", "max_"))}
+
+    @property
+    def _of_brains(self) -> Iterator[Figure]:
+        ends = [pick(self.config.brains, key=lambda brain: brain.week).id for pick in (min, max)]
+        ends = list(dict.fromkeys(ends))
+        yield Figure(
+            "overlay_figure", "Inputs", "surface over the image", f"{BRAIN}/figures/overlay.png",
+            "sections.surface_overlay",
+            """Pial surface of *{brain}* (line) over its image: coronal (a) and axial plane (b) through the middle,
+            sagittal plane through one hemisphere (c). The surface follows the labels, whose cortex may end inside the
+            bright rim of a blurred image.""",
+            lambda brain: {
+                "image": self.config.brain(brain).image,
+                "surface": PIAL["whole"].format(brain=brain),
+                "report": PIAL["report"].format(brain=brain),
+            },
+            lambda brain: {"affine_from": self.config.brain(brain).affine_from},
+            self._each_brain(self.brains.with_image),
+        )  # fmt: skip
+        yield Figure(
+            "inputs_figure", "Inputs", "brains that went in", f"{STUDY_FIGURES}/inputs.png", "pictures.brains_picture",
+            "The youngest and the oldest brain that went in, at one scale.",
+            lambda: {
+                "real": {f"{b}\n{self.brains.week(b):g} GW": PIAL["whole"].format(brain=b) for b in ends},
+                "runs": {},
+            },
+            lambda: {**self._synthetic(*ends), "views": ["left", "top", "bottom"]},
+            paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "quality_figure", "Inputs", "mesh quality", f"{BRAIN}/figures/mesh_quality.png", "solve.quality_histogram",
+            """Quality of the tetrahedra: radius ratio (3 × inscribed / circumscribed radius, 1 for a regular element),
+            dihedral angles and volume. Dashed: the limits of the configuration. Below: distance from the pial surface,
+            crossing faces, difference in volume, and how much of gaps narrower than 3 mm, as the fissure, is open.""",
+            lambda brain: {"quality": MESH["quality"].format(brain=brain)},
+            lambda brain: {**self._synthetic(brain), "gates": self.gates},
+            self._each_brain(self.config.start_brains),
+        )  # fmt: skip
+        # of a mesh that did not pass the gates; made on request
+        yield Figure(
+            "refused_quality_figure", "Inputs", "refused mesh", f"{BRAIN}/mesh/refused/quality.png",
+            "solve.quality_histogram",
+            inputs=lambda brain: {"quality": f"{BRAIN}/mesh/refused/quality.json".format(brain=brain)},
+            options=lambda brain: {**self._synthetic(brain), "gates": self.gates},
+            of=(),
+        )  # fmt: skip
+        yield Figure(
+            "quality_page", "Quality of the brains", "quality of the brain", f"{BRAIN}/figures/quality.png",
+            caption="""Quality of *{brain}* before the solve: (a) the pial surface and the inner border of the cortex
+            over the image or the labels, (b) the surface from several sides, (c) cortical thickness where it is known,
+            else further sides, and what the steps have warned of.""",
+            of=self._each_brain(self.brains.ids),
+            target="quality",
+        )  # fmt: skip
+        yield Figure(
+            "quality_table", "Quality of the brains", "verdicts", f"{STUDY}/quality.html",
+            caption="""The verdict on each brain before the solve: fine, to look at (with warnings), or refused (with
+            the cause). All columns are in ``results/study/quality.csv``.""",
+            target="quality",
+        )  # fmt: skip
+
+    @property
+    def _of_growth(self) -> Iterator[Figure]:
+        series = list(self.config.growth_series)
+        measured = self.config.measured_name(self.chains.grown)
+        yield Figure(
+            "growth_figure", "Growth", "cortical growth rates", f"{STUDY}/growth/growth.png", "growth.growth_chart",
+            f"""Pial area (a; both hemispheres, without the cut at the midline) and brain volume (b) of the brains that
+            were given, and the tangential growth rate between successive weeks{" (c)" if len(series) == 1 else ""},
+            α = (θ^½ − 1)/Δt with θ the ratio of the areas. {self._series_note(series)} {self._rate_note(series)}""",
+            lambda: dict(GROWTH),
+            lambda: {
+                "measured": measured,
+                "folding_rate_per_s": self.chains.folding_rate_per_s,
+                "estimated_from": self.config.start_brains and self.config.estimated_from(self.config.start_brains[0]),
+            },
+            ({},) if self.chains.grown else (),
+            "growth", paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "growth_table", "Growth", "growth rates, table", f"{STUDY}/growth/rates.html", "growth.growth_tables",
+            """Areas and volumes; growth rates between successive weeks, of the cortex from the ratio of the areas
+            (square root), of what lies under it from that of the volumes (cube root); and, where there are several
+            series of brains, how far their rates differ.""",
+            lambda: dict(GROWTH),
+            lambda: {"measured": measured},
+            ({},) if self.chains.grown else (),
+            "growth", paper=True,
+        )  # fmt: skip
+
+    def _series_note(self, series: list[str]) -> str:
+        if len(series) < 2:
+            return ""
+        return (
+            f"The series {', '.join(series)} are brains from different data. Differences are those from *{series[0]}*, "
+            "between weeks that both have."
+        )
+
+    def _rate_note(self, series: list[str]) -> str:
+        rate = self.chains.folding_rate_per_s
+        if rate == "estimated":
+            start = self.config.start_brains
+            source = f"areas of *{self.config.estimated_from(start[0])}*" if len(series) > 1 and start else "same areas"
+            return (
+                f"The dashed line is the growth rate of the simulation, estimated from the {source}: ln θ/(2Δt) at the "
+                "middle of each interval, linear in between. It is lower than α since the model's growth compounds "
+                "from step to step."
+            )
+        if not rate:
+            return ""
+        of = f", {rate:.3g} 1/s" if isinstance(rate, float) else ""
+        return f"The dashed line is the growth rate of the simulation{of}."
+
+    @property
+    def _of_folding(self) -> Iterator[Figure]:
+        at = f"{RUN}/figures"
+        start = {"mesh": REGIONS["mesh"], "data": REGIONS["data"]}
+        of_run = {"params": PARAMETERS}
+
+        def files(**patterns: str) -> Callable[..., dict[str, Any]]:
+            return lambda run, brain: {key: path.format(run=run, brain=brain) for key, path in patterns.items()}
+
+        yield Figure(
+            "weekly_figure", "Folding", "simulated beside measured brains", f"{at}/weekly.png", "pictures.runs_by_week",
+            """Simulated brain of run *{run}* (blue; a, c) beside the measured brain of the same week (beige; b, d),
+            from the left and from above, at one scale. The first week is the start brain as it was meshed.""",
+            lambda run, brain: {
+                "runs": {"simulated": {w: row.parts["whole"] for w, row in self._surfaces(run, brain).items()}},
+                "real": {week: row.parts["whole"] for week, row in self._real_beside(run, brain).items()},
+            },
+            self._beside,
+            self._each_run,
+            paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "outlines_figure", "Folding", "outlines over each other", f"{at}/outlines.png", "sections.outlines_chart",
+            """Simulated brain of run *{run}* (blue) over the measured one of the same week (black), rigidly aligned:
+            coronal (a) and axial planes (b) through the middle, sagittal ones through the right hemisphere (c).""",
+            lambda run, brain: {
+                "pairs": {
+                    week: [self._surfaces(run, brain)[week].parts["whole"], row.parts["whole"]]
+                    for week, row in self._real_beside(run, brain).items()
+                }
+            },
+            self._beside,
+            self._each_run,
+            paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "mesh_figure", "Folding", "the mesh, cut open", f"{at}/mesh.png", "pictures.mesh_picture",
+            """Mesh at the start of run *{run}*: from the left (a), cut open across, from the front (b), and along,
+            from above (c).""",
+            files(**start), self._of_start, self._each_run, paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "displacement_maps", "Folding", "displacement maps", f"{at}/displacement_maps.png",
+            "pictures.displacement_maps",
+            """Norm of the displacement between output weeks on the pial surface of run *{run}*, from the left (a),
+            from above (b) and from behind (c). One vertex in two hundred is above the scale. Ring: the largest one,
+            dotted where it lies on the side turned away, with its place in RAS+ mm. The mean is over the vertices.""",
+            files(frames=FOLDING["frames"]), self._of_start, self._each_run, paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "contact_maps", "Folding", "contact pressure", f"{at}/contact_maps.png", "pictures.scalar_maps",
+            """Pressure of contact at the output weeks of run *{run}*, the size of the contact force over the area of
+            each vertex; where the model forgets stress, what a week of the present growth would build up. It is shown
+            on the surface of the start, since folds hide where they press on each other.""",
+            files(frames=FOLDING["frames"]),
+            lambda run, brain: {
+                **self._synthetic(brain),
+                "views": ["left", "right", "top", "bottom"],
+                # stress that each step forgets is written per week
+                "quantity": f"contact_pressure_pa{'' if self.config.runs[run].stress_memory_gw else '_per_gw'}",
+            },
+            self._each_run_with(
+                lambda run: "contact_pressure" in self.config.run(run).fields
+                and self.config.run(run).contact.kind == "global"
+            ),
+        )  # fmt: skip
+        yield Figure(
+            "zones_figure", "Folding", "zones of the boundary", f"{at}/zones.png", "pictures.zones_picture",
+            """Zones of the boundary at the start of run *{run}*, from the left (a), from below (b) and on the medial
+            sides (c, d): free, clamped (inside the ellipsoid of no growth), the facets of each hemisphere that may
+            touch at the fissure, and those between the contact planes. Grey: the inside of the surface.""",
+            files(**start, **of_run), self._of_start, self._each_run, paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "contact_scheme", "Folding", "scheme of contact", f"{at}/contact_scheme.png", "sections.contact_scheme",
+            """Contact in run *{run}* at the start: an axial section with the walls that may touch (a), the fissure
+            enlarged, with the pressure that acts (b), and the law of contact (c).""",
+            files(**start, **of_run), self._of_start,
+            self._each_run_with(lambda run: self.config.run(run).contact.kind != "none"),
+            paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "growth_zone_figure", "Folding", "growth on the surface", f"{at}/growth_zone.png", "pictures.field_picture",
+            """Tangential growth of the pial surface in the first time step of run *{run}*: from the left (a), from
+            below (b), and the medial sides (c, d). Grey: nothing grows, as inside the ellipsoid of no growth and where
+            tissue bridges the planes at the fissure. Below zero the surface shrinks.""",
+            files(**start, **of_run), self._of_start, self._each_run, paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "layers_figure", "Folding", "regions and growth in sections", f"{at}/layers.png",
+            "sections.region_sections",
+            """Start brain of run *{run}* in sections through its middle: hemispheres (neither between the contact
+            planes), what grows, cortical weight, tangential growth in one time step, and shear modulus. Dashed: the
+            ellipsoid of no growth.""",
+            files(**start, **of_run), self._of_start, self._each_run, paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "normals_figure", "Folding", "pial normals at two weeks", f"{at}/normals.png", "sections.normal_arrows",
+            """Normals that orient growth in run *{run}* at its first and last week, at a sample of vertices near the
+            sections; inner vertices have that of the nearest pial one. Arrows show the part within the section, so
+            those that cross it look short. Growth is across them. Normals are computed again in every step.""",
+            lambda run, brain: {
+                **files(**start, **of_run, frames=FOLDING["frames"])(run, brain),
+                "maps": self.runs.maps(run, brain),
+            },
+            self._of_start, self._each_run, paper=True,
+        )  # fmt: skip
+        order = self.config.mesh.order
+        kind = "quadratic" if order == 2 else "linear"
+        yield Figure(
+            "steps_figure", "Folding", "steps of the solver", f"{at}/steps.png", "solve.steps_chart",
+            f"""Solver of run *{{run}}*, step by step: Newton (a) and CG iterations (b); smallest det F (c; an element
+            would be inverted at 0, dashed); displacement of the step (d); elements through the cortex (e; below
+            {ELEMENTS_NEEDED[order]:g}, dashed, {kind} elements may fold by the mesh and not by the material); radius
+            ratio that all but the worst hundredth of the elements are above (f; 1 is regular); wall time (g).""",
+            files(steps=FOLDING["steps"]),
+            lambda run, brain: {**self._synthetic(brain), "order": order},
+            self._each_run,
+        )  # fmt: skip
+        yield Figure(
+            "study_runs", "Folding", "parameters and summaries of the runs", f"{STUDY}/runs.html",
+            caption="""Parameters of the runs and summaries of their simulations; what differs between the runs comes
+            first. As numbers in ``results/study/runs.csv``.""",
+            target="metrics",
+        )  # fmt: skip
+        displacement = {"displacement": f"{STUDY}/displacement.csv"}
+        yield Figure(
+            "displacement_figure", "Folding", "displacement per week", f"{STUDY_FIGURES}/displacement.png",
+            "solve.displacement_chart",
+            """Largest (a) and mean (b) displacement between output weeks, over all nodes, beside what the FetalFoldSim
+            paper reports of its simulation and of real brains. Those are others: compare orders of magnitude only.""",
+            lambda: displacement,
+            lambda: {**self._runs, **self._synthetic(*self.config.start_brains)},
+            paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "displacement_table", "Folding", "displacement per week, table", f"{STUDY}/displacement_table.html",
+            "tables.displacement_page",
+            """Largest / mean norm of the displacement between output weeks in mm, over all nodes and over the pial
+            surface's nodes, with the published values.""",
+            lambda: displacement, lambda: self._synthetic(*self.config.start_brains), paper=True,
+        )  # fmt: skip
+        last = self.last_week
+        real = [row for row in self.measuring.real if week_tag(row.week) == last][:1]
+        yield Figure(
+            "runs_figure", "Folding", "runs side by side", f"{STUDY_FIGURES}/runs.png", "pictures.brains_picture",
+            f"""The runs of the study at {float(last or 0):g} GW, with the measured brain of that week where there is
+            one. What differs between the runs is in ``results/study/runs.csv``.""",
+            lambda: {
+                "runs": dict(
+                    zip(run_names(self.runs.folded), self.runs.of(f"{RUN}/surfaces/week-{last}/pial.surf.gii"),
+                        strict=True)
+                ),
+                "real": {self.config.measured_name([row.subject]): row.parts["whole"] for row in real},
+            },
+            lambda: self._of_study(*(row.subject for row in real)),
+            ({},) if last and len(self.runs.folded) > 1 else (),
+        )  # fmt: skip
+
+    @property
+    def _of_metrics(self) -> Iterator[Figure]:
+        yield Figure(
+            "shape_maps", "Metrics", "{measure} maps", f"{RUN}/figures/{{measure}}.png", "pictures.shape_maps",
+            "{shows} on the pial surfaces of run *{run}* and of the measured brains of the same weeks.",
+            lambda run, brain, measure: {
+                "brains": {
+                    "simulated": {week: _halves(row) for week, row in self._surfaces(run, brain).items()},
+                    self._beside(run, brain)["measured"]: {
+                        week: _halves(row) for week, row in self._real_beside(run, brain).items()
+                    },
+                }
+            },
+            lambda run, brain, measure: {**self._beside(run, brain), "quantity": measure},
+            tuple({**pair, "measure": measure} for pair, measure in product(self._each_run, SHAPE_MEASURES)),
+        )  # fmt: skip
+        metrics = {"metrics": f"{STUDY}/metrics.csv"}
+        yield Figure(
+            "metrics_figure", "Metrics", "metrics over the weeks", f"{STUDY_FIGURES}/metrics.png",
+            "charts.metrics_chart",
+            """Runs as lines, measured brains as stars. The gyrification index is the pial area over that of the convex
+            hull, or of a tighter envelope. Shape index: −1 is a cup, +1 a cap, so gyri are positive.""",
+            lambda: metrics, lambda: {**self._runs, **self._of_study()},
+        )  # fmt: skip
+        yield Figure(
+            "metrics_table", "Metrics", "metrics, table", f"{STUDY}/metrics_table.html", "tables.metrics_page",
+            """Metrics of whole brains per week: the measured brain, each run, and the run's difference from the
+            measured brain. All numbers, per hemisphere too, are in ``results/study/metrics.csv``.""",
+            lambda: metrics, self._of_study,
+        )  # fmt: skip
+        spectra = {"spectra": f"{STUDY}/spectra.csv"}
+        yield Figure(
+            "spectra_figure", "Metrics", "SpAnGy bands B4-B6 over the weeks", f"{STUDY_FIGURES}/spectra.png",
+            "charts.spectra_weeks_chart",
+            """Relative power in the bands B4, B5 and B6 (primary, secondary and tertiary folds) per hemisphere (SpAnGy,
+            Germanaud et al. 2012). Open marks: the band is cut off, or finer than the surface resolves.""",
+            lambda: spectra, lambda: {**self._runs, **self._of_study()},
+        )  # fmt: skip
+        yield Figure(
+            "bands_figure", "Metrics", "all SpAnGy bands at the last week", f"{STUDY_FIGURES}/bands.png",
+            "charts.spectra_chart",
+            f"""Relative power in all bands at {float(self.last_week or 0):g} GW. Hatched bars and open stars: the band
+            is cut off or finer than the surface.""",
+            lambda: spectra,
+            lambda: {**self._runs, **self._of_study(), "week": float(self.last_week or 0), "bands": list(range(1, 7))},
+            ({},) if self.last_week else (),
+        )  # fmt: skip
+        reference = self.config.norm_reference
+        with_norms: tuple[Wildcards, ...] = ({},) if reference else ()
+        caption = f"""Metrics of whole brains over the weeks: stars are the measured brains that make the norm
+            ({len(reference)} of them, each compared with the others), the grey band holds 90 % of further brains by a
+            quadratic of the week and Student's distribution, bars are 5, 50 and 95 % quantiles where a week has five
+            brains or more. The table gives the centile and, in brackets, z. With one brain a week the scatter is that
+            of templates round the curve, which is less than that of subjects. Brains with other hemispheres than these
+            are compared with none of them, and not drawn."""
+        yield Figure(
+            "norms_figure", "Metrics", "norms over the weeks", f"{STUDY_FIGURES}/norms.png", "charts.norms_chart",
+            caption,
+            lambda: {**metrics, "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"},
+            lambda: {**self._runs, **self._of_study(*reference), "reference": list(reference)},
+            with_norms,
+        )  # fmt: skip
+        yield Figure(
+            "centiles_table", "Metrics", "centiles, table", f"{STUDY}/centiles.html", "tables.centiles_page", caption,
+            lambda: {"centiles": f"{STUDY}/centiles.csv"}, lambda: self._of_study(*reference), with_norms,
+        )  # fmt: skip
+        named = dict(zip(self.runs.folded, run_names(self.runs.folded), strict=True))
+        shown = {row.subject: row for row in self.measuring.real if row.regions} | {
+            f"{named[run, brain]}, {self.config.weeks(run, brain)[-1]:g} GW": row
+            for run, brain in self.measuring.regioned_runs
+            for row in [list(self._surfaces(run, brain).values())[-1]]
+        }
+        of_regions: tuple[Wildcards, ...] = ({},) if self.measuring.with_regions else ()
+        tables = {"regions": f"{STUDY}/regions.csv", "asymmetry": f"{STUDY}/asymmetry.csv"}
+        said = f"""Regions of the cortex, given on {", ".join(self.measuring.given)}, carried to other measured brains
+            by registration, and to simulated ones with the tissue. Metrics by region: areas are sums of both sides,
+            other values means by area; the asymmetry index is 2 (left − right)/(\\|left\\| + \\|right\\|)."""
+
+        def options() -> dict[str, Any]:
+            return self._of_study(*self.measuring.regioned)
+
+        yield Figure(
+            "regions_figure", "Metrics", "regions of the cortex", f"{STUDY_FIGURES}/regions.png",
+            "pictures.regions_picture", said,
+            lambda: {
+                "brains": {
+                    heading: [list(pair) for pair in zip(row.hemispheres, row.regions.values(), strict=True)]
+                    for heading, row in shown.items()
+                }
+            },
+            options, of_regions,
+        )  # fmt: skip
+        yield Figure(
+            "regions_chart", "Metrics", "metrics by region", f"{STUDY_FIGURES}/regions_metrics.png",
+            "charts.regions_chart", said, lambda: tables, options, of_regions,
+        )  # fmt: skip
+        yield Figure(
+            "regions_table", "Metrics", "metrics by region, table", f"{STUDY}/regions.html", "tables.regions_page",
+            said, lambda: tables, options, of_regions,
+        )  # fmt: skip
+
+    @property
+    def _of_validation(self) -> Iterator[Figure]:
+        compared: tuple[Wildcards, ...] = ({},) if self.validating.pairs else ()
+        ceiling = [f"{STUDY}/registration_ceiling.csv"] if self.validating.with_ceiling else []
+        smoothing = self.validating.smoothing_mm
+        runs = {"runs": list(self.config.runs)}
+
+        def beside(**tables: str) -> Callable[[], dict[str, Any]]:
+            # a file in a list may be missing
+            return lambda: {**tables, "ceiling": ceiling[0] if ceiling else None}
+
+        yield Figure(
+            "validation_figure", "Validation", "gain over no folding, by week", f"{STUDY_FIGURES}/validation.png",
+            "scores.validation_chart",
+            """Correlation of curvature with that of the real brain, less that of the start brain scaled up: above 0
+            folding is worth more than none. Bars: 95 % intervals of a bootstrap over patches of the surface; full marks
+            explain a week whose own brains gave the growth, open ones predict it.""",
+            beside(validation=f"{STUDY}/validation.csv"), lambda: runs, compared, target="validate",
+        )  # fmt: skip
+        yield Figure(
+            "smoothing_figure", "Validation", "gain by the smoothing of measured growth",
+            f"{STUDY_FIGURES}/smoothing.png", "scores.smoothing_chart",
+            """How local growth must be known: the gain of runs that differ in the smoothing of measured growth
+            alone.""",
+            beside(validation=f"{STUDY}/validation.csv"), lambda: {"smoothing_mm": smoothing},
+            ({},) if len(set(smoothing.values())) > 2 else (), target="validate",
+        )  # fmt: skip
+        yield Figure(
+            "horizon_figure", "Validation", "gain by weeks after the start", f"{STUDY_FIGURES}/horizon.png",
+            "scores.horizon_chart",
+            """Prediction horizon: the same gain by weeks after the start, whose week stands at the line's end, where
+            growth was known and where it was not.""",
+            beside(horizon=f"{STUDY}/horizon.csv"), lambda: runs, compared, target="validate",
+        )  # fmt: skip
+        yield Figure(
+            "onset_figure", "Validation", "weeks in which sulci begin", f"{STUDY_FIGURES}/onset.png",
+            "scores.onset_chart",
+            """Weeks in which sulci of the last real brain that are not there at the start come to be 2 mm deep below
+            their neighbouring crowns. Marks at the right edge: never in the weeks that were folded or measured.""",
+            lambda: {"onset": f"{STUDY}/onset.csv"}, lambda: runs, ({},) if self.validating.carried else (),
+            target="validate",
+        )  # fmt: skip
+
+    @property
+    def _of_studies(self) -> Iterator[Figure]:
+        studies = tuple({"study": study} for study in self.config.studies)
+
+        def options(study: str) -> dict[str, Any]:
+            measured = self.config.measured_name(row.subject for row in self._shown_real(study))
+            return {**self._synthetic(self._start(study)), "measured": measured}
+
+        def values(study: str) -> dict[str, Any]:
+            members = zip(self._members(study), self.config.members[study], strict=True)
+            return {"values": {run: dict(member.values) for run, member in members}}
+
+        yield Figure(
+            "influence_figure", "Studies", "influence on the folds", f"{INFLUENCE}/influence.png",
+            "pictures.influence_picture",
+            """Runs of the study *{study}* at {week} GW, and the real brain last, from the left (a, c) and from above
+            (b, d): surfaces, and the shape index from −1 in sulci (blue) to +1 on gyri (red).""",
+            lambda study: {
+                "members": {
+                    run: _halves(self._member(study, run)) if self._reached(study, run) else None
+                    for run in self._members(study)
+                },
+                "real": {options(study)["measured"]: _halves(row) for row in self._shown_real(study)},
+            },
+            lambda study: {**options(study), **values(study)},
+            studies, "influence_figures", paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "influence_spectra", "Studies", "influence on the spectrum of the folds", f"{INFLUENCE}/spectra.png",
+            "scores.influence_spectra",
+            """Relative power in the bands B4 to B6 (primary to tertiary folds) of the left (a) and the right hemisphere
+            (b) in the study *{study}* at {week} GW: runs from pale to dark in their order, the real brain as stars.
+            Hatched bars and open stars: the band is cut off or finer than the surface.""",
+            lambda study: {
+                "spectra": [
+                    *(
+                        f"{self._member(study, run).folder}/spectra.csv"
+                        for run in self._members(study)
+                        if self._reached(study, run)
+                    ),
+                    *(f"{row.folder}/spectra.csv" for row in self._shown_real(study)),
+                ]
+            },
+            lambda study: {**options(study), **values(study), "week": self.studying.week(study)},
+            studies, "influence_figures", paper=True,
+        )  # fmt: skip
+        yield Figure(
+            "nearest_figure", "Studies", "what comes nearest to the real brain", f"{INFLUENCE}/nearest.png",
+            "scores.nearest_chart",
+            """Distance of the runs of the study *{study}* from the real brain at {week} GW by each measure, over what
+            is varied. Ring and number: the nearest run that is resolved. Open marks: the mesh does not resolve the
+            cortex, or the band is cut off. Dashed: the value that the FetalFoldSim paper found nearest.""",
+            lambda study: {name: f"{STUDY}/{study}/{name}.csv" for name in ("comparison", "nearest")},
+            lambda study: {
+                **self._synthetic(self._start(study)),
+                "varied": next(iter(self.config.studies[study].vary)),
+                "subject": self._start(study),
+                "real": [row.subject for row in self._shown_real(study)],
+            },
+            tuple({"study": study} for study in self.config.studies if self._is_sweep(study)),
+            "influence_figures", paper=True,
+        )  # fmt: skip
+
+    @property
+    def _of_calibration(self) -> Iterator[Figure]:
+        names = ("runs", "optimum", "sensitivities", "profiles")
+        # a calibration is looked at by itself
+        yield Figure(
+            "calibration_figure", "", "calibration", f"{CALIBRATION}/calibration.png", "scores.calibration_chart",
+            inputs=lambda: {name: f"{CALIBRATION}/{name}.csv" for name in names},
+            options=lambda: {
+                **self._synthetic(*self.config.start_brains),
+                "score": list(self.config.calibrate.score if self.config.calibrate else ()),
+            },
+            of=({},) if self.config.calibrate else (), target="calibrate",
+        )  # fmt: skip
+
+    @property
+    def _of_resources(self) -> Iterator[Figure]:
+        start = self.config.start_brains[:1]
+        population = self.config.brain(start[0]).population if start else None
+        real = [
+            row for row in self.measuring.real if not start or self.config.brain(row.subject).population == population
+        ]
+        yield Figure(
+            "view_surfaces", "", "surfaces in 3D", "results/report/surfaces.json", "view3d.surfaces_view",
+            inputs=lambda: {
+                "runs": {
+                    name: [[week, _halves(row)] for week, row in self._surfaces(*pair).items()]
+                    for name, pair in zip(run_names(self.runs.folded), self.runs.folded, strict=True)
+                },
+                "real": [[row.week, _halves(row)] for row in sorted(real, key=lambda row: row.week)],
+            },
+            options=lambda: {"measured": self.config.measured_name([row.subject for row in real])},
+            target="view",
+        )  # fmt: skip
+        yield Figure(
+            "study_resources", "Resources", "time, memory, energy and emissions", f"{STUDY}/resources.html",
+            caption="""What the jobs behind this report took, with an estimate of their energy and emissions, whose
+            assumptions stand below. As numbers in ``results/study/resources.csv``.""",
+            target="report",
+        )  # fmt: skip
+        yield Figure(
+            "cost_figure", "Resources", "time and energy", f"{STUDY_FIGURES}/cost.png", "resources.cost_chart",
+            """Time (a), summed over jobs that may have run side by side, and estimated energy (b) of the stages.""",
+            lambda: {"resources": f"{STUDY}/resources.csv"}, target="report",
+        )  # fmt: skip
+
+    def _start(self, study: str) -> str:
+        """Returns the brain that the figures of a study are of: the first that its runs fold."""
+        return self.studying.members(study)[0][1]
+
+    def _members(self, study: str) -> list[str]:
+        """Returns the runs of a study from its start, in order."""
+        return [run for run, brain in self.studying.members(study) if brain == self._start(study)]
+
+    def _member(self, study: str, run: str) -> Measured:
+        """Returns a run of a study at the week of comparison."""
+        return self.measuring.simulated_at(run, self._start(study), self.studying.week(study))
+
+    def _reached(self, study: str, run: str) -> bool:
+        return self.reaches(run, self._start(study), self.studying.week(study))
+
+    def _shown_real(self, study: str) -> list[Measured]:
+        """Returns the real brain that a study's runs are shown beside, in a list; none where there is none."""
+        chosen = self.studying.real(study, self._start(study))[:1]
+        return [row for row in self.measuring.real if row.subject in chosen]
+
+    def _is_sweep(self, study: str) -> bool:
+        """Returns whether a study varies one number, which is a line over it, and has a real brain beside it."""
+        vary = self.config.studies[study].vary
+        numbers = all(isinstance(value, int | float) for values in vary.values() for value in values)
+        return len(vary) == 1 and numbers and bool(self._shown_real(study))
+
+
+def _halves(row: Measured) -> list[list[str]]:
+    """Returns the hemispheres of what is measured, each with its maps."""
+    return [[row.parts[side], f"{row.folder}/{side}.shape.gii"] for side in row.sides]

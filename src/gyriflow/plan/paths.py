@@ -1,0 +1,123 @@
+"""Where results lie, each named here alone. Names in braces are the wildcards of the rules."""
+
+import re
+from collections.abc import Iterable
+
+from ..parameters.terms import SIDES, Side
+
+BRAIN = "results/brains/{brain}"
+RUN = "results/runs/{run}/{brain}"
+STUDY = "results/study"
+CALIBRATION = f"{STUDY}/calibration"
+WEEK = "week-{week}"
+
+PARTS = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
+"""How the names of a brain's surfaces begin, by what they are of."""
+
+
+def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:
+    """Returns the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
+    return {part: f"{folder}/{PARTS[part]}.surf.gii" for part in ("whole", *sides)}
+
+
+def pial_of(*sides: Side) -> dict[str, str]:
+    """Returns the files that are made for every brain with some hemispheres, whatever its source."""
+    folder = f"{BRAIN}/surface"
+    return {**surfaces_in(folder, sides), "stl": f"{folder}/pial.stl", "report": f"{folder}/surface.json"}
+
+
+def folded_of(*sides: Side) -> dict[str, str]:
+    """Returns the surfaces of a simulated brain at a week with some hemispheres, and its thickness."""
+    folder = f"{RUN}/surfaces/{WEEK}"
+    return {**surfaces_in(folder, sides), "thickness": f"{folder}/thickness.shape.gii"}
+
+
+def maps_of(*sides: Side) -> dict[str, str]:
+    """Returns the files with maps on some hemispheres, beside the metrics of a brain."""
+    return {side: f"results/{{where}}/{side}.shape.gii" for side in sides}
+
+
+def region_files(folder: str) -> dict[str, str]:
+    """Returns the files with the regions of both hemispheres in a folder."""
+    return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
+
+
+def tables(folder: str, *names: str) -> dict[str, str]:
+    """Returns the files of several tables for print in a folder, by name and kind."""
+    return {f"{name}_{kind}": f"{folder}/{name}.{kind}" for name in names for kind in ("csv", "md", "tex")}
+
+
+LABELS = f"{BRAIN}/surface/labels.nii.gz"
+SHAPE = f"{BRAIN}/surface/shape.surf.gii"
+POSE = f"{BRAIN}/surface/pose.json"
+PIAL = pial_of(*SIDES)
+THICKNESS = {
+    "thickness": f"{BRAIN}/surface/thickness.shape.gii",
+    # not a number where it could not be measured
+    "measured": f"{BRAIN}/surface/measured_thickness.shape.gii",
+    "report": f"{BRAIN}/surface/thickness.json",
+}
+MASK = f"{BRAIN}/surface/mask.nii.gz"
+MATCHED_SURFACE = f"{BRAIN}/surface/matched.surf.gii"
+MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
+REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
+MESH = {
+    "mesh": f"{BRAIN}/mesh/brain.xdmf",
+    "data": f"{BRAIN}/mesh/brain.h5",
+    "surface": f"{BRAIN}/mesh/pial.stl",
+    "quality": f"{BRAIN}/mesh/quality.json",
+}
+CARRIED_MESH = f"{BRAIN}/mesh/carried.h5"
+TARGETS = f"{BRAIN}/mesh/targets.{{whose}}.h5"
+
+GROWTH = {name: f"{STUDY}/growth/{name}.csv" for name in ("areas", "rates", "agreement")}
+CURVES = {"curves": f"{STUDY}/growth/curves.csv", "errors": f"{STUDY}/growth/curve_errors.csv"}
+
+PARAMETERS = f"{RUN}/params.yaml"
+MAPS = f"{RUN}/folding/maps.h5"
+REGIONS = {"mesh": f"{RUN}/folding/regions.xdmf", "data": f"{RUN}/folding/regions.h5"}
+FOLDING = {
+    "steps": f"{RUN}/folding/steps.csv",
+    "frames": f"{RUN}/folding/frames.h5",
+    "series": f"{RUN}/folding/frames.xdmf",
+    "zones": f"{RUN}/folding/zones.json",
+    "summary": f"{RUN}/folding/summary.json",
+}
+
+MEASURES = {name: f"results/{{where}}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
+"""Tables that are made for every brain, whatever hemispheres it has."""
+DISPLACEMENT = f"{RUN}/metrics/displacement.csv"
+SIMILARITY = f"{RUN}/metrics/{WEEK}/similarity.{{measured}}.csv"
+VOLUMES = {"volumes": f"{BRAIN}/metrics/volumes.csv", "scores": f"{BRAIN}/metrics/published_centiles.csv"}
+
+READY = {
+    f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/{WEEK}/{name}{ending}.gii"
+    for name in ("real", "start", "adjacent")
+    for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
+}
+"""What all runs from a start brain are compared with in a week: surfaces that are ready, with their curvature."""
+PREDICTION = f"{RUN}/metrics/prediction.csv"
+VALIDATION = f"{RUN}/metrics/validation.csv"
+AGREEMENT = f"{RUN}/metrics/displacement_agreement.csv"
+ONSET = f"{RUN}/metrics/onset.csv"
+COMPARED_MEMBER = f"{STUDY}/{{study}}/members/{{run}}/{{brain}}.csv"
+CEILING = f"{STUDY}/validation/{{brain}}/registration.csv"
+
+_FOLDERS = (BRAIN, RUN, "results/{where}", f"{STUDY}/{{study}}", CALIBRATION, STUDY, "results/report")
+"""Folders with logs and benchmarks of their own, those within others first."""
+
+
+def one_of(names: Iterable[str]) -> str:
+    """Returns a pattern that matches exactly these names, or nothing if there are none."""
+    return "|".join(map(re.escape, names)) or r"(?!)"
+
+
+def job_files(rule: str, output: str) -> tuple[str, str]:
+    """Returns the log and the benchmark file of a rule's jobs, beside the results that its first `output` is among.
+
+    They are called by the rule, and by those wildcards that the folder does not name.
+    """
+    folder = next((folder for folder in _FOLDERS if output.startswith(f"{folder}/")), STUDY)
+    others = [name for name in re.findall(r"{(\w+)}", output) if f"{{{name}}}" not in folder]
+    name = ".".join([rule, *(WEEK if other == "week" else f"{{{other}}}" for other in dict.fromkeys(others))])
+    return f"{folder}/logs/{name}.log", f"{folder}/benchmarks/{name}.tsv"

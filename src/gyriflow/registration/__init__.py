@@ -1,1 +1,0 @@
-"""Correspondence between weeks or brains: found from volumes, and what is carried along it."""

@@ -1,0 +1,138 @@
+"""What quantities, units, weeks and parameters are called in figures and tables."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+from ..parameters.measures import SHAPE_MEASURES
+
+METRICS = {
+    "volume": "volume",
+    "area": "pial area",
+    "gyrification_index": "gyrification index, hulls",
+    "gyrification_index_envelope": "gyrification index, envelopes",
+    "mean_local_gyrification_index": "local gyrification index",
+    "mean_curvedness": "mean curvedness",
+    "mean_curvature": "mean curvature",
+    "mean_shape_index": "mean shape index",
+    "mean_sulcal_depth": "mean depth below the hull",
+    "folding_index": "folding index",
+    "mean_thickness": "mean cortical thickness",
+}
+"""The metrics of the study's tables that are drawn, and their titles."""
+MEASURES = {"shape_index": "shape index", "mean_curvature": "mean curvature"}
+"""What a simulation is compared with a real brain by, as in the names of columns, and their titles."""
+PRESSURES = {
+    "contact_pressure_pa": "contact pressure (Pa)",
+    "contact_pressure_pa_per_gw": "contact pressure built up in a week (Pa/GW)",
+}
+DISPLACEMENT = "displacement_mm"
+MAPS = {
+    **{name: measure.label for name, measure in SHAPE_MEASURES.items()},
+    **PRESSURES,
+    DISPLACEMENT: "displacement since the start (mm)",
+}
+"""The quantities that are drawn as maps, with the labels of their colour bars."""
+WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth per step (10⁻³)", "shear modulus (Pa)"
+"""The fields of the folding, with their units."""
+QUALITY = {
+    "radius_ratio": "radius ratio (1 = regular)",
+    "min_dihedral_deg": "smallest dihedral angle (°)",
+    "max_dihedral_deg": "largest dihedral angle (°)",
+    "volume_mm3": "volume (mm³)",
+}
+"""The measures of an element's quality."""
+STEPS = {
+    "newton": "Newton\niterations",
+    "krylov": "CG iterations",
+    "min_J": "smallest\ndet F",
+    "max_u_mm": "|u| per step\n(mm)",
+    "elements_through_cortex": "elements through\nthe cortex",
+    "radius_ratio_01": "radius ratio,\n1 % quantile",
+    "seconds": "time per step\n(s)",
+}
+"""What a solve notes of each of its steps."""
+PARAMETERS = {
+    "thickness": "cortical thickness",
+    "shear_modulus_cortex": "shear modulus of the cortex",
+    "shear_modulus_core": "shear modulus of the core",
+}
+"""Parameters of the folding, without the endings of their names, which tell the unit; others are called as they are."""
+
+# as at the ends of names, the longer first, and in the column `unit` of tables
+_ENDINGS = {
+    "_mm_per_gw": "mm/GW",
+    "_per_s": "s⁻¹",
+    "_pa_per_m": "Pa/m",
+    "_mm": "mm",
+    "_pa": "Pa",
+    "_gw": "GW",
+    "_s": "s",
+}
+_UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
+
+
+def shown_unit(unit: object) -> str:
+    """Returns a unit of the tables as shown, for example "cm²"; empty where there is none."""
+    return _UNITS.get(unit, unit) if isinstance(unit, str) else ""
+
+
+def with_unit(name: str, unit: object) -> str:
+    """Returns a name with a unit of the tables behind it, for example "pial area (cm²)"."""
+    return f"{name} ({shown})" if (shown := shown_unit(unit)) else name
+
+
+def plain(name: str) -> str:
+    """Returns a name of columns or files as words."""
+    return name.replace("_", " ")
+
+
+def shown_number(value: float) -> str:
+    """Returns a number with at most three digits, a very large or small one with its power of ten, as in 2·10⁻⁷."""
+    digits, _, power = f"{value:.3g}".replace("-", "−").partition("e")
+    if not power:
+        return digits
+    factor = "" if digits == "1" else f"{digits}·"
+    return f"{factor}10$^{{{int(power.replace('−', '-'))}}}$"
+
+
+def week_label(week: float) -> str:
+    """Returns a gestational week as shown, for example "21 GW" or "21.5 GW"."""
+    return f"{week:g} GW"
+
+
+def column_label(key: Hashable) -> str:
+    """Returns the heading of a column: a week, an interval of two weeks, or a name as it is."""
+    match key:
+        case (first, last):
+            return f"{first:g}–{last:g} GW"
+        case float() | int():
+            return week_label(key)
+        case _:
+            return str(key)
+
+
+def parameter_label(key: str) -> str:
+    """Returns what a key of the folding is called on an axis, with its unit, for example "cortical thickness (mm)"."""
+    name, unit = key.rpartition(".")[2], ""
+    for ending, shown in _ENDINGS.items():
+        if name.endswith(ending):
+            name, unit = name.removesuffix(ending), shown
+            break
+    return with_unit(PARAMETERS.get(name, plain(name)), unit)
+
+
+def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Returns a heading for each member of a study: its values with their units, for example "1.5 mm".
+
+    Where several keys are varied, each is named.
+    """
+    labels = []
+    for member in values:
+        parts = []
+        for key, value in member.items():
+            name, _, unit = parameter_label(key).partition(" (")
+            text = f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
+            text += f" {unit.removesuffix(')')}" if unit else ""
+            parts.append(text if len(member) == 1 and unit else f"{name} {text}")
+        labels.append("\n".join(parts))
+    return labels

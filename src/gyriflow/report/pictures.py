@@ -1,0 +1,510 @@
+"""Pictures of surfaces: simulated beside measured brains, maps, regions, zones, and the mesh cut open."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
+from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, submesh
+from ..parameters.measures import SHAPE_MEASURES
+from ..parameters.terms import (
+    BASE,
+    BETWEEN_PLANES,
+    CLAMPED,
+    FLAT_CUTS,
+    FREE,
+    LEFT_CONTACT,
+    MEDIAL_WALL,
+    RIGHT_CONTACT,
+    SIDE_X,
+    SIDE_Y,
+    ZONE_NAMES,
+)
+from ..units import CM2_PER_MM2
+from .labels import GROWTH, MAPS, PRESSURES, column_label, plain, value_labels
+from .panels import Panel, Row, panel_grid
+from .scene import (
+    MAP,
+    UNKNOWN_COLOUR,
+    VIEWS,
+    View,
+    colour_scale,
+    hemisphere_faces,
+    named_views,
+    paint,
+    restricted,
+    uniform_colours,
+)
+from .style import (
+    MAGNITUDES,
+    NEUTRAL_COLOUR,
+    REAL_BRAIN,
+    REAL_SURFACE_COLOUR,
+    RIGHT_COLOUR,
+    RUN_COLOURS,
+    SIMULATED_SURFACE_COLOUR,
+    styled,
+)
+
+SurfaceMap = tuple[TriangleMesh, Floats]
+"""A surface in RAS+ mm and a value per vertex."""
+Halves = Sequence[tuple[TriangleMesh, Mapping[str, Floats]]]
+"""The hemispheres of a brain, each with its maps per vertex by name."""
+
+SIDE_VIEWS = ("left", "top")
+ROUND_VIEWS = ("left", "right", "top", "bottom")
+MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
+PRESSURE_COLOURS = "YlOrRd"
+SIGNED = "RdBu_r"
+ROUNDING = 1e-9
+_MOST = 0.995
+"""Part of the vertices that a colour scale reaches."""
+ABSENT = "ended\nbefore\nthis week"
+"""What stands in the place of a member of a study that has not come to the week."""
+ZONE_COLOURS = {
+    FREE: "#D55E00",
+    CLAMPED: "#009E73",
+    LEFT_CONTACT: "#0072B2",
+    RIGHT_CONTACT: RIGHT_COLOUR,
+    BETWEEN_PLANES: "#CC79A7",
+    BASE: "#999999",
+    SIDE_X: "#56B4E9",
+    SIDE_Y: "#E69F00",
+    MEDIAL_WALL: "#8C6D31",
+}
+"""Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
+CORTEX_COLOUR, CORE_COLOUR = "#E8A33D", "#F3EBDD"
+CUTS = {"cut across, front view": (1, "front"), "cut along, top view": (2, "top")}
+"""The planes in which the mesh is cut open: the axis across and the side that is seen."""
+TINTS = (0.0, 0.4, 0.7)
+"""How far towards white the colours of further regions are."""
+
+
+def _ordered(*groups: Mapping) -> list:
+    """Returns the keys of all groups, weeks and intervals in order, names as they come."""
+    keys = list(dict.fromkeys(key for group in groups for key in group))
+    return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
+
+
+def _plain_panels(meshes: Mapping[Any, TriangleMesh | None], keys: Sequence, colour: str, view: View) -> list:
+    """Returns a panel of one colour for each key, None for those that lack a surface."""
+    found = [meshes.get(key) for key in keys]
+    return [None if mesh is None else Panel(mesh, uniform_colours(mesh, colour), view) for mesh in found]
+
+
+@styled
+def runs_by_week(
+    runs: Mapping[str, Mapping[float, TriangleMesh]],
+    real: Mapping[float, TriangleMesh],
+    *,
+    views: Sequence[str] = SIDE_VIEWS,
+    measured: str = REAL_BRAIN,
+    **shown: Any,
+) -> Figure:
+    """Returns the brains of several runs (blue) above measured ones (beige), a column per week, their rows by view.
+
+    Parameters
+    ----------
+    runs : {run: {week: surface in RAS+ mm}}
+    real : {week: surface in RAS+ mm}
+        A week that one of them lacks leaves its place empty.
+    """
+    groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items()}
+    groups |= {measured: (real, REAL_SURFACE_COLOUR)}
+    keys = _ordered(*(meshes for meshes, _ in groups.values()))
+    rows = [
+        Row(f"{name}\n{view.name} view", _plain_panels(meshes, keys, colour, view))
+        for view in named_views(views)
+        for name, (meshes, colour) in groups.items()
+        if meshes
+    ]
+    return panel_grid([column_label(key) for key in keys], rows, measured=measured, **shown)
+
+
+@styled
+def brains_picture(
+    runs: Mapping[str, TriangleMesh],
+    real: Mapping[str, TriangleMesh],
+    *,
+    views: Sequence[str] = SIDE_VIEWS,
+    **shown: Any,
+) -> Figure:
+    """Returns brains side by side, those of runs (blue) before measured ones (beige), a row per view.
+
+    Parameters
+    ----------
+    runs, real : {heading: surface in RAS+ mm}
+    """
+    rows = [
+        Row(
+            f"{view.name} view",
+            _plain_panels(runs, list(runs), SIMULATED_SURFACE_COLOUR, view)
+            + _plain_panels(real, list(real), REAL_SURFACE_COLOUR, view),
+        )
+        for view in named_views(views)
+    ]
+    return panel_grid([*runs, *real], rows, **shown)
+
+
+@styled
+def displacement_maps(
+    displacements: Mapping[tuple[float, float], SurfaceMap],
+    *,
+    views: Sequence[str] = ("left", "top", "back"),
+    synthetic: bool = False,
+) -> Figure:
+    """Returns the norm of the displacement on the pial surface, a column per interval, on one colour scale.
+
+    The scale ends where one vertex in two hundred is above, so that a single maximum does not set it. The maximum is
+    ringed, dotted where it lies on the side turned away; below each interval stand its size, its place in RAS+ mm, and
+    the mean over the vertices.
+
+    Parameters
+    ----------
+    displacements : {(from_week, to_week): (surface, norms in mm)}
+    """
+    keys = _ordered(displacements)
+    scale = magnitude_scale(np.concatenate([norms for _, norms in displacements.values()]), MAGNITUDES)
+    seen = named_views(views)
+    rows = []
+    for view in seen:
+        panels = []
+        for key in keys:
+            mesh, norms = displacements[key]
+            place = mesh.vertices[int(np.nanargmax(norms))]
+            where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
+            caption = f"max {np.nanmax(norms):.2f} mm at {where}\nmean {np.nanmean(norms):.2f} mm"
+            shown = caption if view == seen[-1] else ""
+            panels.append(Panel(mesh, paint(norms, scale), view, shown, MAP, place))
+        rows.append(Row(f"{view.name} view", panels))
+    bars = [(scale, "norm of the displacement (mm)")]
+    return panel_grid([column_label(key) for key in keys], rows, synthetic=synthetic, colour_bars=bars)
+
+
+def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
+    """Returns a scale from zero to a round value that at most a few of the values pass, so that no outlier sets it."""
+    known = values[np.isfinite(values)]
+    high = float(np.quantile(known, _MOST)) if len(known) else 1.0
+    end = round_up(high) if high > 0 else 1.0
+    return colour_scale(colours, 0.0, end, cut=bool((known > end).any()))
+
+
+def signed_scale(values: Floats) -> ScalarMappable:
+    """Returns a scale that is pale at zero and as wide on both sides, for values of which some are below zero."""
+    known = np.abs(values[np.isfinite(values)])
+    end = round_up(float(np.quantile(known, _MOST)))
+    return colour_scale(SIGNED, -end, end, cut=bool((known > end).any()))
+
+
+def goes_below_zero(values: Floats) -> bool:
+    """Returns whether values go below zero by more than rounding."""
+    return bool(np.nanmin(values) < -ROUNDING * np.nanmax(np.abs(values)))
+
+
+def round_up(value: float) -> float:
+    """Returns a positive value rounded up to two digits, so that a colour bar ends at a number one can say."""
+    step = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(np.ceil(value / step - 1e-9) * step)
+
+
+def scale_of(quantity: str, values: Floats) -> ScalarMappable:
+    """Returns the colour scale of one of `labels.MAPS`: its own limits, or from zero to where few vertices are above.
+
+    InputError for another quantity.
+    """
+    if quantity not in MAPS:
+        raise InputError("unknown quantity", found=quantity, expected=list(MAPS))
+    if quantity in PRESSURES:
+        return magnitude_scale(values[values > 0], PRESSURE_COLOURS)
+    measure = SHAPE_MEASURES.get(quantity)
+    if measure is not None and measure.limits is not None:
+        return colour_scale(measure.colours, *measure.limits)
+    return magnitude_scale(values, MAGNITUDES if measure is None else measure.colours)
+
+
+def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> tuple[TriangleMesh, dict[str, Floats]]:
+    """Returns the hemispheres of a brain as one surface, with the maps that all of them have.
+
+    Parameters
+    ----------
+    names
+        The maps that are wanted; a hemisphere that lacks one has NaN.
+    """
+    if names is None:
+        names = [name for name in halves[0][1] if all(name in maps for _, maps in halves)]
+    values = {
+        name: np.concatenate([maps.get(name, np.full(len(mesh.vertices), np.nan)) for mesh, maps in halves])
+        for name in names
+    }
+    return merged(*(mesh for mesh, _ in halves)) if len(halves) > 1 else halves[0][0], values
+
+
+def shape_maps(brains: Mapping[str, Mapping[float, Halves]], *, quantity: str, **shown: Any) -> Figure:
+    """Returns `scalar_maps` of a measure of the hemispheres; thickness is not known of every brain.
+
+    Parameters
+    ----------
+    brains : {group: {week: hemispheres}}
+        Groups without any are left out.
+    """
+    whole = {
+        group: {week: whole_maps(halves, [quantity]) for week, halves in known.items()}
+        for group, known in brains.items()
+        if known
+    }
+    maps = {
+        group: {week: (mesh, values[quantity]) for week, (mesh, values) in known.items()}
+        for group, known in whole.items()
+    }
+    return scalar_maps(maps, quantity=quantity, **shown)
+
+
+@styled
+def scalar_maps(
+    maps: Mapping[str, Mapping[Any, SurfaceMap]],
+    *,
+    quantity: str,
+    views: Sequence[str] = SIDE_VIEWS,
+    **shown: Any,
+) -> Figure:
+    """Returns a quantity on surfaces: a row per group and view, a column per week or run, one colour scale.
+
+    Parameters
+    ----------
+    maps : {group: {week or run: (surface, values)}}
+        For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
+    quantity
+        A name of `labels.MAPS`; pressures leave the surface grey where nothing touches.
+
+    InputError for another quantity or an unknown view.
+    """
+    scale = scale_of(quantity, np.concatenate([values for group in maps.values() for _, values in group.values()]))
+    keys = _ordered(*maps.values())
+    rows = [
+        Row(f"{group}\n{view.name} view", [_map_panel(known.get(key), scale, view, quantity) for key in keys])
+        for view in named_views(views)
+        for group, known in maps.items()
+    ]
+    legend = [Patch(color=NEUTRAL_COLOUR, label="no contact")] if quantity in PRESSURES else []
+    if not all(np.isfinite(values).all() for group in maps.values() for _, values in group.values()):
+        legend.append(Patch(color=UNKNOWN_COLOUR, label="not measured"))
+    bars = [(scale, MAPS[quantity])]
+    return panel_grid([column_label(key) for key in keys], rows, colour_bars=bars, legend=legend, **shown)
+
+
+def _map_panel(known: SurfaceMap | None, scale: ScalarMappable, view: View, quantity: str) -> Panel | None:
+    if known is None:
+        return None
+    mesh, values = known
+    return Panel(mesh, paint(values, scale, zero_is_nothing=quantity in PRESSURES), view, material=MAP)
+
+
+@styled
+def influence_picture(
+    members: Mapping[str, Halves | None],
+    real: Mapping[str, Halves],
+    *,
+    values: Mapping[str, Mapping[str, Any]],
+    views: Sequence[str] = SIDE_VIEWS,
+    **shown: Any,
+) -> Figure:
+    """Returns the surfaces of the members of a study at one week above their maps of the shape index on one scale.
+
+    Parameters
+    ----------
+    members : {run: hemispheres with their maps}
+        In the order of the study; None for a member that has not come to the week.
+    real : {what it is called: hemispheres with their maps}
+        The measured brain of the week, if there is one, shown last.
+    values : {run: {parameter: value}}
+        What is varied, for the headings.
+    """
+    quantity = "shape_index"
+    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
+    members = {labels[run]: halves for run, halves in members.items()}
+    known = {
+        name: None if halves is None else whole_maps(halves, [quantity]) for name, halves in {**members, **real}.items()
+    }
+    measured_values = [maps[quantity] for _, maps in filter(None, known.values())]
+    scale = scale_of(quantity, np.concatenate(measured_values) if measured_values else np.empty(0))
+    meshes = {name: found[0] if found else None for name, found in known.items()}
+    maps = {name: (found[0], found[1][quantity]) if found else None for name, found in known.items()}
+    seen = named_views(views)
+    rows = [
+        Row(
+            f"{view.name} view",
+            _plain_panels(meshes, list(members), SIMULATED_SURFACE_COLOUR, view)
+            + _plain_panels(meshes, list(real), REAL_SURFACE_COLOUR, view),
+            absent=ABSENT,
+        )
+        for view in seen
+    ]
+    rows += [
+        Row(
+            f"{plain(quantity)}\n{view.name} view",
+            [_map_panel(maps[name], scale, view, quantity) for name in known],
+            absent=ABSENT,
+        )
+        for view in seen
+    ]
+    return panel_grid(list(known), rows, colour_bars=[(scale, MAPS[quantity])], **shown)
+
+
+def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:
+    """Returns a colour for each region in the order given: those of runs, then their tints.
+
+    No scale from dark to pale, which would make neighbours alike, and dark ones like shade. From the 22nd region on the
+    colours come again.
+    """
+    colours = {}
+    for number, name in enumerate(dict.fromkeys(names)):
+        tint = TINTS[number // len(RUN_COLOURS) % len(TINTS)]
+        red, green, blue = (part + tint * (1.0 - part) for part in to_rgb(RUN_COLOURS[number % len(RUN_COLOURS)]))
+        colours[name] = red, green, blue
+    return colours
+
+
+@styled
+def regions_picture(
+    brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints, Mapping[int, str]]]]],
+    *,
+    views: Sequence[str] = ROUND_VIEWS,
+    **shown: Any,
+) -> Figure:
+    """Returns brains coloured by region, a column per brain and a row per view, with the regions' names.
+
+    Parameters
+    ----------
+    brains : {heading of the column: hemispheres, each with the numbers of its vertices' regions and their names}
+        A number without a name is no region.
+
+    InputError where there is no brain.
+    """
+    if not brains:
+        raise InputError("no brain with regions")
+    names = [name for halves in brains.values() for _, (_, table) in halves for name in table.values()]
+    colours = region_colours(names)
+    painted = {}
+    for heading, halves in brains.items():
+        palettes = [
+            (numbers, {number: colours[name] for number, name in table.items()}) for _, (numbers, table) in halves
+        ]
+        shades = [[palette.get(n, to_rgb(NEUTRAL_COLOUR)) for n in map(int, numbers)] for numbers, palette in palettes]
+        painted[heading] = merged(*(mesh for mesh, _ in halves)), np.concatenate(shades)
+    rows = [
+        Row(f"{view.name} view", [Panel(mesh, shades, view) for mesh, shades in painted.values()])
+        for view in named_views(views)
+    ]
+    legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
+    legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
+    return panel_grid(list(painted), rows, legend=legend, **shown)
+
+
+@styled
+def zones_picture(
+    mesh: TriangleMesh,
+    zones: NDArray[np.integer],
+    *,
+    fissure_x_mm: float,
+    views: Sequence[str] = MEDIAL_VIEWS,
+    synthetic: bool = False,
+) -> Figure:
+    """Returns the zones of the brain's boundary from several sides, with their areas.
+
+    Parameters
+    ----------
+    zones : (m,) code of each face
+    fissure_x_mm
+        Where the medial views part the hemispheres.
+
+    Raises
+    ------
+    InputError
+        If the number of codes is not the number of faces, or a code has no name.
+    """
+    if len(zones) != len(mesh.faces):
+        raise InputError("zones do not fit the surface", found=f"{len(zones)} codes", expected=f"{len(mesh.faces)}")
+    unknown = sorted(set(np.unique(zones).tolist()) - set(ZONE_COLOURS))
+    if unknown:
+        raise InputError("unknown zone", found=unknown, expected=list(ZONE_COLOURS))
+    palette = np.zeros((max(ZONE_COLOURS) + 1, 3))
+    for code, colour in ZONE_COLOURS.items():
+        palette[code] = to_rgb(colour)
+    areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(palette)) * CM2_PER_MM2
+    legend = [
+        Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²")
+        for code, colour in ZONE_COLOURS.items()
+        if areas[code] or code not in FLAT_CUTS
+    ]
+    columns, rows = _one_row(mesh, palette[zones], views, fissure_x_mm)
+    return panel_grid(columns, rows, synthetic=synthetic, legend=legend)
+
+
+@styled
+def field_picture(
+    mesh: TriangleMesh,
+    values: Floats,
+    *,
+    fissure_x_mm: float,
+    views: Sequence[str] = MEDIAL_VIEWS,
+    synthetic: bool = False,
+) -> Figure:
+    """Returns the (n,) growth of the pial vertices in a step from several sides; grey where it is zero."""
+    scale = signed_scale(values) if goes_below_zero(values) else magnitude_scale(values, MAGNITUDES)
+    columns, rows = _one_row(mesh, paint(values, scale, zero_is_nothing=True), views, fissure_x_mm)
+    legend = [Patch(color=NEUTRAL_COLOUR, label="zero")]
+    return panel_grid(columns, rows, synthetic=synthetic, colour_bars=[(scale, GROWTH)], legend=legend)
+
+
+def _one_row(
+    mesh: TriangleMesh, colours: Floats, views: Sequence[str], fissure_x_mm: float
+) -> tuple[list[str], list[Row]]:
+    # a brain of one hemisphere has no medial view of the other
+    shown = [view for view in named_views(views) if hemisphere_faces(mesh, view.hemisphere, fissure_x_mm).any()]
+    panels = [Panel(*restricted(mesh, colours, view.hemisphere, fissure_x_mm), view, material=MAP) for view in shown]
+    return [f"{view.name} view" for view in shown], [Row("", panels)]
+
+
+@styled
+def mesh_picture(mesh: TetrahedralMesh, in_cortex: NDArray[np.bool_], *, synthetic: bool = False) -> Figure:
+    """Returns the mesh from the left, and cut open in a coronal and in an axial plane, with the edges of its elements.
+
+    Elements are left out whole, those whose centroid lies before or above the plane through the middle.
+
+    Parameters
+    ----------
+    mesh : in RAS+ mm, linear or quadratic
+    in_cortex : (m,) whether an element belongs to the cortex
+    """
+    centroid = mesh.vertices[mesh.corners].mean(axis=1)
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    shown: dict[str, Any] = {"left view": (np.ones(len(mesh.tets), dtype=bool), "left")}
+    shown |= {name: (centroid[:, axis] <= middle[axis], view) for name, (axis, view) in CUTS.items()}
+    panels = [
+        Panel(*_open(mesh, keep, in_cortex), VIEWS[view], material=MAP, edges=True) for keep, view in shown.values()
+    ]
+    colours = {"pial surface": SIMULATED_SURFACE_COLOUR, "elements of the cortex": CORTEX_COLOUR}
+    colours["elements of the core"] = CORE_COLOUR
+    legend = [Patch(color=colour, label=label) for label, colour in colours.items()]
+    return panel_grid(list(shown), [Row("", panels)], synthetic=synthetic, legend=legend)
+
+
+def _open(mesh: TetrahedralMesh, keep: NDArray[np.bool_], in_cortex: NDArray[np.bool_]) -> tuple[TriangleMesh, Floats]:
+    """Returns the boundary of some of the elements, and the (k, 3) colours of its faces."""
+    faces, owners = boundary_faces(TetrahedralMesh(mesh.vertices, mesh.tets[keep]))
+    count = len(mesh.vertices)
+    own, pial = (
+        np.sort(triangles, axis=1) @ np.array([count * count, count, 1])
+        for triangles in (faces, boundary_faces(mesh)[0])
+    )
+    inside = np.where(in_cortex[keep][owners][:, None], to_rgb(CORTEX_COLOUR), to_rgb(CORE_COLOUR))
+    colours = np.where(np.isin(own, pial)[:, None], to_rgb(SIMULATED_SURFACE_COLOUR), inside)
+    part, _ = submesh(TriangleMesh(mesh.vertices, faces), np.ones(len(faces), dtype=bool))
+    return part, colours

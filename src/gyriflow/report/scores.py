@@ -1,0 +1,421 @@
+"""Charts of what simulations are worth beside real brains: gain, horizon, onset of sulci, studies, calibrations."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Unpack
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from ..errors import InputError
+from ..parameters.terms import SIDES
+from .charts import spectra_chart
+from .labels import MEASURES, parameter_label, plain, value_labels, with_unit
+from .style import (
+    FULL_WIDTH_IN,
+    MEASURED,
+    MUTED_COLOUR,
+    REAL_COLOUR,
+    RUN_COLOURS,
+    Shown,
+    add_letters,
+    chosen_colours,
+    light_grid,
+    new_figure,
+    panel_figure,
+    run_colours,
+    run_legend,
+    run_panels,
+    star,
+    styled,
+    week_axis,
+    wrap,
+)
+
+CEILING = "registration alone"
+KINDS = ("explained", "predicted")
+"""Weeks whose growth was known, and those whose growth was not; panels show one of them."""
+ONE_WEEK = np.array([-0.25, 0.25])
+"""Ends in weeks of a line that stands for a single week."""
+ROW_IN = 0.22
+"""Height of a sulcus's row."""
+MARKERS = {"whole": "o", "left": "<", "right": ">"}
+LINE_COLOUR, OPTIMUM_COLOUR = RUN_COLOURS[:2]
+_SIZES = ("area", "volume", "gyrification_index")
+
+
+def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any) -> None:
+    """Draws a gain with its interval; full marks explain a week, open ones predict it."""
+    gain = rows[f"gain_{measure}"]
+    away = np.stack([gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain])
+    axes.errorbar(x, gain, yerr=away.clip(min=0), color=colour, linewidth=1.0, elinewidth=0.7)
+    for kind, face in zip(KINDS, (colour, "white"), strict=True):
+        if (chosen := rows["kind"] == kind).any():
+            axes.plot(x[chosen], gain[chosen], "o", color=colour, markerfacecolor=face)
+
+
+def _gain_axes(axes: Axes, title: str) -> None:
+    axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
+    axes.set_title(title)
+    light_grid(axes)
+
+
+def _ceiling_key(ceiling: pd.DataFrame | None) -> list[Artist]:
+    known = ceiling is not None and len(ceiling)
+    return [Line2D([], [], color=MUTED_COLOUR, linestyle=":", label=CEILING)] if known else []
+
+
+@styled
+def validation_chart(validation: pd.DataFrame, ceiling: pd.DataFrame | None = None, **shown: Unpack[Shown]) -> Figure:
+    """Returns by week how much better a run's curvature correlates with the real brain's than the scaled start's does.
+
+    Bars are 95 % intervals of the bootstrap; filled marks explain the week, open ones predict it. The adjacent real
+    week, which skill is measured against, and the start carried by registration alone are drawn beside.
+
+    Parameters
+    ----------
+    validation
+        Columns run, start_week, week, kind, gain_…, gain_low_…, gain_high_…, r_start_…, r_adjacent_… of each of
+        `labels.MEASURES`.
+    ceiling
+        The same of the start carried by registration.
+    """
+    figure, panels, colours = run_panels(len(MEASURES), validation["run"], shown, per_row=2, panel_in=2.5)
+    for axes, (measure, name) in zip(panels, MEASURES.items(), strict=True):
+        for number, ((run, _), rows) in enumerate(validation.groupby(["run", "start_week"], sort=False)):
+            line = rows.sort_values("week")
+            shift = 0.03 * (number - (len(colours) - 1) / 2)
+            _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
+        for _, rows in validation.groupby("start_week"):
+            adjacent = (rows[f"r_adjacent_{measure}"] - rows[f"r_start_{measure}"]).groupby(rows["week"]).first()
+            axes.plot(adjacent.index, adjacent, "*", color=REAL_COLOUR, markersize=6)
+        for _, rows in [] if ceiling is None else ceiling.groupby("start_week"):
+            gain = rows[f"gain_{measure}"]
+            axes.plot(rows["week"], gain, ":", color=MUTED_COLOUR)
+            if len(rows) == 1:  # a line through one point cannot be seen
+                begin, end = rows["week"].iloc[0] + ONE_WEEK
+                axes.hlines(gain, begin, end, colors=MUTED_COLOUR, linestyles=":")
+        _gain_axes(axes, f"{name}: r less that of the scaled start")
+        week_axis(axes, validation["week"])
+    real = star("real brain of the week before", markersize=6)
+    run_legend(figure, colours, extra=[real, *_ceiling_key(ceiling)])
+    return figure
+
+
+@styled
+def smoothing_chart(
+    validation: pd.DataFrame,
+    ceiling: pd.DataFrame | None = None,
+    *,
+    smoothing_mm: Mapping[str, float],
+) -> Figure:
+    """Returns the gain over no folding against the length that local growth is smoothed by, a line for each week.
+
+    Parameters
+    ----------
+    validation
+        Columns run, week, gain_… of each of `labels.MEASURES`.
+    ceiling
+        The same columns of the start carried by registration, drawn as dotted lines.
+    smoothing_mm
+        The runs that differ in nothing else, and their lengths; an infinite one is that of uniform growth.
+    """
+    lengths = {run: float(length) for run, length in smoothing_mm.items() if run in set(validation["run"])}
+    finite = sorted({length for length in lengths.values() if np.isfinite(length)})
+    beyond = 1.6 * max(finite, default=1.0)
+    rows = validation[validation["run"].isin(lengths)].assign(length=lambda table: table["run"].map(lengths))
+    rows["length"] = rows["length"].clip(upper=beyond)
+    colours = run_colours([f"{week:g} GW" for week in sorted(rows["week"].unique())])
+    uniform = any(np.isinf(length) for length in lengths.values())
+    figure, panels = panel_figure(len(MEASURES), per_row=2, panel_in=2.5)
+    for axes, (measure, name) in zip(panels, MEASURES.items(), strict=True):
+        for (week, of_week), colour in zip(rows.groupby("week"), colours.values(), strict=True):
+            line = of_week.groupby("length")[f"gain_{measure}"].mean()
+            axes.plot(line.index, line, "o-", color=colour)
+            if ceiling is not None:
+                for gain in ceiling.loc[ceiling["week"] == week, f"gain_{measure}"]:
+                    axes.axhline(gain, color=colour, linestyle=":", linewidth=0.8)
+        axes.set_xscale("log")
+        places = [*finite, *([beyond] if uniform else [])]
+        axes.set_xticks(places, [f"{length:g}" for length in finite] + ["uniform"] * uniform)
+        axes.minorticks_off()
+        axes.set_xlabel("smoothing of measured growth, standard deviation (mm)")
+        _gain_axes(axes, f"{name}: r less that of the scaled start")
+    run_legend(figure, colours, extra=_ceiling_key(ceiling))
+    return figure
+
+
+@styled
+def horizon_chart(horizon: pd.DataFrame, ceiling: pd.DataFrame | None = None, **shown: Unpack[Shown]) -> Figure:
+    """Returns gain over no folding by weeks after the start, explained weeks above and predicted ones below.
+
+    Lines are of one start, whose week stands at their end; bars are 95 % intervals.
+
+    Parameters
+    ----------
+    horizon
+        Rows of the study's horizon.csv.
+    ceiling
+        Columns start_week, horizon and gain_… of the start carried by registration, drawn as dotted lines.
+    """
+    kinds = [kind for kind in KINDS if (horizon["kind"] == kind).any()]
+    layout: dict[str, Any] = {"per_row": len(MEASURES), "panel_in": 2.6, "foot_in": 0.4, "sharex": True}
+    figure, panels, colours = run_panels(len(kinds) * len(MEASURES), horizon["model"], shown, **layout)
+    places = ((kind, *measure) for kind in kinds for measure in MEASURES.items())
+    for axes, (kind, measure, name) in zip(panels, places, strict=True):
+        of_kind = horizon[horizon["kind"] == kind]
+        for (model, _, start), rows in of_kind.groupby(["model", "known_gw", "start_week"], dropna=False):
+            line = rows.sort_values("horizon")
+            _gain_line(axes, line["horizon"], line, measure, colours[str(model)])
+            end = (line["horizon"].iloc[-1], line[f"gain_{measure}"].iloc[-1])
+            axes.annotate(f"{start:g}", end, xytext=(4, 0), textcoords="offset points", va="center", fontsize=6)
+        # growth that is known is all that the ceiling knows
+        for _, rows in ceiling.groupby("start_week") if ceiling is not None and kind == "explained" else []:
+            line = rows.sort_values("horizon")
+            axes.plot(line["horizon"], line[f"gain_{measure}"], ":", color=MUTED_COLOUR)
+        _gain_axes(axes, f"{name}, {kind}")
+        axes.margins(x=0.1)
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
+        if measure == next(iter(MEASURES)):
+            axes.set_ylabel("r less that of the scaled start")
+        if kind == kinds[-1]:
+            axes.set_xlabel("weeks after the start (its week stands at the line's end)")
+    run_legend(figure, colours, extra=_ceiling_key(ceiling))
+    return figure
+
+
+@styled
+def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+    """Returns a row for each sulcus that the real brains do not have at the start, with the weeks in which it begins.
+
+    A cross at the right edge says that it never begins. Sulci are those of a start brain; where there are several,
+    their names have its name behind.
+
+    Parameters
+    ----------
+    onset
+        Columns run ("real" for the real brains), subject, region, there_at_start, onset_week.
+    runs
+        All runs of the study, which settle the colours.
+    """
+    several = len(onset["subject"].unique()) > 1
+    table = onset.assign(row=onset["region"] + (" · " + onset["subject"] if several else ""))
+    table = table[~table["there_at_start"].astype(bool) | (table["run"] != MEASURED)]
+    late = table[table["run"] == MEASURED].drop_duplicates("row").sort_values("onset_week", ascending=False)
+    places = {name: place for place, name in enumerate(late["row"])}
+    figure = new_figure(FULL_WIDTH_IN, 1.2 + ROW_IN * max(len(places), 2), synthetic=False)
+    axes = figure.subplots()
+    colours = chosen_colours(onset["run"], runs)
+    drawn = table[table["row"].isin(places) & ~table["there_at_start"].astype(bool)]
+    weeks = drawn["onset_week"].dropna()
+    beyond = np.ceil(weeks.max() + 0.5) if len(weeks) else 1.0
+    for number, (run, colour) in enumerate({MEASURED: REAL_COLOUR, **colours}.items()):
+        rows = drawn[drawn["run"] == run].drop_duplicates("row")
+        # runs beside each other, the real brains in the middle
+        shift = 0 if run == MEASURED else 0.5 * ((number - 0.5) / len(colours) - 0.5)
+        heights = rows["row"].map(places) + shift
+        begins = rows["onset_week"].notna()
+        marker, size = ("*" if run == MEASURED else "o"), (6 if shift == 0 else 4)
+        axes.plot(rows.loc[begins, "onset_week"], heights[begins], marker, color=colour, markersize=size)
+        axes.plot(np.full((~begins).sum(), beyond), heights[~begins], "x", color=colour, markersize=4)
+    axes.set_yticks(list(places.values()), list(places))
+    axes.set_ylim(-0.6, max(len(places), 1) - 0.4)
+    if len(weeks):
+        week_axis(axes, [weeks.min(), beyond])
+    else:
+        said: dict[str, Any] = {"ha": "center", "transform": axes.transAxes, "color": MUTED_COLOUR}
+        axes.text(0.5, 0.5, "no sulcus begins after the start", **said)
+        axes.set_xticks([])
+    light_grid(axes, "both")
+    run_legend(figure, colours, measured="real brains")
+    return figure
+
+
+@styled
+def influence_spectra(
+    spectra: Sequence[pd.DataFrame],
+    *,
+    values: Mapping[str, Mapping[str, Any]],
+    week: float,
+    **shown: Unpack[Shown],
+) -> Figure:
+    """Returns the relative power in B4 to B6 of the members of a study at one week, beside the measured brain's.
+
+    Colours go from pale to dark in the order of the values.
+
+    Parameters
+    ----------
+    spectra : tables as for `spectra_chart`
+    values : {run: {parameter: value}}
+        What is varied, in the order of the study.
+    """
+    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
+    table = pd.concat(spectra, ignore_index=True)
+    members = table[table["run"].isin([*labels, MEASURED])]
+    named = members.assign(run=[labels.get(run, run) for run in members["run"]])
+    shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
+    colours = dict(zip(labels.values(), shades, strict=False))
+    return spectra_chart(named, week=week, colours=colours, **shown)
+
+
+@styled
+def nearest_chart(
+    comparison: pd.DataFrame,
+    nearest: pd.DataFrame,
+    *,
+    varied: str,
+    subject: str,
+    real: Sequence[str],
+    synthetic: bool = False,
+) -> Figure:
+    """Returns by each measure how far the members of a study are from the measured brain, over the varied parameter.
+
+    Each measure has its panel, with the whole brain or both hemispheres; the nearest member is filled and named.
+
+    Parameters
+    ----------
+    comparison
+        Columns subject, real, hemisphere, measure, distance, unit, flag, resolution, and one with the values of the
+        parameter. Where the flag or the resolution is not "ok", a distance is not to be trusted: its mark is open.
+    nearest : columns measure, paper
+        The value that the publication found nearest by a measure is drawn as a dashed line.
+    varied
+        Name of the column with the parameter's values.
+    subject, real
+        The start brain, and the measured brains that it is compared with.
+
+    Raises
+    ------
+    InputError
+        If no distance is known.
+    """
+    own = comparison[(comparison["subject"] == subject) & comparison["real"].isin(real)]
+    rows = own[own["distance"].notna()]
+    rows = rows.assign(at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok"))
+    measures = list(dict.fromkeys(rows["measure"]))
+    if not measures:
+        raise InputError("no distance to a measured brain is known", found=f"{len(own)} rows")
+    published = nearest.dropna(subset=["paper"]).set_index("measure")["paper"]
+    figure, panels = panel_figure(len(measures), panel_in=2.1, synthetic=synthetic)
+    colours = {"whole": RUN_COLOURS[0], "left": RUN_COLOURS[0], "right": RUN_COLOURS[1]}
+    drawn: set[str] = set()
+    for number, (axes, measure) in enumerate(zip(panels, measures, strict=True)):
+        own = rows[rows["measure"] == measure]
+        sides = ["whole"] if (own["hemisphere"] == "whole").any() else list(SIDES)
+        drawn |= set(sides)
+        for side in sides:
+            _nearest_line(axes, own[own["hemisphere"] == side].sort_values("at"), MARKERS[side], colours[side])
+        axes.margins(y=0.25)
+        if measure in published:
+            axes.axvline(published[measure], color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
+        # distances of sizes are parts of the real brain's
+        unit = "share of the real" if measure in _SIZES else own["unit"].iloc[0]
+        axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
+        axes.set_xlabel(parameter_label(varied))
+        light_grid(axes)
+        if number % 3 == 0:
+            axes.set_ylabel("distance from the real brain")
+    named = {"whole": "whole brain", "left": "left hemisphere", "right": "right hemisphere"}
+    handles: list[Artist] = [
+        Line2D([], [], color=colours[side], marker=MARKERS[side], markersize=4.5, label=label)
+        for side, label in named.items()
+        if side in drawn
+    ]
+    ring: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
+    handles.append(Line2D([], [], markersize=9, markerfacecolor="none", label="nearest", **ring))
+    if not rows["trusted"].all():
+        label = "cut off, or not resolved"
+        handles.append(Line2D([], [], markersize=4.5, markerfacecolor="white", label=label, **ring))
+    if len(published):
+        handles.append(Line2D([], [], color=MUTED_COLOUR, linestyle="--", label="nearest in the publication"))
+    run_legend(figure, {}, extra=handles)
+    return figure
+
+
+def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> None:
+    if rows.empty:
+        return
+    axes.plot(rows["at"], rows["distance"], color=colour, linewidth=1.0)
+    for trusted, part in rows.groupby("trusted"):
+        look: dict[str, Any] = {"markerfacecolor": colour if trusted else "white", "markersize": 4.5}
+        axes.plot(part["at"], part["distance"], marker, color=colour, **look)
+    sound = rows[rows["trusted"]]
+    best = (sound if len(sound) else rows).sort_values("distance").iloc[0]
+    place = best["at"], best["distance"]
+    axes.plot(*place, "o", markersize=11, markerfacecolor="none", color=colour, markeredgewidth=1.0)
+    below: dict[str, Any] = {"xytext": (0, -8), "textcoords": "offset points", "ha": "center", "va": "top"}
+    axes.annotate(f"{best['at']:g}", place, fontsize=7, color=colour, **below)
+
+
+@styled
+def calibration_chart(
+    runs: pd.DataFrame,
+    optimum: pd.DataFrame,
+    sensitivities: pd.DataFrame,
+    profiles: pd.DataFrame,
+    *,
+    score: Sequence[str],
+    synthetic: bool = False,
+) -> Figure:
+    """Returns a panel for each parameter with the runs' scores and the surrogate, and one with the sensitivities.
+
+    Parameters
+    ----------
+    runs : columns of the parameters, round, score (NaN: diverged)
+    optimum, sensitivities, profiles
+        Tables of `comparison.surrogate`.
+    score
+        What the score is the sum of.
+    """
+    names = list(optimum["parameter"])
+    figure = new_figure(FULL_WIDTH_IN, 2.7, synthetic=synthetic)
+    panels = figure.subplots(1, len(names) + 1, width_ratios=[1.0] * len(names) + [0.7])
+    rows = optimum.set_index("parameter")
+    for axes, name in zip(panels, names, strict=False):
+        _parameter_panel(axes, name, runs, rows.loc[name], profiles[profiles["parameter"] == name])
+    panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
+    _sensitivity_panel(panels[-1], sensitivities)
+    add_letters(panels)
+    handles = [handle for panel in (panels[0], panels[-1]) for handle in panel.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    return figure
+
+
+def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, best: pd.Series, line: pd.DataFrame) -> None:
+    axes.axvspan(best["low"], best["high"], color=OPTIMUM_COLOUR, alpha=0.15, linewidth=0, label="95 % of the optima")
+    axes.axvline(best["value"], color=OPTIMUM_COLOUR, linestyle="--", label="optimum")
+    low, high = line["mean"] - 2 * line["sd"], line["mean"] + 2 * line["sd"]
+    axes.fill_between(line["value"], low, high, color=LINE_COLOUR, alpha=0.15, linewidth=0)
+    axes.plot(line["value"], line["mean"], color=LINE_COLOUR, label="surrogate")
+    finished = runs[runs["score"].notna()]
+    rounds = sorted(runs["round"].unique())
+    for place, number in enumerate(rounds):
+        rows = finished[finished["round"] == number]
+        # later rounds are darker
+        shade = str(0.75 - 0.75 * place / max(len(rounds) - 1, 1))
+        look: dict[str, Any] = {"color": shade, "markeredgecolor": "black", "markeredgewidth": 0.4}
+        axes.plot(rows[name], rows["score"], "o", label=f"round {number}", **look)
+    diverged = runs[runs["score"].isna()]
+    if len(diverged):
+        top = np.full(len(diverged), float(finished["score"].max()))
+        axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
+    axes.set_xlabel(parameter_label(name))
+    light_grid(axes)
+
+
+def _sensitivity_panel(axes: Axes, sensitivities: pd.DataFrame) -> None:
+    places = np.arange(len(sensitivities))
+    for shift, column, label, colour in (
+        (-0.18, "first_order", "variance by it alone", LINE_COLOUR),
+        (0.18, "total", "and by its interactions", MUTED_COLOUR),
+    ):
+        axes.barh(places + shift, sensitivities[column].clip(0, 1), height=0.34, color=colour, label=label)
+    axes.set_yticks(places, [parameter_label(name).replace(" ", "\n") for name in sensitivities["parameter"]])
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1)
+    axes.set_xlabel("part of the variance")

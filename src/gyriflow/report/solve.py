@@ -1,0 +1,250 @@
+"""What a folding solve did: its steps, its displacement, and the quality and resolution of its mesh."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Unpack
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..parameters.terms import ELEMENTS_NEEDED
+from .labels import QUALITY, STEPS, column_label, shown_number, week_label
+from .style import (
+    FULL_WIDTH_IN,
+    MUTED_COLOUR,
+    RUN_COLOURS,
+    SINGLE_COLUMN_IN,
+    Shown,
+    add_letters,
+    from_zero,
+    light_grid,
+    new_figure,
+    run_legend,
+    run_panels,
+    runs_by_name,
+    styled,
+    week_axis,
+)
+
+GATES = {
+    "radius_ratio": "min_radius_ratio",
+    "min_dihedral_deg": "min_dihedral_deg",
+    "max_dihedral_deg": "max_dihedral_deg",
+    "volume_mm3": "min_volume_mm3",
+}
+_PAPER = "FetalFoldSim"
+_MEASURED = "Wang et al. 2021"
+_MARKERS = {_PAPER: "s", _MEASURED: "^"}
+PUBLISHED = pd.DataFrame(
+    [
+        (source, from_week, from_week + 1.0, nodes, largest, mean)
+        for source, nodes, maxima, means in (
+            (_PAPER, "all", (2.51, 2.22, 2.37, 2.57), (0.42, 0.40, 0.38, 0.40)),
+            (_MEASURED, "published", (1.24, 2.29, 3.65, 5.79), (0.45, 0.88, 1.91, 3.03)),
+        )
+        for from_week, largest, mean in zip((21.0, 22.0, 23.0, 24.0), maxima, means, strict=True)
+    ],
+    columns=["source", "from_week", "to_week", "nodes", "max_mm", "mean_mm"],
+)
+"""Weekly displacement norms in mm: the FetalFoldSim paper's simulation (all nodes) and its quotation of real brains."""
+
+
+@styled
+def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> Figure:
+    """Returns what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
+
+    Parameters
+    ----------
+    steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, elements_through_cortex, radius_ratio_01, rung,
+        seconds
+        One row per accepted step. Steps on another rung than the most frequent one are marked.
+    order
+        Of the elements: it says how many through the cortex are enough.
+    """
+    figure = new_figure(SINGLE_COLUMN_IN, 8.4, synthetic=synthetic)
+    panels = dict(zip(STEPS, figure.subplots(len(STEPS), 1, sharex=True), strict=True))
+    week = steps["week"]
+    dots: dict[str, Any] = {"markersize": 2.0, "linewidth": 0.8, "marker": "o"}
+    above: dict[str, Any] = {"loc": "lower right", "ncols": 2, "bbox_to_anchor": (1.0, 0.98), "borderaxespad": 0}
+    for column, axes in panels.items():
+        axes.plot(week, steps[column], color=RUN_COLOURS[0], **dots)
+        axes.set_ylabel(STEPS[column])
+        light_grid(axes)
+    sizes = panels["max_u_mm"]
+    sizes.lines[0].set_label("max")
+    sizes.plot(week, steps["mean_u_mm"], color=RUN_COLOURS[1], label="mean", **dots)
+    sizes.legend(**above)
+    for column in ("newton", "krylov", "max_u_mm", "elements_through_cortex", "radius_ratio_01", "seconds"):
+        from_zero(panels[column])
+    for column in ("newton", "krylov"):
+        panels[column].yaxis.get_major_locator().set_params(integer=True, nbins=5)
+    for column, limit in (("min_J", 0.0), ("elements_through_cortex", ELEMENTS_NEEDED[order])):
+        panels[column].axhline(limit, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
+    figure.align_ylabels(list(panels.values()))
+    add_letters(panels.values())
+    week_axis(panels["seconds"], week)
+    unusual = steps[steps["rung"] != steps["rung"].mode().iloc[0]]
+    for colour, (rung, rows) in zip(RUN_COLOURS[1:], unusual.groupby("rung", sort=False), strict=False):
+        panels["newton"].plot(rows["week"], rows["newton"], "D", color=colour, markersize=3.5, label=f"rung: {rung}")
+    if len(unusual):
+        panels["newton"].legend(**above)
+    return figure
+
+
+@styled
+def quality_histogram(
+    quality: Mapping[str, Any], *, gates: Mapping[str, float] | None = None, synthetic: bool = False
+) -> Figure:
+    """Returns histograms of the tetrahedra's radius ratio, dihedral angles and volumes, and words on the surface.
+
+    Parameters
+    ----------
+    quality
+        What the mesh stage says: `histogram` ({measure: {"edges": (k + 1,), "counts": (k,)}}), and of the surface
+        `surface_distance_mm`, `crossing_faces`, `volume_change` and `gap_kept`.
+    gates : {min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3: limit}
+        The gates of the configuration, drawn as lines; others are left out.
+    """
+    figure = new_figure(FULL_WIDTH_IN, 2.5, synthetic=synthetic)
+    panels = figure.subplots(1, len(QUALITY), sharey=False)
+    for axes, (column, label) in zip(panels, QUALITY.items(), strict=True):
+        counts, edges = (np.asarray(quality["histogram"][column][name]) for name in ("counts", "edges"))
+        axes.stairs(counts, edges, fill=True, color=RUN_COLOURS[0])
+        # a few bad elements decide: a linear axis would hide them
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=0.7)
+        axes.set_xlabel(label)
+        filled = np.flatnonzero(counts)
+        said = f"{edges[filled[0]]:.3g} to {edges[filled[-1] + 1]:.3g}"
+        limit = (gates or {}).get(GATES[column])
+        if limit is not None:
+            # a least volume far below all others would stretch their axis: it is only told
+            if column != "volume_mm3" or limit >= edges[0]:
+                axes.axvline(limit, color=RUN_COLOURS[1], linestyle="--")
+            said += f", limit {shown_number(limit)}"
+        axes.set_title(said, fontsize=7)
+        light_grid(axes)
+    panels[-1].set_xscale("log")
+    add_letters(panels)
+    count = f"{int(counts.sum()):,}".replace(",", "\u2009")
+    panels[0].set_ylabel(f"elements (of {count})")
+    surface = (
+        f"surface: 99 % within {quality['surface_distance_mm']['hausdorff99']:.3f} mm of the given one, "
+        f"{quality['crossing_faces']} faces cross; volume {100 * quality['volume_change']:+.2f} %"
+    ).replace("-", "−")
+    if quality["gap_kept"] is not None:
+        surface += f"; gaps open along {100 * quality['gap_kept']:.1f} % of their walls"
+    figure.supxlabel(surface, fontsize=7)
+    return figure
+
+
+def displacement_table(displacement: pd.DataFrame) -> pd.DataFrame:
+    """Returns the weekly displacement norms of the runs with the published ones appended, one row per interval.
+
+    Parameters
+    ----------
+    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
+
+    Returns
+    -------
+    DataFrame with columns source, from_week, to_week, nodes, max_mm, mean_mm
+    """
+    runs = runs_by_name(displacement).rename(columns={"run": "source"})[list(PUBLISHED.columns)]
+    return pd.concat([runs, PUBLISHED], ignore_index=True)
+
+
+def displacement_summary(displacement: pd.DataFrame) -> pd.DataFrame:
+    """Returns the table as the paper prints it: a row per source and nodes, a column per interval, "max / mean" in mm.
+
+    Parameters
+    ----------
+    displacement : as for `displacement_table`
+    """
+    heading = "max / mean |u| (mm)"
+    table = displacement_table(displacement).sort_values(["from_week", "to_week"], kind="stable")
+    table["interval"] = [column_label(ends) for ends in zip(table["from_week"], table["to_week"], strict=True)]
+    table[heading] = [f"{most:.2f} / {mean:.2f}" for most, mean in zip(table["max_mm"], table["mean_mm"], strict=True)]
+    rows = table.sort_index()[["source", "nodes"]].drop_duplicates()
+    wide = table.pivot_table(index=["source", "nodes"], columns="interval", values=heading, aggfunc="first")
+    wide = wide.reindex(index=pd.MultiIndex.from_frame(rows), columns=list(table["interval"].drop_duplicates()))
+    return wide.fillna("–").rename_axis(columns=heading)
+
+
+@styled
+def displacement_chart(displacement: pd.DataFrame, **told: Unpack[Shown]) -> Figure:
+    """Returns the maximal and the mean displacement norm of all nodes, as in the paper, per interval.
+
+    Runs are lines, published values grey.
+
+    Parameters
+    ----------
+    displacement : as for `displacement_table`
+    """
+    named = runs_by_name(displacement)
+    shown = named[named["nodes"] == "all"]
+    figure, panels, colours = run_panels(2, shown["run"], told, per_row=2)
+    ends = pd.concat([shown, PUBLISHED])
+    for axes, column, label in zip(panels, ("max_mm", "mean_mm"), ("maximal", "mean"), strict=True):
+        lines = {source: (PUBLISHED[PUBLISHED["source"] == source], MUTED_COLOUR) for source in _MARKERS}
+        lines |= {run: (shown[shown["run"] == run].sort_values("from_week"), colour) for run, colour in colours.items()}
+        for name, (rows, colour) in lines.items():
+            look: dict[str, Any] = {"marker": _MARKERS.get(name, "o"), "linestyle": "--" if name in _MARKERS else "-"}
+            axes.plot((rows["from_week"] + rows["to_week"]) / 2, rows[column], color=colour, label=name, **look)
+        axes.set_title(f"{label} |u| per interval, all nodes")
+        axes.set_ylabel("displacement (mm)")
+        from_zero(axes)
+        week_axis(axes, [*ends["from_week"], *ends["to_week"]])
+        axes.set_xlabel("gestational age (GW), middle of the interval")
+        light_grid(axes)
+    extra = [
+        Line2D([], [], color=MUTED_COLOUR, marker=marker, linestyle="--", label=source)
+        for source, marker in _MARKERS.items()
+    ]
+    run_legend(figure, colours, extra=extra)
+    return figure
+
+
+def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
+    """Returns how well the steps of a run resolved the cortex, as the table of runs has it.
+
+    Parameters
+    ----------
+    order
+        Of the elements.
+    steps : columns week, elements_through_cortex
+        One row per step; no number where no element has its centre in the cortex, which counts as none.
+
+    Returns
+    -------
+    dict
+        `order`, `least_elements_through_cortex`, and `unresolved_from_week`, the first week with fewer elements than
+        `ELEMENTS_NEEDED` (NaN: there is none).
+    """
+    through = steps["elements_through_cortex"].fillna(0.0)
+    return {
+        "order": order,
+        "least_elements_through_cortex": float(through.min()),
+        "unresolved_from_week": float(steps.loc[through < ELEMENTS_NEEDED[order], "week"].min()),
+    }
+
+
+def resolution_verdict(run: Mapping[str, Any] | pd.Series) -> str:
+    """Returns what is to be said of a run whose mesh is too coarse, at the start or later; empty where it is not.
+
+    Parameters
+    ----------
+    run : elements_through_cortex (before the first step), and what `resolution_over_steps` returns
+    """
+    needed = ELEMENTS_NEEDED[int(run["order"])]
+    at_start, week = run["elements_through_cortex"], run["unresolved_from_week"]
+    if not at_start >= needed:  # not a number: no element lies in the cortex
+        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds are the mesh's"
+    if math.isnan(week):
+        return ""
+    return (
+        f"cortex not resolved from {week_label(round(week, 2))} on "
+        f"(down to {run['least_elements_through_cortex']:.3g} elements through it, {needed:g} needed): "
+        "folds may be the mesh's from then on"
+    )

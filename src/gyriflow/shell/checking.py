@@ -1,0 +1,226 @@
+"""Checks a study before it is run: its configuration, its files, what will run, and what that will take."""
+
+import os
+import shutil
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, chdir, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import psutil
+
+from ..config import load
+from ..config.brains import Brain
+from ..config.root import Config
+from ..errors import GyriflowError
+from ..folding.predicted_memory import predicted_memory_mib
+from ..io.downloads import require_checksums
+from ..io.files import read_json
+from ..io.volumes import read_label_volume
+from ..io.yaml_files import read_yaml
+from ..parameters.schemes import LabelScheme
+from ..shipped import SHIPPED
+from ..surface.labels import cerebrum_mask, require_cortex_outside
+from .cost import MEASURED, Job, Prediction, predict
+from .launch import OF_PROFILES
+from .launch import main as launch
+from .terminal import DRAWN, ORDER, as_duration, where_of
+from .terminal import stages as stages_of_rules
+
+DEMO = SHIPPED / "config" / "config.yaml"
+NAMED_RUNS = 6
+REASONS = {
+    "Params have changed": "settings changed",
+    "Code has changed": "code changed",
+    "Updated input files": "newer input",
+    "Set of input files has changed": "other inputs",
+    "Software environment definition has changed": "environment changed",
+    "Missing output files": "not made yet",
+    "Input files updated by another job": "follows another step",
+    "Forced execution": "asked for",
+    "Incomplete": "left incomplete",
+}
+"""How Snakemake's reasons begin or what they contain, and what they are called here; the first that fits counts."""
+
+
+@dataclass(frozen=True)
+class PlannedJob:
+    """A job of a dry run: rule, wildcards, cores, outputs, and Snakemake's reason to run it."""
+
+    rule: str
+    wildcards: dict[str, str]
+    threads: int
+    output: list[str]
+    reason: str
+
+    @property
+    def why(self) -> str:
+        """The reason in few words."""
+        return next((words for found, words in REASONS.items() if found in self.reason), self.reason)
+
+    @property
+    def job(self) -> Job:
+        """What the cost of the job depends on."""
+        of = where_of(self.wildcards)
+        return Job(self.rule, of.get("run"), of.get("brain"), self.threads)
+
+
+def check_study(
+    config: Path | None,
+    directory: Path,
+    cores: int,
+    read_files: bool = True,
+    stages: Sequence[str] = (),
+    price: float | None = None,
+) -> Iterator[tuple[str, bool]]:
+    """Yields lines on a study up to some stages, each with whether it is a problem.
+
+    With a price of a core hour they say what the study costs, too.
+
+    InputError for a configuration that is not valid, with all its problems.
+    """
+    path = config or DEMO
+    settings = load(read_yaml(path), path.resolve().parent)
+    yield f"{path}: {_contents(settings)}", False
+    bad = list(input_problems(settings)) if read_files else []
+    for line in bad:
+        yield f"  {line}", True
+    if read_files and not bad:
+        yield "  input files: all can be read and fit their schemes", False
+    missing = sum(len(atlas.missing) for atlas in settings.atlases)
+    if missing:
+        yield f"  {missing} files of atlases are not there yet and will be downloaded", False
+    if not bad:
+        yield from _work(plan(path, directory, stages), settings, directory, cores, price)
+
+
+def work_of_study(config: Path | None, directory: Path, cores: int, further: Sequence[str]) -> Iterator[str]:
+    """Shows what Snakemake would do, and yields lines on what that takes; `further` are arguments of Snakemake's."""
+    path = config or DEMO
+    jobs = plan(path, directory, further, show=True)
+    for line, _ in _work(jobs, load(read_yaml(path), path.resolve().parent), directory, cores, None):
+        yield line
+
+
+def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
+    """Returns the jobs with outputs that Snakemake would run; ends the program as Snakemake does where it refuses.
+
+    With `show` it lists them on the terminal.
+    """
+    said = StringIO()
+    with tempfile.TemporaryDirectory(prefix="gyriflow-") as folder, ExitStack() as stack:
+        file = Path(folder, "plan.json")
+        # Snakemake goes into the working directory
+        stack.enter_context(chdir(Path.cwd()))
+        if not show:
+            stack.enter_context(redirect_stdout(said))
+            stack.enter_context(redirect_stderr(said))
+        arguments = ["--logger", "gyriflow", "--logger-gyriflow-plan", str(file), "--configfile", str(config.resolve())]
+        code = launch([*arguments, "--directory", str(directory.resolve()), "--dry-run", *further])
+        jobs = [] if code else read_json(file)
+    if code:
+        sys.stderr.writelines(
+            line for line in said.getvalue().splitlines(True) if not line.endswith(OF_PROFILES + "\n")
+        )
+        sys.exit(code)
+    return [PlannedJob(**job) for job in jobs if job["output"]]
+
+
+def _contents(config: Config) -> str:
+    """Returns how many brains and simulations a configuration has, and the names of its runs or of the first ones."""
+    names = [*list(config.runs)[:NAMED_RUNS], *(["…"] if len(config.runs) > NAMED_RUNS else [])]
+    brains, folded = len(config.brains), len(config.folded)
+    parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
+    parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})"]
+    parts += [f"{len(members)} of study {name}" for name, members in config.members.items()]
+    if config.calibrate is not None:
+        parts.append(f"{len(config.calibrate.runs)} of the calibration")
+    return ", ".join(parts)
+
+
+def input_problems(config: Config) -> Iterator[str]:
+    """Yields what is wrong with the input files of the brains: files that cannot be read, labels of another scheme."""
+    for brain in config.brains:
+        try:
+            _check_files(brain, config)
+        except GyriflowError as error:
+            yield f"brain {brain.id}: {error}"
+
+
+def _check_files(brain: Brain, config: Config) -> None:
+    files = [path for path in (*brain.files, brain.image) if path in config.known_files and Path(path).is_file()]
+    require_checksums({path: config.known_files[path] for path in files})
+    volume = brain.label_volume
+    if volume is not None and Path(volume).is_file():
+        labels = read_label_volume(volume, brain.affine_from).labels
+        scheme = LabelScheme(**config.scheme(brain))
+        cerebrum_mask(labels, scheme)
+        # the wall of a hemisphere that is alone may have no cortex
+        if scheme.cortex and brain.hemisphere is None:
+            require_cortex_outside(labels, scheme)
+    for file in brain.files:
+        # files of atlases may be missing yet
+        if file != volume and Path(file).is_file():
+            # takes half a second, which label volumes need not wait for
+            from ..io.surfaces import read_one_hemisphere, read_surface
+
+            if brain.hemisphere is None:
+                read_surface(file)
+            else:
+                read_one_hemisphere(file, brain.hemisphere.side)
+
+
+def _work(
+    jobs: Sequence[PlannedJob], config: Config, directory: Path, cores: int, price: float | None
+) -> Iterator[tuple[str, bool]]:
+    """Yields what will run, by stage, and what it will take of time, memory and disk."""
+    if not jobs:
+        yield "nothing to run: all results are up to date", False
+        return
+    of_rule = stages_of_rules(SHIPPED / "workflow" / "rules")
+    by_stage = defaultdict(list)
+    for job in jobs:
+        by_stage[of_rule.get(job.rule, DRAWN)].append(job)
+    yield f"to run: {len(jobs)} steps", False
+    for stage, planned in sorted(by_stage.items(), key=lambda item: ORDER.index(item[0])):
+        reasons = ", ".join(f"{count} {why}" for why, count in Counter(job.why for job in planned).most_common())
+        yield f"  {stage:<12} {len(planned):4d}  {reasons}", False
+    predicted = predict([job.job for job in jobs], config, read_json(MEASURED), cores, predicted_memory_mib)
+    yield from _needs(predicted, directory, cores, price)
+
+
+def _needs(predicted: Prediction, directory: Path, cores: int, price: float | None) -> Iterator[tuple[str, bool]]:
+    error = predicted.error
+    factors = (1 / error["time"], 1, error["time"])
+    least, usual, most = (as_duration(predicted.wall_seconds * factor) for factor in factors)
+    on = f"{cores} core{'s' if cores > 1 else ''} without other load"
+    yield f"time    about {usual} on {on} ({least} to {most}, by the errors of studies left out)", False
+    hours, folding = predicted.core_seconds / 3600, predicted.folding_core_seconds / predicted.core_seconds
+    yield f"work    about {_range(hours, error['time'])} core hours, {folding:.0%} of them folding", False
+    if price is not None:
+        yield f"cost    about {_range(hours * price, error['time'])} at {price:g} a core hour", False
+    # of the folder, or of the first one around it that exists
+    there = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
+    # none for the plan of another machine, or of a cluster
+    memory = None if cores > (os.cpu_count() or 1) else psutil.virtual_memory().available / 2**20
+    for name, mib, free, advice in (
+        ("memory", predicted.memory_mib, memory, ": too little; use fewer cores, or larger edges"),
+        ("disk", predicted.disk_mib, shutil.disk_usage(there).free / 2**20, ": too little"),
+    ):
+        line = f"{name:<7} about {_gib(mib)}, at most {_gib(mib * error[name])}"
+        if free is None:
+            yield f"{line}, of the largest jobs that run side by side", False
+        else:
+            yield f"{line}; {_gib(free)} are free{advice if mib > free else ''}", mib > free
+
+
+def _range(value: float, error: float) -> str:
+    return f"{value:.2g} ({value / error:.2g} to {value * error:.2g})"
+
+
+def _gib(mib: float) -> str:
+    return f"{mib / 1024:.1f} GB" if mib >= 100 else f"{mib:.0f} MB"

@@ -1,0 +1,289 @@
+"""The commands of `gyriflow`, thin: each reads its arguments, calls one function and prints what it returns."""
+
+import os
+import shlex
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+from click.shell_completion import get_completion_class
+
+from ..errors import GyriflowError
+from ..shipped import SHIPPED
+
+STAGES = (
+    *("retrieve", "surface", "mesh", "growth", "folding", "metrics", "figures", "report"),
+    *("studies", "calibrate", "paper", "validate"),
+)
+"""Targets of the workflow that a user asks for by name."""
+CONFIG = "gyriflow.yaml"
+"""The configuration that is taken where none is named."""
+CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
+ELSEWHERE = ("--profile", "--executor", "-e")
+"""Options of Snakemake's by which jobs run on other machines."""
+SHELLS = ("bash", "zsh", "fish")
+
+FOLDER = click.Path(file_okay=False, path_type=Path)
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+directory_option = click.option(
+    "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
+)
+cores_option = click.option(
+    "-c",
+    "--cores",
+    type=click.IntRange(1),
+    default=os.cpu_count() or 1,
+    show_default="all",
+    help="How many cores to use.",
+)
+stages_option = click.option(
+    "-s",
+    "--stage",
+    "stages",
+    multiple=True,
+    type=click.Choice(STAGES),
+    help="Up to this stage only; of studies: theirs.",
+)
+config_argument = click.argument("config", type=FILE, required=False)
+
+
+class Commands(click.Group):
+    """Commands that end in one message and the exit code of their error, without a traceback."""
+
+    def invoke(self, context: click.Context) -> Any:
+        """Runs the command that is asked for."""
+        try:
+            return super().invoke(context)
+        except GyriflowError as error:
+            click.echo(f"gyriflow: {error}", err=True)
+            sys.exit(error.exit_code)
+
+
+def command_name() -> str:
+    """Returns what a user types to get this command: in a checkout that is not installed, `./run gyriflow`."""
+    return "gyriflow" if shutil.which("gyriflow") or not (SHIPPED / "run").is_file() else "./run gyriflow"
+
+
+def version(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+    """Prints the version, with the commit where there is one, and ends."""
+    if value and not context.resilient_parsing:
+        from ..version import version as own
+
+        click.echo(f"gyriflow {own()}")
+        context.exit()
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=version, help="Show the version.")
+def main() -> None:
+    """From fetal brain MRI to folding metrics.
+
+    \b
+    A study, from its data to its report:
+      gyriflow init my-data         write my-data/gyriflow.yaml from the files there
+      cd my-data
+      gyriflow check                is all there, what will run, how long will it take
+      gyriflow run                  run it; the same command goes on after an interruption
+      gyriflow status               how far it is (from another terminal)
+      gyriflow view                 open the report
+
+    A brain of later weeks from one scan: gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
+
+    Without a configuration, `gyriflow run` runs the demo in the current folder.
+    """
+
+
+@main.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
+@click.option("--force", is_flag=True, help="Replace a configuration that is there.")
+def init(folder: Path, output: Path | None, force: bool) -> None:
+    """Write a configuration from the files of a FOLDER.
+
+    It knows tissue label volumes (its scheme is found from the labels), pairs of hemisphere surfaces, files named as in
+    the dHCP, CRL and spina bifida atlases, and ages from participants.tsv or from names such as week21, GA21, 25w.
+    """
+    from .beginning import write_configuration
+
+    path = output or folder / CONFIG
+    for line in write_configuration(folder, path, force):
+        click.echo(line)
+    click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
+
+
+@main.command()
+@config_argument
+@directory_option
+@cores_option
+@stages_option
+@click.option("--no-files", is_flag=True, help="Check the configuration only, not what is in the input files.")
+@click.option("--price", type=click.FloatRange(0), metavar="PRICE", help="Price of a core hour, for the study's cost.")
+def check(
+    config: Path | None, directory: Path, cores: int, stages: Sequence[str], no_files: bool, price: float | None
+) -> None:
+    """Check a configuration and its files; say what will run and what it will take.
+
+    Nothing is run or written. CONFIG is gyriflow.yaml where none is named, or else the demo.
+    """
+    from .checking import check_study
+
+    problems = 0
+    for line, bad in check_study(_chosen(config, directory), directory, cores, not no_files, stages, price):
+        click.echo(line)
+        problems += bad
+    if problems:
+        click.echo(f"gyriflow: {problems} problem{'s' if problems > 1 else ''} found", err=True)
+        sys.exit(2)
+
+
+@main.command(context_settings={"ignore_unknown_options": True})
+@directory_option
+@cores_option
+@stages_option
+@click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
+@click.option("-v", "--verbose", is_flag=True, help="All that Snakemake says, on the terminal.")
+@click.argument("further", nargs=-1, type=click.UNPROCESSED, metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]")
+def run(
+    directory: Path, cores: int, stages: Sequence[str], dry_run: bool, verbose: bool, further: Sequence[str]
+) -> None:
+    """Run a study; what is there and up to date is kept. With --dry-run, say what it would take.
+
+    CONFIG is gyriflow.yaml where none is named, or else the demo. Further arguments go to Snakemake, such as
+    `--profile profiles/slurm`.
+    """
+    named = bool(further) and further[0].endswith(CONFIG_SUFFIXES)
+    chosen = _chosen(Path(further[0]) if named else None, directory)
+    # an option of one value stands before the targets
+    arguments = ["--verbose"] if verbose else []
+    # the cores of this machine are no limit to a cluster, whose profile says how many jobs it may have
+    default = click.get_current_context().get_parameter_source("cores") == ParameterSource.DEFAULT
+    if not (default and any(argument.partition("=")[0] in ELSEWHERE for argument in further)):
+        arguments += ["--cores", str(cores)]
+    targets = [*stages, *further[int(named) :]]
+    if dry_run:
+        from .checking import work_of_study
+
+        for line in work_of_study(chosen, directory, cores, [*arguments, *targets]):
+            click.echo(line)
+    else:
+        from .launch import main as launch
+
+        arguments = [*(["--configfile", str(chosen.resolve())] if chosen else []), *arguments]
+        sys.exit(launch([*arguments, "--directory", str(directory), *targets]))
+
+
+@main.command()
+@click.argument("labels", type=FILE)
+@click.option("--week", type=float, required=True, help="Gestational week of the brain.")
+@click.option("--until", type=float, required=True, help="Week in which it is to be foretold.")
+@click.option("--atlas", help="Whose growth: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
+@click.option("--scheme", help="Label scheme. [default: found from the labels]")
+@click.option("--image", type=FILE, help="T2-weighted volume of the same brain.")
+@click.option("--accept-licence", "accepted", is_flag=True, help="Accept the atlas' licence, where it asks for it.")
+@directory_option
+@cores_option
+@click.option("-n", "--dry-run", is_flag=True, help="Write the configuration, say what would run, and run nothing.")
+@click.pass_context
+def predict(
+    context: click.Context,
+    labels: Path,
+    week: float,
+    until: float,
+    directory: Path,
+    cores: int,
+    dry_run: bool,
+    **given: Any,
+) -> None:
+    """Foretell a brain of later weeks from its tissue LABELS, by the growth of an atlas.
+
+    It writes gyriflow.yaml into the working directory and runs it up to the report; the same command goes on after an
+    interruption.
+    """
+    from .beginning import write_prediction
+
+    config = directory / CONFIG
+    for line in write_prediction(config, labels, (week, until), **given):
+        click.echo(line)
+    context.invoke(
+        run, directory=directory, cores=cores, stages=(), dry_run=dry_run, verbose=False, further=(str(config),)
+    )
+
+
+@main.command()
+@click.argument("directory", type=FOLDER, default=Path())
+@click.option("--json", "as_json", is_flag=True, help="As JSON, for programs.")
+def status(directory: Path, as_json: bool) -> None:
+    """How far a study is: done, running, time left, failed and why."""
+    from . import status as module
+
+    found = module.status(directory)
+    click.echo(module.as_json(found) if as_json else "\n".join(module.as_text(found)))
+
+
+@main.command()
+@click.argument("directory", type=FOLDER, default=Path())
+@click.option("--print", "only_print", is_flag=True, help="Print where the report is instead of opening it.")
+def view(directory: Path, only_print: bool) -> None:
+    """Open the report of a study."""
+    from .status import report_of
+
+    report = report_of(directory)
+    click.echo(report)
+    if not only_print:
+        click.launch(str(report))
+
+
+@main.command()
+@click.argument("first", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("second", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0),
+    default=1e-6,
+    show_default=True,
+    help="Relative difference that counts as none.",
+)
+def compare(first: Path, second: Path, tolerance: float) -> None:
+    """Compare two results folders: settings, versions, inputs, and every number of their tables.
+
+    Ends with 0 where all numbers agree, with 1 where some differ.
+    """
+    from .compare import compare_results
+
+    found = compare_results(first, second, tolerance)
+    if found.settings:
+        click.echo("\n".join(["settings that differ:", *(f"  {line}" for line in found.settings)]))
+    for file, text in found.differences:
+        click.echo(f"{file}: {text}")
+    click.echo(
+        f"{found.numbers} numbers of {found.tables} tables compared: "
+        + (f"all within {tolerance:g}" if not found.differences else f"{len(found.differences)} differences")
+    )
+    sys.exit(bool(found.differences))
+
+
+@main.command()
+@click.argument("shell", type=click.Choice(SHELLS))
+def completion(shell: str) -> None:
+    """Print the script that completes commands and options in a SHELL.
+
+    \b
+    For bash:  gyriflow completion bash >> ~/.bashrc
+    For zsh:   gyriflow completion zsh >> ~/.zshrc
+    For fish:  gyriflow completion fish > ~/.config/fish/completions/gyriflow.fish
+    """
+    complete = get_completion_class(shell)
+    if complete is None:
+        raise click.ClickException(f"no completion for {shell}")
+    click.echo(complete(main, {}, "gyriflow", "_GYRIFLOW_COMPLETE").source())
+
+
+def _chosen(config: Path | None, directory: Path) -> Path | None:
+    """Returns the configuration that is meant: the one named, gyriflow.yaml here or there, or none, the demo."""
+    if config is not None:
+        return config
+    return next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)

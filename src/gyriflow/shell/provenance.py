@@ -1,0 +1,62 @@
+"""Whose results are in a folder, and the versions of everything that made them."""
+
+import platform
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from ..config.root import Config
+from ..errors import InputError
+from ..io.files import read_json, write_json
+from ..version import commit, version
+
+PACKAGES = (
+    *("fenics-dolfinx", "fenics-basix", "fenics-ffcx", "fenics-ufl", "petsc4py", "slepc4py", "mpi4py", "numpy"),
+    *("scipy", "snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk", "lapy"),
+    *("pandas", "picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
+)
+"""Packages whose versions are recorded: those that results depend on."""
+
+
+def software() -> dict[str, Any]:
+    """Returns the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
+    packages: dict[str, str | None] = dict.fromkeys(PACKAGES)
+    for name in PACKAGES:
+        with suppress(metadata.PackageNotFoundError):
+            packages[name] = metadata.version(name)
+    return {
+        "gyriflow": version(),
+        "commit": commit(),
+        "recorded": datetime.now(UTC).isoformat(timespec="seconds"),
+        "python": sys.version.split()[0],
+        "system": platform.platform(),
+        "packages": packages,
+    }
+
+
+def require_own_results(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
+    """Raises InputError where the results in a working directory are those of another study.
+
+    Another study is one of other configuration files without a brain in common; a configuration that was changed,
+    copied or moved goes on. With `record` the study is written down as the one whose results these are.
+    """
+    path = directory / "results" / "study" / "study.json"
+    brains: list[list[Any]] = [[b.id, b.week, b.source, *(Path(file).name for file in b.files)] for b in config.brains]
+    own: dict[str, Any] = {"configuration": [str(file.resolve()) for file in files], "brains": brains}
+    known = read_json(path) if path.is_file() else own
+    there = [brain[0] for brain in known["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
+    if there and known["configuration"] != own["configuration"] and not any(b in known["brains"] for b in brains):
+        raise InputError(
+            "the results here are those of another study",
+            path=path.parents[1].resolve(),
+            found=f"{', '.join(there)} of {', '.join(known['configuration'])}",
+            expected=f"{', '.join(brain[0] for brain in brains)} of {', '.join(own['configuration'])}",
+            remedy="Give this study a folder of its own with --directory; or delete these results, or "
+            f"study/{path.name} in them to have both in one folder.",
+        )
+    if record and (known != own or not path.is_file()):
+        write_json(path, own)

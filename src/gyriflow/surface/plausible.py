@@ -1,0 +1,162 @@
+"""Whether what is given can be the cerebrum of a week: its size, one hemisphere or two, and how alike these are.
+
+A size out of all proportion catches files in metres, micrometres or centimetres.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..geometry.triangles import TriangleMesh, signed_volume
+from ..units import ML_PER_MM3
+
+Floats = NDArray[np.float64]
+
+# cerebral volume (mL) at 25.4 and 36.6 GW: the atlas of Fidon et al. 2021 (doi 10.5281/zenodo.5524312) and the growth
+# by 230 % between these weeks found by Clouchoux et al. 2012 (doi 10.1016/j.ajog.2011.10.002)
+EARLY, LATE = (25.4, 92.0), (36.6, 304.0)
+# from small fetuses with pathologies to adults, and the log-linear growth is a coarse one
+LEAST, MOST = 0.2, 6.0
+# means of atlases from 21 to 36 GW are 0.57 to 1.24 of it; in voxels of 0.8 mm instead of mm, 1.95 times as much
+DOUBTFUL_LEAST, DOUBTFUL_MOST = 0.4, 1.6
+UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
+# left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
+DOUBTFUL_RATIO = 1.15
+# the narrowest extent of a whole cerebrum is 0.61 of its longest and more, that of one hemisphere 0.46 and less
+NARROWEST_BRAIN, DOUBTFUL_BRAIN = 0.5, 0.56
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds beyond which hemispheres are refused: volume of the larger over that of the smaller one, and asymmetry.
+
+    Hemispheres of one fetus differ by a few percent, those of successive weeks by 15 %; unilateral pathology goes
+    further. The asymmetry is the mean distance of the surface from its mirror image, relative to the brain's length.
+    """
+
+    max_hemisphere_ratio: float = 1.15
+    max_asymmetry: float = 0.02
+
+
+USUAL = Limits()
+"""The limits of normal brains."""
+
+
+def expected_volume_ml(week: float) -> float:
+    """Returns the coarse volume of a cerebrum (mL) at a gestational week, growing exponentially."""
+    rate = np.log(LATE[1] / EARLY[1]) / (LATE[0] - EARLY[0])
+    return float(EARLY[1] * np.exp(rate * (week - EARLY[0])))
+
+
+def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -> list[str]:
+    """Returns what is doubtful about a cerebrum's volume at its week: below 0.4 or above 1.6 of the published one.
+
+    InputError where it is out of all proportion, less than a fifth or more than six times, with a guess of the unit.
+    `extents_mm` (3,) only appears in the message.
+    """
+    expected = expected_volume_ml(week)
+    volume = volume_mm3 * ML_PER_MM3
+    share = volume / expected
+    if LEAST <= share <= MOST:
+        if DOUBTFUL_LEAST <= share <= DOUBTFUL_MOST:
+            return []
+        return [f"a cerebrum of {volume:.0f} mL has {100 * share:.0f} % of the volume expected at week {week:g}: "
+                "is the week right, and is the file in mm, not in voxel indices?"]  # fmt: skip
+    guess = next((u for u, mm in UNITS_MM.items() if LEAST <= volume * mm**3 / expected <= MOST), None)
+    raise InputError(
+        f"the cerebrum's size is not that of week {week:g}",
+        found=f"{volume:.3g} mL, {' x '.join(f'{extent:.3g}' for extent in extents_mm)} mm",
+        expected=f"{LEAST * expected:.0f} to {MOST * expected:.0f} mL",
+        remedy=f"The file seems to be in {guess}: give it in mm, or with its unit in the header."
+        if guess
+        else "Check the file's unit, its week, and which labels make the cerebrum.",
+    )
+
+
+def narrowness(mesh: TriangleMesh) -> float:
+    """Returns the shortest over the longest extent of a surface along the axes of inertia of its vertices."""
+    points = mesh.vertices - mesh.vertices.mean(axis=0)
+    _, axes = np.linalg.eigh(np.cov(points.T))
+    extents = np.ptp(points @ axes, axis=0)
+    return float(extents.min() / extents.max())
+
+
+def require_one(mesh: TriangleMesh) -> None:
+    """Raises InputError where a surface is that of a whole brain."""
+    if (shape := narrowness(mesh)) > DOUBTFUL_BRAIN:
+        raise InputError(
+            "this is no single hemisphere",
+            found=f"a narrowest extent that is {shape:.2f} of the longest",
+            expected=f"at most {DOUBTFUL_BRAIN}",
+            remedy="Give a whole brain as labels or pial, or its hemispheres as hemispheres.",
+        )
+
+
+def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> list[str]:
+    """Returns what is doubtful about the surface of both hemispheres, of a brain given as a "surface" or a "volume".
+
+    InputError where it is one hemisphere's, unless a narrow one is only to be told.
+    """
+    shape = narrowness(mesh)
+    if refuses and shape < NARROWEST_BRAIN:
+        raise InputError(
+            f"the {what} seems to {'hold' if what == 'volume' else 'be'} one hemisphere only",
+            found=f"a cerebrum whose narrowest extent is {shape:.2f} of its longest",
+            expected=f"{NARROWEST_BRAIN} or more, as in whole cerebra",
+            remedy="Give both hemispheres; or the only one under hemisphere, with its side.",
+        )
+    narrow = f"the cerebrum is narrow ({shape:.2f} of its length): are both hemispheres there?"
+    return [narrow] if shape < DOUBTFUL_BRAIN else []
+
+
+def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits, coordinates: str) -> list[str]:
+    """Returns what is doubtful about two surfaces in RAS+ as the left and right hemisphere of one brain.
+
+    `coordinates` are those that the user has named, "ras", "lps" or "auto". InputError where their centroids are not in
+    order (left is the smaller x), or their volumes too different.
+    """
+    x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
+    if x_left >= x_right:
+        remedy = "The files seem to be swapped: swap `left` and `right`; or, if they are right, name the coordinates."
+        if other := {"ras": "lps", "lps": "ras"}.get(coordinates):
+            remedy = (
+                f"Either the coordinates are {other.upper()} (set coordinates: {other}) or the files are swapped (swap "
+                "`left` and `right`). Both changes together would turn the brain back to front; in doubt, set "
+                "coordinates: auto."
+            )
+        raise InputError(
+            "the left hemisphere lies to the right of the right one",
+            found=f"centroids at x = {x_left:.1f} (left) and {x_right:.1f} mm (right)",
+            expected="left at the smaller x (RAS+)",
+            remedy=remedy,
+        )
+    volumes = signed_volume(left), signed_volume(right)
+    ratio = max(volumes) / min(volumes)
+    if ratio > limits.max_hemisphere_ratio:
+        raise InputError(
+            "the hemispheres are too different in size to be of one brain",
+            found=f"{volumes[0] / 1e3:.1f} mL (left) and {volumes[1] / 1e3:.1f} mL (right)",
+            expected=f"volumes within {100 * (limits.max_hemisphere_ratio - 1):.0f} % of each other",
+            remedy="Give both hemispheres of the same subject and week; if they are, raise "
+            "surface.max_hemisphere_ratio.",
+        )
+    if ratio > DOUBTFUL_RATIO:
+        return [f"the hemispheres' volumes differ by {100 * (ratio - 1):.0f} %: are they of one brain?"]
+    return []
+
+
+def require_common_pose(asymmetry_mm: float, length_mm: float, limits: Limits) -> None:
+    """Raises InputError where two hemispheres together are no mirror images of each other in any plane.
+
+    `asymmetry_mm` is the mean distance to the mirror image, `length_mm` the brain's length.
+    """
+    if asymmetry_mm > limits.max_asymmetry * length_mm:
+        raise InputError(
+            "the hemispheres are not posed as one brain",
+            found=f"{asymmetry_mm:.1f} mm between the surface and its mirror image",
+            expected=f"at most {limits.max_asymmetry * length_mm:.1f} mm",
+            remedy="Give both hemispheres of one subject in the same coordinates; if they are so asymmetric, raise "
+            "surface.max_asymmetry.",
+        )

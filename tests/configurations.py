@@ -1,0 +1,43 @@
+"""Configurations to change in tests, and the messages with which they are refused."""
+
+import pytest
+
+from gyriflow.config import load
+from gyriflow.errors import InputError
+
+
+def phantoms(*weeks, names="abcdefgh"):
+    """Returns brains of some weeks that are called a, b, ..."""
+    return [{"id": name, "week": week, "phantom": {}} for name, week in zip(names, weeks, strict=False)]
+
+
+def study(brains=None, **changes):
+    """Returns a valid configuration, of two phantoms if no brains are given, with changes on its top level."""
+    return {"brains": brains or phantoms(21, 22.5), "start": "a", "folding": {"end_week": 24}} | changes
+
+
+def touched(folder, *names):
+    """Makes empty files in a folder, which it returns."""
+    for name in names:
+        (folder / name).touch()
+    return folder
+
+
+def refusal(raw, folder="."):
+    """Returns the message with which a configuration is refused."""
+    with pytest.raises(InputError) as caught:
+        load(raw, folder)
+    return str(caught.value)
+
+
+def problems(raw, folder="."):
+    """Returns the lines of that message, a problem each; none where the configuration is valid."""
+    try:
+        load(raw, folder)
+    except InputError as error:
+        message = str(error)
+    else:
+        return []
+    first, *lines, _ = message.splitlines()
+    assert first.startswith(f"the configuration has {len(lines)} problem")
+    return [line.strip() for line in lines]

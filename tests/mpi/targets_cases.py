@@ -1,0 +1,119 @@
+"""Growth towards known shapes: they are met, whatever their pose, and a run that was stopped meets them as well."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from boxes import COMM
+from contact_bodies import in_a_tube, problem_with_contact, two_blocks
+from shapes import ellipsoid_mesh, rigid
+
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.simulation import Folding
+from gyriflow.folding.targets import inverse_exponential, log_growth
+from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.alignment import without_rigid_motion
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.diffusion import vertex_sizes
+from gyriflow.geometry.tetrahedra import linear_pieces
+from gyriflow.parameters.folding import parameters_from
+from gyriflow.units import M_PER_MM, MM_PER_M
+
+DAY_S = 86_400.0
+BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
+TIGHT = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
+
+
+def bent(week):
+    """Returns where the body's vertices are to be after some weeks: larger, and bent smoothly."""
+    x, y, z = BODY.vertices.T
+    wave = np.stack([1.2 * np.sin(y / 12), 0.8 * np.cos(z / 10), 1.0 * np.sin(x / 14)], axis=1)
+    return 1.04**week * BODY.vertices + week * wave
+
+
+def towards(targets, **changes):
+    """Returns a free body that is to have shapes, by week, and its state before."""
+    known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
+    settings = {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
+    alike = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0, "step_s": DAY_S}
+    sizes = {"area_cm2": {21.0: 1.0, 23.0: 1.0}, "volume_ml": {21.0: 1.0, 23.0: 1.0}}
+    names = {week: f"target_{week:05.2f}" for week in targets}
+    follow = {"loop": "closed", "smoothing_mm": 1.5} | sizes
+    parameters = parameters_from(known | settings | alike | {"follow": follow, "targets": names} | changes)
+    maps = {
+        f"{names[week]}_{axis}": places
+        for week, at in targets.items()
+        for axis, places in zip("xyz", at.T, strict=True)
+    }
+    folding = Folding(COMM, BODY, zones_of_run(BODY, parameters), parameters, maps)
+    return folding, State.at_start(BODY.vertices * M_PER_MM, DAY_S)
+
+
+def grown(folding, state, steps):
+    for _ in range(steps):
+        state = folding.step(state, DAY_S)
+    return state
+
+
+def away(state, target):
+    """Returns how far vertices are from where they are to be, root mean square in mm, without rigid motion."""
+    now = state.positions * MM_PER_M
+    sizes = vertex_sizes(now, linear_pieces(BODY))
+    left = without_rigid_motion(now, target, sizes)
+    return float(np.sqrt(np.average((left**2).sum(axis=1), weights=sizes)))
+
+
+def test_shapes_a_week_apart_are_met_in_any_pose():
+    targets = {22.0: bent(1), 23.0: bent(2)}
+    folding, start = towards(targets)
+    first = grown(folding, start, 7)
+    assert away(start, targets[22.0]) > 0.9
+    assert away(first, targets[22.0]) < 0.05
+    last = grown(folding, first, 7)
+    assert away(last, targets[23.0]) < 0.05
+    # each step tells how far it begins from the next shape
+    told = [row["to_target_mm"] for row in last.rows]
+    assert told[0] == pytest.approx(away(start, targets[22.0]), rel=1e-6)
+    assert told[7] == pytest.approx(away(first, targets[23.0]), rel=1e-6)
+    assert all(later < earlier for earlier, later in pairwise(told[:7]))
+    assert (COMM.bcast(last.positions) == last.positions).all()
+
+    motion = rigid(20, -35, 50, shift=(8.0, -3.0, 5.0))
+    turned = {week: transform_points(at, motion) for week, at in targets.items()}
+    again = grown(towards(turned)[0], start, 2)
+    np.testing.assert_allclose(again.positions, grown(folding, start, 2).positions, atol=1e-3 * M_PER_MM)
+
+
+def test_a_run_that_was_stopped_within_a_week_ends_where_another_ends():
+    folding, start = towards({22.0: bent(1), 23.0: bent(2)}, **TIGHT)
+    middle = grown(folding, start, 3)
+    whole = grown(folding, middle, 5)
+    # nothing is learnt on the way that a checkpoint would have to keep
+    again, _ = towards({22.0: bent(1), 23.0: bent(2)}, **TIGHT)
+    resumed = grown(again, replace(middle, learnt=None, rows=()), 5)
+    furthest = np.abs(whole.positions - start.positions).max()
+    np.testing.assert_allclose(resumed.positions, whole.positions, atol=1e-8 * furthest)
+
+
+def test_growth_of_an_even_stretch_is_that_stretch():
+    axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    U = axes @ np.diag([1.05, 0.98, 1.1]) @ axes.T
+    turn = rigid(30, 40, 50)[:3, :3]
+    pieces = linear_pieces(BODY)
+    logs = log_growth(BODY.vertices, pieces, BODY.vertices @ (turn @ U).T - BODY.vertices, 3.0)
+    expected = axes @ np.diag(np.log([1.05, 0.98, 1.1])) @ axes.T
+    at = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
+    assert logs == pytest.approx(np.tile(expected[at], (len(logs), 1)), abs=1e-6)
+    assert inverse_exponential(expected) == pytest.approx(np.linalg.inv(U), abs=1e-6)
+    # what a rigid motion alone leaves is none
+    assert log_growth(BODY.vertices, pieces, BODY.vertices @ turn.T - BODY.vertices, 3.0) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_way_of_contact_that_is_far_too_long_is_shortened():
+    mesh = two_blocks()
+    problem, contact = problem_with_contact(mesh, in_a_tube(mesh), 0.1)
+    apart = problem.domain.local(problem.domain.positions).copy()
+    apart[:, :2], apart[:, 2] = 0.0, np.sign(apart[:, 2])
+    for way_mm, part in ((100.0, 0.08), (4.0, 1.0)):
+        assert contact.largest_step(apart * way_mm * M_PER_MM) == pytest.approx(part, rel=1e-6)

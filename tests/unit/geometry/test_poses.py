@@ -1,0 +1,42 @@
+"""The pose of a brain: surfaces and volumes follow it onto the posed surface, each from its own axes, and back."""
+
+import numpy as np
+import pytest
+from shapes import LPS, rigid
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.poses import Pose, pose_from, turned
+
+TURN = rigid(10, 20, 30, shift=(4.0, -3.0, 2.0))
+
+
+def test_without_motions_of_files_these_are_in_the_world_of_the_volumes():
+    pose = Pose(TURN)
+    assert pose.of_file("left") is pose.of_file() is pose.of_volume("a.nii") is pose.world
+    np.testing.assert_allclose(pose.inverse @ TURN, np.eye(4), atol=1e-15)
+
+
+@pytest.mark.parametrize(("coordinates", "flip"), [("lps", LPS), ("ras", np.eye(4))])
+def test_surfaces_in_lps_are_flipped_once_and_volumes_never(coordinates, flip):
+    pose = turned((TURN @ flip)[:3, :3], "configuration", coordinates)
+    np.testing.assert_allclose(pose.of_file()[:3, :3], (TURN @ flip)[:3, :3])
+    np.testing.assert_allclose(pose.of_volume("a.nii")[:3, :3], TURN[:3, :3])
+
+
+def test_a_motion_after_a_pose_moves_all_and_sides_may_have_their_own():
+    pose = Pose(files={"left": LPS, "whole": LPS}, by="shape").each({"left": TURN}).then(rigid(0, 0, 90))
+    np.testing.assert_allclose(pose.of_file("left"), rigid(0, 0, 90) @ TURN)
+    np.testing.assert_allclose(pose.of_file("right"), rigid(0, 0, 90) @ LPS)
+    np.testing.assert_allclose(pose.world, rigid(0, 0, 90))
+
+
+def test_a_volume_cannot_follow_hemispheres_that_were_posed_separately():
+    with pytest.raises(InputError, match=r"a\.nii: a volume cannot belong.*posed separately.*per vertex \(GIFTI\)"):
+        Pose(together=False).of_volume("a.nii")
+
+
+def test_a_pose_is_the_same_after_writing_and_a_refusal_is_none():
+    pose = Pose(TURN, {"left": LPS}, "file", False, {"pitch_deg": 2.0}, ("look",))
+    assert pose_from(pose.plain()).plain() == pose.plain()
+    with pytest.raises(InputError, match=r"^the hemispheres seem to be swapped"):
+        pose_from({"refused": "the hemispheres seem to be swapped"})

@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+from shapes import ellipsoid_mesh, rigid, sphere
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import without_rigid_motion
+from gyriflow.geometry.deformations import Deformation
+from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.triangles import transformed
+from gyriflow.growth.carrying import carry_back_over_weeks, carry_over_weeks, carry_regions
+from gyriflow.growth.local import local_growth
+
+GRID = np.diag([4.0, 4.0, 4.0, 1.0])
+GRID[:3, 3] = -30.0
+
+
+def affine_map(matrix: np.ndarray) -> Deformation:
+    return Deformation(matrix, np.zeros((16, 16, 16, 3)), GRID)
+
+
+def scaled(factor: float, shift: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
+    matrix = np.diag([factor] * 3 + [1.0])
+    matrix[:3, 3] = shift
+    return matrix
+
+
+BALL = ellipsoid_mesh(10, (10.0, 10.0, 10.0))
+
+
+def test_points_are_carried_in_turn_and_back():
+    chain = [affine_map(scaled(1.1, (1, 0, 0))), affine_map(scaled(1.2))]
+    positions = carry_over_weeks(BALL.vertices, chain)
+    assert positions.shape == (3, len(BALL.vertices), 3)
+    assert positions[2] == pytest.approx(1.2 * (1.1 * BALL.vertices + [1, 0, 0]))
+    assert carry_back_over_weeks(positions[2], chain) == pytest.approx(positions, abs=2e-3)
+
+
+def test_points_beyond_the_grid_are_refused():
+    with pytest.raises(InputError, match=r"beyond the grid.*8\.00 mm|beyond the grid"):
+        carry_over_weeks(BALL.vertices + [60.0, 0, 0], [affine_map(np.eye(4))])
+
+
+def test_regions_come_to_the_same_places_of_another_brain():
+    source = sphere()
+    matrix = scaled(1.3, (5.0, 0, 0))
+    target = transformed(sphere(subdivisions=3), matrix)
+    deformation = affine_map(matrix)
+    regions = carry_regions((source.vertices[:, 0] > 0).astype(int), source, target, deformation)
+    clear = np.abs(target.vertices[:, 0] - 5.0) > 1.5
+    assert (regions == (target.vertices[:, 0] > 5.0))[clear].all()
+
+
+@pytest.mark.parametrize("sigma", [0.0, 3.0, 25.0])
+def test_uniform_growth_is_found_whatever_the_smoothing(sigma):
+    positions = np.stack([BALL.vertices, 1.1 * BALL.vertices, 1.1 * 1.3 * BALL.vertices])
+    rates = local_growth(positions, BALL.tets, [21, 22, 24], sigma)
+    assert rates[0] == pytest.approx(np.full(rates.shape[1], 3 * np.log(1.1)))
+    assert rates[1] == pytest.approx(np.full(rates.shape[1], 3 * np.log(1.3) / 2))
+    surface, used = boundary_surface(BALL)
+    areas = local_growth(positions[:, used], surface.faces, [21, 22, 24], sigma)
+    assert areas[0] == pytest.approx(np.full(len(used), 2 * np.log(1.1)))
+
+
+def test_local_growth_is_where_it_was_and_fades_with_smoothing():
+    x = BALL.vertices
+    # stretched along x by 1 + x/20: local growth ln(1 + x/20), that of the whole near 0
+    positions = np.stack([x, np.stack([x[:, 0] + x[:, 0] ** 2 / 40, x[:, 1], x[:, 2]], axis=1)])
+    rates = {sigma: local_growth(positions, BALL.tets, [21, 22], sigma)[0] for sigma in (0.0, 3.0, 25.0)}
+    inner = np.linalg.norm(x, axis=1) < 8
+    assert rates[0.0][inner] == pytest.approx(np.log(1 + x[inner, 0] / 20), abs=0.02)
+    spread = [np.std(values) for values in rates.values()]
+    assert spread[0] > spread[1] > spread[2]
+    assert spread[2] < 0.2 * spread[0]
+
+
+def test_inverted_vertices_and_weeks_that_do_not_ascend_are_refused():
+    positions = np.stack([BALL.vertices, BALL.vertices * [-1.0, 1.0, 1.0]])
+    with pytest.raises(InputError, match=f"{len(BALL.vertices)} of {len(BALL.vertices)} vertices"):
+        local_growth(positions, BALL.tets, [21, 22], 3.0)
+    with pytest.raises(InputError, match=r"\[22, 21\]"):
+        local_growth(np.stack([BALL.vertices] * 2), BALL.tets, [22, 21], 3.0)
+
+
+def test_rigid_motion_is_no_displacement():
+    surface = sphere()
+    turn = rigid(0, 0, 37, shift=(4, 5, 6))
+    moved_points = transformed(surface, turn).vertices
+    sizes = np.ones(len(moved_points))
+    assert without_rigid_motion(surface.vertices, moved_points, sizes) == pytest.approx(
+        np.zeros_like(moved_points), abs=1e-9
+    )
+    grown = transformed(surface, turn @ scaled(1.2)).vertices
+    grown_by = without_rigid_motion(surface.vertices, grown, sizes)
+    assert grown_by == pytest.approx(0.2 * surface.vertices, abs=1e-9)

@@ -1,0 +1,221 @@
+"""What is to be expected of a brain: surfaces met sharply, and growth carried through a known map."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from shapes import box_mesh, ellipsoid_mesh, phantom_halves, rigid, sphere
+
+from gyriflow.errors import InputError
+from gyriflow.folding.targets import log_growth
+from gyriflow.geometry.alignment import without_rigid_motion
+from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, transform_points
+from gyriflow.geometry.diffusion import diffuse, vertex_sizes
+from gyriflow.geometry.matching import nearest_on
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
+from gyriflow.geometry.triangles import TriangleMesh, area, signed_volume, vertex_areas
+from gyriflow.growth.expected import carry_sharply, expected_positions, fit_onto_surface, foretell, sizes_of
+from gyriflow.metrics.curvature import curvature
+
+BALL = ellipsoid_mesh(10, (20.0, 20.0, 20.0))
+WEEKS = [22.0, 23.0, 24.0]
+
+
+def apart_mm(moving, surface):
+    """Returns the mean distance of a surface's vertices from another one, weighted by area."""
+    return float(np.average(nearest_on(moving.vertices, surface)[0], weights=vertex_areas(moving)))
+
+
+def bend(mesh):
+    return float(np.sqrt(np.average(curvature(mesh, radius_mm=2.5).mean ** 2, weights=vertex_areas(mesh))))
+
+
+def wavy(height_mm):
+    ball = sphere(20.0, 5)
+    x, y, z = (ball.vertices / 20.0).T
+    wave = np.sin(9 * x) * np.cos(8 * y + 1) + np.sin(8 * z + 2) * np.cos(7 * x)
+    return TriangleMesh(ball.vertices * (1 + height_mm * wave / 20)[:, None], ball.faces)
+
+
+def test_a_smoothed_surface_is_fitted_onto_the_folded_one():
+    folded = wavy(1.0)
+    smooth = TriangleMesh(diffuse(folded.vertices, folded.faces, folded.vertices, 3.0), folded.faces)
+    assert apart_mm(smooth, folded) > 0.3
+    assert bend(smooth) < 0.7 * bend(folded)
+    fitted = TriangleMesh(fit_onto_surface(smooth, folded), folded.faces)
+    assert apart_mm(fitted, folded) < 0.06
+    assert apart_mm(folded, fitted) < 0.06
+    assert bend(fitted) == pytest.approx(bend(folded), rel=0.05)
+
+
+def test_a_surface_that_lies_on_the_other_stays():
+    folded = wavy(1.0)
+    assert fit_onto_surface(folded, folded) == pytest.approx(folded.vertices, abs=0.02)
+
+
+def shift_map(factor, shift=(0.0, 0.0, 0.0)):
+    """Returns a registration that knows how large a brain becomes and where it lies, and nothing of its folds."""
+    matrix = np.diag([factor] * 3 + [1.0])
+    matrix[:3, 3] = shift
+    affine = np.diag([10.0, 10.0, 10.0, 1.0])
+    affine[:3, 3] = -60.0
+    return Deformation(matrix, np.zeros((13, 13, 13, 3)), affine)
+
+
+def test_a_mesh_is_carried_onto_the_surface_of_the_next_brain_and_its_inside_along():
+    later = wavy(1.0)
+    moved = TriangleMesh(1.1 * later.vertices + [3.0, -2.0, 1.0], later.faces)
+    positions = carry_sharply(BALL, [shift_map(1.1, (3.0, -2.0, 1.0))], [moved])
+    assert positions[0] == pytest.approx(BALL.vertices)
+    boundary, used = boundary_surface(BALL)
+    plain = 1.1 * BALL.vertices + [3.0, -2.0, 1.0]
+    before, after = (TriangleMesh(at[used], boundary.faces) for at in (plain, positions[1]))
+    assert apart_mm(after, moved) < 0.4 * apart_mm(before, moved)
+    # deep inside it goes as the registration says
+    deep = np.linalg.norm(BALL.vertices, axis=1) < 5
+    assert positions[1][deep] == pytest.approx(plain[deep], abs=0.3)
+
+
+def test_a_phantom_is_carried_onto_its_later_hemisphere():
+    early, late = (phantom_halves(week)[0] for week in (24.0, 25.0))
+    factor = (signed_volume(late) / signed_volume(early)) ** (1 / 3)
+    shift = late.vertices.mean(axis=0) - factor * early.vertices.mean(axis=0)
+    carried = TriangleMesh(transform_points(early.vertices, shift_map(factor, shift).matrix), early.faces)
+    fitted = TriangleMesh(fit_onto_surface(carried, late), early.faces)
+    assert apart_mm(fitted, late) < 0.3 * apart_mm(carried, late)
+    assert area(fitted) == pytest.approx(area(late), rel=0.05)
+
+
+def test_matched_surfaces_are_followed_as_they_are():
+    boundary = boundary_surface(BALL)[0]
+    pair = MatchedSurfaces(boundary, boundary.vertices * [1.1, 1.2, 1.3])
+    positions = carry_sharply(BALL, [pair], [boundary])
+    assert positions[1] == pytest.approx(BALL.vertices * [1.1, 1.2, 1.3], abs=0.05)
+
+
+def atlas_of(places, weeks=WEEKS):
+    """Returns an atlas that grows unevenly, at (n, 3) places, in a pose of its own each week."""
+
+    def grown(week):
+        t = week - weeks[0]
+        x, y, z = places.T
+        wave = np.stack([0.6 * np.sin(y / 9), 0.5 * np.sin(z / 8), 0.4 * np.cos(x / 10)], axis=1)
+        return places * (1 + t * np.array([0.05, 0.08, 0.06])) + t * wave
+
+    poses = [rigid(5 * week, -3 * week, 40, shift=(week, -20.0, 7.0)) for week in weeks]
+    return [grown(week) for week in weeks], np.stack(
+        [transform_points(grown(week), pose) for week, pose in zip(weeks, poses, strict=True)]
+    )
+
+
+def without_pose(found, wanted, mesh=BALL):
+    sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
+    return np.abs(without_rigid_motion(wanted, found, sizes)).max()
+
+
+def test_a_brain_that_is_the_atlas_ends_as_the_atlas():
+    plain, posed = atlas_of(BALL.vertices)
+    weeks, positions = expected_positions(BALL, 22.0, posed, WEEKS)
+    assert weeks == WEEKS
+    assert positions[0] == pytest.approx(BALL.vertices)
+    for found, wanted in zip(positions, plain, strict=True):
+        assert without_pose(found, wanted) < 1e-6
+    # in the pose of the start
+    assert np.abs(positions[2] - plain[2]).max() < 1.5
+
+
+def test_a_brain_between_two_weeks_has_gone_a_part_of_the_way():
+    places = BALL.vertices * [1.0, 1.2, 0.9]
+    atlas = np.stack([places * (1 + 0.1 * (week - 22)) for week in WEEKS])
+    start = TetrahedralMesh(places * 1.04, BALL.tets)
+    weeks, positions = expected_positions(start, 22.4, atlas, WEEKS)
+    assert weeks == [22.4, 23.0, 24.0]
+    assert without_pose(positions[1], places * 1.1) < 1e-6
+    assert without_pose(positions[2], places * 1.2) < 1e-6
+    # as of the week before it would be a brain too large, all its life
+    early = expected_positions(start, 22.0, atlas, WEEKS, own_mm=0)[1][-1]
+    assert early == pytest.approx(1.04 * 1.2 * places, abs=1e-6)
+
+
+def test_a_longer_brain_stays_as_much_longer():
+    atlas = np.stack([BALL.vertices * (1 + 0.1 * (week - 22)) for week in WEEKS])
+    start = TetrahedralMesh(BALL.vertices * [1.0, 2.0, 1.0], BALL.tets)
+    _, positions = expected_positions(start, 22.0, atlas, WEEKS, own_mm=0)
+    assert positions[-1] == pytest.approx(1.2 * start.vertices, abs=1e-6)
+    smooth = np.ptp(expected_positions(start, 22.0, atlas, WEEKS)[1][-1], axis=0)
+    assert smooth[1] / smooth[0] > 1.7
+
+
+def test_small_bumps_of_a_brain_fade_and_its_size_stays():
+    mesh = box_mesh((10, 10, 10), (40.0, 40.0, 40.0))
+    atlas = np.stack([mesh.vertices * (1 + 0.1 * (week - 22)) for week in WEEKS])
+    start = TetrahedralMesh(mesh.vertices + 0.3 * np.sin(mesh.vertices * 2.0), mesh.tets)
+    _, positions = expected_positions(start, 22.0, atlas, WEEKS)
+    left = [np.sqrt(((at - a) ** 2).mean()) for at, a in zip(positions, atlas, strict=True)]
+    assert left[2] < 0.35 * left[0]
+
+
+@pytest.mark.parametrize("week", [20.9, 24.0, 25.0])
+def test_a_brain_before_or_after_the_atlas_is_refused(week):
+    with pytest.raises(InputError, match=rf"a start at {week:g} GW and an atlas of 22 to 24 GW.*from 21 GW to before"):
+        expected_positions(BALL, week, np.stack([BALL.vertices] * 3), WEEKS)
+    assert expected_positions(BALL, 21.0, np.stack([BALL.vertices] * 3), WEEKS)[0] == [21.0, *WEEKS]
+
+
+def test_growth_comes_through_a_known_map_turned_by_its_rotation():
+    """Growth L of an atlas is Rᵀ L R in a brain that a map with rotation R leads from.
+
+    What sets a brain apart is added as displacements, so that this holds where R differs little from place to place.
+    """
+    mesh = box_mesh((12, 12, 12), (60.0, 60.0, 60.0))
+    pieces = linear_pieces(mesh)
+    x = mesh.vertices
+
+    # the atlas' place of each point of the brain: turned, twisted by up to 5 degrees, and bent
+    def psi(p):
+        angles = np.radians(30.0 + 5.0 * p[:, 2] / 30.0)
+        turned = Rotation.from_rotvec(angles[:, None] * [0.0, 0.0, 1.0]).apply(p)
+        return turned + 0.4 * np.sin(p[:, [1, 2, 0]] / 20.0)
+
+    def grows(p):
+        return p + np.stack([0.08 * p[:, 0] + 0.02 * p[:, 1], 0.02 * p[:, 0] - 0.02 * p[:, 1], 0.03 * p[:, 2]], axis=1)
+
+    first = psi(x)
+    _, positions = expected_positions(mesh, 22.0, np.stack([first, grows(first)]), [22.0, 23.0])
+    found = log_growth(x, pieces, positions[1] - x, 0.0)
+    known = log_growth(first, pieces, grows(first) - first, 0.0)
+    inner = np.abs(x).max(axis=1) < 16
+    edges = [np.swapaxes(at[pieces[:, 1:]] - at[pieces[:, :1]], 1, 2) for at in (x, first)]
+    F = edges[1] @ np.linalg.inv(edges[0])
+    sizes = np.zeros(len(x))
+    mean = np.zeros((len(x), 3, 3))
+    for corner in pieces.T:
+        np.add.at(mean, corner, F)
+        np.add.at(sizes, corner, 1)
+    u, _, vt = np.linalg.svd(mean[inner] / sizes[inner, None, None])
+    R = u @ vt
+    wanted = np.swapaxes(R, 1, 2) @ tensors(known[inner]) @ R
+    # without the rotation they would be wrong by much more than what is allowed
+    size = np.linalg.norm(wanted, axis=(1, 2)).mean()
+    assert np.linalg.norm(tensors(known[inner]) - wanted, axis=(1, 2)).mean() > 0.2 * size
+    assert np.linalg.norm(tensors(found[inner]) - wanted, axis=(1, 2)).mean() < 0.05 * size
+
+
+def tensors(parts):
+    xx, yy, zz, xy, xz, yz = parts.T
+    return np.stack([np.stack(row, axis=1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))], axis=1)
+
+
+def test_simpler_ways_start_where_the_brain_is_and_sizes_are_those_of_the_boundary():
+    pairs = [shift_map(1.0), shift_map(1.1)]
+    surface = sphere(20.0)
+    surfaces = [surface, TriangleMesh(1.1 * surface.vertices, surface.faces)]
+    weeks, positions, others = foretell(BALL, 22.0, pairs, surfaces, [22.0, 23.0])
+    assert weeks == [22.0, 23.0]
+    used = boundary_surface(BALL)[1]
+    assert set(others) == {"atlas_deformed", "displaced"}
+    for places in others.values():
+        assert places[0] == pytest.approx(BALL.vertices[used])
+        assert places[1] == pytest.approx(1.1 * BALL.vertices[used], abs=0.1)
+    sizes = sizes_of(BALL, positions)
+    assert sizes["volume_ml"][1] / sizes["volume_ml"][0] == pytest.approx(1.1**3, rel=0.01)
+    assert sizes["area_cm2"][0] == pytest.approx(4 * np.pi * 4.0, rel=0.03)

@@ -1,0 +1,162 @@
+"""What jobs leave is read: messages of their logs, causes of failures, and Snakemake's benchmark files."""
+
+import os
+
+import numpy as np
+import pytest
+
+from gyriflow.io.jobs import GrowingFile, cause, events_in, gather_messages, read_benchmarks, read_messages
+
+HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
+PATTERNS = {
+    "pial_from_labels": r"results/brains/(?P<brain>a|b)/benchmarks/pial_from_labels\.tsv$",
+    "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/benchmarks/simulate\.tsv$",
+    "study_runs": r"results/study/benchmarks/study_runs\.tsv$",
+}
+
+
+def write_log(path, *lines):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_messages_of_steps_and_of_the_folding_are_told_apart(tmp_path):
+    log = tmp_path / "a.log"
+    write_log(
+        log,
+        "2026-11-22 00:53:59,004 INFO gyriflow.surface: fine",
+        "2026-11-22 00:53:59,004 WARNING gyriflow.surface: it is crooked",
+        "2026-11-22 00:53:59,004 WARNING gyriflow.surface: it is crooked",
+        "2026-11-22 00:53:59,004 WARNING py.warnings: deprecated",
+        "warning: few elements",
+        "2026-11-22 00:54:00,004 ERROR root: a.nii: no brain",
+        "gyriflow: the solver gave up",
+    )
+    assert read_messages(log) == [
+        ("warning", "it is crooked"),
+        ("warning", "few elements"),
+        ("error", "a.nii: no brain"),
+        ("error", "the solver gave up"),
+    ]
+    assert read_messages(tmp_path / "none.log") == []
+
+
+def test_messages_are_gathered_by_brain_and_run(tmp_path):
+    warned = "2026-11-22 00:53:59,004 WARNING gyriflow.x: {}"
+    for place in (
+        "brains/a/logs/pial_from_labels",
+        "brains/old/logs/pial_from_labels",
+        "brains/a/metrics/logs/measure",
+        "runs/r/a/logs/simulate",
+        "runs/r/a/metrics/week-22.00/logs/measure",
+        "runs/old/a/logs/simulate",
+        "study/logs/poses",
+    ):
+        write_log(tmp_path / "results" / f"{place}.log", warned.format(place))
+    table = gather_messages(tmp_path, ["a"], [("r", "a")])
+    assert set(table["message"]) == {
+        "brains/a/logs/pial_from_labels",
+        "brains/a/metrics/logs/measure",
+        "runs/r/a/logs/simulate",
+        "runs/r/a/metrics/week-22.00/logs/measure",
+        "study/logs/poses",
+    }
+    row = table[table["message"] == "runs/r/a/metrics/week-22.00/logs/measure"].iloc[0]
+    assert (row["subject"], row["run"], row["step"], row["level"]) == ("a", "r", "measure", "warning")
+    os.utime(tmp_path / "results/brains/a/logs/pial_from_labels.log", (0, 0))
+    later = gather_messages(tmp_path, ["a"], [], since_s=1.0)
+    assert set(later["message"]) == {"brains/a/metrics/logs/measure", "study/logs/poses"}
+
+
+@pytest.mark.parametrize(
+    ("log", "expected"),
+    [
+        (
+            "2026-11-22 00:54:57,955 INFO gyriflow.io: read\n2026-11-22 00:54:58,001 ERROR root: a.nii: is no image;\n"
+            "  found text\n2026-11-22 00:54:59,000 INFO gyriflow.io: end\n",
+            "a.nii: is no image;\n  found text",
+        ),
+        (
+            "GW 21.071/23  step 1\n2026-11-22 00:54:58,001 INFO root: a\ngyriflow: no step left. Use smaller steps\n",
+            "no step left. Use smaller steps",
+        ),
+        (
+            "2026-11-22 00:54:58,001 ERROR root: unexpected error\nTraceback (most recent call last):\n"
+            '  File "a.py", line 1, in <module>\n    1 / 0\nZeroDivisionError: division by zero\n',
+            "unexpected ZeroDivisionError: division by zero",
+        ),
+        (
+            "ValueError: no such week\nsnakemake_interface_common.exceptions.WorkflowError: At least one job did not "
+            "complete successfully.\nWorkflowError:\nAt least one job did not complete successfully.\n",
+            "unexpected ValueError: no such week",
+        ),
+        ("mpiexec: one\n\ntwo\n", "mpiexec: one\ntwo"),
+        ("", ""),
+    ],
+)  # fmt: skip
+def test_the_cause_is_gyriflows_own_message_or_else_the_exception_or_the_end(log, expected):
+    assert cause(log) == expected
+
+
+def test_a_growing_file_gives_each_whole_line_once(tmp_path):
+    log = GrowingFile(tmp_path / "log")
+    assert log.new_text() == ""
+    log.path.write_text("one\ntw")
+    assert log.new_text() == "one\n"
+    with log.path.open("a") as file:
+        file.write("o\nthree\n")
+    assert log.new_text() == "two\nthree\n"
+    assert log.new_text() == ""
+    # the job is tried again
+    log.path.write_text("new\n")
+    assert log.new_text() == "new\n"
+
+
+def test_an_event_that_is_torn_is_left_out():
+    assert events_in('{"event": "size", "elements": 3}\n{"event": "st\n') == [{"event": "size", "elements": 3}]
+
+
+def write(folder, name, *lines, head=HEAD):
+    path = folder / "results" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(head + "".join(line + "\n" for line in lines))
+
+
+def line(seconds, memory, cpu):
+    return f"{seconds}\t0:00:00\t{memory}\t1\t1\t1\t1\t1\t90.00\t{cpu}"
+
+
+def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
+    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(10.5, 200.25, 9.75))
+    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line(11, 210, 10))
+    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", line("100.00", "1000.00", "190.00"))
+    # of an earlier configuration
+    write(tmp_path, "brains/c/benchmarks/pial_from_labels.tsv", line(1, 1, 1))
+    write(tmp_path, "runs/three/a/benchmarks/simulate.tsv", line(1, 1, 1))
+    jobs = read_benchmarks(tmp_path, PATTERNS)
+    assert jobs["rule"].tolist() == ["pial_from_labels", "pial_from_labels", "simulate"]
+    assert jobs["run"].isna().tolist() == [True, True, False]
+    assert jobs[["run", "brain"]].iloc[-1].tolist() == ["two", "a"]
+    assert jobs["brain"].tolist() == ["a", "b", "a"]
+    np.testing.assert_array_equal(
+        jobs[["wall_s", "cpu_s", "memory_MiB"]], [[10.5, 9.75, 200.25], [11, 10, 210], [100, 190, 1000]]
+    )
+
+
+def test_what_could_not_be_measured_is_nan(tmp_path):
+    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(0.3, "NA", "NA"))
+    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line("-", "-", "-"))
+    write(tmp_path, "runs/one/a/benchmarks/simulate.tsv", head="")
+    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", "5.0\t0:00:05", head="s\th:m:s\n")
+    write(tmp_path, "study/benchmarks/study_runs.tsv")
+    jobs = read_benchmarks(tmp_path, PATTERNS)
+    assert len(jobs) == 5
+    np.testing.assert_array_equal(jobs["wall_s"], [0.3, np.nan, np.nan, 5.0, np.nan])
+    assert jobs[["cpu_s", "memory_MiB"]].isna().all(axis=None)
+
+
+def test_repeated_jobs_add_up_and_no_jobs_are_an_empty_table(tmp_path):
+    assert read_benchmarks(tmp_path, PATTERNS).empty
+    write(tmp_path, "study/benchmarks/study_runs.tsv", line(2, 50, 1), line(3, 70, "NA"))
+    (job,) = read_benchmarks(tmp_path, PATTERNS).to_dict("records")
+    assert (job["wall_s"], job["cpu_s"], job["memory_MiB"]) == (5.0, 1.0, 70.0)

@@ -1,0 +1,307 @@
+"""Charts hold what the tables say."""
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import same_color
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from pictures import words
+
+from gyriflow.errors import InputError
+from gyriflow.metrics.norms import measured_norms, measured_scores, norm_curves
+from gyriflow.report.charts import metrics_chart, norms_chart, regions_chart, spectra_chart, spectra_weeks_chart
+from gyriflow.report.pictures import region_colours
+from gyriflow.report.tables import centiles_table, region_table
+
+COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
+REGIONS = pd.DataFrame(
+    [
+        (subject, run, week, side, region, metric, factor * size + (1.0 if side == "left" else 0.0), unit)
+        for subject, run, week, size in (("a", "real", 21.0, 10.0), ("b", "real", 22.0, 12.0), ("a", "r", 22.0, 11.0))
+        for side in ("left", "right")
+        for region, factor in (("front", 1), ("back", 2))
+        for metric, unit in (("area", "cm2"), ("mean_sulcal_depth", "mm"))
+    ],
+    columns=COLUMNS,
+)
+ASYMMETRY = pd.DataFrame(
+    [("a", "real", 21.0, "area", region, 0.1) for region in ("front", "back")] + [("a", "real", 21.0, "area", "", 0.5)],
+    columns=["subject", "run", "week", "metric", "region", "asymmetry_index"],
+)
+WEEKS = np.arange(21.0, 31.0)
+REFERENCE = [f"s{i}" for i in range(len(WEEKS))]
+NOISE = np.array([0.5, -0.5, 0.2, -0.1, -0.4, 0.3, 0.3, -0.5, 0.4, -0.2])
+
+
+def metric_rows(run: str, hemisphere: str, metric: str, values: dict[float, float], unit: str) -> pd.DataFrame:
+    columns = {"subject": "s", "run": run, "week": list(values), "hemisphere": hemisphere, "metric": metric}
+    return pd.DataFrame({**columns, "value": list(values.values()), "unit": unit})
+
+
+def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: bool = True) -> list[pd.DataFrame]:
+    return [
+        pd.DataFrame(
+            {
+                "subject": "s",
+                "run": run,
+                "week": week,
+                "hemisphere": side,
+                "band": list(power),
+                "relative_power": [factor * value for value in power.values()],
+                "complete": complete,
+                "denominator_complete": complete,
+                "resolved": True,
+            }
+        )
+        for side, factor in (("left", 1.0), ("right", 0.5))
+    ]
+
+
+def test_phantom_is_called_synthetic_and_never_real():
+    metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
+    phantom = {"measured": "phantom", "synthetic": True}
+    spectra = pd.concat(spectrum_rows("thin", 22.0, {4: 0.1}))
+    for figure in (metrics_chart(metrics, **phantom), spectra_weeks_chart(spectra, **phantom)):
+        shown = words(figure)
+        assert any("synthetic phantom" in text for text in shown)
+        assert "real brain" not in shown
+    assert not any("synthetic" in text for text in words(metrics_chart(metrics)))
+
+
+def test_a_phantom_beside_real_brains_is_synthetic_and_they_are_not():
+    metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
+    shown = words(metrics_chart(metrics, measured="real brain", synthetic=True))
+    assert {"simulated from a synthetic phantom", "real brain"} <= shown
+    assert not any("not a real brain" in text for text in shown)
+
+
+def test_settings_outside_stay_and_fonts_inside_are_the_same_when_saved(tmp_path):
+    before = dict(mpl.rcParams)
+    figure = metrics_chart(metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2"))
+    assert dict(mpl.rcParams) == before
+    figure.savefig(tmp_path / "chart.png")
+    assert {label.get_fontsize() for axes in figure.axes for label in axes.get_xticklabels()} == {7.0}
+
+
+def test_metrics_of_runs_are_lines_and_measured_ones_stars():
+    metrics = pd.concat(
+        [
+            metric_rows("thin", "whole", "area", {22.0: 110.0, 21.0: 100.0}, "cm2"),
+            metric_rows("real", "whole", "area", {21.0: 99.0, 22.0: 120.0}, "cm2"),
+            metric_rows("thin", "left", "area", {21.0: 50.0}, "cm2"),
+        ]
+    )
+    figure = metrics_chart(metrics)
+    (axes,) = figure.axes
+    assert axes.get_title() == "pial area (cm²)"
+    assert [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"] == [[[21, 100], [22, 110]]]
+    (stars,) = [line for line in axes.lines if line.get_marker() == "*"]
+    assert stars.get_linestyle() == "None"
+    assert stars.get_xydata().tolist() == [[21, 99], [22, 120]]
+    assert {"thin", "real brain"} <= words(figure)
+
+
+def test_a_metric_of_hemispheres_only_is_drawn_for_both():
+    metrics = pd.concat(
+        [
+            metric_rows("thin", "left", "mean_curvedness", {21.0: 0.1, 22.0: 0.2}, "1/mm"),
+            metric_rows("thin", "right", "mean_curvedness", {21.0: 0.3, 22.0: 0.4}, "1/mm"),
+        ]
+    )
+    figure = metrics_chart(metrics)
+    assert {line.get_linestyle(): line.get_ydata().tolist() for line in figure.axes[0].lines} == {
+        "--": [0.1, 0.2],
+        ":": [0.3, 0.4],
+    }
+    assert {"left hemisphere", "right hemisphere"} <= words(figure)
+
+
+def test_metrics_chart_refuses_a_table_without_its_metrics():
+    with pytest.raises(InputError, match=r"no metric to draw.*spam"):
+        metrics_chart(metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""))
+
+
+def test_many_runs_have_distinct_colours_and_a_legend_within_the_figure():
+    runs = [f"thickness_{i}_with_a_long_name" for i in range(12)]
+    figure = metrics_chart(
+        pd.concat([metric_rows(run, "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2") for run in runs])
+    )
+    (axes,) = figure.axes
+    assert len({str(line.get_color()) for line in axes.lines}) == 12
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
+
+
+def test_spectra_bars_are_the_relative_powers_of_each_side():
+    rows = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15})]
+    spectra = pd.concat([*rows, *spectrum_rows("thin", 27.0, {4: 0.9})])
+    left, right = spectra_chart(spectra, week=28.0).axes
+    assert [bar.get_height() for bar in left.patches] == pytest.approx([0.2, 0.3, 0.1])
+    assert [bar.get_height() for bar in right.patches] == pytest.approx([0.1, 0.15, 0.05])
+    assert [line.get_xydata()[0].tolist() for line in left.lines] == [[0, 0.25], [1, 0.15]]
+    assert not any(bar.get_hatch() for bar in left.patches)
+
+
+def test_bands_that_are_cut_off_are_hatched_and_written_as_b6_too():
+    rows = [*spectrum_rows("thin", 28.0, {5: 0.2}), *spectrum_rows("thin", 28.0, {6: 0.1}, complete=False)]
+    spectra = pd.concat(rows)
+    spectra["band"] = "B" + spectra["band"].astype(str)
+    figure = spectra_chart(spectra, week=28.0)
+    assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, True]
+    assert any("cut off" in text for text in words(figure))
+
+
+def hatches_and_open_stars(figure: Figure) -> tuple[bool, bool]:
+    """Returns whether the legend of a figure has a hatched patch, and whether it has an open star."""
+    handles = figure.legends[0].legend_handles
+    patches = [handle for handle in handles if isinstance(handle, Patch)]
+    marks = [handle for handle in handles if isinstance(handle, Line2D) and handle.get_marker() == "*"]
+    hatched = any(patch.get_hatch() for patch in patches)
+    return hatched, any(mark.get_markerfacecolor() == "white" for mark in marks)
+
+
+@pytest.mark.parametrize(("run", "shown"), [("thin", (True, False)), ("real", (False, True))])
+def test_the_legend_names_only_the_marks_that_are_drawn(run, shown):
+    good = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("real", 28.0, {4: 0.2})]
+    spectra = pd.concat([*good, *spectrum_rows(run, 28.0, {5: 0.1}, complete=False)])
+    assert hatches_and_open_stars(spectra_chart(spectra, week=28.0)) == shown
+    assert hatches_and_open_stars(spectra_chart(pd.concat(good), week=28.0)) == (False, False)
+    assert hatches_and_open_stars(spectra_weeks_chart(spectra)) == (False, run == "real")
+
+
+def test_bands_without_modes_are_said_to_be_beyond_them():
+    rows = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("thin", 28.0, {6: np.nan}, complete=False)]
+    figure = spectra_chart(pd.concat(rows), week=28.0, bands=(4, 6))
+    said = [text for text in figure.axes[0].texts if "modes computed" in text.get_text()]
+    assert [text.get_position()[0] for text in said] == [1]
+    # nothing is drawn of it, so the legend has no mark for it
+    assert hatches_and_open_stars(figure) == (False, False)
+
+
+def test_spectra_chart_refuses_a_week_without_spectra():
+    with pytest.raises(InputError, match=r"no spectrum at 30 GW; found \[28.0\]"):
+        spectra_chart(pd.concat(spectrum_rows("thin", 28.0, {4: 0.2})), week=30.0)
+
+
+def test_spectra_over_weeks_have_a_row_per_side_and_a_column_per_band():
+    kinds = [("thin", 22.0), ("thin", 21.0), ("real", 22.0), ("real", 21.0)]
+    rows = [frame for run, week in kinds for frame in spectrum_rows(run, week, {4: week / 100})]
+    figure = spectra_weeks_chart(pd.concat(rows))
+    assert len(figure.axes) == 6
+    assert figure.axes[0].lines[0].get_xydata().tolist() == [[21, 0.21], [22, 0.22]]
+    assert figure.axes[3].lines[0].get_ydata().tolist() == pytest.approx([0.105, 0.11])
+    assert {line.get_marker() for line in figure.axes[0].lines} == {"None", "o", "*"}
+    assert all(figure.axes[place].get_ylim()[0] == 0 and figure.axes[place].get_ylim()[1] > 0.22 for place in (0, 3))
+
+
+def test_a_run_keeps_its_colour_in_charts_of_other_runs():
+    def colours(*runs):
+        rows = pd.concat([metric_rows(run, "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2") for run in runs])
+        return [line.get_color() for line in metrics_chart(rows, runs=["thin", "thick"]).axes[0].lines]
+
+    thin, thick = colours("thin", "thick")
+    assert colours("thick") == [thick] != [thin]
+    spectra = pd.concat(spectrum_rows("thick", 28.0, {4: 0.2}))
+    bars = spectra_chart(spectra, week=28.0, runs=["thin", "thick"]).axes[0].patches
+    assert all(same_color(bar.get_facecolor(), thick) for bar in bars)
+
+
+def test_bars_are_keyed_as_bars_and_lines_as_lines():
+    spectra = pd.concat([*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("thin", 27.0, {4: 0.2})])
+    (bars,) = spectra_chart(spectra, week=28.0).legends[0].legend_handles
+    (lines,) = spectra_weeks_chart(spectra).legends[0].legend_handles
+    assert isinstance(bars, Patch)
+    assert isinstance(lines, Line2D)
+
+
+def test_regions_chart_sums_areas_and_averages_depths():
+    area, depth, asymmetry = regions_chart(REGIONS, ASYMMETRY).axes[:3]
+    assert "area" in area.get_title()
+    assert "(mm)" in depth.get_title()
+    colours = region_colours(REGIONS["region"])
+
+    def points(axes, region, marker):
+        return [
+            (float(x), float(y))
+            for line in axes.lines
+            if line.get_marker() == marker and same_color(line.get_color(), colours[region])
+            for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)
+        ]
+
+    assert points(area, "front", "*") == [(21, 21), (22, 25)]
+    assert points(depth, "back", "*") == [(21, 20.5), (22, 24.5)]
+    assert points(depth, "back", "None") == [(22, 22.5)]
+    # that of the hemispheres is no region
+    assert points(asymmetry, "front", "*") == [(21, 0.1)]
+
+
+def test_table_of_regions_has_left_right_and_asymmetry():
+    table = region_table(REGIONS, ASYMMETRY)
+    row = table.loc[("a", "real", 21.0, "front")]
+    assert (row["area (cm²), left"], row["area (cm²), right"], row["area, asymmetry"]) == (11.0, 10.0, 0.1)
+    assert len(table) == 6
+
+
+@pytest.fixture(scope="module")
+def metrics_with_norms() -> pd.DataFrame:
+    rows = [
+        (name, "real", week, "whole", "area", 10 * week + noise, "cm2")
+        for name, week, noise in zip(REFERENCE, WEEKS, NOISE, strict=True)
+    ]
+    rows += [("case", "real", 25.0, "whole", "area", 252.0, "cm2"), ("s0", "r", 24.0, "whole", "area", 240.0, "cm2")]
+    return pd.DataFrame(rows, columns=["subject", "run", "week", "hemisphere", "metric", "value", "unit"])
+
+
+def test_norms_show_the_reference_the_band_and_the_others(metrics_with_norms):
+    curves = norm_curves(metrics_with_norms, REFERENCE)
+    figure = norms_chart(metrics_with_norms, curves, measured_norms(metrics_with_norms, REFERENCE), reference=REFERENCE)
+    axes = figure.axes[0]
+    stars = {
+        (float(x), float(y)): line.get_color()
+        for line in axes.lines
+        if line.get_marker() == "*"
+        for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)
+    }
+    assert len(stars) == 11
+    assert stars[21.0, 210.5] != stars[25.0, 252.0]
+    band = axes.collections[0].get_paths()[0].vertices
+    low, high = band[:, 1].min(), band[:, 1].max()
+    assert low < 210 < 300 < high
+    names = [text.get_text() for text in figure.legends[0].texts]
+    assert "other measured brains" in names
+    assert "90 % of further brains" in names
+
+
+def test_the_band_holds_ninety_per_cent_of_further_brains():
+    # of 400 draws of ten brains and one further brain, in the band of the ten
+    rng = np.random.default_rng(3)
+    inside = 0
+    for _ in range(400):
+        values = 10 * WEEKS + rng.normal(size=len(WEEKS))
+        table = pd.DataFrame({"subject": REFERENCE, "run": "real", "week": WEEKS, "value": values})
+        table = table.assign(hemisphere="whole", metric="area", unit="cm2")
+        curve = norm_curves(table, REFERENCE, points=10).set_index("week").loc[25.0]
+        inside += curve["low"] < 250 + rng.normal() < curve["high"]
+    assert 0.86 < inside / 400 < 0.94
+
+
+def test_table_of_centiles_says_of_how_many_brains(metrics_with_norms):
+    table = centiles_table(measured_scores(metrics_with_norms, REFERENCE))
+    case = table.loc[("case", "real", 25.0)]
+    assert case["brains"] == 10
+    assert case["of the week"] == 1
+    assert case["note"] == "one brain a week"
+    centile, z = case["pial area"].rstrip(")").split(" (")
+    assert float(centile) > 95
+    assert float(z) > 3
+    # a brain of the reference is compared with the others
+    assert table.loc[("s3", "real", 24.0), "brains"] == 9
+
+
+def test_norms_without_metrics_are_refused(metrics_with_norms):
+    with pytest.raises(InputError, match="no metric"):
+        norms_chart(metrics_with_norms.iloc[:0], pd.DataFrame(), pd.DataFrame(), reference=REFERENCE)

@@ -1,0 +1,218 @@
+"""The report is one page with everything inside, and tells no paths."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from gyriflow.io.figures import picture_addresses, read_body, write_figure, write_html
+from gyriflow.report.page import (
+    Results,
+    Shown,
+    assemble,
+    brains_table,
+    hide_paths,
+    picture,
+    report_page,
+    run_verdict,
+    scores_table,
+    sections,
+    what_was_done,
+)
+from gyriflow.report.solve import resolution_over_steps
+from gyriflow.report.tables import html_table
+
+PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
+BRAINS = [
+    {
+        "id": "young",
+        "week": 21.0,
+        "population": "healthy",
+        "source": "labels",
+        "synthetic": False,
+        "licence": "CC0 1.0",
+    },
+    {"id": "old", "week": 23.0, "population": "healthy", "source": "labels", "synthetic": False, "licence": None},
+]
+SURFACES = {"young": {"volume_mL": 46.2, "area_cm2": {"whole": 90.0}, "warnings": ["a bridge was cut"]}}
+RUNS = pd.DataFrame(
+    {
+        "run": ["thin"], "subject": ["young"], "start_week": [21.0], "preset": ["measured"], "end_week": [23.0],
+        "weeks": ["[21.0, 22.0]"], "min_J": [0.9], "elements_through_cortex": [1.2], "initial_penetration_mm": [0.0],
+        "order": [1], "least_elements_through_cortex": [1.1], "unresolved_from_week": [21.5],
+    }
+)  # fmt: skip
+VALIDATION = pd.DataFrame(
+    {
+        "run": "thin", "kind": "predicted", "start_week": 21.0, "week": [22.0, 23.0], "area_difference": [0.1, -0.0794],
+        "volume_difference": [0.0, 0.02], "r_shape_index": [0.1, 0.566], "r_start_shape_index": [0.1, 0.568],
+        "gain_shape_index": [0.0, -0.002], "gain_low_shape_index": [0.0, -0.044], "gain_high_shape_index": [0.0, 0.045],
+        "skill_shape_index": [np.nan, np.nan],
+    }
+)  # fmt: skip
+
+
+def page(shown: list[Shown], view: dict | None = None) -> str:
+    results = Results(
+        brains=BRAINS,
+        surfaces=SURFACES,
+        runs=RUNS,
+        provenance={
+            "commit": "abc-dirty",
+            "recorded": "2026-01-01T12:30:00+00:00",
+            "gyriflow": "0.1",
+            "python": "3.13",
+            "packages": {"numpy": "2.0", "absent": None},
+            "files": [{"brain": "young", "what": "labels", "sha256": "12ab"}],
+        },
+        metrics={"curvature_radius_mm": {"value": 2.4, "unit": "mm", "description": "Radius."}},
+        configuration="start: young\n",
+        validation=VALIDATION,
+    )
+    parts = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
+    parts["notice"] = "three.LICENSE.txt"
+    texts = {name: (PAGE / file).read_text() for name, file in parts.items()}
+    view = view or {"groups": [], "maps": []}
+    return report_page((PAGE / "page.html").read_text(), texts, view, **assemble(results, shown, view))
+
+
+def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
+    shown = [
+        Shown("Growth", "rates", "<table></table>", "of *all* brains"),
+        Shown("Folding", "weeks", picture("data:image/webp;base64,AA", "weeks"), "first <page>", first=True),
+    ]
+    text = page(shown, {"groups": [{"name": "</script><b>"}], "maps": []})
+    assert (
+        re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)) == []
+    )
+    assert "</script><b>" not in text
+    assert "<em>all</em>" in text
+    assert "first &lt;page&gt;" in text
+    order = [
+        text.index(word)
+        for word in ("<h3>Brains", "<h3>The weeks", "<h2>Surfaces in 3D", "<h2>Growth", "<h2>Provenance")
+    ]
+    assert order == sorted(order)
+    assert "12ab" in text
+    assert "Made 2026-01-01 12:30 UTC by gyriflow 0.1, commit abc, changed." in text
+    assert "numpy" in text
+    assert "absent" not in text
+
+
+@pytest.mark.fault(61)
+def test_what_a_user_has_written_is_shown_as_text(monkeypatch):
+    script = "<script>alert(1)</script><img src=x onerror=alert(1)>"
+    monkeypatch.setitem(BRAINS[0], "population", script)
+    monkeypatch.setitem(SURFACES["young"], "warnings", [script])
+    shown = [Shown("Growth", script, html_table(pd.DataFrame({script: [script]})), script)]
+    text = page(shown, {"groups": [{"name": script}], "maps": [script]})
+    # the data of the 3D view are JSON, in which no element ends
+    shown_text = re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL)
+    assert shown_text.count("alert(1)") >= 5
+    assert "<img src=x" not in shown_text
+    assert "<script" not in shown_text
+
+
+def test_without_surfaces_there_is_no_3d_view():
+    assert 'id="view3d"' not in page([])
+
+
+def test_sections_stand_in_order_and_numbers_run_through():
+    found = sections([Shown(name, name, "") for name in ("Inputs", "Growth", "Inputs")])
+    assert {name: [item["number"] for item in items] for name, items in found} == {"Inputs": [1, 2], "Growth": [3]}
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ({"labels": "/data/Smith_John.nii.gz"}, {"labels": "(file)"}),
+        ({"labels": "Smith.nii.gz"}, {"labels": "(file)"}),
+        ({"command": "seg {image} {labels}"}, {"command": "(command)"}),
+        ({"brains": [{"id": "a", "pial": "C:\\x\\lh.pial"}]}, {"brains": [{"id": "a", "pial": "(file)"}]}),
+        ({"population": "spina bifida aperta", "week": 21.0}, {"population": "spina bifida aperta", "week": 21.0}),
+    ],
+)  # fmt: skip
+def test_paths_and_commands_are_hidden(given, shown):
+    assert hide_paths(given) == shown
+
+
+def test_a_table_escapes_its_text_and_marks_verdicts():
+    html = html_table(pd.DataFrame({"verdict": ["look"], "said": ["a < b"], "value": [np.nan]}))
+    assert '<td class="verdict look">look</td>' in html
+    assert "a &lt; b" in html
+    assert '<td class="number">–</td>' in html
+
+
+def test_a_brain_without_a_surface_is_refused_and_warnings_are_told():
+    table = brains_table(BRAINS, SURFACES).set_index("brain")
+    assert table["verdict"].to_dict() == {"young": "look", "old": "refused"}
+    assert table.loc["young", "warnings"] == "a bridge was cut"
+    assert table["licence"].to_list() == ["CC0 1.0", "your own data"]
+
+
+def test_the_table_of_quality_control_judges_where_there_is_one():
+    quality = pd.DataFrame(
+        {"subject": ["young", "old"], "verdict": ["fine", "refused"], "cause": ["", "cropped"], "warnings": ""}
+    )
+    table = brains_table(BRAINS, SURFACES, quality).set_index("brain")
+    assert table["verdict"].to_dict() == {"young": "fine", "old": "refused"}
+    assert table.loc["old", "warnings"] == "cropped"
+
+
+def test_a_run_is_judged_and_scored_at_its_last_compared_week():
+    (row,) = scores_table(RUNS, VALIDATION).to_dict("records")
+    assert row["verdict"].startswith("ended at 22 GW of 23; cortex not resolved (1.2 elements")
+    assert row["compared at"] == "23 GW"
+    assert row["area, difference (%)"] == "−7.9"
+    assert row["gain (95 %)"] == "−0.00 (−0.04 to +0.04)"
+    assert row["skill"] == "–"
+
+
+def test_a_sound_run_has_nothing_said_against_it():
+    good = finished_run(1, 2.4, 2.2)
+    assert run_verdict(good) == "reached 23 GW"
+    assert "inverted" in run_verdict(good | {"min_J": -0.1})
+
+
+def finished_run(order, *through):
+    """Returns a run to its end with so many elements through the cortex, before and in its steps of half a week."""
+    steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
+    run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
+    return run | resolution_over_steps(order, steps)
+
+
+def test_a_run_is_judged_by_the_order_of_its_elements():
+    assert run_verdict(finished_run(2, 1.0, 1.0)) == "reached 23 GW"
+    assert "(1 elements through it, 2 needed)" in run_verdict(finished_run(1, 1.0, 1.0))
+    assert "not resolved (0.6 elements" in run_verdict(finished_run(2, 0.6, 0.5))
+
+
+@pytest.mark.parametrize(("order", "through"), [(1, (2.3, 2.1, 1.9, 1.7)), (2, (1.0, 0.9, 0.7, 0.6))])
+def test_a_cortex_that_outgrows_its_elements_is_told_with_its_week(order, through):
+    said = run_verdict(finished_run(order, *through))
+    assert f"cortex not resolved from 22.5 GW on (down to {through[-1]:g} elements" in said
+    assert "(down to 0 elements" in run_verdict(finished_run(order, *through[:2], np.nan))
+
+
+def test_what_was_done_names_brains_weeks_and_runs():
+    said = what_was_done(BRAINS, RUNS)
+    assert said.startswith("2 brains of 21 to 23 GW (healthy) went in. young was filled")
+    assert "1 simulation of" in said
+
+
+def test_pictures_are_made_smaller_until_they_fit(tmp_path):
+    figure = Figure(figsize=(8, 4))
+    figure.subplots().imshow(np.random.default_rng(0).random((200, 400)))
+    write_figure(tmp_path / "a.png", tmp_path / "a.pdf", figure, dpi=300)
+    (large,) = picture_addresses([tmp_path / "a.png"], 1e9)
+    (small,) = picture_addresses([tmp_path / "a.png"], 0.6 * len(large))
+    assert large.startswith("data:image/webp;base64,")
+    assert len(small) < 0.8 * len(large)
+
+
+def test_the_body_of_a_written_page_is_read_back(tmp_path):
+    write_html(tmp_path / "a.html", "<p>a</p>\n<p>b</p>")
+    assert read_body(tmp_path / "a.html") == "<p>a</p>\n<p>b</p>"

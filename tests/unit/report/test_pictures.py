@@ -1,0 +1,381 @@
+"""Pictures show the right side, at one scale, in the colours of their values."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from pictures import colour_bar, covered, picture, pictures, tone, words
+from shapes import box, ellipsoid, ellipsoid_mesh, sphere
+
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh, merged
+from gyriflow.io.figures import write_figure
+from gyriflow.parameters.terms import ZONE_NAMES
+from gyriflow.report.labels import GROWTH
+from gyriflow.report.panels import round_length
+from gyriflow.report.pictures import (
+    ABSENT,
+    CORE_COLOUR,
+    CORTEX_COLOUR,
+    ZONE_COLOURS,
+    brains_picture,
+    displacement_maps,
+    field_picture,
+    influence_picture,
+    mesh_picture,
+    region_colours,
+    regions_picture,
+    round_up,
+    runs_by_week,
+    scalar_maps,
+    shape_maps,
+    signed_scale,
+    zones_picture,
+)
+from gyriflow.report.scene import MAP, TISSUE, VIEWS, render, uniform_colours
+from gyriflow.report.style import RUN_COLOURS, SIMULATED_SURFACE_COLOUR
+
+BRAIN = box((20, 30, 20))
+SMOOTH = ellipsoid((20.0, 26.0, 18.0))
+REGIONS = {1: "front", 2: "back"}
+
+
+@pytest.mark.parametrize(("name", "size"), [("left", (30, 20)), ("top", (10, 30)), ("front", (10, 20))])
+def test_a_view_shows_the_right_extents_in_mm(name, size):
+    mesh = box((10, 30, 20), (100, -50, 7))
+    image = render(
+        mesh, uniform_colours(mesh, "#ff0000"), VIEWS[name], half_width_mm=20, half_height_mm=20, pixels_per_mm=4
+    )
+    seen = covered(image)
+    assert image.shape == (160, 160, 3)
+    assert np.ptp(np.flatnonzero(seen.any(axis=0))) / 4 == pytest.approx(size[0], abs=1)
+    assert np.ptp(np.flatnonzero(seen.any(axis=1))) / 4 == pytest.approx(size[1], abs=1)
+
+
+@pytest.mark.parametrize("name", ["left", "right", "top", "bottom", "front", "back"])
+def test_the_letters_of_a_view_are_where_they_say(name):
+    mesh = merged(*(box((4, 4, 4), place) for place in [(-15, 0, 0), (15, 0, 0), (0, 15, 0), (0, -15, 0), (0, 0, 0)]))
+    palette = {"L": (1, 0, 0), "R": (0, 1, 0), "A": (0, 0, 1), "P": (1, 1, 0), "": (0.5, 0.5, 0.5)}
+    colours = np.repeat([palette[key] for key in ("L", "R", "A", "P", "")], 12, axis=0).astype(float)
+    image = render(mesh, colours, VIEWS[name], half_width_mm=20, half_height_mm=20, pixels_per_mm=4).astype(float)
+    found = []
+    for columns in (slice(0, 40), slice(-40, None)):
+        part = image[:, columns]
+        tone = part[covered(part)].mean(axis=0)
+        tone /= np.linalg.norm(tone)
+        found.append(max("LRAP", key=lambda key: tone @ np.array(palette[key]) / np.linalg.norm(palette[key])))
+    assert tuple(found) == VIEWS[name].ends
+
+
+def test_up_is_superior_and_in_the_top_view_anterior():
+    mesh = merged(box((20, 20, 20)), box((5, 5, 5), (0, 0, 30)), box((5, 5, 5), (0, 30, 0)))
+    for name in ("left", "top"):
+        image = render(
+            mesh, uniform_colours(mesh, "#ff0000"), VIEWS[name], half_width_mm=30, half_height_mm=30, pixels_per_mm=2
+        )
+        width = covered(image).sum(axis=1)
+        assert 0 < width[:20].max() < width[-20:].max()
+
+
+def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps():
+    small, large = BRAIN, box((25, 36, 25))
+    figure = runs_by_week({"simulated": {22.0: small, 23.5: large}}, {22.0: small}, views=("left", "top"))
+    panels = [axes.get_label() for axes in figure.axes if axes.images]
+    assert len(panels) == 6
+    assert "real brain\nleft view, column 0" in panels
+    assert "real brain\nleft view, column 1" not in panels
+    assert {"22 GW", "23.5 GW", "a", "d", "simulated\ntop view", "A", "P", "L", "R"} <= words(figure)
+    assert covered(picture(figure, 0)).sum() < covered(picture(figure, 1)).sum()
+
+
+def test_all_panels_have_one_scale_and_the_bar_its_length():
+    figure = runs_by_week({"simulated": {22.0: BRAIN}}, {22.0: box((60, 80, 60))}, views=("left", "top"))
+    axes = pictures(figure)
+    scales = [np.ptp(each.get_xlim()) / each.get_window_extent().width for each in axes]
+    scales += [np.ptp(each.get_ylim()) / each.get_window_extent().height for each in axes]
+    assert scales == pytest.approx([scales[0]] * len(scales))
+    (bar,) = [each for each in figure.axes if each.get_label() == "scale bar"]
+    length = np.ptp(bar.get_xlim())
+    assert f"{length:g} mm" in words(figure)
+    assert length / bar.get_window_extent().width == pytest.approx(scales[0])
+
+
+def test_simulated_and_measured_brains_differ_in_colour_and_the_phantom_is_named():
+    figure = runs_by_week(
+        {"simulated": {22.0: BRAIN}}, {22.0: BRAIN}, views=("left",), measured="phantom", synthetic=True
+    )
+    simulated, measured = map(tone, (picture(figure, 0), picture(figure, 1)))
+    assert simulated[2] > simulated[0]
+    assert measured[0] > measured[2]
+    assert "phantom\nleft view" in words(figure)
+    assert any("synthetic phantom" in text for text in words(figure))
+    assert not any("real brain\n" in text for text in words(figure))
+
+
+def test_many_weeks_go_on_below():
+    figure = runs_by_week({"simulated": {float(week): BRAIN for week in range(21, 31)}}, {}, views=("left",))
+    places = [axes.get_position() for axes in figure.axes if axes.images]
+    assert len({round(place.y0, 6) for place in places}) == 2
+    assert max(place.x1 for place in places) <= 1
+
+
+def test_runs_stand_side_by_side_with_the_measured_brain_last():
+    figure = brains_picture({"thin": BRAIN, "thick": BRAIN}, {"real brain": BRAIN}, views=("top",))
+    assert {"thin", "thick", "real brain", "top view"} <= words(figure)
+    assert len(pictures(figure)) == 3
+
+
+def test_displacement_maps_share_their_colour_scale():
+    maps = {(22.0, 23.0): (BRAIN, np.full(8, 4.0)), (21.0, 22.0): (BRAIN, np.full(8, 1.0))}
+    figure = displacement_maps(maps, views=("left",))
+    bar = colour_bar(figure, "displacement")
+    assert bar.get_xlim() == pytest.approx((0.0, 4.0))
+    assert "(mm)" in bar.get_xlabel()
+    said = {"max 1.00 mm at −10, −15, −10\nmean 1.00 mm", "max 4.00 mm at −10, −15, −10\nmean 4.00 mm"}
+    assert {"21–22 GW", "22–23 GW"} | said <= words(figure)
+    first, second = map(tone, (picture(figure, 0), picture(figure, 1)))
+    # pale at a quarter of the scale, dark blue at its end
+    assert first.sum() > 1.5 * second.sum()
+    assert second[2] > 1.5 * second[0]
+
+
+def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed():
+    norms = np.ones(len(SMOOTH.vertices))
+    top = int(SMOOTH.vertices[:, 2].argmax())
+    norms[top] = 50.0
+    figure = displacement_maps({(21.0, 22.0): (SMOOTH, norms)}, views=("top", "bottom"))
+    bar = colour_bar(figure, "displacement")
+    assert bar.get_xlim()[1] == pytest.approx(1.0)
+    above, below = (
+        [ring for ring in axes.patches if ring.get_edgecolor()[:3] == (0, 0, 0)] for axes in pictures(figure)
+    )
+    assert [ring.get_linestyle() for ring in (*above, *below)] == ["-", ":"]
+    middle = (SMOOTH.vertices.min(axis=0) + SMOOTH.vertices.max(axis=0)) / 2
+    assert above[0].center == pytest.approx((SMOOTH.vertices[top] - middle)[:2])
+
+
+@pytest.mark.parametrize("material", [TISSUE, MAP])
+def test_light_makes_no_difference_between_the_hemispheres(material):
+    image = render(
+        SMOOTH,
+        uniform_colours(SMOOTH, "#8FB4DC"),
+        VIEWS["top"],
+        half_width_mm=25,
+        half_height_mm=30,
+        pixels_per_mm=4,
+        material=material,
+    ).astype(float)
+    inside = covered(image)
+    assert np.abs(image - image[:, ::-1])[inside & inside[:, ::-1]].mean() < 2.0
+
+
+def test_maps_are_darkened_less_by_shade_than_tissue():
+    size = {"half_width_mm": 25, "half_height_mm": 30, "pixels_per_mm": 4}
+    spread = []
+    for material in (TISSUE, MAP):
+        image = render(SMOOTH, uniform_colours(SMOOTH, "#8FB4DC"), VIEWS["top"], material=material, **size)
+        spread.append(np.ptp(np.percentile(image[covered(image)].sum(axis=-1), [5, 95])))
+    assert spread[1] < 0.7 * spread[0]
+
+
+def test_pictures_keep_their_pixels_in_print(tmp_path):
+    figure = runs_by_week({"simulated": {22.0: SMOOTH}}, {}, views=("top",))
+    write_figure(tmp_path / "a.png", tmp_path / "a.pdf", figure, dpi=300)
+    ((axes, image),) = [(axes, axes.images[0]) for axes in figure.axes if axes.images]
+    rows, columns, _ = np.asarray(image.get_array()).shape
+    assert f"/Height {rows}" in (pdf := (tmp_path / "a.pdf").read_bytes().decode("latin-1"))
+    assert f"/Width {columns}" in pdf
+    # the panel covers whole dots of 300 to the inch
+    box = axes.get_window_extent()
+    inches = np.array([box.x0, box.y0, box.width, box.height]) / figure.dpi
+    assert 300 * inches == pytest.approx(np.round(300 * inches), abs=1e-6)
+    assert (columns, rows) == tuple(np.round(600 * inches[2:]).astype(int))
+
+
+def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
+    maps = {"simulated": {28.0: (BRAIN, np.full(8, 0.7))}, "real brain": {28.0: (BRAIN, np.full(8, -0.7))}}
+    figure = scalar_maps(maps, quantity="shape_index", views=("left",))
+    bar = colour_bar(figure, "shape index")
+    assert bar.get_xlim() == (-1.0, 1.0)
+    gyri, sulci = map(tone, (picture(figure, 0), picture(figure, 1)))
+    assert gyri[0] > gyri[2]
+    assert sulci[2] > sulci[0]
+
+
+def test_an_unknown_quantity_or_view_is_refused():
+    with pytest.raises(InputError, match="unknown quantity; found depth"):
+        scalar_maps({"simulated": {28.0: (BRAIN, np.zeros(8))}}, quantity="depth")
+    with pytest.raises(InputError, match=r"unknown view.*lateral"):
+        runs_by_week({"simulated": {21.0: BRAIN}}, {}, views=("lateral",))
+
+
+def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
+    brain = merged(box((10, 30, 20), (-6, 0, 0)), box((10, 30, 20), (6, 0, 0)))
+    zones = np.repeat([1, 3], 12)
+    figure = zones_picture(brain, zones, fissure_x_mm=0.0, views=("left medial", "right medial"))
+    # a box of 10 × 30 × 20 mm has 22 cm²
+    assert {"clamped 22.0 cm²", "right contact 22.0 cm²", "free 0.0 cm²"} <= words(figure)
+    left, right = map(tone, (picture(figure, 0), picture(figure, 1)))
+    assert left[1] > left[0]
+    assert right[0] > 2 * right[2]
+
+
+def test_the_inside_of_a_parted_brain_has_no_zone():
+    mesh = box((10, 30, 20))
+    # without the side towards the camera
+    open_ = TriangleMesh(mesh.vertices, mesh.faces[~(mesh.vertices[mesh.faces, 0] == 5.0).all(axis=1)])
+    figure = zones_picture(open_, np.full(10, 1), fissure_x_mm=20.0, views=("left medial", "left"))
+    medial, lateral = (image[covered(image)].astype(float) for image in (picture(figure, 0), picture(figure, 1)))
+    assert np.ptp(medial.mean(axis=0)) < 10
+    assert lateral.mean(axis=0)[1] > lateral.mean(axis=0)[0] + 50
+
+
+def test_zones_that_do_not_fit_are_refused():
+    with pytest.raises(InputError, match="found 3 codes; expected 12"):
+        zones_picture(BRAIN, np.zeros(3, int), fissure_x_mm=0.0)
+    with pytest.raises(InputError, match=r"unknown zone; found \[9\]"):
+        zones_picture(BRAIN, np.full(12, 9), fissure_x_mm=0.0)
+
+
+def test_field_picture_names_the_field():
+    figure = field_picture(BRAIN, np.linspace(0, 2, 8), fissure_x_mm=0.0)
+    bar = colour_bar(figure, GROWTH)
+    assert bar.get_xlim() == (0.0, 2.0)
+
+
+def test_a_field_that_goes_below_zero_has_a_scale_as_wide_on_both_sides():
+    figure = field_picture(BRAIN, np.linspace(-1, 2, 8), fissure_x_mm=0.0)
+    bar = colour_bar(figure, GROWTH)
+    assert bar.get_xlim() == (-2.0, 2.0)
+    scale = signed_scale(np.array([-1.0, 0.0, 2.0]))
+    minus, zero, plus = scale.to_rgba([-1.0, 0.0, 1.0])[:, :3]
+    # blue, pale, red
+    assert minus[2] > minus[0]
+    assert zero.min() > 0.9
+    assert plus[0] > plus[2]
+
+
+def test_what_was_not_measured_is_keyed():
+    figure = scalar_maps({"real brain": {21.0: (BRAIN, np.array([np.nan, *range(7)]))}}, quantity="thickness_mm")
+    assert [text.get_text() for text in figure.legends[0].texts] == ["not measured"]
+
+
+@pytest.mark.parametrize(("quantity", "label"), [("curvedness", "(mm⁻¹)"), ("sulcal_depth_mm", "sulcal depth (mm)")])
+def test_curvedness_and_depth_go_from_zero_to_where_few_vertices_are_above(quantity, label):
+    values = np.array([0.1] * 7 + [9.0])
+    figure = scalar_maps({"simulated": {28.0: (BRAIN, values)}}, quantity=quantity, views=("left",))
+    bar = colour_bar(figure, label)
+    assert bar.get_xlim() == pytest.approx((0.0, round_up(np.quantile(values, 0.995))))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit"), [("contact_pressure_pa", "(Pa)"), ("contact_pressure_pa_per_gw", "(Pa/GW)")]
+)
+def test_contact_pressure_is_scaled_by_what_touches(quantity, unit):
+    figures = [
+        scalar_maps({"run": {28.0: (BRAIN, values)}}, quantity=quantity, views=("left",))
+        for values in (np.array([0.0] * 6 + [100.0, 300.0]), np.zeros(8))
+    ]
+    ends = [next(axes for axes in figure.axes if unit in axes.get_xlabel()).get_xlim()[1] for figure in figures]
+    assert ends == pytest.approx([round_up(np.quantile([100.0, 300.0], 0.995)), 1.0])
+
+
+def test_a_surface_that_nothing_touches_is_grey_in_the_map_of_pressure():
+    # the upper face is in contact, the side is not
+    values = np.where(BRAIN.vertices[:, 2] > 0, 100.0, 0.0)
+    values[(BRAIN.vertices[:, 0] < 0) & (BRAIN.vertices[:, 2] > 0)] = 0.0
+    figure = scalar_maps({"run": {28.0: (BRAIN, values)}}, quantity="contact_pressure_pa", views=("left", "right"))
+    left, right = (image[covered(image)].astype(float) for image in (picture(figure, 0), picture(figure, 1)))
+    assert np.ptp(left.mean(axis=0)) < 3
+    assert np.ptp(right.mean(axis=0)) > 30
+    assert "no contact" in words(figure)
+
+
+def test_every_zone_has_its_own_colour():
+    assert len(set(ZONE_COLOURS.values())) == len(ZONE_NAMES)
+
+
+@pytest.mark.parametrize(("limit", "length"), [(55, 50), (50, 50), (49, 20), (0.7, 0.5), (9.9, 5)])
+def test_scale_bars_have_round_lengths(limit, length):
+    assert round_length(limit) == pytest.approx(length)
+
+
+def test_a_map_that_one_hemisphere_lacks_is_grey_there():
+    halves = [(box((8, 30, 20), (x, 0, 0)), maps) for x, maps in ((-6, {"curvedness": np.ones(8)}), (6, {}))]
+    figure = shape_maps({"simulated": {21.0: halves}, "real brain": {}}, quantity="curvedness", views=("top",))
+    assert {"simulated\ntop view", "not measured"} <= words(figure)
+    image = picture(figure).astype(float)
+    left, right = tone(image[:, : image.shape[1] // 2]), tone(image[:, image.shape[1] // 2 :])
+    assert np.ptp(right) < 3 < np.ptp(left)
+
+
+def test_a_study_has_renders_and_maps_of_all_members_and_says_which_did_not_come_so_far():
+    halves = [(SMOOTH, {"shape_index": np.linspace(-1, 1, len(SMOOTH.vertices))})]
+    members = {"a": None, "b": halves, "c": halves}
+    values = {run: {"thickness_mm": value} for run, value in zip(members, (0.8, 1.5, 2.25), strict=True)}
+    figure = influence_picture(members, {"real brain": halves}, values=values, views=("left",))
+    assert len(pictures(figure)) == 6
+    assert {"0.8 mm", "1.5 mm", "2.25 mm", "real brain", ABSENT, "a", "b"} <= words(figure)
+    assert colour_bar(figure, "shape index").get_xlim() == (-1.0, 1.0)
+    # the measured brain is beige
+    red, _, blue = tone(picture(figure, 2))
+    assert red > blue
+
+
+def test_the_mesh_is_cut_open_with_cortex_and_core_apart():
+    ball = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
+    deep = np.linalg.norm(ball.vertices[ball.tets].mean(axis=1) / [20.0, 26.0, 18.0], axis=1)
+    figure = mesh_picture(ball, deep > 0.7)
+    palette = np.array([to_rgb(colour) for colour in (SIMULATED_SURFACE_COLOUR, CORTEX_COLOUR, CORE_COLOUR)])
+
+    def shares(number):
+        """Returns which part of a picture has the hue of each colour."""
+        image = picture(figure, number).astype(float)
+        inside = image[covered(image)]
+        hues = inside / np.linalg.norm(inside, axis=1, keepdims=True)
+        near = np.argmax(hues @ (palette / np.linalg.norm(palette, axis=1, keepdims=True)).T, axis=1)
+        return np.bincount(near, minlength=3) / len(near)
+
+    assert shares(0)[0] > 0.8
+    outside, cortex, _ = shares(1)
+    assert cortex > 0.2 > outside
+
+
+def test_regions_are_seen_in_their_colours_where_they_are():
+    mesh = sphere(20.0)
+    y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
+    regions = np.where(z < -12, 0, np.where(y > 0, 1, 2))
+    figure = regions_picture({"p": [(mesh, (regions, REGIONS))]}, views=("left",))
+    colours = {patch.get_label(): np.array(patch.get_facecolor()[:3]) for patch in figure.legends[0].legend_handles}
+    image = picture(figure)
+    height, width = image.shape[:2]
+
+    def nearest(row: float, column: float) -> str:
+        """Returns whose hue a place of the picture is nearest to."""
+        pixel = image[int(row * height), int(column * width)] / 255.0
+        hues = {name: colour / colour.sum() for name, colour in colours.items()}
+        return min(hues, key=lambda name: np.linalg.norm(hues[name] - pixel / pixel.sum()))
+
+    # seen from the left, anterior is on the left of the picture
+    assert (nearest(0.45, 0.3), nearest(0.45, 0.7), nearest(0.92, 0.5)) == ("front", "back", "no region")
+    assert list(colours) == ["front", "back", "no region"]
+
+
+def test_a_legend_of_many_regions_does_not_lie_over_the_brains():
+    mesh = sphere(20.0, 2)
+    names = {number: f"region {number}" for number in range(1, 25)}
+    figure = regions_picture({"p": [(mesh, (np.arange(len(mesh.vertices)) % 25, names))]}, views=("left",))
+    figure.canvas.draw()
+    top = figure.legends[0].get_window_extent().y1
+    assert top <= min(axes.get_window_extent().y0 for axes in pictures(figure))
+
+
+def test_many_regions_have_colours_of_their_own_and_none_is_darker_than_those_of_runs():
+    colours = region_colours([f"region {number}" for number in range(21)])
+    assert len({tuple(np.round(colour, 3)) for colour in colours.values()}) == 21
+    brightness = [max(colour) for colour in colours.values()]
+    assert min(brightness) >= min(max(to_rgb(colour)) for colour in RUN_COLOURS)
+
+
+def test_without_a_brain_there_is_no_picture_of_regions():
+    with pytest.raises(InputError, match="no brain with regions"):
+        regions_picture({})

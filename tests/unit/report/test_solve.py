@@ -1,0 +1,236 @@
+"""Charts and tables of growth and of the solve hold what their tables say."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import same_color
+from pictures import words
+
+from gyriflow.parameters.terms import ELEMENTS_NEEDED
+from gyriflow.report.growth import agreement_table, growth_chart, growth_table, sizes_table
+from gyriflow.report.solve import (
+    displacement_chart,
+    displacement_summary,
+    displacement_table,
+    quality_histogram,
+    steps_chart,
+)
+
+AREAS = pd.DataFrame(
+    {"subject": ["a", "c", "b"], "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
+).assign(series="volume")
+RATES = pd.DataFrame({"from_week": [21.0, 22.0], "to_week": [22.0, 23.0], "rate_per_s": [1.2e-7, -0.3e-7]}).assign(
+    series="volume"
+)
+NORMS = pd.DataFrame(
+    {
+        "run": "thin",
+        "subject": "s",
+        "from_week": [21.0, 21.0, 25.0],
+        "to_week": [22.0, 22.0, 26.0],
+        "nodes": ["all", "pial", "all"],
+        "max_mm": [3.31, 3.31, 2.5],
+        "mean_mm": [0.57, 0.8, 0.5],
+    }
+)
+
+
+def line_of(axes, label):
+    """Returns the (n, 2) data of the line whose label begins so."""
+    (line,) = [line for line in axes.lines if str(line.get_label()).startswith(label)]
+    return np.array(line.get_xydata())
+
+
+def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
+    figure = growth_chart(AREAS, RATES, folding_rate_per_s=2e-7)
+    area_axes, volume_axes, rate_axes = figure.axes
+    assert {"a", "b", "c"} <= words(figure)
+    assert [bar.get_height() for bar in rate_axes.patches] == pytest.approx([1.2, -0.3])
+    assert "10⁻⁷ s⁻¹" in rate_axes.get_ylabel()
+    assert [label.get_text() for label in rate_axes.get_xticklabels()] == ["21–22", "22–23"]
+    assert line_of(rate_axes, "folding")[:, 1] == pytest.approx([2.0, 2.0])
+    assert area_axes.lines[0].get_xydata().tolist() == [[21, 100], [22, 115], [23, 130]]
+    assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
+
+
+def test_series_have_bars_on_one_scale_and_their_differences_a_panel():
+    areas = pd.concat([AREAS.assign(series="surface"), AREAS.assign(area_cm2=2 * AREAS["area_cm2"])])
+    rates = pd.concat([RATES.assign(series="surface", rate_per_s=[3e-7, 1e-7]), RATES])
+    agreement = RATES.assign(reference="surface", difference_per_s=[-1.8e-7, 0.4e-7])
+    figure = growth_chart(areas, rates, agreement, folding_rate_per_s=2e-7)
+    area_axes, _, surface_axes, volume_axes, difference_axes = figure.axes
+    assert [line_of(area_axes, series)[:, 1].tolist() for series in ("surface", "volume")] == [
+        [100, 115, 130],
+        [200, 230, 260],
+    ]
+    assert [bar.get_height() for bar in difference_axes.patches] == pytest.approx([-1.8, 0.4])
+    assert "volume − surface: mean −0.70, mean size 1.10" in words(figure)
+    assert [bar.get_height() for bar in surface_axes.patches] == pytest.approx([3.0, 1.0])
+    assert [bar.get_height() for bar in volume_axes.patches] == pytest.approx([1.2, -0.3])
+    assert surface_axes.get_ylim() == volume_axes.get_ylim()
+    assert {"tangential growth rate:\nsurface", "tangential growth rate:\nvolume"} <= words(figure)
+    assert [text.get_text() for text in area_axes.get_legend().get_texts()] == ["surface", "volume"]
+    # a series is of one colour in all panels, and not that of the folding
+    folding = next(line.get_color() for line in surface_axes.lines if str(line.get_label()).startswith("folding"))
+    surface, volume = (
+        {bar.get_facecolor() for axes in panels for bar in axes.patches}
+        for panels in ([surface_axes], [volume_axes, difference_axes])
+    )
+    assert len(surface) == len(volume) == 1
+    assert surface != volume
+    assert not any(same_color(colour, folding) for colour in surface | volume)
+
+
+def test_series_without_common_weeks_have_no_panel_of_differences():
+    other = RATES.assign(series="surface", from_week=[30.0, 31.0], to_week=[31.0, 32.0])
+    areas = pd.concat([AREAS, AREAS.assign(series="surface", week=AREAS["week"] + 9)])
+    figure = growth_chart(areas, pd.concat([RATES, other]), RATES.iloc[:0])
+    assert not any("difference" in text for text in words(figure))
+    assert len([axes for axes in figure.axes if axes.patches]) == 2
+
+
+def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
+    curve = {21.5: 1e-7, 22.5: 2e-7, 25.0: 4.5e-7}
+    figure = growth_chart(AREAS, RATES, folding_rate_per_s=curve)
+    # the bars of weeks 21-22 and 22-23 stand at 0 and 1, one wide: constant up to 21.5, linear from there on
+    assert line_of(figure.axes[2], "folding") == pytest.approx(
+        np.array([[-0.5, 1.0], [0.0, 1.0], [0.5, 1.5], [1.0, 2.0], [1.5, 2.5]])
+    )
+    assert "folding" in words(figure)
+
+
+def test_a_curve_of_one_week_is_a_constant_rate():
+    figure = growth_chart(AREAS, RATES, folding_rate_per_s={30.0: 2e-7})
+    assert line_of(figure.axes[2], "folding")[:, 1] == pytest.approx([2.0, 2.0, 2.0])
+
+
+def test_growth_chart_without_a_folding_has_no_line_of_it():
+    assert not any("folding" in text for text in words(growth_chart(AREAS, RATES)))
+
+
+def test_steps_are_drawn_and_unusual_rungs_marked():
+    count = 6
+    steps = pd.DataFrame(
+        {
+            "week": 21 + np.arange(count) / 14,
+            "newton": [2, 1, 1, 3, 1, 1],
+            "krylov": [20, 10, 11, 60, 12, 12],
+            "min_J": np.linspace(0.99, 0.7, count),
+            "max_u_mm": 0.3,
+            "mean_u_mm": 0.05,
+            "rung": ["cg", "cg", "cg", "minres", "cg", "cg"],
+            "elements_through_cortex": np.linspace(2.3, 1.7, count),
+            "radius_ratio_01": np.linspace(0.4, 0.3, count),
+            "seconds": np.arange(1.0, count + 1),
+        }
+    )
+    figure = steps_chart(steps, order=1)
+    newton, krylov, jacobian, displacement, through, quality, seconds = figure.axes
+    assert newton.lines[0].get_ydata().tolist() == [2, 1, 1, 3, 1, 1]
+    assert newton.lines[1].get_xydata().tolist() == [[steps["week"][3], 3]]
+    assert newton.lines[1].get_label() == "rung: minres"
+    assert krylov.lines[0].get_ydata().tolist() == steps["krylov"].tolist()
+    assert jacobian.lines[0].get_ydata().min() == pytest.approx(0.7)
+    assert [line.get_label() for line in displacement.lines] == ["max", "mean"]
+    assert through.lines[0].get_ydata()[[0, -1]].tolist() == [2.3, 1.7]
+    assert through.lines[1].get_ydata()[0] == 2.0
+    assert steps_chart(steps, order=2).axes[4].lines[1].get_ydata()[0] == ELEMENTS_NEEDED[2]
+    assert quality.lines[0].get_ydata()[-1] == 0.3
+    assert seconds.lines[0].get_ydata().sum() == 21
+    assert "(s)" in seconds.get_ylabel()
+
+
+def test_quality_histogram_has_the_classes_their_limits_and_words_on_the_surface():
+    classes = {"edges": [1e-3, 0.5, 1.0], "counts": [1, 7]}
+    quality = {
+        "histogram": dict.fromkeys(("radius_ratio", "min_dihedral_deg", "max_dihedral_deg", "volume_mm3"), classes),
+        "surface_distance_mm": {"hausdorff99": 0.05},
+        "crossing_faces": 0,
+        "volume_change": -0.001,
+        "gap_kept": 0.9,
+    }
+    gates = {"min_radius_ratio": 0.1, "min_dihedral_deg": 2.0, "max_dihedral_deg": 175.0, "min_volume_mm3": 1e-6}
+    figure = quality_histogram(quality, gates=gates)
+    for axes in figure.axes:
+        assert axes.patches[0].get_data().values.tolist() == [1, 7]
+    assert [[line.get_xdata()[0] for line in axes.lines] for axes in figure.axes] == [[0.1], [2.0], [175.0], []]
+    assert figure.axes[3].get_title() == "0.001 to 1, limit 10$^{-6}$"
+    assert "of 8" in figure.axes[0].get_ylabel()
+    (said,) = [text for text in words(figure) if text.startswith("surface")]
+    assert said.endswith(
+        "0.050 mm of the given one, 0 faces cross; volume −0.10 %; gaps open along 90.0 % of their walls"
+    )
+
+
+def test_displacement_stands_beside_the_papers_values():
+    table = displacement_table(NORMS).set_index(["source", "from_week", "nodes"])
+    assert table.loc[("thin", 21.0, "pial"), "mean_mm"] == 0.8
+    paper = table.xs("FetalFoldSim")
+    assert paper["max_mm"].tolist() == [2.51, 2.22, 2.37, 2.57]
+    assert paper["mean_mm"].tolist() == [0.42, 0.40, 0.38, 0.40]
+    measured = table.xs("Wang et al. 2021")
+    assert measured["max_mm"].tolist() == [1.24, 2.29, 3.65, 5.79]
+    assert measured["mean_mm"].tolist() == [0.45, 0.88, 1.91, 3.03]
+
+
+def test_displacement_summary_has_a_column_per_interval_and_dashes_where_nothing_is_known():
+    summary = displacement_summary(NORMS)
+    assert list(summary.columns) == ["21–22 GW", "22–23 GW", "23–24 GW", "24–25 GW", "25–26 GW"]
+    assert summary.loc[("thin", "all"), "21–22 GW"] == "3.31 / 0.57"
+    assert summary.loc[("thin", "all"), "22–23 GW"] == "–"
+    assert summary.loc[("FetalFoldSim", "all"), "24–25 GW"] == "2.57 / 0.40"
+
+
+def test_displacement_chart_draws_the_chosen_nodes_at_the_middle_of_the_interval():
+    figure = displacement_chart(NORMS)
+    lines = {line.get_label(): line.get_xydata().tolist() for line in figure.axes[1].lines}
+    assert lines["thin"] == [[21.5, 0.57], [25.5, 0.5]]
+    assert lines["FetalFoldSim"][0] == [21.5, 0.42]
+
+
+def test_growth_table_is_in_units_of_1e_7():
+    rates = pd.DataFrame(
+        {
+            "series": "volume",
+            "from_week": [21.0],
+            "to_week": [22.0],
+            "area_ratio": [1.1],
+            "rate_per_s": [1.234e-7],
+            "volume_ratio": [1.2],
+            "core_rate_per_s": [0.5e-7],
+        }
+    )
+    assert growth_table(rates)["tangential rate (10⁻⁷ s⁻¹)"].tolist() == [1.234]
+    assert "series" not in growth_table(rates)
+    both = growth_table(pd.concat([rates, rates.assign(series="surface")]))
+    assert both["series"].tolist() == ["volume", "surface"]
+
+
+def test_agreement_table_has_each_interval_the_mean_and_the_mean_size():
+    agreement = pd.DataFrame(
+        {
+            "series": "volume",
+            "reference": "surface",
+            "from_week": [21.0, 22.0],
+            "to_week": [22.0, 23.5],
+            "difference_per_s": [0.3e-7, -0.1e-7],
+            "core_difference_per_s": [0.2e-7, 0.4e-7],
+        }
+    )
+    table = agreement_table(agreement)
+    assert set(table["compared"]) == {"volume − surface"}
+    assert table["interval (GW)"].tolist() == ["21–22", "22–23.5", "mean", "mean size"]
+    assert table["tangential rate, difference (10⁻⁷ s⁻¹)"].tolist() == pytest.approx([0.3, -0.1, 0.1, 0.2])
+    assert table["core rate, difference (10⁻⁷ s⁻¹)"].tolist() == pytest.approx([0.2, 0.4, 0.3, 0.3])
+
+
+def test_sizes_table_compares_series_week_by_week():
+    areas = pd.DataFrame(
+        [("surface", 21.0, 100.0, 50.0), ("surface", 22.0, 120.0, 60.0), ("volume", 22.0, 126.0, 57.0)],
+        columns=["series", "week", "area_cm2", "volume_ml"],
+    )
+    table = sizes_table(areas)
+    assert table["pial area (cm²): surface"].tolist() == [100.0, 120.0]
+    assert table.loc[22.0, "pial area: volume − surface (%)"] == pytest.approx(5.0)
+    assert table.loc[22.0, "volume: volume − surface (%)"] == pytest.approx(-5.0)
+    assert np.isnan(table.loc[21.0, "pial area: volume − surface (%)"])

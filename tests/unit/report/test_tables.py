@@ -1,0 +1,56 @@
+"""Tables hold differences and escaped text."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gyriflow.report.tables import html_table, metrics_table, runs_table
+
+
+def test_metrics_table_gives_the_difference_from_the_measured_brain():
+    metrics = pd.DataFrame(
+        [
+            ("s", "thin", 22.0, "whole", "area", 110.0, "cm2"),
+            ("s", "thin", 23.0, "whole", "area", 150.0, "cm2"),
+            ("s", "real", 22.0, "whole", "area", 100.0, "cm2"),
+            ("s", "thin", 22.0, "left", "area", 55.0, "cm2"),
+            ("s", "thin", 22.0, "whole", "gyrification_index", 1.2, "1"),
+        ],
+        columns=["subject", "run", "week", "hemisphere", "metric", "value", "unit"],
+    )
+    table = metrics_table(metrics)
+    assert table.loc[("area (cm²)", 22.0), "thin"] == 110.0
+    assert table.loc[("area (cm²)", 22.0), "thin: difference (%)"] == pytest.approx(10.0)
+    assert np.isnan(table.loc[("area (cm²)", 23.0), "real brain"])
+    assert table.loc[("gyrification index", 22.0), "thin"] == 1.2
+    assert "phantom" in metrics_table(metrics, measured="phantom")
+
+
+def test_metrics_table_without_measured_brains_has_no_differences():
+    metrics = pd.DataFrame(
+        [("s", "thin", 22.0, "whole", "area", 110.0, "cm2")],
+        columns=["subject", "run", "week", "hemisphere", "metric", "value", "unit"],
+    )
+    assert metrics_table(metrics)["thin: difference (%)"].isna().all()
+
+
+def test_runs_table_puts_what_differs_first():
+    table = runs_table(
+        {
+            "reference": {"poisson_ratio": 0.45, "contact": {"gap_mm": 2.5}, "thickness_mm": 1.5},
+            "thin": {"poisson_ratio": 0.45, "contact": {"gap_mm": 2.0}, "thickness_mm": 1.5},
+        }
+    )
+    assert table.index.tolist() == ["contact.gap_mm", "poisson_ratio", "thickness_mm"]
+    assert table["differs"].tolist() == ["yes", "", ""]
+    assert table.loc["contact.gap_mm", "thin"] == "2"
+
+
+def test_html_is_escaped_named_and_the_same_each_time():
+    table = pd.DataFrame({"run <b>": ["a & b"], "value": [1 / 3]})
+    html = html_table(table, caption="x < y", synthetic=True)
+    assert "a &amp; b" in html
+    assert "run &lt;b&gt;" in html
+    assert "x &lt; y (synthetic phantom, not a real brain)" in html
+    assert "0.3333<" in html
+    assert html == html_table(table, caption="x < y", synthetic=True)

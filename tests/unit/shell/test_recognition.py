@@ -1,0 +1,117 @@
+"""Which files are recognised as brains: names of atlases, sides, ages, label schemes, participants."""
+
+import numpy as np
+import pytest
+import yaml
+
+from gyriflow.config import load
+from gyriflow.errors import InputError
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.shell.beginning import UNSET, fitting_scheme, participants, recognise, week_in, write_configuration
+from gyriflow.shipped import SHIPPED
+
+ATLAS = SHIPPED / "atlases" / "spina-bifida"
+LABELS = ATLAS / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
+
+
+@pytest.mark.parametrize(
+    ("name", "week"),
+    [
+        ("week21_labels.nii.gz", 21),
+        ("fetal.week36.left.pial.surf.gii", 36),
+        ("tissue-t21.00_dhcp-19.nii.gz", 21),
+        ("STA30_tissue.nii.gz", 30),
+        ("HarvardSTA25_Study1", 25),
+        ("fetal_SB_atlas_GA27_operated", 27),
+        ("sub-01_ga-26.4_dseg.nii.gz", 26.4),
+        ("brain_24w.nii.gz", 24),
+        ("case_33GW_seg.nii.gz", 33),
+        ("sub-21_dseg.nii.gz", None),
+        ("week99.nii.gz", None),
+        ("T2w.nii.gz", None),
+        ("GestationalAge24_seg", 24),
+        ("sub-01_EGA25_seg", 25),
+        # numbers of subjects after words that end as a name of an age does
+        ("patient23_seg.nii.gz", None),
+        ("subject-24", None),
+        ("fet_30_labels.nii.gz", None),
+        ("infant-31_seg.nii.gz", None),
+        ("image24_seg.nii.gz", None),
+        ("dataset_21", None),
+        ("PATIENT23", None),
+    ],
+)
+def test_ages_are_read_from_names(name, week):
+    assert week_in(name) == week
+
+
+def test_the_scheme_is_found_from_the_labels():
+    labels = read_label_volume(LABELS).labels
+    assert fitting_scheme(labels)[0] == "spina-bifida-atlas"
+    # the same brain with the numbers of FeTA
+    feta = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])[labels]
+    assert fitting_scheme(feta)[0] == "feta-7"
+    assert fitting_scheme((labels > 0).astype(np.int32))[0] == "binary"
+    assert fitting_scheme(labels + 200 * (labels > 0)) == (None, [])
+
+
+def touched(folder, *names):
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+
+
+def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
+    for side in ("left", "right"):
+        touched(
+            tmp_path, *(f"fetal.week22.{side}.{kind}.surf.gii" for kind in ("pial", "wm", "sphere", "midthickness"))
+        )
+    touched(tmp_path, "fetal.week23.left.pial.surf.gii")
+    touched(tmp_path, *(f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white")))
+    (tmp_path / "participants.tsv").write_text("participant_id\tsex\tga\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
+    assert participants(tmp_path) == {"sub-07": 27.3}
+    first, alone, second = (brain.entry for brain in recognise(tmp_path))
+    assert first == {
+        "id": "fetal.week22",
+        "week": 22.0,
+        "hemispheres": {
+            "left": "fetal.week22.left.pial.surf.gii",
+            "right": "fetal.week22.right.pial.surf.gii",
+            "white": {"left": "fetal.week22.left.wm.surf.gii", "right": "fetal.week22.right.wm.surf.gii"},
+        },
+    }
+    assert alone["hemisphere"] == {"file": "fetal.week23.left.pial.surf.gii", "side": "left"}
+    assert (second["id"], second["week"]) == ("sub-07", 27.3)
+    assert second["hemispheres"]["white"] == {"left": "sub-07/surf/lh.white", "right": "sub-07/surf/rh.white"}
+
+
+def test_a_configuration_is_written_that_is_valid(tmp_path):
+    for name in ("GA21", "GA22"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "parcellation.nii.gz").write_bytes(LABELS.read_bytes())
+    path = tmp_path / "gyriflow.yaml"
+    said = list(write_configuration(tmp_path, path, force=False))
+    assert said == ["2 brains: 2 from label volumes (spina-bifida-atlas)"]
+    config = load(yaml.safe_load(path.read_text()), tmp_path)
+    assert [(brain.id, brain.week) for brain in config.brains] == [("GA21", 21.0), ("GA22", 22.0)]
+    assert config.start == "GA21"
+    assert list(config.runs) == ["reference", "measured"]
+    with pytest.raises(InputError, match="is there already"):
+        list(write_configuration(tmp_path, path, force=False))
+
+
+def test_what_files_do_not_tell_is_left_to_be_filled_in(tmp_path):
+    (tmp_path / "mine_seg.nii.gz").write_bytes(LABELS.read_bytes())
+    path = tmp_path / "gyriflow.yaml"
+    said = list(write_configuration(tmp_path, path, force=False))
+    assert said[1] == "to be filled in for mine: week: not told by its name"
+    written = yaml.safe_load(path.read_text())
+    assert written["brains"][0]["week"] == UNSET
+    with pytest.raises(InputError, match=r"brains\[0\].week"):
+        load(written, tmp_path)
+
+
+def test_a_folder_without_brains_says_what_is_expected(tmp_path):
+    touched(tmp_path, "notes.txt")
+    with pytest.raises(InputError, match="no brain was recognised; found 1 files; expected tissue label volumes"):
+        recognise(tmp_path)

@@ -1,0 +1,176 @@
+"""A figure or a table of the registry: its files are read, one function of the report draws them."""
+
+from importlib import import_module
+from itertools import pairwise
+
+import numpy as np
+
+from gyriflow.geometry.poses import pose_from
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.io.figures import write_figure, write_html
+from gyriflow.io.files import read_json, read_table, write_json
+from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
+from gyriflow.io.maps import read_maps, read_volume_map
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
+from gyriflow.io.tetmeshes import read_regions
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.parameters.folding import parameters_from
+from gyriflow.parameters.terms import BASE, CORTEX
+from gyriflow.step import step
+
+# what functions need besides, each imports itself: its figure alone depends on it
+READERS = {
+    ".csv": read_table,
+    ".json": read_json,
+    ".yaml": lambda path: parameters_from(read_yaml(path)),
+    ".surf.gii": read_surface,
+    ".shape.gii": read_vertex_maps,
+    ".label.gii": read_vertex_labels,
+    "regions.xdmf": read_regions,
+    "maps.h5": read_maps,
+}
+
+
+def read(inputs):
+    """Returns dictionaries and lists of files as they are with the files' content; other files stay paths."""
+    match inputs:
+        case str():
+            return next((reader(inputs) for end, reader in READERS.items() if inputs.endswith(end)), inputs)
+        case dict():
+            return {key: read(value) for key, value in inputs.items()}
+        case list() | tuple():
+            return [read(value) for value in inputs]
+        case _:
+            return inputs
+
+
+def surface_overlay(image, surface, report, affine_from, **_):
+    """Returns the image in the pose of the surface, which was turned upright."""
+    volume = read_volume_map(image, affine_from)
+    return {"values": volume.values, "affine": pose_from(report["pose"]).world @ volume.affine, "surface": surface}
+
+
+def growth_chart(areas, rates, agreement, folding_rate_per_s, estimated_from, **shown):
+    """Returns the tables of growth, with the curve of the folding's rate where it is estimated."""
+    from gyriflow.growth.rates import FOLDING_RATES, rate_curve
+
+    rate = folding_rate_per_s
+    if rate == "estimated":
+        chosen = rates[rates["series"] == estimated_from]
+        rate = dict(zip(*rate_curve(chosen, FOLDING_RATES["growth_rate_per_s"], allow_negative=True), strict=True))
+    return {"areas": areas, "rates": rates, "agreement": agreement, "folding_rate_per_s": rate, **shown}
+
+
+def displacement_maps(frames, **shown):
+    """Returns the displacement between output weeks on the pial surface at the interval's end."""
+    weeks = read_weeks(frames)
+    surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames)))
+    at = {week: read_positions(frames, week)[pial] for week in weeks}
+    maps = {
+        (a, b): (TriangleMesh(at[b], surface.faces), np.linalg.norm(at[b] - at[a], axis=1)) for a, b in pairwise(weeks)
+    }
+    return {"displacements": maps, **shown}
+
+
+def scalar_maps(frames, quantity, **shown):
+    """Returns the contact pressure at the output weeks, on the surface of the start: there no fold hides it."""
+    start, *weeks = read_weeks(frames)
+    surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, start), read_tets(frames)))
+    maps = {week: (surface, read_field(frames, week, quantity)[pial]) for week in weeks}
+    return {"maps": {"simulated": maps}, "quantity": quantity, **shown}
+
+
+def outlines_chart(pairs, **shown):
+    """Returns the simulated brains in the pose in which each is nearest to the real one."""
+    from gyriflow.metrics.similarity import rigid_alignment
+
+    laid = {week: (transformed(mesh, rigid_alignment(mesh, real).matrix), real) for week, (mesh, real) in pairs.items()}
+    return {"pairs": laid, **shown}
+
+
+def mesh_picture(mesh, **shown):
+    """Returns a mesh and which of its elements belong to the cortex."""
+    return {"mesh": mesh.mesh, "in_cortex": mesh.cell_tags["layer"] == CORTEX, "synthetic": shown["synthetic"]}
+
+
+def zones_picture(mesh, params, synthetic, **_):
+    """Returns the boundary of the start mesh with its zones."""
+    boundary = TriangleMesh(mesh.mesh.vertices, mesh.facets)
+    shown = {"fissure_x_mm": params.fissure_x_mm, "synthetic": synthetic}
+    return {"mesh": boundary, "zones": mesh.facet_tags["zone"], **shown}
+
+
+def field_picture(mesh, params, synthetic, **_):
+    """Returns the growth of the pial surface in one step."""
+    surface, pial = boundary_surface(mesh.mesh)
+    shown = {"fissure_x_mm": params.fissure_x_mm, "synthetic": synthetic}
+    return {"mesh": surface, "values": 1e3 * mesh.fields["tangential_growth_per_step"][pial], **shown}
+
+
+def region_sections(mesh, params, synthetic, **_):
+    """Returns the start mesh with its fields and tags, and the ellipsoid of no growth."""
+    from gyriflow.folding.zones import no_growth_ellipsoid
+
+    ellipsoid = no_growth_ellipsoid(mesh.mesh.vertices, params)
+    return {"mesh": mesh.mesh, "fields": mesh.fields, "tags": mesh.cell_tags, "ellipsoid": ellipsoid,
+            "synthetic": synthetic}  # fmt: skip
+
+
+def normal_arrows(mesh, params, frames, maps, synthetic, **_):
+    """Returns the normals that orient growth at the first and the last week."""
+    from gyriflow.folding.output import layer_fields
+    from gyriflow.folding.zones import zones_of_run
+    from gyriflow.report.sections import Normals
+
+    pial, found = mesh.facets[mesh.facet_tags["zone"] < BASE], zones_of_run(mesh.mesh, params)
+    weeks = {}
+    for week in dict.fromkeys((read_weeks(frames)[0], read_weeks(frames)[-1])):
+        at = TetrahedralMesh(read_positions(frames, week), mesh.mesh.tets)
+        fields = layer_fields(at.vertices, found, params, maps or {}, week, ("normal", "cortex_weight"))
+        weeks[week] = Normals(at, fields["pial_normal"], fields["cortex_weight"], pial)
+    return {"weeks": weeks, "synthetic": synthetic}
+
+
+def contact_scheme(mesh, params, synthetic, **_):
+    """Returns the walls of contact and its law: by planes, or by the distance of the walls."""
+    from gyriflow.folding.contact import BARRIER, DISTANCE_PER_EDGE
+    from gyriflow.folding.zones import zones_of_run
+    from gyriflow.geometry.triangles import mean_edge_length
+    from gyriflow.report.sections import barrier_law, penalty_law
+
+    found = zones_of_run(mesh.mesh, params)
+    boundary, settings = TriangleMesh(mesh.mesh.vertices, found.facets), params.contact
+    by_planes = settings.kind == "planes"
+    distance = settings.distance_mm or DISTANCE_PER_EDGE * mean_edge_length(boundary)
+    return {
+        "mesh": boundary,
+        "zones": found.facet_zone,
+        "law": penalty_law(settings.penalty_pa_per_m) if by_planes else barrier_law(BARRIER),
+        "planes_mm": found.planes_mm if by_planes else None,
+        "distance": f"d̂ = {distance:.2g} mm",
+        "synthetic": synthetic,
+    }
+
+
+def norms_chart(metrics, reference, **shown):
+    """Returns the metrics of brains with the hemispheres of the reference."""
+    from gyriflow.metrics.norms import same_sides
+
+    return {"metrics": metrics[same_sides(metrics, reference)], "reference": reference, **shown}
+
+
+params, output = snakemake.params, snakemake.output
+with step(snakemake.log[0]):
+    module, _, function = params.draw.rpartition(".")
+    content = {**read(params.inputs), **params.options}
+    # a function here of the same name works out what is drawn from the files
+    if function in globals():
+        content = globals()[function](**content)
+    shown = getattr(import_module(f"gyriflow.report.{module}"), function)(**content)
+    if isinstance(shown, str):
+        write_html(output[0], shown)
+    elif isinstance(shown, dict):
+        write_json(output[0], shown)
+    else:
+        write_figure(*output, shown, dpi=params.dpi)

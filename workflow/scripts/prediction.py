@@ -1,0 +1,40 @@
+"""A run that foretells a brain and the simplest ways to do so, beside the real brains of the weeks."""
+
+import numpy as np
+import pandas as pd
+
+from gyriflow.comparison.prediction import endpoints, scaled_to, with_skill
+from gyriflow.comparison.shapes import Shape, ready
+from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh, signed_volume
+from gyriflow.io.files import write_table
+from gyriflow.io.registrations import read_targets
+from gyriflow.io.surfaces import read_surface, read_vertex_maps
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.metrics.curvature import curvature
+from gyriflow.step import step
+
+files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
+with step(snakemake.log[0]):
+    targets, rows = read_targets(files.targets), []
+    start, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
+    for number, week in enumerate(map(float, params.weeks)):
+        real = read_surface(files.whole[number])
+        real_shape = Shape(read_surface(files.real[number]), **read_vertex_maps(files.real_maps[number]))
+        at = int(np.argmin(np.abs(targets.weeks - week)))
+        target = TriangleMesh(targets.positions[at][used], start.faces)
+        volume = signed_volume(target)
+        models = {
+            "run": read_surface(files.simulated[number]),
+            "scaled": scaled_to(start, volume),
+            "atlas": scaled_to(read_surface(files.atlas[number]), volume),
+            **{name: TriangleMesh(places[at], start.faces) for name, places in targets.surfaces.items()},
+            "target": target,
+        }
+        for model, surface in models.items():
+            even = ready(surface, real)
+            bend = curvature(even, radius_mm=params.curvature_radius_mm)
+            found = endpoints(surface, real, Shape(even, bend.mean, bend.shape_index), real_shape)
+            row = {"run": names.run, "start": names.brain, "start_week": params.start_week, "week": week}
+            rows.append(row | {"horizon": week - params.start_week, "model": model} | found)
+    write_table(snakemake.output[0], with_skill(pd.DataFrame(rows)))
