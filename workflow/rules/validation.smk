@@ -34,6 +34,7 @@ rule validation:
         kinds=of(PLAN.validating.kinds),
         seed=of(PLAN.runs.seed),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+        mirrored_patches=CONFIG.metrics.mirrored_patches,
     script:
         "../scripts/validation.py"
 
@@ -75,6 +76,7 @@ rule registration_ceiling:
         start_week=of(PLAN.brains.week),
         weeks=of(PLAN.validating.ceiling_weeks),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+        mirrored_patches=CONFIG.metrics.mirrored_patches,
     script:
         "../scripts/registration_ceiling.py"
 

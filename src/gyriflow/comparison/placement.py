@@ -4,14 +4,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.matching import match_points, values_at
-from ..geometry.triangles import Floats, Ints, vertex_normals
+from ..geometry.alignment import fit_onto
+from ..geometry.matching import MIRROR, match_points, nearest_on, values_at
+from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed, vertex_normals
 from .shapes import Shape
 
 MEASURES = ("shape_index", "mean_curvature")
 
 PATCH_MM = 20.0
 """Edge of the patches that the bootstrap draws: wider than a gyrus with its sulcus."""
+
+SYMMETRIC_MM = 0.4
+"""Mean distance of a brain from its mirror image below which its sides are one observation: half a voxel of atlases."""
 
 DRAWS = 2000
 INTERVAL = (0.025, 0.975)
@@ -37,27 +41,37 @@ def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
 
 
 def placement(
-    real: Shape, run: Shape, start: Shape, adjacent: Shape | None, *, horizon: float, seed: int
-) -> dict[str, float]:
+    real: Shape,
+    run: Shape,
+    start: Shape,
+    adjacent: Shape | None,
+    *,
+    horizon: float,
+    seed: int,
+    mirrored: bool = False,
+) -> dict[str, float | bool]:
     """Returns how well the folds of a run are placed in a week, all shapes ready and laid onto the real brain.
 
     To each vertex of the real surface belongs the nearest point of the other whose normal agrees; correlations are
     weighted by area, over the whole surface. For each of `MEASURES`: r_…, r_start_…, r_adjacent_…, gain_… (r − r_start)
     with its 95 % interval gain_low_…, gain_high_… from patches drawn with replacement (Efron and Tibshirani 1993), and
     skill_…. matched_share is the part of the real surface's area for which an agreeing point of the run was found.
+    asymmetry_mm and mirrored_patches are those of `drawn_patches`.
 
     `start` is the start brain scaled up: no folding at all; `adjacent` the real brain of the week before, if there is
     one. The horizon is in weeks since the start, the seed that of the bootstrap.
     """
     others = {"run": run, "start": start} | ({"adjacent": adjacent} if adjacent is not None else {})
     normals, areas = vertex_normals(real.mesh), real.areas
-    values, row = {}, {}
+    values: dict[str, dict[str, Floats]] = {}
+    row: dict[str, float | bool] = {}
     for name, shape in others.items():
         match = match_points(real.mesh.vertices, normals, shape.mesh)
         values[name] = {measure: values_at(match, getattr(shape, measure)) for measure in MEASURES}
         if name == "run":
             row["matched_share"] = float(np.average(match.agrees, weights=areas))
-    patch = patches(real.mesh.vertices, areas, PATCH_MM)
+    patch, drawn = drawn_patches(real, mirrored=mirrored)
+    row |= drawn
     for measure in MEASURES:
         truth = getattr(real, measure)
         found = {name: correlation(truth, value[measure], areas) for name, value in values.items()}
@@ -69,12 +83,38 @@ def placement(
     return row
 
 
-def patches(points: Floats, areas: Floats, edge_mm: float) -> Ints:
+def drawn_patches(real: Shape, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
+    """Returns for each vertex the number of the patch that is drawn with it, and how patches were made.
+
+    asymmetry_mm is the mean distance of the brain from its mirror image. Where it is below `SYMMETRIC_MM`, or where
+    `mirrored` asks for it, a patch is drawn together with its mirror image: mirrored_patches is true.
+    """
+    there, asymmetry_mm = mirror_places(real.mesh, real.areas)
+    together = mirrored or asymmetry_mm < SYMMETRIC_MM
+    patch = patches(real.mesh.vertices, real.areas, PATCH_MM, there if together else None)
+    return patch, {"asymmetry_mm": asymmetry_mm, "mirrored_patches": together}
+
+
+def mirror_places(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
+    """Returns where the mirror image of each vertex lies, (n, 3), and the mean distance of the two surfaces in mm.
+
+    The image, mirrored along x (left to right), is laid onto the surface rigidly.
+    """
+    image = transformed(mesh, np.pad(MIRROR, (0, 1)) + np.diag([0.0, 0.0, 0.0, 1.0]))
+    laid = transformed(image, fit_onto(image, mesh))
+    return laid.vertices, float(np.average(nearest_on(laid.vertices, mesh)[0], weights=areas))
+
+
+def patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | None = None) -> Ints:
     """Returns for each of (n,) vertices the number of its patch, about `edge_mm` wide, the same in every call.
 
-    Patches are nearest to seeds that are spread by farthest points.
+    Patches are nearest to seeds that are spread by farthest points. With the (n, 3) places of the vertices' mirror
+    images, a patch and its mirror image have one number.
     """
-    count = max(2, round(float(areas.sum()) / edge_mm**2))
+    sides = 1
+    if mirrored is not None:
+        sides, points = 2, np.where((points[:, 0] < mirrored[:, 0])[:, None], points, mirrored)
+    count = max(2, round(float(areas.sum()) / edge_mm**2 / sides))
     seeds = [0]
     away = np.linalg.norm(points - points[0], axis=1)
     for _ in range(count - 1):

@@ -57,6 +57,7 @@ def validation_row(
     real: Shape,
     start: Shape,
     adjacent: Shape | None,
+    mirrored: bool = False,
 ) -> dict[str, Any]:
     """Returns a row of validation.csv.
 
@@ -77,7 +78,7 @@ def validation_row(
     for name, unit, aim in (("area", "cm2", wanted[0]), ("volume", "ml", wanted[1])):
         row[f"{name}_error"] = row[f"{name}_{unit}"] / aim - 1
         row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"real_{name}_{unit}"] - 1
-    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=comparison.seed)
+    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=comparison.seed, mirrored=mirrored)
     row |= against_real(run, real)
     measures = {"": fold_measures(run), "real_": fold_measures(real)}
     # relative area is that of the surfaces as they are

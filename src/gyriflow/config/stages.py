@@ -128,6 +128,10 @@ class MetricsSettings(Settings):
     spangy_wavelength: WeylFormula = setting(
         SPANGY_WAVELENGTH, "", "Eigenvalue of the shortest wavelength WL: `paper` 2π/WL², `textbook` (2π/WL)²."
     )
+    mirrored_patches: bool = setting(
+        False, "", "Intervals draw patches of the surface together with their mirror images even in brains that differ "
+        "from their mirror image; where both are within half a voxel they always do.",
+    )  # fmt: skip
     norm_reference: tuple[str, ...] | None = setting(
         None, "",
         "Ids of the measured brains that others are compared with in tables of centiles and nearest weeks. `null`: all "

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gyriflow.comparison.placement import correlation, gain_interval, patches, placement, skill
+from gyriflow.comparison.placement import correlation, drawn_patches, gain_interval, patches, placement, skill
 from gyriflow.comparison.shapes import Shape, ready
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import fit_onto
@@ -106,6 +106,57 @@ def test_interval_is_as_wide_as_gains_scatter_from_surface_to_surface():
     assert gain_interval(truth, run, start, areas, patch, seed=3) == gain_interval(
         truth, run, start, areas, patch, seed=3
     )
+
+
+def two_sided(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns the surface beside its mirror image."""
+    away = mesh.vertices + [1.5 * RADIUS, 0, 0]
+    return TriangleMesh(
+        np.concatenate([away, away * [-1, 1, 1]]),
+        np.concatenate([mesh.faces, flipped(mesh).faces + len(away)]),
+    )
+
+
+def test_mirror_patches_are_drawn_together_where_the_brain_is_its_mirror_image():
+    brain = two_sided(bumpy(1))
+    half = len(REAL.vertices)
+    # wherever the brain lies
+    laid = transformed(brain, motion(8, (5, -3, 2)))
+    patch, drawn = drawn_patches(shaped(laid, np.zeros(2 * half)))
+    assert drawn["mirrored_patches"] is True
+    assert drawn["asymmetry_mm"] == pytest.approx(0, abs=0.02)
+    assert np.mean(patch[:half] == patch[half:]) > 0.98
+    assert patch.max() + 1 == round(shaped(laid, np.zeros(2 * half)).areas.sum() / 20**2 / 2)
+    # another brain on the other side: only on demand
+    other = transformed(bumpy(5), motion(0, (-1.5 * RADIUS, 0, 0)))
+    unlike = TriangleMesh(
+        np.concatenate([brain.vertices[:half], other.vertices]), np.concatenate([REAL.faces, REAL.faces + half])
+    )
+    shape = shaped(unlike, np.zeros(2 * half))
+    patch, drawn = drawn_patches(shape)
+    assert drawn["mirrored_patches"] is False
+    assert drawn["asymmetry_mm"] > 0.4
+    assert not set(patch[:half]) & set(patch[half:])
+    patch, drawn = drawn_patches(shape, mirrored=True)
+    assert drawn["mirrored_patches"] is True
+    assert set(patch[:half]) & set(patch[half:])
+
+
+def test_intervals_of_symmetric_brains_are_root_two_wider_when_mirror_patches_are_drawn_together():
+    brain = two_sided(SMOOTH)
+    areas = np.ones(len(brain.vertices))
+    directions = SMOOTH.vertices / RADIUS
+    place = brain.vertices * [-1, 1, 1]
+    sizes = np.full(len(areas), 8 * np.pi * RADIUS**2 / len(areas))
+    ratios = []
+    for seed in range(10):
+        shared, own, other = (np.tile(field(directions, 100 * seed + k), 2) for k in range(3))
+        widths = [
+            np.ptp(gain_interval(shared, shared + own, 0.5 * shared + other, areas, patch, seed=seed))
+            for patch in (patches(brain.vertices, sizes, 10.0), patches(brain.vertices, sizes, 10.0, place))
+        ]
+        ratios.append(widths[1] / widths[0])
+    assert np.mean(ratios) == pytest.approx(np.sqrt(2), abs=0.15)
 
 
 def test_closest_points_find_the_motion_back():
