@@ -126,7 +126,8 @@ def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_halvings": 0, "max_newton": 1}}
     done = fold(mesh, tmp_path / "out", 2, **hard)
     assert done.returncode == 4, done.stdout + done.stderr
-    assert "fails even with 86400 s" in done.stderr
+    # no step is halved: a whole one fails, or what is left before the first output
+    assert re.search(r"fails even with (86400|64800) s", done.stderr)
     assert re.search(r"smallest det F \S+ in element \d+ at \[.*\] mm, largest residual .* at vertex \d+", done.stderr)
     assert not (tmp_path / "out" / "frames.h5").exists()
 
