@@ -41,7 +41,8 @@ def main() -> None:
     validation = read_table(folder / "validation.csv")
     moves = folder / "displacement_agreement.csv"
     displacement = read_table(moves) if moves.exists() else pd.DataFrame()
-    shown = ["run", "kind", "start_week", "week", "seed", "area_error", "volume_error", "r_shape_index"]
+    shown = ["run", "kind", "start_week", "week", "seed", "distance_mm", "distance95_mm", "cortex_dice"]
+    shown += ["area_error", "volume_error", "r_shape_index"]
     shown += ["r_start_shape_index", "r_adjacent_shape_index", "gain_low_shape_index", "gain_high_shape_index"]
     shown += ["skill_shape_index", "skill_mean_curvature", "curvature_rms_ratio"]
     print(validation[[name for name in shown if name in validation]].to_string(index=False, float_format="%.3f"))

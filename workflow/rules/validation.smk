@@ -95,6 +95,7 @@ rule displacement_agreement:
             "start_week": CONFIG.brain(wildcards.brain).week,
             "seed": PLAN.runs.seed(wildcards.run),
         },
+        known_until=of(PLAN.validating.registered_until),
     script:
         "../scripts/displacement_agreement.py"
 

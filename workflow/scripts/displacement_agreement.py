@@ -17,5 +17,6 @@ with step(snakemake.log[0]):
     surface, pial = boundary_surface(TetrahedralMesh(start, read_tets(files.frames)))
     simulated = np.stack([read_positions(files.frames, week)[pial] for week in both])
     measured = np.stack([carried.positions[np.isclose(carried.weeks, week).argmax()][pial] for week in both])
-    table = displacement_table(both, simulated, measured, surface.faces)
+    known_until = snakemake.params.known_until
+    table = displacement_table(both, simulated, measured, surface.faces, known_until=known_until)
     write_table(snakemake.output[0], table.assign(**labels)[[*labels, *table.columns]])

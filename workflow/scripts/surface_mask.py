@@ -1,6 +1,6 @@
 """The inside of a brain's pial surface as a label volume, for the registration of brains that have no labels."""
 
-from gyriflow.growth.carried_regions import surface_mask
+from gyriflow.geometry.matching import surface_mask
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.step import step

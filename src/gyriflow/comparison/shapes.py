@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.ndimage import distance_transform_edt
 from scipy.sparse.csgraph import dijkstra
 from scipy.stats import wasserstein_distance
 
 from ..errors import InputError
 from ..geometry.alignment import fit_onto
+from ..geometry.matching import surface_mask
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import (
     Floats,
@@ -33,6 +35,9 @@ LARGEST_CURVATURE = 1.0
 
 PIT, TROUGH = -5 / 8, -3 / 8
 """Shape indices below which a place is a pit, and from there a trough (Koenderink and van Doorn 1992)."""
+
+CORTEX_MM, VOXEL_MM = 2.0, 0.8
+"""Depth of what counts as cortex where brains are laid over each other, and the edge of the voxels that are counted."""
 
 LEAST_SULCUS_MM2 = 10.0
 """Connected sulcal areas that are smaller tell of noise."""
@@ -136,6 +141,20 @@ def against_real(run: Shape, real: Shape) -> dict[str, float]:
     """
     distance = wasserstein_distance(run.mean_curvature, real.mean_curvature, run.areas, real.areas)
     return {"curvature_rms_ratio": run.curvature_rms / real.curvature_rms, "curvature_distance_per_mm": float(distance)}
+
+
+def cortex_dice(one: TriangleMesh, other: TriangleMesh) -> float:
+    """Returns the Dice overlap of the outermost `CORTEX_MM` of two closed surfaces, as they lie to each other in mm."""
+    box = np.concatenate([one.vertices, other.vertices])
+    box = np.stack([box.min(axis=0), box.max(axis=0)])
+    ribbons = []
+    for mesh in (one, other):
+        inside = surface_mask(mesh, VOXEL_MM, box)[0] > 0
+        # distances are to the centres of voxels outside, half a voxel beyond the surface
+        depth = distance_transform_edt(inside, sampling=VOXEL_MM) - VOXEL_MM / 2
+        ribbons.append(inside & (depth <= CORTEX_MM))
+    both = np.count_nonzero(ribbons[0] & ribbons[1])
+    return 2 * both / sum(map(np.count_nonzero, ribbons))
 
 
 def sulci(mesh: TriangleMesh, shape_index: Floats) -> tuple[Floats, Floats]:

@@ -11,11 +11,21 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from ..geometry.alignment import rigid_fit, without_rigid_motion
-from ..geometry.triangles import Floats, Ints, TriangleMesh, area, face_components, signed_volume, vertex_areas
+from ..geometry.alignment import fit_onto, rigid_fit, without_rigid_motion
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    area,
+    face_components,
+    signed_volume,
+    transformed,
+    vertex_areas,
+)
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .placement import MEASURES, SKILLED_FROM, placement
-from .shapes import Shape, against_real, fold_measures
+from .prediction import distances
+from .shapes import Shape, against_real, cortex_dice, fold_measures
 
 type Kind = Literal["explained", "predicted"]
 """Whether growth came from the weeks that are compared, or from another brain, atlas or only earlier weeks."""
@@ -61,10 +71,11 @@ def validation_row(
 ) -> dict[str, Any]:
     """Returns a row of validation.csv.
 
-    Columns: run, kind, start_week, week, horizon, seed; area_cm2, volume_ml and the same with real_ and curve_ in
-    front; area_error and volume_error against the curve and area_difference and volume_difference from the real brain,
-    as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
-    `placement.placement`, `folds.against_real` and `folds.fold_measures`, the latter for the real brain with real_ in
+    Columns: run, kind, start_week, week, horizon, seed; distance_mm and distance95_mm of `prediction.distances` and
+    `cortex_dice`, both of the surfaces as they are, laid onto each other rigidly; area_cm2, volume_ml and the same with
+    real_ and curve_ in front; area_error and volume_error against the curve and area_difference and volume_difference
+    from the real brain, as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
+    `placement.placement`, `shapes.against_real` and `shapes.fold_measures`, the latter for the real brain with real_ in
     front.
 
     `simulated` and `real_brain` are closed surfaces in mm as they are; `curve` the area (mm²) and volume (mm³) that the
@@ -73,6 +84,8 @@ def validation_row(
     sizes = {"": _sizes(simulated), "real_": _sizes(real_brain)}
     wanted = (np.nan, np.nan) if curve is None else (curve[0] * CM2_PER_MM2, curve[1] * ML_PER_MM3)
     row: dict[str, Any] = asdict(comparison) | {"horizon": comparison.horizon}
+    placed = transformed(simulated, fit_onto(simulated, real_brain))
+    row |= distances(placed, real_brain) | {"cortex_dice": cortex_dice(placed, real_brain)}
     row |= {f"{who}{name}": value for who, size in sizes.items() for name, value in size.items()}
     row |= {"curve_area_cm2": wanted[0], "curve_volume_ml": wanted[1]}
     for name, unit, aim in (("area", "cm2", wanted[0]), ("volume", "ml", wanted[1])):
@@ -87,7 +100,7 @@ def validation_row(
 
 def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """Returns rows of `validation_row` as a table, what is compared first, by run, start, seed and week."""
-    first = ["run", "kind", "start_week", "week", "horizon", "seed"]
+    first = ["run", "kind", "start_week", "week", "horizon", "seed", "distance_mm", "distance95_mm", "cortex_dice"]
     table = pd.DataFrame(rows)
     return table[[*first, *table.columns.difference(first, sort=False)]].sort_values(
         ["run", "start_week", "seed", "week"], ignore_index=True
@@ -247,7 +260,9 @@ def vector_agreement(one: Floats, measured: Floats, weights: Floats) -> tuple[fl
     return both / np.sqrt(own * other), both / other
 
 
-def displacement_table(weeks: Sequence[float], simulated: Floats, measured: Floats, faces: Ints) -> pd.DataFrame:
+def displacement_table(
+    weeks: Sequence[float], simulated: Floats, measured: Floats, faces: Ints, *, known_until: float = -np.inf
+) -> pd.DataFrame:
     """Returns how the displacement of the pial vertices agrees with the measured one, a row per interval of weeks.
 
     The rigid part of each interval is removed from both, and the simulated vectors are turned as the simulated brain
@@ -256,13 +271,15 @@ def displacement_table(weeks: Sequence[float], simulated: Floats, measured: Floa
     nothing joins hemispheres that are bodies of their own, so that growth does not say how they lie to each other.
 
     Weeks ascend; simulated and measured are (w, n, 3) positions in mm of the same vertices, of the run and carried
-    along the registration; faces the (m, 3) triangles of the closed surface.
+    along the registration; faces the (m, 3) triangles of the closed surface. Up to the week `known_until` growth came
+    from that very registration: there the agreement tests the solver's consistency, not the model.
 
     Returns
     -------
     DataFrame
-        from_week, to_week, displacement_r, displacement_slope, displacement_r_scaling, displacement_slope_scaling,
-        rms_mm, measured_rms_mm (root mean square by area, of the interval).
+        from_week, to_week, test (consistency or comparison), displacement_r, displacement_slope,
+        displacement_r_scaling, displacement_slope_scaling, rms_mm, measured_rms_mm (root mean square by area, of the
+        interval).
     """
     if len(weeks) < 2 or simulated.shape != measured.shape or len(simulated) != len(weeks):
         raise InputError(
@@ -289,9 +306,10 @@ def displacement_table(weeks: Sequence[float], simulated: Floats, measured: Floa
         r, slope = vector_agreement(own, real, weights)
         r_scaling, slope_scaling = vector_agreement(scaling, real, weights)
         sizes = [float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights))) for vectors in (own, real)]
-        rows.append((weeks[number], weeks[number + 1], r, slope, r_scaling, slope_scaling, *sizes))
+        test = "consistency" if weeks[number + 1] <= known_until else "comparison"
+        rows.append((weeks[number], weeks[number + 1], test, r, slope, r_scaling, slope_scaling, *sizes))
     columns = ["displacement_r", "displacement_slope", "displacement_r_scaling", "displacement_slope_scaling"]
-    return pd.DataFrame(rows, columns=["from_week", "to_week", *columns, "rms_mm", "measured_rms_mm"])
+    return pd.DataFrame(rows, columns=["from_week", "to_week", "test", *columns, "rms_mm", "measured_rms_mm"])
 
 
 def folding_agreement(

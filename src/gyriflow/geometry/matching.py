@@ -1,4 +1,4 @@
-"""Where surfaces are near each other, match or cross, and values brought from one to another."""
+"""What lies inside surfaces, where they are near each other, match or cross, and values brought from one to another."""
 
 from dataclasses import dataclass
 
@@ -48,6 +48,21 @@ def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
     there, _, nearest = nearest_on(outer.vertices, inner)
     back, _, _ = nearest_on(nearest, outer)
     return 0.5 * (there + back)
+
+
+def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None) -> tuple[NDArray[np.int32], Floats]:
+    """Returns a label volume with 1 inside a closed surface, and its (4, 4) affine: what a brain without labels has.
+
+    The volume holds the surface with a margin of four voxels, or else the (2, 3) corners of a box with that margin.
+    """
+    low, high = (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) if box is None else box
+    low = low - 4 * voxel_mm
+    shape = np.ceil((high - low) / voxel_mm + 4).astype(int) + 1
+    centres = low + voxel_mm * np.indices(shape).reshape(3, -1).T
+    inside = igl.fast_winding_number(mesh.vertices, mesh.faces, centres) > 0.5
+    affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
+    affine[:3, 3] = low
+    return inside.reshape(shape).astype(np.int32), affine
 
 
 def faces_that_cross(mesh: TriangleMesh) -> Ints:

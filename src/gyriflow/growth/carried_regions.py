@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Mapping
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -117,18 +116,3 @@ def regions_from_surface(target: TriangleMesh, surface: TriangleMesh, regions: N
             remedy="Give it in the coordinates of the brain's own files.",
         )
     return labels_at(match, regions)
-
-
-def surface_mask(mesh: TriangleMesh, voxel_mm: float) -> tuple[NDArray[np.int32], Floats]:
-    """Returns a label volume with 1 inside a closed surface, and its (4, 4) affine: what a brain without labels has.
-
-    It can be registered with other brains, by its shape alone.
-    """
-    margin = 4 * voxel_mm
-    low = mesh.vertices.min(axis=0) - margin
-    shape = np.ceil((np.ptp(mesh.vertices, axis=0) + 2 * margin) / voxel_mm).astype(int) + 1
-    centres = low + voxel_mm * np.indices(shape).reshape(3, -1).T
-    inside = igl.fast_winding_number(mesh.vertices, mesh.faces, centres) > 0.5
-    affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
-    affine[:3, 3] = low
-    return inside.reshape(shape).astype(np.int32), affine

@@ -1,5 +1,6 @@
 """What simulations are compared with to tell what they are worth: which real brain in which week, and which runs."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -99,6 +100,13 @@ class Validating:
             float(week): "explained" if explains and (until is None or float(week) <= until) else "predicted"
             for week in self.compared(run, brain)
         }
+
+    def registered_until(self, run: str, brain: str) -> float:
+        """Returns the last week whose registration a run takes its growth from: −inf for none, inf for all."""
+        if self.predicts(run, brain) or not (self.runs.closed(run) or self.runs.regional(run)):
+            return -math.inf
+        until = self.runs.followed(run, "known_until_gw")
+        return math.inf if until is None else float(until)
 
     def ceiling_weeks(self, brain: str) -> list[float]:
         """Returns the compared weeks that a start brain's mesh is carried to."""

@@ -231,16 +231,20 @@ def _scores(validation: Mapping[str, Any], displacement: Mapping[str, Any]) -> d
     if gain != "–":
         gain += f" ({shown('gain_low_shape_index', '%+.2f')} to {shown('gain_high_shape_index', '%+.2f')})"
     moved = displacement.get("displacement_r", np.nan)
+    check = ", consistency" if displacement.get("test") == "consistency" else ""
     return {
         "compared at": week_label(validation["week"]) if validation else "–",
         "kind": str(validation.get("kind", "–")),
+        "distance (mm)": shown("distance_mm", "%.2f"),
+        "distance, 95 % (mm)": shown("distance95_mm", "%.2f"),
+        "cortex, Dice": shown("cortex_dice", "%.2f"),
         "area, difference (%)": shown("area_difference", "%+.1f", 100),
         "volume, difference (%)": shown("volume_difference", "%+.1f", 100),
         "shape index, r": shown("r_shape_index", "%.2f"),
         "scaled start, r": shown("r_start_shape_index", "%.2f"),
         "gain (95 %)": gain,
         "skill": shown("skill_shape_index", "%.2f"),
-        "displacement, r": "–" if pd.isna(moved) else f"{moved:.2f}".replace("-", "−"),
+        "displacement, r": "–" if pd.isna(moved) else f"{moved:.2f}{check}".replace("-", "−"),
     }
 
 

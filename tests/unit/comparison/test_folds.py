@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from gyriflow.comparison.shapes import Shape, against_real, fold_measures, length_over_width, sulci
+from gyriflow.comparison.shapes import Shape, against_real, cortex_dice, fold_measures, length_over_width, sulci
 from gyriflow.geometry.triangles import TriangleMesh
 
 BALL = trimesh.creation.icosphere(subdivisions=5, radius=30.0)
@@ -68,3 +68,11 @@ def test_two_sulci_are_two_and_specks_are_none():
     one_face = np.ones(len(X))
     one_face[SPHERE.faces[0]] = -0.5
     assert len(sulci(SPHERE, one_face)[0]) == 0
+
+
+def test_cortices_overlap_as_far_as_their_surfaces_are_the_same():
+    # the outer 2 mm of balls of 30 and 31 mm share those from 29 to 30 mm
+    shared, *whole = ((far**3 - near**3) for near, far in ((29, 30), (28, 30), (29, 31)))
+    larger = TriangleMesh(SPHERE.vertices * 31 / 30, SPHERE.faces)
+    assert cortex_dice(SPHERE, larger) == pytest.approx(2 * shared / sum(whole), abs=0.04)
+    assert cortex_dice(SPHERE, SPHERE) == 1.0

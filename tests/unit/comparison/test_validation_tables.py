@@ -59,12 +59,17 @@ def test_a_row_holds_sizes_errors_placement_and_folds():
     assert found["relative_area"] == pytest.approx(found["real_relative_area"])
     assert found["r_shape_index"] == pytest.approx(1.0)
     assert found["skill_shape_index"] > 1.0
+    # as they are, not scaled: a fiftieth of the radius apart everywhere
+    assert found["distance_mm"] == pytest.approx(0.02 * np.linalg.norm(REAL.vertices, axis=1).mean(), rel=0.05)
+    assert found["distance95_mm"] > found["distance_mm"]
+    assert 0.7 < found["cortex_dice"] < row(23.0)["cortex_dice"] == 1.0
     assert found["curvature_rms_ratio"] == pytest.approx(1.0)
     assert found["pit_share"] == found["real_pit_share"]
 
 
 def test_rows_are_ordered_and_named_first(table):
     assert table.columns[:6].tolist() == ["run", "kind", "start_week", "week", "horizon", "seed"]
+    assert table.columns[6:9].tolist() == ["distance_mm", "distance95_mm", "cortex_dice"]
     assert table[["run", "seed", "week"]].to_numpy().tolist() == [
         ["measured", 0, 22.0],
         ["measured", 0, 23.0],

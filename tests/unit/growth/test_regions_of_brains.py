@@ -6,13 +6,13 @@ from shapes import ellipsoid
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.matching import surface_mask
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume
 from gyriflow.growth.carried_regions import (
     number_regions,
     regions_from_surface,
     regions_from_volume,
     renumber,
-    surface_mask,
 )
 from gyriflow.growth.carrying import carry_regions
 from gyriflow.growth.channels import channels

@@ -3,6 +3,7 @@
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gyriflow.config import load
@@ -200,6 +201,18 @@ def test_a_week_is_explained_by_growth_that_knows_it_and_else_predicted(real):
         "estimated": ["explained"] * 3,
         "known": ["explained", "explained", "predicted"],
     }
+
+
+def test_displacements_are_a_consistency_check_where_growth_is_of_the_same_registration(real):
+    runs = {
+        "plain": {},
+        "uniform": {"follow": FOLLOW},
+        "closed": {"preset": "measured"},
+        "regional": {"follow": REGIONAL},
+        "known": {"follow": REGIONAL | {"known_until_gw": 23}},
+    }
+    until = plan(real, runs=runs).validating.registered_until
+    assert [until(run, "b21") for run in runs] == [-np.inf, -np.inf, np.inf, np.inf, 23]
 
 
 def test_tables_of_validation_are_joined_from_the_runs_that_are_compared(real):

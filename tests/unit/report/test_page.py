@@ -50,7 +50,7 @@ VALIDATION = pd.DataFrame(
         "run": "thin", "kind": "predicted", "start_week": 21.0, "week": [22.0, 23.0], "area_difference": [0.1, -0.0794],
         "volume_difference": [0.0, 0.02], "r_shape_index": [0.1, 0.566], "r_start_shape_index": [0.1, 0.568],
         "gain_shape_index": [0.0, -0.002], "gain_low_shape_index": [0.0, -0.044], "gain_high_shape_index": [0.0, 0.045],
-        "skill_shape_index": [np.nan, np.nan],
+        "skill_shape_index": [np.nan, np.nan], "distance_mm": [0.1, 0.42],
     }
 )  # fmt: skip
 
@@ -169,6 +169,10 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     assert row["area, difference (%)"] == "−7.9"
     assert row["gain (95 %)"] == "−0.00 (−0.04 to +0.04)"
     assert row["skill"] == "–"
+    assert (row["distance (mm)"], row["cortex, Dice"], row["displacement, r"]) == ("0.42", "–", "–")
+    moves = pd.DataFrame({"run": "thin", "start_week": 21.0, "to_week": [22.0, 23.0], "displacement_r": [0.5, 0.98]})
+    (row,) = scores_table(RUNS, VALIDATION, moves.assign(test=["comparison", "consistency"])).to_dict("records")
+    assert row["displacement, r"] == "0.98, consistency"
 
 
 def test_a_sound_run_has_nothing_said_against_it():
