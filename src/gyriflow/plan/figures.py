@@ -633,6 +633,24 @@ class Figures:
             growth was known and where it was not.""",
             beside(horizon=f"{STUDY}/horizon.csv"), lambda: runs, compared, target="validate",
         )  # fmt: skip
+        foretold: tuple[Wildcards, ...] = ({},) if self.validating.foretold else ()
+        prediction = {"prediction": f"{STUDY}/prediction.csv"}
+        yield Figure(
+            "prediction_figure", "Validation", "foretold brains beside the real ones",
+            f"{STUDY_FIGURES}/prediction.png", "scores.prediction_chart",
+            """Brains that another population's growth foretells, by weeks after the start: correlation of shape index
+            with the real brain's, both at one size, and mean distance of the two surfaces, as they are and rigidly
+            aligned. Dashed: simpler ways to foretell the same brain, which need no mechanics, and the shape that the
+            run grows towards.""",
+            lambda: prediction, lambda: runs, foretold, target="validate",
+        )  # fmt: skip
+        yield Figure(
+            "prediction_table", "Validation", "foretold brains, table", f"{STUDY}/prediction.html",
+            "tables.prediction_page",
+            """The same as numbers, unscaled but for r. Skill is 1 − distance over that of the best simpler way of the
+            week; roughness is that of the real surface's. All columns are in ``results/study/prediction.csv``.""",
+            lambda: prediction, of=foretold, target="validate",
+        )  # fmt: skip
         yield Figure(
             "onset_figure", "Validation", "weeks in which sulci begin", f"{STUDY_FIGURES}/onset.png",
             "scores.onset_chart",

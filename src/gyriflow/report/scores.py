@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from ..errors import InputError
 from ..parameters.terms import SIDES
 from .charts import spectra_chart
-from .labels import MEASURES, parameter_label, plain, value_labels, with_unit
+from .labels import FORETOLD, MEASURES, parameter_label, plain, value_labels, with_unit
 from .style import (
     FULL_WIDTH_IN,
     MEASURED,
@@ -25,6 +25,7 @@ from .style import (
     Shown,
     add_letters,
     chosen_colours,
+    from_zero,
     light_grid,
     new_figure,
     panel_figure,
@@ -186,6 +187,47 @@ def horizon_chart(horizon: pd.DataFrame, ceiling: pd.DataFrame | None = None, **
         if kind == kinds[-1]:
             axes.set_xlabel("weeks after the start (its week stands at the line's end)")
     run_legend(figure, colours, extra=_ceiling_key(ceiling))
+    return figure
+
+
+@styled
+def prediction_chart(prediction: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
+    """Returns correlation with and distance from the real brain by weeks after the start: a row of panels per start.
+
+    Runs are full lines, simpler ways to foretell the brain dashed ones.
+
+    Parameters
+    ----------
+    prediction
+        Columns run, start, horizon, model (`run` or a simpler way), r_shape_index and distance_mm.
+    """
+    columns = {"r_shape_index": "shape index, r with the real brain", "distance_mm": "distance from it (mm)"}
+    starts = list(dict.fromkeys(prediction["start"]))
+    layout: dict[str, Any] = {"per_row": 2, "panel_in": 2.4, "foot_in": 0.9, "sharex": True, "sharey": "col"}
+    figure, panels, colours = run_panels(2 * len(starts), prediction["run"], shown, **layout)
+    ways = [model for model in dict.fromkeys(prediction["model"]) if model != "run"]
+    dashes = dict(zip(ways, reversed(run_colours([*colours, *ways]).values()), strict=False))
+    for number, axes in enumerate(panels):
+        start, (column, title) = starts[number // 2], list(columns.items())[number % 2]
+        of_start = prediction[prediction["start"] == start]
+        for run, rows in of_start[of_start["model"] == "run"].groupby("run", sort=False):
+            axes.plot(rows["horizon"], rows[column], "o-", color=colours[str(run)], zorder=3)
+        # what is simpler is the same for all runs
+        for way, colour in dashes.items():
+            line = of_start[of_start["model"] == way].groupby("horizon")[column].first()
+            axes.plot(line.index, line, ".--", color=colour, linewidth=1.0)
+        axes.set_title(f"{start}: {title}" if len(starts) > 1 else title)
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
+        axes.margins(x=0.1)
+        light_grid(axes)
+        if number >= len(panels) - 2:
+            axes.set_xlabel("weeks after the start")
+    from_zero(panels[1])
+    extra = [
+        Line2D([], [], color=colour, marker=".", linestyle="--", label=FORETOLD.get(way, plain(way)))
+        for way, colour in dashes.items()
+    ]
+    run_legend(figure, colours, extra=extra)
     return figure
 
 

@@ -9,7 +9,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from .charts import WITH_NORMS
-from .labels import METRICS, plain, with_unit
+from .labels import FORETOLD, METRICS, plain, with_unit
 from .solve import displacement_summary
 from .style import MEASURED, PHANTOM, REAL_BRAIN, runs_by_name, simulated_runs, synthetic_note
 
@@ -148,6 +148,30 @@ def displacement_page(displacement: pd.DataFrame, **shown: Any) -> str:
     """Returns `displacement_summary` as HTML."""
     caption = "Largest / mean norm of the displacement (mm)"
     return html_table(displacement_summary(displacement), caption=caption, **shown)
+
+
+def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
+    """Returns what foretold brains and simpler ways to foretell them are worth: a row per start, week and way.
+
+    Parameters
+    ----------
+    prediction
+        The study's prediction.csv.
+    """
+    shown = {
+        **{"r_shape_index": "shape index, r", "distance_mm": "distance (mm)", "distance95_mm": "95 % of it (mm)"},
+        **{name: plain(name) for name in ("area_error", "volume_error", "crossing_faces", "roughness_ratio", "skill")},
+    }
+    ways = prediction["model"].map(lambda way: FORETOLD.get(way, plain(way)))
+    table = prediction.assign(way=ways.where(prediction["model"] != "run", prediction["run"]))
+    # what is simpler is the same for all runs
+    table = table.drop_duplicates(["start", "week", "way"]).set_index(["start", "week", "way"])
+    return table[[*shown]].rename(columns=shown).rename_axis(["start", "week (GW)", "way"])
+
+
+def prediction_page(prediction: pd.DataFrame) -> str:
+    """Returns `prediction_table` as HTML."""
+    return html_table(prediction_table(prediction), caption="Foretold brains beside the real ones", digits=3)
 
 
 def html_table(

@@ -363,6 +363,7 @@ def test_a_closed_loop_of_its_own_goes_through_the_later_brains_of_its_series(re
     assert [found.expecting.targets(run, "b21") for run in runs] == [[], "results/brains/b21/mesh/targets.own.h5"]
     assert set(found.validating.kinds("own", "b21").values()) == {"explained"}
     assert found.validating.foretold == found.validating.tables["prediction"] == []
+    assert "results/study/figures/prediction.png" not in found.figures.target("validate")
     # sizes come from the shapes, and growth from no carried mesh
     assert found.runs.curves("own") == found.chains.carried_mesh("own", "b21") == []
 
@@ -388,6 +389,7 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
     assert found.validating.prediction("a", "own22")["atlas"] == [
         f"results/brains/b{week}/surface/pial.surf.gii" for week in (23, 24)
     ]
+    assert "results/study/figures/prediction.png" in found.figures.target("validate")
     # of unknown population, it is compared with the brains that its growth comes from
     unknown = plan(of_two(tmp_path, 22, population=None), **EXPECTED)
     assert not unknown.expecting.reads_only_others("own22")

@@ -12,6 +12,7 @@ from gyriflow.report.scores import (
     influence_spectra,
     nearest_chart,
     onset_chart,
+    prediction_chart,
     smoothing_chart,
     validation_chart,
 )
@@ -100,6 +101,27 @@ def test_gain_stands_over_its_smoothing_length_and_uniform_growth_beyond():
     line = next(line for line in axes.lines if line.get_marker() == "o")
     np.testing.assert_allclose(line.get_ydata(), [0.01, 0.02, 0.03])
     assert line.get_xdata()[-1] == pytest.approx(1.6 * 6)
+
+
+def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():
+    rows = [
+        {"run": run, "start": start, "horizon": horizon, "model": model, "distance_mm": 0.1 * horizon}
+        | {"r_shape_index": level - 0.1 * horizon + (0.02 if run == "stiff" and model == "run" else 0)}
+        for start, level in (("a", 0.9), ("b", 0.8))
+        for run in ("expected", "stiff")
+        for model in ("run", "scaled", "new")
+        for horizon in (1.0, 2.0)
+    ]
+    figure = prediction_chart(pd.DataFrame(rows), runs=["expected", "stiff"])
+    first, away, second, _ = figure.axes
+    assert [len(axes.lines) for axes in figure.axes] == [4] * 4
+    full = [line.get_ydata() for line in second.lines if line.get_linestyle() == "-"]
+    np.testing.assert_allclose(full, [[0.7, 0.6], [0.72, 0.62]])
+    assert [line.get_linestyle() for line in first.lines].count("--") == 2
+    assert all(list(line.get_ydata()) == pytest.approx([0.1, 0.2]) for line in away.lines)
+    assert len({line.get_color() for line in first.lines}) == 4
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["expected", "stiff", "start, scaled: no folding", "new"]
 
 
 def onsets(**weeks):

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.report.tables import html_table, metrics_table, runs_table
+from gyriflow.report.tables import html_table, metrics_table, prediction_table, runs_table
 
 
 def test_metrics_table_gives_the_difference_from_the_measured_brain():
@@ -54,3 +54,16 @@ def test_html_is_escaped_named_and_the_same_each_time():
     assert "x &lt; y (synthetic phantom, not a real brain)" in html
     assert "0.3333<" in html
     assert html == html_table(table, caption="x < y", synthetic=True)
+
+
+def test_simpler_ways_of_several_runs_are_one_row():
+    columns = ("r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error")
+    numbers = dict.fromkeys((*columns, "crossing_faces", "roughness_ratio", "skill"), 0.1234)
+    rows = [
+        {"run": run, "start": "a", "week": 24.0, "model": model} | numbers
+        for run in ("expected", "stiff")
+        for model in ("run", "atlas")
+    ]
+    table = prediction_table(pd.DataFrame(rows))
+    assert [way for _, _, way in table.index] == ["expected", "the atlas' brain, scaled", "stiff"]
+    assert list(table.loc["a", 24.0, "stiff"]) == [0.1234] * 8
