@@ -26,10 +26,10 @@ def distances_to(
 ) -> pd.DataFrame:
     """Returns how far one simulated brain is from a real one, a row per hemisphere and measure.
 
-    Measures: `relative_power_B4` to `B6`, the share of the band in the power of the spectrum, as the paper compares
-    (distance: the absolute difference); `spectral_distance_…` of `metrics.spangy`; `surface_symmetric_mean`
-    and `surface_hausdorff95` of `metrics.similarity`; `area`, `volume`, `gyrification_index` (distance: the absolute
-    relative difference).
+    Measures: `relative_power_B4` to `B6`, the share of the band in the power of the spectrum, and the same with
+    `_weyl`, cut at Weyl's number as the paper's (distance: the absolute difference); `spectral_distance_…` of
+    `metrics.spangy`; `surface_symmetric_mean` and `surface_hausdorff95` of `metrics.similarity`; `area`, `volume`,
+    `gyrification_index` (distance: the absolute relative difference).
 
     `real` is the id of the real brain. Metrics and spectra are rows of the simulated brain and of the real one, whose
     `run` is "real"; spectral and similarity those of the simulated brain, with the column `real`. The columns are
@@ -51,7 +51,11 @@ def _band_rows(real: str, spectra: pd.DataFrame) -> list[tuple]:
         values = (pair["relative_power"], pair["relative_power_real"]) if whole else (np.nan, np.nan)
         flag = "ok" if whole and fine else "not resolved" if whole else "cut off"
         distance = abs(values[0] - values[1])
-        rows.append((pair["hemisphere"], f"relative_power_B{pair['band']}", *values, distance, "1", flag))
+        name = f"relative_power_B{pair['band']}"
+        rows.append((pair["hemisphere"], name, *values, distance, "1", flag))
+        cut = pair["relative_power_weyl"], pair["relative_power_weyl_real"]
+        flag = "cut off" if np.isnan(sum(cut)) else "ok" if fine else "not resolved"
+        rows.append((pair["hemisphere"], f"{name}_weyl", *cut, abs(cut[0] - cut[1]), "1", flag))
     return rows
 
 

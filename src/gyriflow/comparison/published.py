@@ -31,14 +31,14 @@ def with_published_nearest(
 ) -> pd.DataFrame:
     """Returns the table of the nearest runs with what the paper finds nearest by the same measure (NaN: not reported).
 
-    The paper's brains are others (a normal atlas).
+    The paper's brains are others (a normal atlas), and its spectra are cut at Weyl's number.
     """
     found = {
         entry["measure"]: entry["value"]
         for entry in published["nearest"]
         if [entry["parameter"]] == list(varied) and entry["week"] == week
     }
-    values = [found.get(measure, float("nan")) for measure in nearest["measure"]]
+    values = [found.get(measure.removesuffix("_weyl"), float("nan")) for measure in nearest["measure"]]
     place = nearest.columns.get_loc("run")
     return pd.concat([nearest.iloc[:, :place], pd.DataFrame({"paper": values}), nearest.iloc[:, place:]], axis=1)
 

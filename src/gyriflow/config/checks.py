@@ -238,7 +238,13 @@ def _member_problems(name: str, study: Study, base: Run, names: dict[str, str]) 
     here = ("studies", name)
     if not study.vary:
         yield Problem("found nothing; expected keys of folding with lists of values", (*here, "vary"))
-    for section, keys in (("vary", study.vary), ("fixed", study.fixed)):
+    first = next(iter(study.vary.values()), ())
+    for value in study.fixed_at:
+        if value not in first:
+            yield Problem(f"found {value:g}; expected a value of the first varied key", (*here, "fixed_at"))
+    sections: list[tuple[str, Mapping[str, object]]] = [("vary", study.vary), ("fixed", study.fixed)]
+    sections += [("fixed_at", keys) for keys in study.fixed_at.values()]
+    for section, keys in sections:
         for key in keys:
             if key in NOT_VARIED:
                 yield Problem("cannot differ within a study; choose another base", (*here, section, key))
@@ -248,9 +254,9 @@ def _member_problems(name: str, study: Study, base: Run, names: dict[str, str]) 
             yield Problem(f"found {list(listed)}; expected one or more values, each once", (*here, "vary", key))
     for own, values in variants(name, study):
         try:
-            settings = changed(base, study.fixed | values | {"end_week": study.compare_week})
+            settings = changed(base, study.changes(values))
         except KeyError as error:
-            section = "vary" if error.args[0] in study.vary else "fixed"
+            section = next(section for section, keys in sections if error.args[0] in keys)
             yield Problem("there is no such key of folding", (*here, section, error.args[0]))
             return
         except ValidationError as error:

@@ -196,6 +196,14 @@ class Study(Compared):
         "(`contact.gap_mm`).",
     )  # fmt: skip
     fixed: dict[str, Value] = setting({}, "", "Keys of `folding` that differ from the base's in all runs.")
+    fixed_at: dict[float, dict[str, Value]] = setting(
+        {}, "", "The same for the runs of single values of the first varied key, such as `{1.5: {step_s: 43200}}`."
+    )
+
+    def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Returns all keys by which the run of some varied values differs from the base."""
+        own = next((self.fixed_at.get(first, {}) for first in values.values()), {})
+        return {**self.fixed, **own, **values, "end_week": self.compare_week}
 
 
 class Calibration(Compared):
@@ -291,7 +299,7 @@ def members_of(
     `passes` says whether a run of `runs`, by its name, has a given week among its output weeks.
     """
     wanted = [
-        (name, own, values, changed(runs[study.base], study.fixed | values | {"end_week": study.compare_week}))
+        (name, own, values, changed(runs[study.base], study.changes(values)))
         for name, study in studies.items()
         for own, values in variants(name, study)
     ]

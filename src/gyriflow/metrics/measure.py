@@ -114,6 +114,7 @@ def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, 
     stiffness, mass = laplacian(mesh)
     first = first_eigenvalue(stiffness, mass)
     modes, reach = modes_of(settings.spangy_modes, name, mesh, stiffness, mass, first, formula)
+    weyl = weyl_number(area(mesh), first, formula)
     # near a cut the proxy is continued from beyond
     proxy = bend.shape_index if settings.spangy_proxy == "shape_index" else bend.mean
     values = continue_smoothly(proxy, bend.reliable, stiffness)
@@ -127,8 +128,8 @@ def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, 
         local_gyrification=local_gyrification_index(mesh, around),
         thickness=np.full(len(mesh.vertices), np.nan) if thickness is None else np.asarray(thickness, dtype=float),
         crossing=crossing_faces(mesh),
-        spectrum=spectrum(values, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach),
-        weyl=weyl_number(area(mesh), first, formula),
+        spectrum=spectrum(values, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach, weyl=weyl),
+        weyl=weyl,
     )
 
 
@@ -231,7 +232,7 @@ class BrainMetrics:
         (where it is known; NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
     spectra : DataFrame
         Per hemisphere and band: hemisphere, band, wavelength_min_mm, wavelength_max_mm, modes, power, relative_power,
-        complete, denominator_complete, resolved, weyl_formula.
+        relative_power_weyl, complete, denominator_complete, resolved, weyl_formula.
     coefficients : DataFrame
         Per hemisphere and mode: hemisphere, mode, eigenvalue_per_mm2, band (−1 beyond B6), coefficient (cᵢ, in mm, or
         without a unit for mean curvature).

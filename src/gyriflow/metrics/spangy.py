@@ -47,7 +47,8 @@ class Spectrum:
         The band of each mode; −1 beyond the last band.
     bands : DataFrame
         Per band: band, wavelength_min_mm, wavelength_max_mm, modes, power (unit of the proxy squared times mm²; NaN
-        without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0), complete (the modes
+        without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0), relative_power_weyl
+        (the same of as many modes as Weyl's number alone; NaN where there are fewer), complete (the modes
         reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are), resolved
         (the shortest wavelength spans at least 6 edges).
     dominant_band : (n,) int
@@ -143,11 +144,18 @@ def bands_of_modes(eigenvalues: Floats) -> Ints:
 
 
 def spectrum(
-    proxy: Floats, modes: Modes, mass: sparse.csc_matrix, *, edge_length_mm: float, reach: float | None = None
+    proxy: Floats,
+    modes: Modes,
+    mass: sparse.csc_matrix,
+    *,
+    edge_length_mm: float,
+    reach: float | None = None,
+    weyl: int | None = None,
 ) -> Spectrum:
     """Returns the band spectrum of a folding proxy, (n,) values per vertex.
 
-    `reach` is the λ in mm⁻² below which no mode is missing; that of the highest mode where it is not given.
+    `reach` is the λ in mm⁻² below which no mode is missing; that of the highest mode where it is not given. `weyl` is
+    Weyl's number, where known.
 
     The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by itself: a vertex where the
     proxy is positive belongs to the band that adds most, another to the band that takes most away, with a minus sign.
@@ -156,6 +164,9 @@ def spectrum(
     band = bands_of_modes(modes.eigenvalues)
     reach = float(modes.eigenvalues[-1]) if reach is None else reach
     bands = _band_table(modes.eigenvalues, band, coefficients, edge_length_mm, reach)
+    enough = weyl is not None and weyl <= len(coefficients)
+    cut = _relative(_powers(band[:weyl], coefficients[:weyl])) if enough else np.full(BANDS + 1, np.nan)
+    bands.insert(list(bands.columns).index("complete"), "relative_power_weyl", cut.tolist())
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
         parts = np.stack([modes.functions[:, band == k] @ coefficients[band == k] for k in whole])
@@ -164,15 +175,24 @@ def spectrum(
     return Spectrum(modes.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
+def _powers(band: Ints, coefficients: Floats) -> Floats:
+    """Returns the (7,) powers of the bands, NaN of those without modes."""
+    return np.array([np.sum(coefficients[own] ** 2) if (own := band == k).any() else np.nan for k in range(BANDS + 1)])
+
+
+def _relative(power: Floats) -> Floats:
+    """Returns the (7,) shares in the power of B1 to B6, NaN for B0 and for bands without modes."""
+    total = np.nansum(power[1:])
+    return np.concatenate([[np.nan], power[1:] / total if total > 0 else 0 * power[1:]])
+
+
 def _band_table(
     eigenvalues: Floats, band: Ints, coefficients: Floats, edge_length_mm: float, reach: float
 ) -> pd.DataFrame:
     limits = band_limits(eigenvalues[1])
-    power = np.array([np.sum(coefficients[band == k] ** 2) for k in range(BANDS + 1)])
+    power = _powers(band, coefficients)
     numbers = np.array([np.count_nonzero(band == k) for k in range(BANDS + 1)])
     wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
-    total = power[1:].sum()
-    shares = power / total if total > 0 else np.zeros_like(power)
     complete = np.concatenate([[True], limits[1:] <= reach * (1.0 + ROUNDING)])
     whole = np.arange(BANDS + 1) == 0
     return pd.DataFrame(
@@ -181,8 +201,8 @@ def _band_table(
             "wavelength_min_mm": np.where(whole, np.inf, wavelengths[1:]),
             "wavelength_max_mm": wavelengths[:-1],
             "modes": numbers,
-            "power": np.where(numbers > 0, power, np.nan),
-            "relative_power": np.where((numbers > 0) & ~whole, shares, np.nan),
+            "power": power,
+            "relative_power": _relative(power),
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
             "resolved": whole | (wavelengths[1:] >= EDGES_PER_WAVELENGTH * edge_length_mm),

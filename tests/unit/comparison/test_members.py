@@ -10,7 +10,7 @@ from gyriflow.comparison.published import comparison_caption, displacement_table
 def spectra(run, subject, powers, *, complete=True):
     rows = [
         {"subject": subject, "run": run, "hemisphere": "left", "band": band, "relative_power": power,
-         "complete": complete, "resolved": band < 6}
+         "relative_power_weyl": float("nan") if band == 6 else 2 * power, "complete": complete, "resolved": band < 6}
         for band, power in zip((4, 5, 6), powers, strict=True)
     ]  # fmt: skip
     return pd.DataFrame(rows)
@@ -31,9 +31,13 @@ SIMILARITY = pd.DataFrame(
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))])
     table = distances_to("b", METRICS, both, SPECTRAL, SIMILARITY).set_index(["hemisphere", "measure"])
-    assert table["distance"].to_dict() == {
+    cut_off = table.loc[("left", "relative_power_B6_weyl")]
+    assert (cut_off["flag"], cut_off["distance"] == cut_off["distance"]) == ("cut off", False)
+    assert table["distance"].dropna().to_dict() == {
         ("left", "relative_power_B4"): pytest.approx(0.1),
         ("left", "relative_power_B5"): pytest.approx(0.1),
+        ("left", "relative_power_B4_weyl"): pytest.approx(0.2),
+        ("left", "relative_power_B5_weyl"): pytest.approx(0.2),
         ("left", "relative_power_B6"): pytest.approx(0.0),
         ("whole", "area"): pytest.approx(0.1),
         ("left", "spectral_distance_B4"): 0.2,
@@ -96,6 +100,8 @@ def test_the_papers_value_stands_beside_ours_where_it_reports_one():
     published = {"nearest": [{"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 2.25}]}
     table = nearest(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
     assert with_published_nearest(table, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
+    cut = table.assign(measure="relative_power_B4_weyl")
+    assert with_published_nearest(cut, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
     assert with_published_nearest(table, published, ["thickness_mm"], 27)["paper"].isna().all()
     assert with_published_nearest(table, published, ["poisson_ratio"], 28)["paper"].isna().all()
 

@@ -77,6 +77,16 @@ def test_comparison_prefers_the_starts_population(tmp_path):
     assert named.compared_with(named.studies["thickness"], "a") == ["b"]
 
 
+def test_the_run_of_a_single_value_may_differ_further():
+    study = THICKNESS | {
+        "fixed": {"shear_modulus_cortex_pa": 3000, "step_s": 86400},
+        "fixed_at": {1.5: {"step_s": 43200}},
+    }
+    members = config(studies={"s": study}).members["s"]
+    assert [(member.run, member.settings.step_s) for member in members] == [("s-0.8", 86400), ("s-1.5", 43200)]
+    assert [dict(member.values) for member in members] == [{"thickness_mm": 0.8}, {"thickness_mm": 1.5}]
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -86,6 +96,8 @@ def test_comparison_prefers_the_starts_population(tmp_path):
         ({"vary": {"preset": ["measured"]}}, "studies.s.vary.preset: cannot differ"),
         ({"vary": {}}, "studies.s.vary: found nothing"),
         ({"fixed": {"contact.gap": 2}}, "studies.s.fixed.contact.gap: there is no such key"),
+        ({"fixed_at": {1.2: {"step_s": 43200}}}, "studies.s.fixed_at: found 1.2; expected a value of the first varied"),
+        ({"fixed_at": {1.5: {"steps": 1}}}, "studies.s.fixed_at.steps: there is no such key"),
         ({"base": "ref"}, "studies.s.base: found 'ref'; expected a run: reference, short"),
         ({"compare_week": 24}, "studies.s.compare_week: found 24; there are brains of 21, 25 GW"),
         ({"compare_with": ["a"]}, "studies.s.compare_with: found a, of 21 GW"),

@@ -131,6 +131,19 @@ def test_wavelengths_and_flags(solved) -> None:
     assert np.isnan(bands["power"][6])
 
 
+def test_shares_of_the_modes_to_weyls_number_stand_beside_those_of_all(solved) -> None:
+    modes, mass = solved
+    # one mode of B2 and two of B3, of which Weyl's number leaves one out
+    band = bands_of_modes(modes.eigenvalues)
+    second, (third, other) = np.flatnonzero(band == 2)[0], np.flatnonzero(band == 3)[[0, -1]]
+    proxy = modes.functions[:, [second, third, other]] @ [1.0, 1.0, 2.0]
+    bands = spectrum(proxy, modes, mass, edge_length_mm=1.0, weyl=int(other)).bands
+    np.testing.assert_allclose(bands["relative_power"][1:4], [0, 1 / 6, 5 / 6], atol=1e-9)
+    np.testing.assert_allclose(bands["relative_power_weyl"][1:4], [0, 1 / 2, 1 / 2], atol=1e-9)
+    assert bands["relative_power_weyl"][[0, 4, 5, 6]].isna().all()
+    assert spectrum(proxy, modes, mass, edge_length_mm=1.0, weyl=10**6).bands["relative_power_weyl"].isna().all()
+
+
 @pytest.mark.parametrize("count", [200, 130, 61])
 def test_agrees_with_slam_once_its_slip_is_undone(shape, solved, count: int) -> None:
     modes, mass = solved

@@ -49,7 +49,16 @@ EXAMPLES = Path(__file__).parents[3] / "config" / "examples"
 def test_the_paper_is_planned_of_another_atlas_by_one_line(atlas):
     paper = read_yaml(EXAMPLES / "paper.yaml")
     own, other = (Plan(load(paper | one, EXAMPLES)).runs for one in ({}, {"atlas": atlas}))
-    assert (len(own.folded), len(own.members)) == (len(other.folded), len(other.members)) == (2, 9)
+    assert (len(own.folded), len(own.members)) == (len(other.folded), len(other.members)) == (2, 10)
+
+
+def test_the_paper_is_planned_with_the_paper_s_steps_and_ratios():
+    config = load(read_yaml(EXAMPLES / "paper.yaml"), EXAMPLES)
+    steps = {member.values["thickness_mm"]: member.settings.step_s for member in config.members["thickness"]}
+    assert steps == {0.8: 86400, 1.5: 43200, 2.25: 86400, 6.0: 86400}
+    stiffness = [member.settings for member in config.members["stiffness"]]
+    ratios = [run.shear_modulus_cortex_pa / run.shear_modulus_core_pa for run in stiffness]
+    assert (ratios[0], ratios[-1], {run.step_s for run in stiffness}) == (1, 20, {43200})
 
 
 def test_runs_that_write_contact_pressure_have_a_figure_of_it():
