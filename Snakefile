@@ -56,7 +56,8 @@ rule all:
 
 
 # What all rules share. The log and the benchmark lie beside the results. A change of the code reruns what depends on it:
-# a hash of the modules that a script imports is a parameter of its rule.
+# a hash of the modules that a script imports is a parameter of its rule. So is what its inputs hold: a file may be
+# replaced by an older one.
 for job in workflow.rules:
     if not job.norun:
         job.log_modifier = job.benchmark_modifier = job.output_modifier
@@ -67,6 +68,13 @@ for job in workflow.rules:
         # a download's time is the network's, and figures take little
         if job.name not in ("atlas_file", *(row.name for row in FIGURES.drawn)):
             job.benchmark = job.benchmark or benchmark
+        job.set_params(
+            contents=lambda wildcards, job=job: [
+                f"input with the content {CONTENTS[path]}"
+                for path in job.expand_input(wildcards)[0]
+                if path in CONTENTS
+            ]
+        )
         job.conda_env = f"{workflow.basedir}/envs/gyriflow.yaml"
     if job.script and "code" not in job.params.keys():
         source = job.basedir.join(job.script).get_path_or_uri(secret_free=False)

@@ -3,6 +3,7 @@
 import copy
 import os
 import re
+import shutil
 from contextlib import contextmanager
 
 import pytest
@@ -133,3 +134,35 @@ def test_a_lost_table_is_made_again(finished):
     finally:
         kept.rename(lost)
     assert jobs == NEW_TABLE
+
+
+@pytest.fixture
+def surfaced(workflow):
+    """A study with a file of labels whose surface counts as made, and the arguments that ask for it."""
+    (workflow.directory / "l.nii.gz").write_text("one brain")
+    brain = {"id": "a", "week": 21, "labels": "l.nii.gz", "scheme": "binary"}
+    study = {"brains": [brain], "start": "a", "folding": {"end_week": 22}}
+    arguments = ("surface", "--configfile", workflow.write("study.yaml", study))
+    workflow.lay_out(*arguments)
+    workflow.count_as_made(*arguments, "--forceall")
+    assert workflow.jobs(*arguments) == {}
+    return workflow, arguments
+
+
+def test_an_input_replaced_by_an_older_one_runs_again_what_was_made_of_it(surfaced):
+    workflow, arguments = surfaced
+    labels, other = workflow.directory / "l.nii.gz", workflow.directory / "other.nii.gz"
+    other.write_text("another 1")
+    an_hour_ago = labels.stat().st_mtime_ns - 3600 * 10**9
+    os.utime(other, ns=(an_hour_ago, an_hour_ago))
+    # as `mv` and `rsync -a` do
+    other.rename(labels)
+    assert workflow.jobs(*arguments) == {"pial_from_labels": 1, "surface": 1}
+    assert "input with the content" in workflow.run("-n", *arguments).stdout
+
+
+def test_a_copy_of_an_input_with_its_date_is_the_same_input(surfaced):
+    workflow, arguments = surfaced
+    copy = shutil.copy2(workflow.directory / "l.nii.gz", workflow.directory / "copy.nii.gz")
+    copy.rename(workflow.directory / "l.nii.gz")
+    assert workflow.jobs(*arguments) == {}

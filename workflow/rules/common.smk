@@ -7,7 +7,7 @@ from gyriflow.parameters.terms import SIDES
 from gyriflow.plan import Plan
 from gyriflow.plan.paths import *
 from gyriflow.shell.launch import hold_lock, keeps_going, refused_brains, runs_nothing
-from gyriflow.shell.provenance import require_own_results
+from gyriflow.shell.provenance import input_contents, require_own_results
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
 
@@ -20,7 +20,7 @@ shell.prefix(
 
 
 def validated_config():
-    """Returns the configuration as models; ends with a message and exit code 2 where it is not valid."""
+    """Returns the configuration as models, and what the input files hold; ends in 2 where it is not valid."""
     from gyriflow.config import load
     from gyriflow.io.yaml_files import read_yaml
 
@@ -38,14 +38,15 @@ def validated_config():
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             require_own_results(Path.cwd(), files, found, record=not runs_nothing())
-        return found
+        record = workflow.is_main_process and not runs_nothing()
+        return found, input_contents(Path.cwd(), found, record)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
 
 
-WHOLE_CONFIG = validated_config()
+WHOLE_CONFIG, CONTENTS = validated_config()
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
 REFUSED = {
     brain: cause

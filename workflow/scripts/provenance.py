@@ -4,22 +4,15 @@ from pathlib import Path
 
 from gyriflow.io.files import files_in, fingerprints, write_json
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.shell.provenance import software
+from gyriflow.shell.provenance import software, texts_in
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
 OF_JOBS = ("logs", "benchmarks", "provenance.json")
 
-
-def texts(value):
-    """Returns all texts in a brain's entry, files among them."""
-    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else []
-    return [value] if isinstance(value, str) else [text for item in items for text in texts(item)]
-
-
 with step(snakemake.log[0]):
     used = software()
-    inputs = {brain["id"]: fingerprints(texts(brain)) for brain in params.brains}
+    inputs = {brain["id"]: fingerprints(texts_in(brain)) for brain in params.brains}
     for path, brain in zip(output.brains, params.brains, strict=True):
         results = fingerprints(files_in(Path(path).parent, *OF_JOBS))
         write_json(path, used | {"configuration": brain, "inputs": inputs[brain["id"]], "results": results})

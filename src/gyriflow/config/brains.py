@@ -226,10 +226,11 @@ NESTED: Mapping[str, tuple[str, ...]] = {
     "hemispheres": (*(f"hemispheres.{key}" for key in HemisphereFiles.model_fields if key != "white"),
                     *(f"hemispheres.white.{key}" for key in WhiteFiles.model_fields)),
     "hemisphere": tuple(f"hemisphere.{key}" for key in OneHemisphere.model_fields),
-    "segmentation": tuple(f"segmentation.{key}" for key in SegmentationSettings.model_fields),
 }  # fmt: skip
+COMMANDS = tuple(f"segmentation.{key}" for key in SegmentationSettings.model_fields)
+"""Keys of brains that are programs: a configuration's, never a table's, which is data."""
 COLUMNS = (
-    *(key for key in Brain.model_fields if key not in (*NESTED, "phantom", "shape", "id")),
+    *(key for key in Brain.model_fields if key not in (*NESTED, "segmentation", "phantom", "shape", "id")),
     *(column for columns in NESTED.values() for column in columns),
 )
 """The columns that are keys of brains; any others are left alone, as BIDS allows."""
@@ -268,7 +269,16 @@ def participants_brains(
     """
     path = located(folder, settings.file)
     rows = read_tab_separated(path)
-    columns = [*rows[0], *settings.columns] if rows else []
+    if commands := [name for name in rows[0] if name in COMMANDS]:
+        raise InputError(
+            "names programs, which are not run: a table is data, whoever sent it",
+            path=path,
+            found=", ".join(commands),
+            expected="columns that name files, ages and the like",
+            remedy="Give what all rows share under participants.columns in the configuration, with {id} for the row's "
+            "id; or list the brains under brains.",
+        )
+    columns = [*rows[0], *settings.columns]
     _require_columns(path, columns)
     id_column = next(name for name in IDS if name in columns)
     age_column = _age_column(path, [settings.columns | row for row in rows])
@@ -302,7 +312,7 @@ def _require_columns(path: Path, columns: list[str]) -> None:
                 found=", ".join(columns) or "no rows",
                 expected=" or ".join(names),
             )
-    known = {*IDS, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS}
+    known = {*IDS, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS, *COMMANDS}
     for column in {name for name in columns if name.lower() not in AGES} - known:
         nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
         if nearest:
@@ -356,7 +366,7 @@ def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str
             return {}, f"files: found {len(parts)}, {'; '.join(parts)}; expected {expected}"
         values |= _of_files(parts, side)
     entry: dict[str, Any] = {}
-    for column in COLUMNS:
+    for column in (*COLUMNS, *COMMANDS):
         if column not in values or column == "week":
             continue
         value = values[column]

@@ -6,7 +6,7 @@ import math
 import shutil
 import uuid
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from os import PathLike
@@ -189,6 +189,21 @@ def sha256_of(path: AnyPath) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise StorageError("cannot be read", path=path, found=error.strerror or error) from error
+
+
+def contents(files: Iterable[AnyPath], known: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Returns for each file that can be read its SHA-256, size in bytes, and last writing and last change of any kind.
+
+    A file whose size and times (ns, of the epoch) are those in `known`, an earlier answer, is not read again.
+    """
+    found: dict[str, list[Any]] = {}
+    for path in map(str, files):
+        with suppress(OSError, StorageError):
+            state = Path(path).stat()
+            # one that takes another's place keeps its date, but has been renamed
+            now = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
+            found[path] = known[path] if known.get(path, [])[1:] == now else [sha256_of(path), *now]
+    return found
 
 
 def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:

@@ -5,6 +5,7 @@ mistake; it runs where all keys are valid.
 """
 
 import difflib
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -175,6 +176,9 @@ def _models(kind: Any) -> list[type[BaseModel]]:
 
 # paths of input files
 
+WILDCARD = re.compile(r"\{.*\}", re.DOTALL)
+"""What Snakemake would replace in a path, as it knows no way to escape braces."""
+
 
 def beside(folder: Path, path: str) -> Path:
     """Returns the place of a file that is named relative to a folder, or below a home folder (`~/scans/a.nii.gz`)."""
@@ -191,7 +195,7 @@ def located(folder: Path | str, path: str) -> Path:
 
 
 def _absolute(path: str, info: ValidationInfo) -> str:
-    """Returns the absolute path of a file, which must exist.
+    """Returns the path of a file, which must exist: absolute, or relative in a working directory with braces.
 
     The context names the `folder` of the configuration, which is searched for relative paths before the working
     directory, and `awaited` files, which need not exist yet. Without a context the path is returned unchanged.
@@ -201,7 +205,12 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     folder, place = Path(info.context["folder"]), located(info.context["folder"], path)
     if not place.is_file() and path not in info.context.get("awaited", ()):
         raise refused(f"no such file: {beside(folder, path)}{_present_instead(beside(folder, path))}")
-    return str(place)
+    if not WILDCARD.search(str(place)):
+        return str(place)
+    # braces of the working directory need not be named
+    if WILDCARD.search(inside := os.path.relpath(place)) or not place.is_file():
+        raise refused(f"found {place}; braces in a path are placeholders to Snakemake: rename the file or its folder")
+    return inside
 
 
 InputFile = Annotated[str, AfterValidator(_absolute)]

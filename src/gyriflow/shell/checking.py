@@ -34,6 +34,7 @@ from .terminal import stages as stages_of_rules
 DEMO = SHIPPED / "config" / "config.yaml"
 NAMED_RUNS = 6
 REASONS = {
+    "input with the content": "other content",
     "Params have changed": "settings changed",
     "Code has changed": "code changed",
     "Updated input files": "newer input",

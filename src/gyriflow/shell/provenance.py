@@ -1,4 +1,4 @@
-"""Whose results are in a folder, and the versions of everything that made them."""
+"""Whose results are in a folder, what the inputs hold, and the versions of everything that made them."""
 
 import platform
 import sys
@@ -11,7 +11,7 @@ from typing import Any
 
 from ..config.root import Config
 from ..errors import InputError
-from ..io.files import read_json, write_json
+from ..io.files import contents, read_json, write_json
 from ..version import commit, version
 
 PACKAGES = (
@@ -60,3 +60,25 @@ def require_own_results(directory: Path, files: Sequence[Path], config: Config, 
         )
     if record and (known != own or not path.is_file()):
         write_json(path, own)
+
+
+def texts_in(value: Any) -> list[str]:
+    """Returns all texts in nested mappings and lists, such as a brain's entry, names of files among them."""
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else []
+    return [value] if isinstance(value, str) else [text for item in items for text in texts_in(item)]
+
+
+def input_contents(directory: Path, config: Config, record: bool) -> dict[str, str]:
+    """Returns the SHA-256 of each input file of a study by its path; that of its atlas where the file is not there yet.
+
+    With `record` they are kept in the results, with sizes and times, so that unchanged files are not read again.
+    """
+    path = directory / "results" / "study" / "inputs.json"
+    known: dict[str, Any] = {}
+    with suppress(InputError):
+        known = read_json(path)
+    found = contents(dict.fromkeys(texts_in(config.model_dump())), known)
+    if record and found != known:
+        write_json(path, found)
+    expected = {name: sha256 for name, (_, sha256) in config.known_files.items()}
+    return expected | {name: state[0] for name, state in found.items()}

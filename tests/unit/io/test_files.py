@@ -1,14 +1,17 @@
 """Files appear whole or not at all."""
 
 import errno
+import hashlib
 import json
+import os
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from gyriflow.errors import InputError, StorageError
-from gyriflow.io.files import read_json, read_tab_separated, read_table, replaced, write_json, write_table
+from gyriflow.io import files
+from gyriflow.io.files import contents, read_json, read_tab_separated, read_table, replaced, write_json, write_table
 
 
 @pytest.mark.promise(1)
@@ -96,3 +99,22 @@ def test_cells_stay_below_their_heading(tmp_path, rows):
         {"id": "s1", "age": "24", "file": "a"},
         {"id": "s2", "age": "25", "file": "b"},
     ]
+
+
+def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monkeypatch):
+    one, other, gone = tmp_path / "one", tmp_path / "other", tmp_path / "gone"
+    one.write_text("a brain")
+    other.write_text("another")
+    first = contents([one, other, gone, tmp_path], {})
+    assert list(first) == [str(one), str(other)]
+    assert first[str(one)][0] == hashlib.sha256(b"a brain").hexdigest()
+    # an older file of the same size takes its place
+    state = one.stat()
+    (tmp_path / "older").write_text("a train")
+    os.utime(tmp_path / "older", ns=(state.st_atime_ns, state.st_mtime_ns))
+    (tmp_path / "older").rename(one)
+    read = []
+    monkeypatch.setattr(files, "sha256_of", lambda path: read.append(path) or "new")
+    second = contents([one, other], first)
+    assert read == [str(one)]
+    assert (second[str(one)][0], second[str(other)]) == ("new", first[str(other)])
