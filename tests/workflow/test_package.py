@@ -1,6 +1,7 @@
 """The package as a wheel: what it carries, and that its command works in an empty folder without the checkout."""
 
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -64,11 +65,13 @@ def test_the_command_works_in_an_empty_folder(installed, tmp_path):
 
     assert gyriflow("--version").stdout.startswith("gyriflow 0.")
     target = "results/brains/spina-bifida-unoperated-21/surface/pial.surf.gii"
-    outcome = gyriflow("run", "--cores", "1", target)
+    # where there is no configuration, it is told where the demo's is
+    demo = re.search(r"The demo's is (\S+)\.$", gyriflow("run").stderr)[1]
+    outcome = gyriflow("run", demo, "--cores", "1", target)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     assert (tmp_path / target).is_file()
     assert str(CHECKOUT) not in outcome.stdout + outcome.stderr
     # nothing is missing further down
-    dry = gyriflow("run", "--dry-run")
+    dry = gyriflow("run", demo, "--dry-run")
     assert dry.returncode == 0
     assert " core hours, " in dry.stdout

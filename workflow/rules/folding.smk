@@ -85,8 +85,10 @@ SOLVE = (
     # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
     "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
     'log={log:q}; progress=${{log%.log}}.jsonl; rm -f "$progress"; '
-    # a cluster's profile sets no launcher for a single rank
-    "launch='{resources.mpi}'; ${{launch:+$launch -n {resources.tasks}}}"
+    # on this machine no more ranks than cores; a cluster's profile sets no launcher for a single rank
+    "launch='{resources.mpi}'; ranks={resources.tasks}; "
+    '[ "$launch" != mpiexec ] || ranks={threads}; '
+    "${{launch:+$launch -n $ranks}}"
     " python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
     ' {params.options:q} --out {params.folder:q} --progress "$progress" 2>&1'
     " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"

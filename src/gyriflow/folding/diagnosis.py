@@ -48,9 +48,9 @@ def resolution_warning(rows: Sequence[dict], order: int) -> str:
     now, before = found[-1], found[0] if len(found) > 1 else math.inf
     if not now < ELEMENTS_NEEDED[order] <= before:
         return ""
+    since = f"since it grows, from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
     return (
-        f"from GW {rows[-1]['week']:.2f} on fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the cortex, "
-        "since it grows: folds may be mesh noise; "
+        f"{since} fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the cortex: folds may be mesh noise; "
         "a smaller mesh.surface_edge_mm, or mesh.sized_for: end, resolves it to a later week"
     )
 

@@ -132,10 +132,11 @@ def dotted(path: Key) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Returns a hint for an unknown name: the most similar known name, or all of them."""
+    """Returns a hint for an unknown name: the known names that end with it, the most similar one, or all of them."""
     known = list(known)
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+    longer = [other for other in known if other.endswith(f"_{name}")]
+    near = longer or difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
 
 
 def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:

@@ -25,8 +25,8 @@ from ..surface.labels import cerebrum_mask, require_cortex_outside
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
-# Written by `gyriflow init` from the files of this folder. Every key has a default: config/README.md of gyriflow lists
-# them with their units. Paths are relative to this file.
+# Written by `gyriflow init` from the files of this folder. Every key has a default; paths are relative to this file.
+# All keys with their units: {SHIPPED / "config" / "README.md"}
 
 brains:
 """
@@ -41,6 +41,11 @@ folding:
 # Runs by name, each with what differs from `folding`; `measured` lets growth follow the brains above.
 runs:
   reference: {{}}{measured}
+"""
+QUICK = """
+# Minutes on a laptop: coarse, to see that all goes well. Without these lines the mesh is fine enough for results to trust.
+surface: {edge_length_mm: 1.5}
+mesh: {mesher: tetgen, order: 1, surface_edge_mm: 1.5, core_edge_mm: 4}
 """
 MEASURED = """
   measured: {preset: measured}"""
@@ -84,7 +89,7 @@ class Found:
     notes: list[str] = field(default_factory=list)
 
 
-def write_configuration(folder: Path, path: Path, force: bool) -> Iterator[str]:
+def write_configuration(folder: Path, path: Path, force: bool, quick: bool = False) -> Iterator[str]:
     """Writes a configuration for the brains of a folder; yields what was recognised, a line a kind.
 
     InputError where nothing was recognised, or a configuration is there and `force` is not set.
@@ -94,7 +99,7 @@ def write_configuration(folder: Path, path: Path, force: bool) -> Iterator[str]:
             "is there already", path=path, remedy="Choose another file with --output, or replace it: --force"
         )
     found = recognise(folder)
-    write_text(path, configuration(found, folder, path))
+    write_text(path, configuration(found, folder, path) + (QUICK if quick else ""))
     kinds = ", ".join(f"{count} from {kind}" for kind, count in Counter(map(_kind, found)).items())
     yield f"{len(found)} brain{'s' if len(found) > 1 else ''}: {kinds}"
     for brain in found:

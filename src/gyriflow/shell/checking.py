@@ -1,5 +1,6 @@
 """Checks a study before it is run: its configuration, its files, what will run, and what that will take."""
 
+import math
 import os
 import shutil
 import sys
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import psutil
 
 from ..config import load
@@ -23,16 +25,20 @@ from ..io.files import read_json
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import read_yaml
 from ..parameters.schemes import LabelScheme
+from ..parameters.terms import ELEMENTS_NEEDED
+from ..parameters.varying import Varying, curve_at
 from ..shipped import SHIPPED
 from ..surface.labels import cerebrum_mask, require_cortex_outside
+from ..surface.plausible import require_plausible_size
 from .cost import MEASURED, Job, Prediction, predict
 from .launch import OF_PROFILES
 from .launch import main as launch
 from .terminal import DRAWN, ORDER, as_duration, where_of
 from .terminal import stages as stages_of_rules
 
-DEMO = SHIPPED / "config" / "config.yaml"
 NAMED_RUNS = 6
+THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1): 0.67, ("tetgen", 2): 0.27}
+"""Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as found on the shipped brains."""
 REASONS = {
     "input with the content": "other content",
     "Params have changed": "settings changed",
@@ -71,7 +77,7 @@ class PlannedJob:
 
 
 def check_study(
-    config: Path | None,
+    path: Path,
     directory: Path,
     cores: int,
     read_files: bool = True,
@@ -84,12 +90,12 @@ def check_study(
 
     InputError for a configuration that is not valid, with all its problems.
     """
-    path = config or DEMO
     settings = load(read_yaml(path), path.resolve().parent)
     yield f"{path}: {_contents(settings)}", False
-    bad = list(input_problems(settings)) if read_files else []
-    for line in bad:
-        yield f"  {line}", True
+    said = list(input_problems(settings)) if read_files else []
+    yield from ((f"  {line}", bad) for line, bad in said)
+    yield from ((f"  warning: {line}", False) for line in coarse_cortices(settings))
+    bad = any(bad for _, bad in said)
     if read_files and not bad:
         yield "  input files: all can be read and fit their schemes", False
     missing = sum(len(atlas.missing) for atlas in settings.atlases)
@@ -99,10 +105,14 @@ def check_study(
         yield from _work(plan(path, directory, stages), settings, directory, cores, price)
 
 
-def work_of_study(config: Path | None, directory: Path, cores: int, further: Sequence[str]) -> Iterator[str]:
-    """Shows what Snakemake would do, and yields lines on what that takes; `further` are arguments of Snakemake's."""
-    path = config or DEMO
-    jobs = plan(path, directory, further, show=True)
+def work_of_study(
+    path: Path, directory: Path, cores: int, further: Sequence[str], *, show: bool = False
+) -> Iterator[str]:
+    """Yields lines on what would run and what it takes; `further` are arguments of Snakemake's.
+
+    With `show`, Snakemake lists every job on the terminal first.
+    """
+    jobs = plan(path, directory, further, show=show)
     for line, _ in _work(jobs, load(read_yaml(path), path.resolve().parent), directory, cores, None):
         yield line
 
@@ -115,6 +125,10 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
     said = StringIO()
     with tempfile.TemporaryDirectory(prefix="gyriflow-") as folder, ExitStack() as stack:
         file = Path(folder, "plan.json")
+        # Snakemake makes folders even where it only looks
+        state = directory.resolve() / ".snakemake"
+        made = [path for path in (*reversed(state.parents), state) if not path.exists()]
+        stack.callback(lambda: [shutil.rmtree(path) for path in made[:1] if path.exists()])
         # Snakemake goes into the working directory
         stack.enter_context(chdir(Path.cwd()))
         if not show:
@@ -143,26 +157,51 @@ def _contents(config: Config) -> str:
     return ", ".join(parts)
 
 
-def input_problems(config: Config) -> Iterator[str]:
-    """Yields what is wrong with the input files of the brains: files that cannot be read, labels of another scheme."""
+def coarse_cortices(config: Config) -> Iterator[str]:
+    """Yields for each run, before anything is solved, whether its mesh is too coarse for its cortex at the start."""
+    mesh = config.mesh
+    needed = ELEMENTS_NEEDED[mesh.order]
+    for run, brain in config.folded:
+        thickness = config.run(run).thickness_mm
+        # maps and measured thicknesses are known once the surface is made
+        if mesh.pial_faces or isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
+            continue
+        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, config.brain(brain).week)
+        if through / mesh.surface_edge_mm < 0.99 * needed:
+            yield (
+                f"run {run} from {brain}: about {through / mesh.surface_edge_mm:.1f} elements through the cortex, "
+                f"{needed:g} are needed: mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g} would do"
+            )
+
+
+def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
+    """Yields what is wrong or doubtful about the input files of the brains, and whether it is wrong.
+
+    Wrong are files that cannot be read and labels of another scheme, doubtful is a size that is not that of the week.
+    """
     for brain in config.brains:
         try:
-            _check_files(brain, config)
+            for doubt in _check_files(brain, config):
+                yield f"warning: brain {brain.id}: {doubt}", False
         except GyriflowError as error:
-            yield f"brain {brain.id}: {error}"
+            yield f"brain {brain.id}: {error}", True
 
 
-def _check_files(brain: Brain, config: Config) -> None:
+def _check_files(brain: Brain, config: Config) -> Iterator[str]:
     files = [path for path in (*brain.files, brain.image) if path in config.known_files and Path(path).is_file()]
     require_checksums({path: config.known_files[path] for path in files})
     volume = brain.label_volume
     if volume is not None and Path(volume).is_file():
-        labels = read_label_volume(volume, brain.affine_from).labels
-        scheme = LabelScheme(**config.scheme(brain))
-        cerebrum_mask(labels, scheme)
+        read = read_label_volume(volume, brain.affine_from)
+        labels, scheme = read.labels, LabelScheme(**config.scheme(brain))
+        cerebrum = cerebrum_mask(labels, scheme)
         # the wall of a hemisphere that is alone may have no cortex
         if scheme.cortex and brain.hemisphere is None:
             require_cortex_outside(labels, scheme)
+        if brain.hemisphere is None:
+            size = cerebrum.sum() * abs(np.linalg.det(read.affine[:3, :3]))
+            extents = np.ptp(np.argwhere(cerebrum), axis=0) * np.linalg.norm(read.affine[:3, :3], axis=0)
+            yield from require_plausible_size(float(size), extents, brain.week)
     for file in brain.files:
         # files of atlases may be missing yet
         if file != volume and Path(file).is_file():

@@ -12,16 +12,14 @@ import click
 from click.core import ParameterSource
 from click.shell_completion import get_completion_class
 
-from ..errors import GyriflowError
-from ..shipped import SHIPPED
+from ..errors import GyriflowError, InputError
+from ..shipped import CONFIG, DEMO, SHIPPED
 
 STAGES = (
-    *("retrieve", "surface", "mesh", "growth", "folding", "metrics", "figures", "report"),
-    *("studies", "calibrate", "paper", "validate"),
+    *("retrieve", "surface", "quality", "mesh", "growth", "folding", "metrics", "figures", "report"),
+    *("studies", "calibrate", "paper", "validate", "export"),
 )
 """Targets of the workflow that a user asks for by name."""
-CONFIG = "gyriflow.yaml"
-"""The configuration that is taken where none is named."""
 CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
 ELSEWHERE = ("--profile", "--executor", "-e")
 """Options of Snakemake's by which jobs run on other machines."""
@@ -77,7 +75,11 @@ def version(context: click.Context, parameter: click.Parameter, value: bool) -> 
         context.exit()
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog=f"Every key of a configuration: {SHIPPED / 'config' / 'README.md'}",
+)
 @click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=version, help="Show the version.")
 def main() -> None:
     """From fetal brain MRI to folding metrics.
@@ -92,8 +94,6 @@ def main() -> None:
       gyriflow view                 open the report
 
     A brain of later weeks from one scan: gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
-
-    Without a configuration, `gyriflow run` runs the demo in the current folder.
     """
 
 
@@ -101,7 +101,8 @@ def main() -> None:
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
 @click.option("--force", is_flag=True, help="Replace a configuration that is there.")
-def init(folder: Path, output: Path | None, force: bool) -> None:
+@click.option("--quick", is_flag=True, help="With a coarse mesh: minutes on a laptop, to see that all goes well.")
+def init(folder: Path, output: Path | None, force: bool, quick: bool) -> None:
     """Write a configuration from the files of a FOLDER.
 
     It knows tissue label volumes (its scheme is found from the labels), pairs of hemisphere surfaces, files named as in
@@ -110,7 +111,7 @@ def init(folder: Path, output: Path | None, force: bool) -> None:
     from .beginning import write_configuration
 
     path = output or folder / CONFIG
-    for line in write_configuration(folder, path, force):
+    for line in write_configuration(folder, path, force, quick):
         click.echo(line)
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
 
@@ -127,7 +128,7 @@ def check(
 ) -> None:
     """Check a configuration and its files; say what will run and what it will take.
 
-    Nothing is run or written. CONFIG is gyriflow.yaml where none is named, or else the demo.
+    Nothing is run or written. CONFIG is gyriflow.yaml where none is named.
     """
     from .checking import check_study
 
@@ -152,8 +153,7 @@ def run(
 ) -> None:
     """Run a study; what is there and up to date is kept. With --dry-run, say what it would take.
 
-    CONFIG is gyriflow.yaml where none is named, or else the demo. Further arguments go to Snakemake, such as
-    `--profile profiles/slurm`.
+    CONFIG is gyriflow.yaml where none is named. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
     """
     named = bool(further) and further[0].endswith(CONFIG_SUFFIXES)
     chosen = _chosen(Path(further[0]) if named else None, directory)
@@ -167,13 +167,12 @@ def run(
     if dry_run:
         from .checking import work_of_study
 
-        for line in work_of_study(chosen, directory, cores, [*arguments, *targets]):
+        for line in work_of_study(chosen, directory, cores, [*arguments, *targets], show=verbose):
             click.echo(line)
     else:
         from .launch import main as launch
 
-        arguments = [*(["--configfile", str(chosen.resolve())] if chosen else []), *arguments]
-        sys.exit(launch([*arguments, "--directory", str(directory), *targets]))
+        sys.exit(launch(["--configfile", str(chosen.resolve()), *arguments, "--directory", str(directory), *targets]))
 
 
 @main.command()
@@ -282,8 +281,13 @@ def completion(shell: str) -> None:
     click.echo(complete(main, {}, "gyriflow", "_GYRIFLOW_COMPLETE").source())
 
 
-def _chosen(config: Path | None, directory: Path) -> Path | None:
-    """Returns the configuration that is meant: the one named, gyriflow.yaml here or there, or none, the demo."""
-    if config is not None:
-        return config
-    return next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)
+def _chosen(config: Path | None, directory: Path) -> Path:
+    """Returns the configuration that is meant, the one named or gyriflow.yaml; InputError without one."""
+    found = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)
+    if found is None:
+        raise InputError(
+            "there is no configuration",
+            path=Path(CONFIG).absolute(),
+            remedy=f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}.",
+        )
+    return found

@@ -8,14 +8,19 @@ from typing import Any, NamedTuple
 
 from tabulate import tabulate
 
+from ..config import load
 from ..errors import InputError, StorageError
 from ..io.files import read_json
 from ..io.jobs import events_in, read_log
+from ..io.yaml_files import read_yaml
+from ..shipped import CONFIG
 from ..units import week_tag
 from .launch import hold_lock
 from .terminal import REPORT, STATE, as_duration, at_week
 
 BRAIN_FILES = {"surface": "surface/pial.surf.gii", "mesh": "mesh/brain.xdmf", "metrics": "metrics/metrics.csv"}
+OF_BRAINS = ("brain", *BRAIN_FILES)
+OF_RUNS = ("run", "brain", "folding", "surfaces", "metrics", "figures")
 DONE, NOT_YET = "done", "-"
 
 
@@ -39,9 +44,21 @@ def status(directory: Path) -> Status:
         [folder.name, *(DONE if (folder / file).is_file() else NOT_YET for file in BRAIN_FILES.values())]
         for folder in _folders(results / "brains")
     ]
-    runs = [_row(run.name, folder) for run in _folders(results / "runs") for folder in _folders(run)]
+    begun = {(run.name, folder.name) for run in _folders(results / "runs") for folder in _folders(run)}
+    names = [*(configured := _configured(directory)), *sorted(begun - set(configured))]
+    runs = [_row(run, results / "runs" / run / brain) for run, brain in names]
     report = directory / REPORT
     return Status(_lines(directory, state), brains, runs, report if report.is_file() else None)
+
+
+def _configured(directory: Path) -> list[tuple[str, str]]:
+    """Returns the runs, each with its start brain, of the configuration that lies in a working directory."""
+    path = directory / CONFIG
+    # what is wrong with a configuration is for the command that runs it to say
+    with suppress(InputError):
+        if path.is_file():
+            return load(read_yaml(path), path.resolve().parent).folded
+    return []
 
 
 def run_state(directory: Path) -> dict[str, Any] | None:
@@ -109,8 +126,7 @@ def _folders(folder: Path) -> list[Path]:
 def as_text(found: Status) -> Iterator[str]:
     """Yields the lines of a status."""
     yield from found.run
-    of_runs = ["run", "brain", "folding", "surfaces", "metrics", "figures"]
-    for head, rows in ((["brain", *BRAIN_FILES], found.brains), (of_runs, found.runs)):
+    for head, rows in ((OF_BRAINS, found.brains), (OF_RUNS, found.runs)):
         if rows:
             yield "\n" + tabulate(rows, head, tablefmt="plain", disable_numparse=True)
     if found.report:
@@ -118,8 +134,13 @@ def as_text(found: Status) -> Iterator[str]:
 
 
 def as_json(found: Status) -> str:
-    """Returns a status as JSON, for programs."""
-    return json.dumps(found._asdict() | {"report": str(found.report or "")}, indent=2, ensure_ascii=False)
+    """Returns a status as JSON, for programs: a mapping for each brain and each run."""
+    brains = [dict(zip(OF_BRAINS, row, strict=True)) for row in found.brains]
+    runs = [dict(zip(OF_RUNS, row, strict=True)) for row in found.runs]
+    report = str(found.report or "")
+    return json.dumps(
+        {"run": found.run, "brains": brains, "runs": runs, "report": report}, indent=2, ensure_ascii=False
+    )
 
 
 def report_of(directory: Path) -> Path:

@@ -45,7 +45,7 @@ def test_a_cortex_that_outgrows_its_elements_is_told_once():
     assert resolution_warning(rows(2.3, 2.1), 1) == ""
     assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9), 1)
     assert resolution_warning(rows(2.3, 1.9, 1.8), 1) == ""
-    assert "fewer than 2" in resolution_warning(rows(1.5), 1)
+    assert resolution_warning(rows(1.5), 1).startswith("from the start on fewer than 2")
     assert resolution_warning(rows(1.5), 2) == ""
     assert resolution_warning(rows(0.81), 2) == ""  # the default mesh at its start
     assert "fewer than 0.8" in resolution_warning(rows(1.2, 0.79), 2)

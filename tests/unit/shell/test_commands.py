@@ -15,14 +15,16 @@ from gyriflow.shipped import SHIPPED
 
 @pytest.fixture
 def handed_on(monkeypatch, tmp_path):
-    """Returns the arguments that Snakemake gets for those of `gyriflow run`."""
+    """Returns the arguments that Snakemake gets for those of `gyriflow run`, beside a configuration."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "gyriflow.yaml").touch()
 
     def arguments(*given):
         got = []
         monkeypatch.setattr(launch, "main", lambda asked: got.extend(asked) or 0)
         assert CliRunner().invoke(main, ["run", *given]).exit_code == 0
-        return got
+        assert got[:2] == ["--configfile", str(tmp_path / "gyriflow.yaml")]
+        return got[2:]
 
     return arguments
 
@@ -39,10 +41,17 @@ def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
     assert handed_on("--cores", "200", "--profile", "profiles/slurm")[:2] == ["--cores", "200"]
 
 
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_missing_configuration_is_an_error(monkeypatch, tmp_path, command):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, [command])
+    assert (done.exit_code, "there is no configuration" in done.output) == (2, True)
+
+
 @pytest.mark.parametrize(("installed", "typed"), [(None, "./run gyriflow"), ("/usr/bin/gyriflow", "gyriflow")])
 def test_what_to_type_next_can_be_typed(monkeypatch, tmp_path, installed, typed):
     monkeypatch.setattr(shutil, "which", lambda name: installed)
-    monkeypatch.setattr(beginning, "write_configuration", lambda folder, path, force: ["1 brain"])
+    monkeypatch.setattr(beginning, "write_configuration", lambda folder, path, force, quick: ["1 brain"])
     folder = tmp_path / "brains of our lab"
     folder.mkdir()
     said = CliRunner().invoke(main, ["init", str(folder)]).output

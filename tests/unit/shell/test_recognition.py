@@ -96,8 +96,11 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
     assert [(brain.id, brain.week) for brain in config.brains] == [("GA21", 21.0), ("GA22", 22.0)]
     assert config.start == "GA21"
     assert list(config.runs) == ["reference", "measured"]
+    assert config.mesh.order == 2
     with pytest.raises(InputError, match="is there already"):
         list(write_configuration(tmp_path, path, force=False))
+    list(write_configuration(tmp_path, path, force=True, quick=True))
+    assert load(yaml.safe_load(path.read_text()), tmp_path).mesh.surface_edge_mm == 1.5
 
 
 def test_what_files_do_not_tell_is_left_to_be_filled_in(tmp_path):

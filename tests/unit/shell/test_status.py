@@ -1,11 +1,13 @@
 """How far a study is, from what lies in its folder."""
 
+import json
+
 import pytest
 
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
 from gyriflow.shell.launch import hold_lock
-from gyriflow.shell.status import as_text, status
+from gyriflow.shell.status import as_json, as_text, status
 from gyriflow.shell.terminal import STATE
 
 RUNNING = {
@@ -71,3 +73,14 @@ def test_stages_of_brains_and_runs_are_told_from_their_files(study):
 def test_a_folder_without_a_study_is_named(tmp_path):
     with pytest.raises(InputError, match="holds no study"):
         status(tmp_path)
+
+
+def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(study):
+    brain = "brains: [{id: a, week: 23, phantom: {}}]\nstart: a\nfolding: {end_week: 24}\nruns: {r: {}, later: {}}\n"
+    (study / "gyriflow.yaml").write_text(brain)
+    found = json.loads(as_json(status(study)))
+    assert found["brains"][0] == {"brain": "a", "surface": "done", "mesh": "-", "metrics": "-"}
+    assert [(row["run"], row["brain"], row["folding"]) for row in found["runs"]] == [
+        ("r", "a", "-"),
+        ("later", "a", "-"),
+    ]
