@@ -58,10 +58,12 @@ def parameters_table(published: Mapping[str, Any], runs: Mapping[str, Mapping[st
 def displacement_table(published: Mapping[str, Any], displacement: pd.DataFrame) -> pd.DataFrame:
     """Returns largest and mean norm of the displacement in mm, a row per quantity and source, a column per interval.
 
-    Displacement has the columns run, from_week, to_week, nodes, max_mm, mean_mm. All nodes count, as in the paper.
+    Displacement has the columns run, from_week, to_week, nodes, max_mm, mean_mm. The paper does not say whether its
+    numbers are of all nodes or of the surface, so both stand here.
     """
-    rows = displacement[displacement["nodes"] == "all"]
-    sources = {f"{run} (simulated)": of_run.set_index("from_week") for run, of_run in rows.groupby("run", sort=False)}
+    rows = displacement.replace({"nodes": {"all": "all nodes", "pial": "surface"}})
+    groups = rows.groupby(["run", "nodes"], sort=False)
+    sources = {f"{run} (simulated, {nodes})": of_run.set_index("from_week") for (run, nodes), of_run in groups}
     for entry in published["displacement"]["rows"]:
         paper = pd.DataFrame(entry, index=published["displacement"]["from_weeks"])
         sources[f"{PAPER}: {entry['source']}"] = paper

@@ -125,5 +125,6 @@ def test_displacements_of_runs_and_paper_share_their_intervals():
     moves = pd.DataFrame(rows, columns=["run", "from_week", "to_week", "nodes", "max_mm", "mean_mm"])
     table = displacement_table(published, moves).set_index(["quantity", "source"])
     assert list(table) == ["21-22 GW", "22-23 GW", "25-26 GW"]
-    assert table.loc[("largest displacement (mm)", "r (simulated)"), "21-22 GW"] == 3.0
+    assert table.loc[("largest displacement (mm)", "r (simulated, all nodes)"), "21-22 GW"] == 3.0
+    assert table.loc[("largest displacement (mm)", "r (simulated, surface)"), "21-22 GW"] == 9.0
     assert table.loc[("mean displacement (mm)", "FetalFoldSim paper: S"), "22-23 GW"] == 0.3
