@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..io.files import read_tab_separated
 from ..parameters.schemes import Label
 from ..parameters.settings import InputFile, Problem, Settings, beside, check, located, setting
 from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
-from ..parameters.varying import WEEKS, Week
+from ..parameters.varying import Week
+from .scans import AGE, AGES, IDS, NOTHING, SESSION, SURE_AGES, Scan, read_scans
 
 SOURCES = ("labels", "segmentation", "hemispheres", "hemisphere", "pial", "phantom", "shape")
 """The keys of which a brain has exactly one."""
@@ -99,6 +99,9 @@ class Brain(Settings):
         "Subject of whom several brains are scans. Change between scans is tabled, and simulations are compared with "
         "scans of their subject first.", min_length=1,
     )  # fmt: skip
+    covariates: dict[str, str] = setting(
+        {}, "", "What else is known of it, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."
+    )
     labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI or MGZ).")
     image: InputFile | None = setting(
         None, "", "T2-weighted volume (NIfTI): input of `segmentation`, or with `labels` shown in a figure."
@@ -210,16 +213,6 @@ class Brain(Settings):
 
 # tables of brains
 
-IDS = ("participant_id", "id")
-AGE = "age"
-"""The one name of the column with the gestational age that is the mother's, or that after birth, in many tables."""
-SURE_AGES = ("gestational_age", "week")
-"""Names of that column which are believed whatever others are there."""
-AGES = (
-    *(*SURE_AGES, "ga", "ga_weeks", "gestational_weeks", "gestational_age_weeks", "scan_age", "weeks", "age_at_scan"),
-    AGE,
-)
-"""All names of that column, in small letters or capitals."""
 FILES = ("file", "files")
 SIDE = "side"
 NESTED: Mapping[str, tuple[str, ...]] = {
@@ -230,13 +223,11 @@ NESTED: Mapping[str, tuple[str, ...]] = {
 COMMANDS = tuple(f"segmentation.{key}" for key in SegmentationSettings.model_fields)
 """Keys of brains that are programs: a configuration's, never a table's, which is data."""
 COLUMNS = (
-    *(key for key in Brain.model_fields if key not in (*NESTED, "segmentation", "phantom", "shape", "id")),
+    *(key for key in Brain.model_fields if key not in (*NESTED, "segmentation", "phantom", "shape", "id", "covariates")),
     *(column for columns in NESTED.values() for column in columns),
 )
-"""The columns that are keys of brains; any others are left alone, as BIDS allows."""
+"""The columns that are keys of brains; any others are covariates."""
 PATHS = ("labels", "image", "pial", "white", *NESTED["hemispheres"], "hemisphere.file", "hemisphere.white")
-NOTHING = frozenset(("", "n/a"))
-"""What stands for no value in BIDS."""
 ALMOST = 0.85
 """How like the name of a key an unknown column has to be to be taken for a mistyped one."""
 
@@ -244,17 +235,18 @@ ALMOST = 0.85
 class ParticipantsSettings(Settings):
     """A table with a brain a row. `participants: FILE` is short for a section.
 
-    Columns are `participant_id` (or `id`); the gestational age in weeks, `gestational_age` (or `week`, or another usual
-    name); and keys of brains, inner ones with a dot (`hemispheres.left`). Instead of keys, `files` may name labels, a
-    pial surface, or left and right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is no value.
-    Other columns are ignored.
+    Columns are `participant_id` (or `id`); the gestational age, `gestational_age` (or `week`, another usual name, or
+    one that the table's sidecar describes so), as `24.3`, `24+2` or `24w2d`; and keys of brains, inner ones with a dot
+    (`hemispheres.left`). Instead of keys, `files` may name labels, a pial surface, or left and right surfaces with a
+    semicolon between; with `side`, one hemisphere. `n/a` is no value. Other columns are covariates. A participant with
+    a `sub-01/sub-01_sessions.tsv` beside the table has a brain for each of its sessions, with that one's age.
     """
 
     file: str = setting(..., "", "Tab-separated file; paths in it are relative to it.")
     columns: dict[str, str] = setting(
         {}, "",
-        "Columns that the table lacks, with one value for all rows, in which `{id}` is the row's id: `{labels: "
-        "'{id}/anat/{id}_dseg.nii.gz', scheme: feta-7}`.",
+        "Columns that the table lacks, with one value for all rows, in which `{subject}`, `{session}` and `{id}`, such "
+        "as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme: feta-7}`.",
     )  # fmt: skip
 
 
@@ -268,51 +260,36 @@ def participants_brains(
     InputError where the table cannot be read or lacks what every row needs.
     """
     path = located(folder, settings.file)
-    rows = read_tab_separated(path)
-    if commands := [name for name in rows[0] if name in COMMANDS]:
-        raise InputError(
-            "names programs, which are not run: a table is data, whoever sent it",
-            path=path,
-            found=", ".join(commands),
-            expected="columns that name files, ages and the like",
-            remedy="Give what all rows share under participants.columns in the configuration, with {id} for the row's "
-            "id; or list the brains under brains.",
-        )
-    columns = [*rows[0], *settings.columns]
-    _require_columns(path, columns)
-    id_column = next(name for name in IDS if name in columns)
-    age_column = _age_column(path, [settings.columns | row for row in rows])
-    counts = Counter(row[id_column] for row in rows)
+    scans = read_scans(path, settings.columns)
+    _require_known_columns(path, list(scans[0].values))
+    counts = Counter(scan.id for scan in scans)
     entries: list[dict[str, Any]] = []
     refused: dict[str, dict[str, Any]] = {}
     problems: list[str] = []
-    for row in rows:
-        name = row[id_column]
-        known = {key: value.replace("{id}", name) for key, value in settings.columns.items()} | row
-        values = {key: value for key, value in known.items() if value not in NOTHING}
-        week, cause = _week(values.get(age_column), age_column)
+    for scan in scans:
+        values = {key: value for key, value in scan.values.items() if value not in NOTHING}
         entry, problem = _entry(values, path.parent)
-        text = f"{path}: {name}: {cause or problem}"
-        if not (cause or problem):
-            entries.append({"id": name, "week": week} | entry)
-        elif counts[name] > 1 and name not in NOTHING:
-            problems.append(f"{text} (the id is that of {counts[name]} rows; ids are unique)")
+        text = f"{path}: {scan.id}: {scan.cause or problem}"
+        if not (scan.cause or problem):
+            subject = {} if scan.subject is None else {"subject": scan.subject}
+            further = covariates(scan)
+            entries.append({"id": scan.id, "week": scan.week} | subject | further | entry)
+        elif counts[scan.id] > 1 and scan.id not in NOTHING:
+            problems.append(f"{text} (the id is that of {counts[scan.id]} rows; ids are unique)")
         else:
-            refused[name] = {"week": week, "cause": text}
+            refused[scan.id] = {"week": scan.week, "cause": text}
     return entries, refused, problems
 
 
-def _require_columns(path: Path, columns: list[str]) -> None:
-    ages = {name.lower() for name in columns}
-    for names, there, what in ((IDS, set(columns), "ids"), (AGES, ages, "gestational ages")):
-        if not set(names) & there:
-            raise InputError(
-                f"has no column of {what}",
-                path=path,
-                found=", ".join(columns) or "no rows",
-                expected=" or ".join(names),
-            )
-    known = {*IDS, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS, *COMMANDS}
+def covariates(scan: Scan) -> dict[str, dict[str, str]]:
+    """Returns the key `covariates` of a scan's brain: the columns of its table that mean nothing else."""
+    known = {*IDS, SESSION, *FILES, SIDE, *COLUMNS, scan.age_column.lower()}
+    found = {key: value for key, value in scan.values.items() if key.lower() not in known and value not in NOTHING}
+    return {"covariates": found} if found else {}
+
+
+def _require_known_columns(path: Path, columns: list[str]) -> None:
+    known = {*IDS, SESSION, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS, *COMMANDS}
     for column in {name for name in columns if name.lower() not in AGES} - known:
         nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
         if nearest:
@@ -321,38 +298,8 @@ def _require_columns(path: Path, columns: list[str]) -> None:
                 path=path,
                 found=column,
                 expected=nearest[0],
-                remedy="Rename it; columns with quite other names are left alone.",
+                remedy="Rename it; columns with quite other names are covariates.",
             )
-
-
-def _age_column(path: Path, rows: Sequence[Mapping[str, str]]) -> str:
-    """Returns the column with the gestational age; InputError where several may be it that do not say the same."""
-    columns = list(rows[0])
-    found = [name for name in SURE_AGES if name in columns][:1] or [
-        column for name in AGES for column in columns if column.lower() == name
-    ]
-    ages = [[_week(row[column], column)[0] for row in rows] for column in found]
-    if any(other != ages[0] for other in ages[1:]):
-        raise InputError(
-            "has several columns that may be the gestational age, which differ",
-            path=path,
-            found=" and ".join(found),
-            expected="one of them",
-            remedy=f"Call that of the gestational age in weeks {SURE_AGES[0]}; it is taken whatever others are there.",
-        )
-    return found[0]
-
-
-def _week(text: str | None, column: str) -> tuple[float | None, str]:
-    """Returns the age and what is wrong with it, empty where nothing is."""
-    try:
-        week = float(text or "")
-    except ValueError:
-        return None, f"{column}: found {text or 'n/a'}; expected the gestational age in weeks"
-    first, last = WEEKS
-    if not first <= week <= last:
-        return None, f"{column}: found {text}; expected gestational weeks, {first:g} to {last:g} (not days or years)"
-    return week, ""
 
 
 def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str]:

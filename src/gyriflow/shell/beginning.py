@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import yaml
 
 from ..config.atlas import Atlas, AtlasSettings, atlas_sections
-from ..config.brains import AGE, AGES, IDS
+from ..config.brains import covariates
+from ..config.scans import IDS, Scan, read_scans
 from ..errors import InputError
-from ..io.files import files_in, read_tab_separated, write_text
+from ..io.files import files_in, read_json, write_text
 from ..io.schemes import SCHEMES
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import read_yaml
@@ -74,8 +74,9 @@ WEEK = re.compile(
 )
 WEEKS = (18.0, 45.0)
 """Numbers in names that may be gestational ages."""
-AGE_COLUMNS = tuple(name for name in AGES if name != AGE)
 ID_COLUMNS = (*IDS, "subject_id", "subject")
+SUBJECT_AND_SESSION = re.compile(r"(?<![A-Za-z0-9])(sub-[A-Za-z0-9]+)(?:[_/](?:.*[_/])?(ses-[A-Za-z0-9]+))?")
+"""The entities of BIDS in a path."""
 HIDDEN = ("results", "resources", "derivatives-gyriflow")
 UNSET = "CHOOSE"
 """Stands where the files do not tell: `gyriflow check` then asks for it."""
@@ -103,8 +104,7 @@ def write_configuration(folder: Path, path: Path, force: bool, quick: bool = Fal
     kinds = ", ".join(f"{count} from {kind}" for kind, count in Counter(map(_kind, found)).items())
     yield f"{len(found)} brain{'s' if len(found) > 1 else ''}: {kinds}"
     for brain in found:
-        unset = [] if brain.entry["week"] != UNSET else ["week: not told by its name"]
-        for note in unset + brain.notes:
+        for note in brain.notes:
             yield f"to be filled in for {brain.entry['id']}: {note}"
 
 
@@ -204,9 +204,11 @@ def _kind(brain: Found) -> str:
 
 def recognise(folder: Path) -> list[Found]:
     """Returns the brains of a folder and the folders in it, the youngest first; InputError where there are none."""
-    files = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
-    ages = participants(folder)
-    found = [*_hemispheres(files, ages), *_volumes(folder, files, ages)]
+    every = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
+    own = [path.parent for path in every if path.name == "dataset_description.json" and _is_own(folder / path)]
+    files = [path for path in every if not any(path.is_relative_to(place) for place in own)]
+    scans, said = participants(folder)
+    found = [*_hemispheres(files, scans), *_volumes(folder, files, scans)]
     if not found:
         raise InputError(
             "no brain was recognised",
@@ -216,21 +218,29 @@ def recognise(folder: Path) -> list[Found]:
             remedy="Write the configuration by hand: config/README.md.",
         )
     _tell_apart(found)
+    for brain in found:
+        if brain.entry["week"] == UNSET and not any(note.startswith("week:") for note in brain.notes):
+            brain.notes.insert(0, f"week: {said or 'not told by its name'}")
     return sorted(found, key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
 
 
-def participants(folder: Path) -> dict[str, float]:
-    """Returns the gestational ages of a folder's participants.tsv, by id; nothing where there is none."""
+def _is_own(description: Path) -> bool:
+    """Returns whether a BIDS data set was made by gyriflow itself."""
+    described = read_json(description)
+    made_by = described.get("GeneratedBy") if isinstance(described, dict) else None
+    return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in made_by or ())
+
+
+def participants(folder: Path) -> tuple[list[Scan], str]:
+    """Returns the scans that a folder's participants.tsv and sessions.tsv are of, and why none are known."""
+    said = ""
     for path in (folder / "participants.tsv", *sorted(folder.glob("*/participants.tsv"))):
         if path.is_file():
-            rows = read_tab_separated(path)
-            columns = {name.lower(): name for name in rows[0]}
-            of_id = next((columns[name] for name in ID_COLUMNS if name in columns), None)
-            of_age = next((columns[name] for name in AGE_COLUMNS if name in columns), None)
-            if of_id and of_age:
-                ages = pd.to_numeric([row[of_age] for row in rows], errors="coerce")
-                return {row[of_id]: float(age) for row, age in zip(rows, ages, strict=True) if age == age}
-    return {}
+            try:
+                return read_scans(path, ids=ID_COLUMNS), ""
+            except InputError as error:
+                said = said or str(error)
+    return [], said
 
 
 def week_in(text: str) -> float | None:
@@ -269,7 +279,7 @@ def fitting_scheme(labels: np.ndarray) -> tuple[str | None, list[str]]:
     return None, best
 
 
-def _hemispheres(files: Sequence[Path], ages: dict[str, float]) -> list[Found]:
+def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> list[Found]:
     """Returns the brains with pial surfaces, of both sides and then with their white ones, or of one side alone."""
     pairs: dict[tuple[str, str], dict[str, Path]] = {}
     for file in files:
@@ -292,13 +302,13 @@ def _hemispheres(files: Sequence[Path], ages: dict[str, float]) -> list[Found]:
         if kind == "pial":
             side, file = next((side, sides[side]) for side in SIDE if side in sides)
             whole = {"hemispheres": files_of} if len(sides) == 2 else {"hemisphere": {"file": str(file), "side": side}}
-            brains[plain] = Found({"id": _id(file), "week": _week(file, ages)} | whole)
+            brains[plain] = _found(file, scans, whole)
         elif len(sides) == 2 and plain in brains and "hemispheres" in brains[plain].entry:
             brains[plain].entry["hemispheres"]["white"] = files_of
     return list(brains.values())
 
 
-def _volumes(folder: Path, files: Sequence[Path], ages: dict[str, float]) -> list[Found]:
+def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> list[Found]:
     volumes = [file for file in files if file.name.lower().endswith(VOLUMES)]
     named = [file for file in volumes if LABELS.search(file.name)]
     brains = []
@@ -308,7 +318,7 @@ def _volumes(folder: Path, files: Sequence[Path], ages: dict[str, float]) -> lis
         except InputError:
             continue
         scheme, candidates = fitting_scheme(labels)
-        brain = Found({"id": _id(file), "week": _week(file, ages), "labels": str(file), "scheme": scheme or UNSET})
+        brain = _found(file, scans, {"labels": str(file), "scheme": scheme or UNSET})
         if scheme is None:
             none = f"none of {', '.join(SCHEMES)} fits; write one under schemes"
             brain.notes.append(f"scheme: {' or '.join(candidates) or none}")
@@ -336,33 +346,49 @@ def _stem(file: Path) -> str:
     )
 
 
-def _week(file: Path, ages: dict[str, float]) -> float | str:
-    """Returns the age of a file's brain: of the participant that its path names, or of its name, else UNSET."""
-    parts = "/".join(file.parts)
-    for name, age in ages.items():
-        if re.search(rf"(?<![A-Za-z0-9]){re.escape(name)}(?![A-Za-z0-9])", parts):
-            return age
-    # the file's own name before those of folders
-    return next((week for text in reversed(file.parts) if (week := week_in(text)) is not None), UNSET)
+def _found(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Found:
+    """Returns the brain of a file: of the scan that its path names, or of the age in its name."""
+    entities = SUBJECT_AND_SESSION.search(file.as_posix())
+    subject = {"subject": entities[1]} if entities and entities[2] else {}
+    # a participant's row holds for its sessions too, but the session's own comes first
+    named = [scan for scan in scans if all(_names(file, part) for part in (scan.subject or scan.id, scan.session))]
+    scan = max(named, key=lambda scan: scan.session is not None, default=None)
+    if scan is None:
+        # the file's own name before those of folders
+        week = next((week for text in reversed(file.parts) if (week := week_in(text)) is not None), UNSET)
+        return Found({"id": _id(file), "week": week} | subject | source)
+    week, notes = (scan.week, []) if scan.week is not None else (UNSET, [f"week: {scan.cause}"])
+    return Found({"id": _id(file), "week": week} | subject | covariates(scan) | source, notes)
+
+
+def _names(file: Path, part: str | None) -> bool:
+    """Returns whether a file's path names a participant or a session."""
+    return part is None or bool(re.search(rf"(?<![A-Za-z0-9]){re.escape(part)}(?![A-Za-z0-9])", file.as_posix()))
 
 
 def _id(file: Path) -> str:
-    """Returns an id for a file's brain: the participant, or the name without what says left, pial or labels."""
-    subject = next((part for part in file.parts[:-1] if part.startswith("sub-")), None)
-    name = subject or file.name
+    """Returns an id for a file's brain: its participant and session, or its name without what says pial or labels."""
+    entities = SUBJECT_AND_SESSION.search(file.as_posix())
+    if entities:
+        return "_".join(filter(None, entities.groups()))
+    name = file.name
     for pattern in (*SIDE.values(), *OF_SURFACES.values()):
         name = pattern.sub("", name)
-    name = _stem(Path(name)) if subject is None else name
-    if len(file.parts) > 1 and subject is None and (not name.strip("._-") or not re.search(r"\d", name)):
+    name = _stem(Path(name))
+    if len(file.parts) > 1 and (not name.strip("._-") or not re.search(r"\d", name)):
         name = file.parts[-2]
     return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"
 
 
 def _tell_apart(found: Sequence[Found]) -> None:
-    """Gives equal ids a number."""
+    """Gives equal ids a number; several files of one scan are no scans of several weeks."""
+    counts: Counter[str] = Counter(brain.entry["id"] for brain in found)
     seen: Counter[str] = Counter()
     for brain in found:
         name = brain.entry["id"]
         seen[name] += 1
+        if counts[name] > 1:
+            brain.entry.pop("subject", None)
+            brain.notes.append(f"{counts[name]} files are of {name}: keep one")
         if seen[name] > 1:
             brain.entry["id"] = f"{name}-{seen[name]}"

@@ -40,6 +40,7 @@ def test_rows_are_brains_whatever_their_files_are_of(folder):
     assert (brains["sub-1"].week, brains["sub-1"].scheme, brains["sub-1"].population) == (24.5, "feta-7", None)
     assert brains["sub-2"].source == "hemispheres"
     assert brains["sub-2"].population == "twins"
+    assert brains["sub-1"].covariates == {"sex": "F"}
     assert brains["sub-3"].sides == ("left",)
     assert brains["sub-3"].label_volume == str(folder / "bids" / "a.nii.gz")
 
@@ -56,7 +57,7 @@ def test_values_for_all_rows_stand_in_the_configuration(folder):
 
 @pytest.mark.parametrize("column", ["segmentation.command", "segmentation.container"])
 def test_a_table_that_names_programs_is_refused(folder, column):
-    head = ("id", "age", "image", "scheme", column)
+    head = ("id", "week", "image", "scheme", column)
     write(folder, head, ("sub-1", "24", "a.nii.gz", "feta-7", "n/a"))
     with pytest.raises(
         InputError, match=rf"participants\.tsv: names programs(.|\n)*found {column}(.|\n)*columns in the"
@@ -65,14 +66,14 @@ def test_a_table_that_names_programs_is_refused(folder, column):
 
 
 def test_the_program_of_all_rows_stands_in_the_configuration(folder):
-    write(folder, ("id", "age", "image", "scheme"), ("sub-1", "24", "a.nii.gz", "feta-7"))
+    write(folder, ("id", "week", "image", "scheme"), ("sub-1", "24", "a.nii.gz", "feta-7"))
     section = {"file": "bids/participants.tsv", "columns": {"segmentation.command": "model {image} {labels}"}}
     (brain,) = config(folder, section).brains
     assert brain.segmentation.command == "model {image} {labels}"
 
 
 def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(folder):
-    head = ("participant_id", "age", "labels", "scheme")
+    head = ("participant_id", "gestational_age", "labels", "scheme")
     write(
         folder,
         head,
@@ -82,7 +83,7 @@ def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(fold
         ("sub-4", "24", "none.nii.gz", "feta-7"),
         ("sub-5", "24", "n/a", "feta-7"),
     )
-    with pytest.raises(InputError, match=r"4 problems(.|\n)*sub-2: age: found n/a(.|\n)*with --keep-going"):
+    with pytest.raises(InputError, match=r"4 problems(.|\n)*sub-2: gestational_age: found n/a(.|\n)*with --keep-going"):
         config(folder)
     found = config(folder, keep_going=True)
     assert [brain.id for brain in found.brains] == ["sub-1"]
@@ -133,13 +134,67 @@ def test_the_column_called_gestational_age_is_believed(folder):
     assert config(folder).brains[0].week == 24.3
 
 
+@pytest.mark.parametrize(
+    ("text", "week"),
+    [("24.3", 24.3), ("24+3", 24.43), ("25w2d", 25.29), ("25 weeks 2 days", 25.29), ("24w", 24), ("170d", 24.29)],
+)
+def test_ages_are_read_as_they_are_written(folder, text, week):
+    write(folder, ("id", "ga", "labels", "scheme"), ("sub-1", text, "a.nii.gz", "feta-7"))
+    assert config(folder).brains[0].week == week
+
+
+def test_a_sidecar_names_the_column_and_its_unit(folder):
+    head, row = ("id", "age", "pma", "ga_birth", "labels", "scheme"), ("a.nii.gz", "feta-7")
+    write(folder, head, ("sub-1", "31", "170", "39", *row))
+    sidecar = folder / "bids" / "participants.json"
+    sidecar.write_text(
+        '{"pma": {"Description": "Gestational age at scan", "Units": "days"},'
+        ' "ga_birth": {"Description": "Gestational age at birth", "Units": "weeks"}}'
+    )
+    (brain,) = config(folder).brains
+    assert (brain.week, brain.covariates) == (24.29, {"age": "31", "ga_birth": "39"})
+    sidecar.write_text('{"age": {"Units": "years"}}')
+    with pytest.raises(InputError, match="has no column of gestational ages(.|\n)*age in other units"):
+        config(folder)
+
+
+def test_whole_numbers_called_age_may_be_the_mothers(folder):
+    write(folder, ("id", "age", "labels", "scheme"), ("sub-1", "31", "a.nii.gz", "feta-7"))
+    with pytest.raises(InputError, match=r"participants\.tsv: has a column age that may be(.|\n)*Units"):
+        config(folder)
+
+
+def test_a_participant_has_a_brain_for_each_session(folder):
+    write(folder, ("participant_id", "sex"), ("sub-1", "F"), ("sub-2", "M"))
+    for name, ages in (("sub-1", ("21.5", "24.5")), ("sub-2", ("22.5", "23.5"))):
+        place = folder / "bids" / name
+        place.mkdir()
+        rows = "".join(f"ses-{number}\t{age}\n" for number, age in enumerate(ages, 1))
+        (place / f"{name}_sessions.tsv").write_text(f"session_id\tgestational_age\n{rows}")
+        for number in (1, 2):
+            (place / f"ses-{number}").mkdir()
+            (place / f"ses-{number}" / f"{name}_ses-{number}_dseg.nii.gz").touch()
+    section = {
+        "file": "bids/participants.tsv",
+        "columns": {"labels": "{subject}/{session}/{id}_dseg.nii.gz", "scheme": "feta-7"},
+    }
+    found = load({"participants": section, "start": "sub-1_ses-1", "folding": FOLDING}, folder)
+    assert [(brain.id, brain.week, brain.subject) for brain in found.brains] == [
+        ("sub-1_ses-1", 21.5, "sub-1"),
+        ("sub-1_ses-2", 24.5, "sub-1"),
+        ("sub-2_ses-1", 22.5, "sub-2"),
+        ("sub-2_ses-2", 23.5, "sub-2"),
+    ]
+    assert found.scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
+
+
 def test_rows_of_one_id_are_problems_where_one_cannot_be_used(folder):
-    head, row = ("id", "age", "labels", "scheme"), ("a.nii.gz", "feta-7")
+    head, row = ("id", "week", "labels", "scheme"), ("a.nii.gz", "feta-7")
     write(folder, head, ("sub-1", "24", *row), ("sub-2", "n/a", *row), ("sub-2", "170", *row))
-    with pytest.raises(InputError, match=r"2 problems(.|\n)*sub-2: age: found n/a(.|\n)*sub-2: age: found 170"):
+    with pytest.raises(InputError, match=r"2 problems(.|\n)*sub-2: week: found n/a(.|\n)*sub-2: week: found 170"):
         config(folder)
     write(folder, head, ("sub-1", "24", *row), ("sub-1", "n/a", *row))
-    with pytest.raises(InputError, match=r"sub-1: age: found n/a(.|\n)*the id is that of 2 rows; ids are unique"):
+    with pytest.raises(InputError, match=r"sub-1: week: found n/a(.|\n)*the id is that of 2 rows; ids are unique"):
         config(folder, keep_going=True)
 
 
@@ -151,7 +206,7 @@ def test_rows_of_one_id_are_problems_where_one_cannot_be_used(folder):
     ],
 )
 def test_more_files_than_are_used_are_refused(folder, files, side, said):
-    write(folder, ("id", "age", "files", "side"), ("sub-1", "24", files, side))
+    write(folder, ("id", "week", "files", "side"), ("sub-1", "24", files, side))
     with pytest.raises(InputError, match=f"sub-1: files: {said}"):
         config(folder)
 

@@ -69,7 +69,7 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     touched(tmp_path, "fetal.week23.left.pial.surf.gii")
     touched(tmp_path, *(f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white")))
     (tmp_path / "participants.tsv").write_text("participant_id\tsex\tga\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
-    assert participants(tmp_path) == {"sub-07": 27.3}
+    assert {scan.id: scan.week for scan in participants(tmp_path)[0]} == {"sub-07": 27.3, "sub-08": None}
     first, alone, second = (brain.entry for brain in recognise(tmp_path))
     assert first == {
         "id": "fetal.week22",
@@ -81,7 +81,7 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
         },
     }
     assert alone["hemisphere"] == {"file": "fetal.week23.left.pial.surf.gii", "side": "left"}
-    assert (second["id"], second["week"]) == ("sub-07", 27.3)
+    assert (second["id"], second["week"], second["covariates"]) == ("sub-07", 27.3, {"sex": "F"})
     assert second["hemispheres"]["white"] == {"left": "sub-07/surf/lh.white", "right": "sub-07/surf/rh.white"}
 
 
@@ -118,3 +118,43 @@ def test_a_folder_without_brains_says_what_is_expected(tmp_path):
     touched(tmp_path, "notes.txt")
     with pytest.raises(InputError, match="no brain was recognised; found 1 files; expected tissue label volumes"):
         recognise(tmp_path)
+
+
+def bids_folder(folder):
+    for session in ("ses-1", "ses-2"):
+        place = folder / "derivatives" / "seg" / "sub-01" / session / "anat"
+        place.mkdir(parents=True)
+        (place / f"sub-01_{session}_desc-brain_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    (folder / "participants.tsv").write_text("participant_id\tsex\nsub-01\tF\nsub-02\tM\n")
+    (folder / "sub-01").mkdir()
+    (folder / "sub-02").mkdir()
+    for name, ages in (("sub-01", ("21w2d", "24+3")), ("sub-02", ("22.1", "25"))):
+        rows = "".join(f"ses-{number}\t{age}\t3.0\n" for number, age in enumerate(ages, 1))
+        (folder / name / f"{name}_sessions.tsv").write_text("session_id\tga\ttesla\n" + rows)
+
+
+def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
+    bids_folder(tmp_path)
+    own = tmp_path / "derivatives" / "gyriflow"
+    (own / "sub-01").mkdir(parents=True)
+    (own / "sub-01" / "sub-01_desc-x_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    (own / "dataset_description.json").write_text('{"GeneratedBy": [{"Name": "gyriflow"}]}')
+    first, second = (brain.entry for brain in recognise(tmp_path))
+    assert (first["id"], first["week"], first["subject"]) == ("sub-01_ses-1", 21.29, "sub-01")
+    assert (second["id"], second["week"], second["subject"]) == ("sub-01_ses-2", 24.43, "sub-01")
+    assert first["covariates"] == {"sex": "F", "tesla": "3.0"}
+    path = tmp_path / "gyriflow.yaml"
+    list(write_configuration(tmp_path, path, force=False))
+    config = load(yaml.safe_load(path.read_text()), tmp_path)
+    assert config.scans == {"sub-01": ["sub-01_ses-1", "sub-01_ses-2"]}
+
+
+def test_an_ambiguous_age_is_asked_for_by_file_and_column(tmp_path):
+    (tmp_path / "sub-01_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    (tmp_path / "sub-01_dseg_copy.nii.gz").write_bytes(LABELS.read_bytes())
+    (tmp_path / "participants.tsv").write_text("participant_id\tage\nsub-01\t31\n")
+    first, second = recognise(tmp_path)
+    assert first.entry["week"] == UNSET
+    assert f"week: {tmp_path}/participants.tsv: has a column age that may be" in first.notes[0]
+    assert second.entry["id"] == "sub-01-2"
+    assert "2 files are of sub-01: keep one" in second.notes
