@@ -17,7 +17,7 @@ from .conftest import Workflow
 pytestmark = pytest.mark.slow
 
 ROWS = (
-    ("participant_id", "age", "sex", "files", "side", "scheme"),
+    ("participant_id", "week", "sex", "files", "side", "scheme"),
     ("sub-01", "22", "F", "surface.surf.gii", "left", "n/a"),
     ("sub-02", "23", "M", "labels.nii.gz", "left", "spina-bifida-atlas"),
     ("sub-03", "23", "F", "torn.nii.gz", "n/a", "spina-bifida-atlas"),
@@ -64,7 +64,7 @@ def cohort(checkout_copy, tmp_path_factory):
 @pytest.mark.fault(54)
 def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(cohort):
     assert cohort.refusal.returncode == 2
-    assert "sub-04: age: found n/a" in cohort.refusal.stderr
+    assert "sub-04: week: found n/a" in cohort.refusal.stderr
 
 
 @pytest.mark.fault(54)

@@ -75,7 +75,7 @@ def test_a_table_of_participants_is_found_beside_its_configuration(workflow):
     for folder in ("study", "elsewhere"):
         (workflow.directory / folder).mkdir()
         (workflow.directory / folder / "labels.nii.gz").touch()
-        table = f"participant_id\tage\tlabels\nof-{folder}\t24\tlabels.nii.gz\n"
+        table = f"participant_id\tweek\tlabels\nof-{folder}\t24\tlabels.nii.gz\n"
         (workflow.directory / folder / "participants.tsv").write_text(table)
     table = {"file": "participants.tsv", "columns": {"scheme": "binary"}}
     study = {"participants": table, "start": "all", "folding": {"end_week": 26}}

@@ -107,6 +107,7 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
     assert set(published["flag"]) == {"other labels"}
     bids = results / "export" / "sub-one" / "ses-2200w" / "anat"
     assert (bids / "sub-one_ses-2200w_hemi-L_thickness.shape.gii").exists()
+    assert not list((results / "export").rglob(".snakemake*"))
 
 
 @pytest.mark.slow

@@ -60,11 +60,13 @@ rule group_tables:
         change=f"{STUDY}/change.csv",
     params:
         scans=CONFIG.scans,
+        covariates={brain.id: brain.covariates for brain in CONFIG.brains},
     script:
         "../scripts/group_tables.py"
 
 
 EXPORTED = PLAN.measuring.exported
+EXPORT_LAST = {"plain": "metrics_wide.csv", "bids": "dataset_description.json"}
 
 
 # a target of its own: what a study is handed on as
@@ -75,10 +77,12 @@ rule export:
             for brain in EXPORTED
             for kind in ("surfaces", "maps", "regions")
         ],
+        [brain["report"] for brain in EXPORTED],
         long=rules.group_tables.output.long,
         wide=rules.group_tables.output.wide,
     output:
-        directory("results/export"),
+        # a folder would hold a file of Snakemake's
+        f"results/export/{EXPORT_LAST[CONFIG.metrics.export]}",
     params:
         brains=EXPORTED,
         names=CONFIG.metrics.export,

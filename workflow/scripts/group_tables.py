@@ -8,5 +8,5 @@ output = snakemake.output
 with step(snakemake.log[0]):
     table = long_table([read_table(path) for path in snakemake.input])
     write_table(output.long, table)
-    write_table(output.wide, wide_table(table))
+    write_table(output.wide, wide_table(table, snakemake.params.covariates))
     write_table(output.change, change_between_scans(table, snakemake.params.scans))

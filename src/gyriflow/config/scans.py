@@ -26,6 +26,7 @@ AGES = (*IN_WEEKS, *IN_DAYS)
 """All names of that column, in small letters or capitals."""
 NOTHING = frozenset(("", "n/a"))
 """What stands for no value in BIDS."""
+SUBJECT = re.compile(r"sub-[A-Za-z0-9]{1,100}")
 DAYS = "days"
 UNITS = {
     **dict.fromkeys(("w", "wk", "wks", "week", "weeks", "gw"), "weeks"),
@@ -65,11 +66,12 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None, ids: Sequen
     rows = [dict(further or {}) | row for row in _read(path)]
     id_column = _required(path, list(rows[0]), ids, "ids")
     sessions = _sessions(path.parent, [row[id_column] for row in rows])
-    of_participants = None if all(row[id_column] in sessions for row in rows) else _Ages(path, rows)
+    # no age is needed here of those who have sessions
+    whole = [] if all(row[id_column] in sessions for row in rows) else [_Ages(path, rows)]
     scans = []
     for row in rows:
         name = row[id_column]
-        for table, session in sessions.get(name) or [(of_participants, row)]:
+        for table, session in sessions.get(name) or [(table, row) for table in whole]:
             # a session's own values stand for the participant's
             values = row | session
             label = values.get(SESSION, "n/a")
@@ -81,8 +83,8 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None, ids: Sequen
                     filled = text.replace("{id}", own_id).replace("{subject}", name)
                     values[key] = filled.replace("{session}", label)
             week, cause = table.week(session.get(table.column))
-            parts = (name, label) if known else (None, None)
-            scans.append(Scan(own_id, *parts, week, cause, values, table.column))
+            subject, own_session = (name, label) if known else (None, None)
+            scans.append(Scan(own_id, subject, own_session, week, cause, values, table.column))
     return scans
 
 
@@ -115,9 +117,9 @@ def _sessions(folder: Path, participants: Sequence[str]) -> dict[str, list[tuple
             found.setdefault(row[column], []).append((ages, row))
     for name in participants:
         path = folder / name / f"{name}_sessions.tsv"
-        # without a column of ages it says nothing that is asked here
-        if path.is_file() and (ages := _Ages.of_sessions(path)):
-            found[name] = [(ages, row) for row in ages.rows]
+        # any other name leads elsewhere; without a column of ages the table says nothing that is asked here
+        if SUBJECT.fullmatch(name) and path.is_file() and (aged := _Ages.of_sessions(path)):
+            found[name] = [(aged, row) for row in aged.rows]
     return found
 
 
@@ -200,14 +202,18 @@ def _sidecar(path: Path) -> dict[str, Any]:
     """Returns what the sidecar of a table says of its columns: that beside it, or one for all above its folder."""
     kind = path.stem.rpartition("_")[2]
     places = [path.with_suffix(".json"), *(folder / f"{kind}.json" for folder in path.parents[:2])]
-    found = next((read_json(place) for place in places if place.is_file()), {})
+    found: Any = next((read_json(place) for place in places if place.is_file()), {})
     return {name: said for name, said in found.items() if isinstance(said, dict)} if isinstance(found, dict) else {}
 
 
 def _describes_age(said: Mapping[str, Any] | None) -> bool:
     """Returns whether a sidecar describes a column as the gestational age, in weeks or days."""
     words = " ".join(str((said or {}).get(key, "")) for key in ("LongName", "Description"))
-    return bool(GESTATIONAL.search(words)) and not OF_BIRTH.search(words) and str((said or {}).get("Units", "weeks")).strip().lower() in UNITS
+    return (
+        bool(GESTATIONAL.search(words))
+        and not OF_BIRTH.search(words)
+        and str((said or {}).get("Units", "weeks")).strip().lower() in UNITS
+    )
 
 
 def _required(path: Path, columns: Sequence[str], names: Sequence[str], what: str) -> str:

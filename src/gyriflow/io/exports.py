@@ -1,6 +1,8 @@
 """Surfaces, maps and tables of a study in a folder to hand on, with their own names or those of BIDS derivatives."""
 
+import re
 import shutil
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,30 +10,59 @@ from pathlib import Path
 import pandas as pd
 
 from ..errors import InputError
+from ..geometry.triangles import transformed
 from ..parameters.terms import STRUCTURES, Side
-from .files import AnyPath, replaced, write_json, write_table
-from .surfaces import read_vertex_maps, write_vertex_maps
+from .files import AnyPath, read_json, replaced, write_json, write_table, write_text
+from .poses import read_pose
+from .surfaces import read_surface, read_vertex_maps, write_surface, write_vertex_maps
 
 MEASURED = "real"
+BIDS_VERSION = "1.10.0"
 BIDS_MAPS = {
-    "mean_curvature": "curv",
-    "sulcal_depth_mm": "sulc",
-    "thickness_mm": "thickness",
-    "shape_index": "desc-shapeIndex_shape",
-    "curvedness": "desc-curvedness_shape",
-    "gaussian_curvature": "desc-gaussian_curv",
-    "local_gyrification_index": "desc-localGyrification_shape",
-    "spangy_dominant_band": "desc-spangyBand_shape",
-    "reliable": "desc-reliable_shape",
+    "mean_curvature": ("curv", "1/mm", "Mean curvature, positive on gyri"),
+    "sulcal_depth_mm": ("sulc", "mm", "Sulcal depth: distance to the convex hull of the hemisphere"),
+    "thickness_mm": ("thickness", "mm", "Cortical thickness"),
+    "gaussian_curvature": ("gaussCurv", "1/mm^2", "Gaussian curvature"),
+    "curvedness": ("curvedness", "1/mm", "Curvedness, the root mean square of the principal curvatures"),
 }
-"""Entities and suffix of the files of maps that BIDS, or a label of this project's own, names."""
+"""Suffix, unit and description of maps whose own names do not tell them."""
+OF_STUDY = ("participants", "metrics_wide", "metrics_long")
+"""Tables of all subjects."""
+IGNORED = """\
+# BIDS has no names for surfaces and the maps on them yet: these are those that its proposal BEP011 has for them
+*.surf.gii
+*.shape.gii
+{kinds}
+# tables of the whole study, its report, and what is to be kept of the work
+/metrics_*
+/report.html
+/work
+"""
+README = """\
+# gyriflow derivatives
+
+Pial surfaces of fetal brains, maps of folding on them, and simulated brains of later weeks, made by gyriflow {version}.
+
+- `*_pial.surf.gii`: surfaces, in the world coordinates (RAS+ mm) of the input's volumes; `*_curv.shape.gii` and others:
+  a map with a value at each of their vertices, described with its unit in the file `.json` of its name.
+- `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each.
+- `participants.tsv` and `sessions.tsv`: gestational ages in weeks. `metrics_wide.tsv` has a row for each brain,
+  `metrics_long.tsv` one for each number; `metrics_wide.json` has units.
+"""
+PEOPLE = {
+    "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
+    "brain": {"Description": "Name of the brain in gyriflow's own results"},
+}
+OF_INPUT = {"Description": "As in the tables of the input"}
+SESSION = re.compile(r"_ses-([A-Za-z0-9]+)")
 
 
 @dataclass(frozen=True)
 class ExportedBrain:
     """A brain at a week, and its files by the sides that it has; regions may be empty.
 
-    The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said.
+    The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said. Of a
+    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface.
     """
 
     brain: str
@@ -41,6 +72,8 @@ class ExportedBrain:
     surfaces: Mapping[Side, str]
     maps: Mapping[Side, str]
     regions: Mapping[Side, str]
+    report: str
+    covariates: Mapping[str, str]
 
 
 def export_plain(folder: AnyPath, brains: Sequence[ExportedBrain], tables: Mapping[str, pd.DataFrame]) -> None:
@@ -55,50 +88,141 @@ def export_plain(folder: AnyPath, brains: Sequence[ExportedBrain], tables: Mappi
 
 
 def export_bids(
-    folder: AnyPath, brains: Sequence[ExportedBrain], tables: Mapping[str, pd.DataFrame], version: str
+    folder: AnyPath,
+    brains: Sequence[ExportedBrain],
+    tables: Mapping[str, pd.DataFrame],
+    version: str,
+    units: Mapping[str, str],
 ) -> None:
-    """Writes a BIDS derivative: a session a week, simulated brains with `acq-RUN`, a file for each map, tables as TSV.
+    """Writes a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
 
-    Names follow the BIDS specification 1.9 with the suffixes that BEP011 proposes for surfaces. InputError where two
-    brains of one subject have the same session.
+    Subjects and sessions keep their names. Brains of no named session have their week's, where a subject has several.
+    Surfaces lie in the world of the brain's own volumes, unless its hemispheres were posed separately. `tables`
+    have the columns subject, run and week; `units` are those of columns of `metrics_wide`. Suffixes of surfaces are
+    those that BEP011 proposes. InputError where two brains have the same names.
     """
     folder = Path(folder)
-    made_by = [{"Name": "gyriflow", "Version": version}]
-    described = {"Name": "gyriflow", "BIDSVersion": "1.9.0", "DatasetType": "derivative", "GeneratedBy": made_by}
-    write_json(folder / "dataset_description.json", described)
-    people: list[tuple[str, str, str, float]] = []
-    taken: dict[tuple[str, str, str], ExportedBrain] = {}
+    names = _subjects_and_sessions([brain for brain in brains if brain.run == MEASURED])
+    described: dict[str, dict[str, str]] = {"pial": {"Description": "Pial surface, RAS+ mm", "Units": "mm"}}
+    simulated: dict[str, str] = {}
+    taken: dict[tuple[str, str], ExportedBrain] = {}
     for brain in brains:
-        name, session = f"sub-{_alphanumeric(brain.subject)}", f"ses-{_alphanumeric(f'{brain.week:.2f}')}w"
-        before = taken.setdefault((name, session, _alphanumeric(brain.run)), brain)
-        if before is not brain:
+        subject, session = names[brain.brain]
+        stem, label = "_".join(filter(None, (subject, session))), ""
+        if brain.run != MEASURED:
+            label = f"{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
+            simulated[f"desc-{label}"] = f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
+        if (other := taken.setdefault((stem, label), brain)) is not brain:
             raise InputError(
-                f"two brains have the same BIDS name {name}_{session}",
-                found=f"{before.brain} and {brain.brain}",
-                expected="ids that differ in their letters and digits",
+                f"two brains have the same BIDS name {stem}",
+                found=" and ".join(f"{one.brain} ({one.run})" for one in (other, brain)),
+                expected="ids and runs that differ in their letters and digits",
             )
-        if brain.run == MEASURED:
-            people.append((name, session, brain.brain, brain.week))
-        run = "" if brain.run == MEASURED else f"_acq-{_alphanumeric(brain.run)}"
+        pose = read_pose(brain.report)
+        desc = f"_desc-{label}" if label else ""
         for side, surface in brain.surfaces.items():
-            stem = folder / name / session / "anat" / f"{name}_{session}{run}_hemi-{side[0].upper()}"
-            _copy(surface, f"{stem}_pial.surf.gii")
+            named = f"{folder / subject / (session or '') / 'anat' / stem}_hemi-{side[0].upper()}"
+            mesh = read_surface(surface)
+            mesh = transformed(mesh, pose.inverse) if pose.together else mesh
+            write_surface(f"{named}{desc}_pial.surf.gii", mesh, STRUCTURES[side])
             for quantity, values in read_vertex_maps(brain.maps[side]).items():
-                # a map that BIDS has no name for is described by its own
-                kind = BIDS_MAPS.get(quantity, f"desc-{_alphanumeric(quantity.title())}_shape")
-                write_vertex_maps(f"{stem}_{kind}.shape.gii", {quantity: values}, STRUCTURES[side])
+                suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
+                described[suffix] = {"Description": text, "Units": unit}
+                write_vertex_maps(f"{named}{desc}_{suffix}.shape.gii", {quantity: values}, STRUCTURES[side])
             if side in brain.regions:
-                _copy(brain.regions[side], f"{stem}_desc-regions_dseg.label.gii")
-    sessions = pd.DataFrame(people, columns=["participant_id", "session_id", "brain", "gestational_age_weeks"])
-    participants = sessions[["participant_id"]].drop_duplicates()
-    for name, table in {"participants": participants, "sessions": sessions, **tables}.items():
-        with replaced(folder / f"{name}.tsv") as temporary:
-            table.to_csv(temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a")
+                _copy(brain.regions[side], f"{named}{desc or '_desc-regions'}_dseg.label.gii")
+    for suffix, sidecar in described.items():
+        write_json(folder / f"{suffix}.json", sidecar)
+    ignored = "\n".join(f"/{suffix}.json" for suffix in sorted(described))
+    write_text(folder / ".bidsignore", IGNORED.format(kinds=ignored))
+    write_text(folder / "README.md", README.format(version=version))
+    if simulated:
+        _write_tsv(folder / "descriptions.tsv", pd.DataFrame(simulated.items(), columns=["desc_id", "description"]))
+    _write_people(folder, [brain for brain in brains if brain.run == MEASURED], names)
+    for name, table in tables.items():
+        ids = [names[brain] for brain in table["subject"]]
+        table = table.rename(columns={"subject": "brain"})
+        table.insert(0, "participant_id", [subject for subject, _ in ids])
+        table.insert(1, "session_id", [session for _, session in ids])
+        _write_tsv(folder / f"{name}.tsv", table)
+    write_json(folder / "metrics_wide.json", {column: {"Units": unit} for column, unit in units.items()})
+    made_by = [
+        {"Name": "gyriflow", "Version": version, "Description": "Pial surfaces, maps and simulations of folding"}
+    ]
+    dataset = {"Name": "gyriflow", "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative", "GeneratedBy": made_by}
+    # the last file: where it is there, all is
+    write_json(folder / "dataset_description.json", dataset)
+
+
+def hand_over(exported: AnyPath, folder: AnyPath, subjects_only: bool, source: AnyPath) -> None:
+    """Brings a BIDS derivative to another folder, where what it has of other subjects stays.
+
+    With `subjects_only`, tables of the whole study are left behind. `source` is the data set that it was made of, which
+    `SourceDatasets` then names by its DOI, or else by its folder.
+    """
+    exported, folder, source = Path(exported), Path(folder), Path(source)
+    for path in sorted(exported.iterdir()):
+        if path.is_dir():
+            shutil.rmtree(folder / path.name, ignore_errors=True)
+            shutil.copytree(path, folder / path.name)
+        elif not (subjects_only and path.stem in OF_STUDY):
+            _copy(path, folder / path.name)
+    own = source / "dataset_description.json"
+    said = read_json(own) if own.is_file() else {}
+    doi = str(said.get("DatasetDOI", ""))
+    url = doi if doi.startswith(("doi:", "http")) else f"doi:{doi}" if doi else source.resolve().as_uri()
+    described = read_json(exported / "dataset_description.json")
+    write_json(folder / "dataset_description.json", described | {"SourceDatasets": [{"URL": url}]})
+
+
+def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> dict[str, tuple[str, str | None]]:
+    """Returns the subject and the session of each measured brain, None where the study needs no sessions."""
+    subjects = {brain.brain: f"sub-{_alphanumeric(brain.subject.removeprefix('sub-'))}" for brain in brains}
+    own = {brain.brain: match and f"ses-{match[1]}" for brain in brains for match in [SESSION.search(brain.brain)]}
+    # two subjects whose names differ in other characters only are told by their equal sessions
+    several = max(Counter(brain.subject for brain in brains).values(), default=0) > 1 or any(own.values())
+    week = {brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None for brain in brains}
+    return {brain.brain: (subjects[brain.brain], own[brain.brain] or week[brain.brain]) for brain in brains}
+
+
+def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Mapping[str, tuple[str, str | None]]) -> None:
+    """Writes participants.tsv, and sessions.tsv of each participant where there are any, with their sidecars.
+
+    Covariates that differ between a subject's brains are those of sessions.
+    """
+    first = ["participant_id", "session_id", "gestational_age", "brain"]
+    people = pd.DataFrame(
+        dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True)) | dict(brain.covariates)
+        for brain in brains
+    )
+    most = people.groupby("participant_id").nunique(dropna=False).max()
+    tables = {"participants": people.drop(columns="session_id")}
+    if people["session_id"].notna().any():
+        varying = [name for name in people if name in first[1:] or most.get(name, 0) > 1]
+        tables = {"participants": people.drop(columns=varying).drop_duplicates(), "sessions": people[varying]}
+        for subject, part in people.groupby("participant_id"):
+            _write_tsv(folder / str(subject) / f"{subject}_sessions.tsv", part[varying])
+    _write_tsv(folder / "participants.tsv", tables["participants"])
+    for name, table in tables.items():
+        columns = {str(key): PEOPLE.get(str(key), OF_INPUT) for key in table if key not in first[:2]}
+        write_json(folder / f"{name}.json", columns)
+
+
+def _described(quantity: str) -> tuple[str, str, str]:
+    """Returns suffix, unit and description of a map by its name, such as `distance_to_pial_mm`."""
+    first, *others = quantity.removesuffix("_mm").split("_")
+    suffix = _alphanumeric(first + "".join(word.capitalize() for word in others))
+    return suffix, "mm" if quantity.endswith("_mm") else "arbitrary", " ".join((first.capitalize(), *others))
 
 
 def _alphanumeric(text: str) -> str:
     """Returns the letters and digits of a text, which is what BIDS labels may have."""
-    return "".join(letter for letter in text if letter.isalnum())
+    return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
+
+
+def _write_tsv(path: Path, table: pd.DataFrame) -> None:
+    with replaced(path) as temporary:
+        table.to_csv(temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a")
 
 
 def _copy(source: AnyPath, target: AnyPath) -> None:

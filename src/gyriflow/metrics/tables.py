@@ -36,18 +36,30 @@ def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     return both[columns].reset_index(drop=True)
 
 
-def wide_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Returns a table as of `long_table` with a row per brain, run and week.
+def wide_names(table: pd.DataFrame) -> list[str]:
+    """Returns the column of the wide table that each row of one as of `long_table` belongs in.
 
-    The columns are named by hemisphere, region, metric and unit, such as `left_frontal_area_cm2`; numbers without a
-    unit have none in their name.
+    They are named by hemisphere, region, metric and unit, such as `left_frontal_area_cm2`; numbers without a unit have
+    none in their name.
     """
     unit = table["unit"].astype(str).replace({"1": "", "nan": ""}).str.replace("/", "_per_")
     parts = [table["hemisphere"], table["region"].fillna(""), table["metric"], unit]
-    names = ["_".join(part for part in row if part).replace(" ", "-") for row in zip(*parts, strict=True)]
+    return ["_".join(part for part in row if part).replace(" ", "-") for row in zip(*parts, strict=True)]
+
+
+def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]]) -> pd.DataFrame:
+    """Returns a table as of `long_table` with a row per brain, run and week, and the columns of `wide_names`.
+
+    Before these stand the covariates of each brain, by its id; of a simulated one, its start's.
+    """
+    names = wide_names(table)
     wide = table.assign(column=names).pivot_table("value", BRAIN, "column", aggfunc="first")
     brains = pd.MultiIndex.from_frame(table[BRAIN].drop_duplicates())
-    return wide.reindex(index=brains, columns=list(dict.fromkeys(names))).reset_index().rename_axis(columns=None)
+    wide = wide.reindex(index=brains, columns=list(dict.fromkeys(names))).reset_index().rename_axis(columns=None)
+    known = dict.fromkeys(name for of_brain in covariates.values() for name in of_brain if name not in wide)
+    for place, name in enumerate(known, start=len(BRAIN)):
+        wide.insert(place, name, [covariates.get(brain, {}).get(name) for brain in wide["subject"]])
+    return wide
 
 
 def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:

@@ -180,6 +180,8 @@ class Measuring:
                 "surfaces": {side: measured.parts[side] for side in measured.sides},
                 "maps": {side: f"{measured.folder}/{side}.shape.gii" for side in measured.sides},
                 "regions": dict(zip(SIDES, measured.regions.values(), strict=False)),
+                "report": PIAL["report"].format(brain=measured.subject),
+                "covariates": self.config.brain(measured.subject).covariates,
             }
             for measured in self.every
         ]

@@ -154,7 +154,7 @@ def test_a_sidecar_names_the_column_and_its_unit(folder):
     (brain,) = config(folder).brains
     assert (brain.week, brain.covariates) == (24.29, {"age": "31", "ga_birth": "39"})
     sidecar.write_text('{"age": {"Units": "years"}}')
-    with pytest.raises(InputError, match="has no column of gestational ages(.|\n)*age in other units"):
+    with pytest.raises(InputError, match=r"has no column of gestational ages(.|\n)*age in other units"):
         config(folder)
 
 

@@ -38,7 +38,7 @@ def test_the_study_without_such_a_name_is_valid():
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "a\n"])
 def test_rows_of_a_table_have_such_names_neither(tmp_path, name):
     (tmp_path / "a.gii").touch()
-    lines = [["participant_id", "age", "pial"], [name, "24", "a.gii"]]
+    lines = [["participant_id", "week", "pial"], [name, "24", "a.gii"]]
     table = "\n".join("\t".join(f'"{cell.replace(chr(34), chr(34) * 2)}"' for cell in row) for row in lines)
     (tmp_path / "participants.tsv").write_text(table + "\n")
     said = refusal({"participants": "participants.tsv", "folding": {"end_week": 25}, "start": "first"}, tmp_path)

@@ -1,13 +1,19 @@
 """Exports hold what was measured, under names of their own or of BIDS derivatives."""
 
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 from shapes import hemisphere
 
 from gyriflow.errors import InputError
-from gyriflow.io.exports import ExportedBrain, export_bids, export_plain
-from gyriflow.io.files import read_json
+from gyriflow.geometry.poses import Pose
+from gyriflow.io.exports import ExportedBrain, export_bids, export_plain, hand_over
+from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import (
     read_surface,
     read_vertex_labels,
@@ -17,7 +23,10 @@ from gyriflow.io.surfaces import (
     write_vertex_maps,
 )
 
+VALIDATOR = shutil.which("bids-validator-deno")
 TABLES = {"metrics_wide": pd.DataFrame({"subject": ["case_1"], "area": [3.5], "depth": [np.nan]})}
+POSE = np.array([[0.0, -1, 0, 5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+"""A quarter turn and 5 mm."""
 
 
 @pytest.fixture
@@ -35,37 +44,110 @@ def brain(tmp_path):
         write_vertex_labels(files["regions"], number % 2, {1: "frontal"})
         for kind, path in files.items():
             paths[kind][side] = path
-    return ExportedBrain("case_1", "real", 22.43, "case_1", **paths)
+    write_json(tmp_path / "surface.json", {"pose": Pose(POSE).plain()})
+    return ExportedBrain(
+        "case_1", "real", 22.43, "case_1", **paths, report=str(tmp_path / "surface.json"), covariates={}
+    )
 
 
 def test_bids_derivatives(tmp_path, brain):
     folder = tmp_path / "bids"
-    simulated = ExportedBrain("case_1", "run-a", 22.43, "case_1", brain.surfaces, brain.maps, {})
-    export_bids(folder, [brain, simulated], TABLES, "1.2.3")
+    simulated = replace(brain, run="run-a", week=24.0)
+    export_bids(folder, [brain, simulated], TABLES, "1.2.3", {"area": "cm2"})
     described = read_json(folder / "dataset_description.json")
     assert described["DatasetType"] == "derivative"
-    assert described["GeneratedBy"] == [{"Name": "gyriflow", "Version": "1.2.3"}]
-    place = folder / "sub-case1" / "ses-2243w" / "anat"
+    assert described["GeneratedBy"][0]["Version"] == "1.2.3"
+    place = folder / "sub-case1" / "anat"
     names = {path.name for path in place.iterdir()}
-    assert "sub-case1_ses-2243w_hemi-L_pial.surf.gii" in names
-    assert "sub-case1_ses-2243w_acq-runa_hemi-R_thickness.shape.gii" in names
-    assert len(names) == 2 * (1 + 2 + 1) + 2 * (1 + 2)
+    assert "sub-case1_hemi-L_pial.surf.gii" in names
+    assert "sub-case1_hemi-R_desc-runagw2400_thickness.shape.gii" in names
+    assert len(names) == 2 * 2 * (1 + 2 + 1)
+    # in the world of the volumes
+    turned = hemisphere(1).vertices @ POSE[:3, :3].T + POSE[:3, 3]
+    write_surface(brain.surfaces["right"], replace(hemisphere(1), vertices=turned))
+    export_bids(folder, [brain], TABLES, "1.2.3", {})
     np.testing.assert_allclose(
-        read_surface(place / "sub-case1_ses-2243w_hemi-R_pial.surf.gii").vertices, hemisphere(1).vertices, atol=1e-5
+        read_surface(place / "sub-case1_hemi-R_pial.surf.gii").vertices, hemisphere(1).vertices, atol=1e-5
     )
-    depth = read_vertex_maps(place / "sub-case1_ses-2243w_hemi-L_sulc.shape.gii")
+    depth = read_vertex_maps(place / "sub-case1_hemi-L_sulc.shape.gii")
     assert list(depth) == ["sulcal_depth_mm"]
     np.testing.assert_allclose(depth["sulcal_depth_mm"][:3], [0, 1 / 7, 2 / 7], rtol=1e-6)
-    _, regions = read_vertex_labels(place / "sub-case1_ses-2243w_hemi-L_desc-regions_dseg.label.gii")
+    assert read_json(folder / "sulc.json")["Units"] == "mm"
+    _, regions = read_vertex_labels(place / "sub-case1_hemi-L_desc-regions_dseg.label.gii")
     assert regions == {1: "frontal"}
-    assert (folder / "metrics_wide.tsv").read_text() == "subject\tarea\tdepth\ncase_1\t3.5\tn/a\n"
-    assert (folder / "participants.tsv").read_text() == "participant_id\nsub-case1\n"
+    wide = (folder / "metrics_wide.tsv").read_text()
+    assert wide == "participant_id\tsession_id\tbrain\tarea\tdepth\nsub-case1\tn/a\tcase_1\t3.5\tn/a\n"
+    assert (folder / "descriptions.tsv").read_text().splitlines()[1].startswith("desc-runagw2400\tRun run-a")
+
+
+def scans_of_two(brain):
+    return [
+        replace(
+            brain, brain=f"{subject}_{session}", subject=subject, week=week, covariates={"sex": sex, "tesla": tesla}
+        )
+        for subject, sex, scans in (
+            ("sub-01", "F", (("ses-1", 21.0, "1.5"), ("ses-2", 24.43, "3"))),
+            ("sub-02", "M", (("ses-1", 22.0, "3"),)),
+        )
+        for session, week, tesla in scans
+    ]
+
+
+def test_subjects_and_sessions_keep_their_names(tmp_path, brain):
+    folder = tmp_path / "bids"
+    export_bids(folder, scans_of_two(brain), {}, "1", {})
+    assert (folder / "sub-01" / "ses-2" / "anat" / "sub-01_ses-2_hemi-L_sulc.shape.gii").exists()
+    assert (folder / "participants.tsv").read_text() == "participant_id\tsex\nsub-01\tF\nsub-02\tM\n"
+    assert (folder / "sub-01" / "sub-01_sessions.tsv").read_text().splitlines() == [
+        "session_id\tgestational_age\tbrain\ttesla",
+        "ses-1\t21\tsub-01_ses-1\t1.5",
+        "ses-2\t24.43\tsub-01_ses-2\t3",
+    ]
+    # scans of a subject that have no names of sessions have their weeks'
+    unnamed = [replace(one, brain=f"scan{number}") for number, one in enumerate(scans_of_two(brain))]
+    export_bids(folder, unnamed, {}, "1", {})
+    assert (folder / "sub-01" / "ses-2443w" / "anat").is_dir()
 
 
 def test_brains_of_one_bids_name_are_refused(tmp_path, brain):
-    same = ExportedBrain("case-1", "real", 22.43, "case-1", brain.surfaces, brain.maps, {})
-    with pytest.raises(InputError, match="case_1 and case-1"):
-        export_bids(tmp_path / "bids", [brain, same], {}, "1")
+    same = replace(brain, brain="case-1", subject="case-1")
+    with pytest.raises(InputError, match=r"case_1 \(real\) and case-1"):
+        export_bids(tmp_path / "bids", [brain, same], {}, "1", {})
+
+
+def test_subjects_are_handed_over_beside_others(tmp_path, brain):
+    exported, folder, source = (tmp_path / name for name in ("exported", "out", "source"))
+    export_bids(exported, scans_of_two(brain), TABLES_OF_TWO, "1", {"area": "cm2"})
+    (folder / "sub-07").mkdir(parents=True)
+    (folder / "sub-01" / "ses-9").mkdir(parents=True)
+    source.mkdir()
+    hand_over(exported, folder, True, source)
+    assert {path.name for path in folder.iterdir()} >= {"sub-07", "sub-01", "sub-02", ".bidsignore"}
+    assert not (folder / "sub-01" / "ses-9").exists()
+    assert not (folder / "participants.tsv").exists()
+    write_json(source / "dataset_description.json", {"DatasetDOI": "10.1/x"})
+    hand_over(exported, folder, False, source)
+    assert (folder / "participants.tsv").exists()
+    assert read_json(folder / "dataset_description.json")["SourceDatasets"] == [{"URL": "doi:10.1/x"}]
+
+
+TABLES_OF_TWO = {
+    "metrics_wide": pd.DataFrame({"subject": ["sub-01_ses-1"], "run": ["real"], "week": [21.0], "area": [3.5]}),
+}
+
+
+@pytest.mark.skipif(not VALIDATOR, reason="no bids-validator-deno on PATH: pip install bids-validator-deno")
+def test_the_bids_validator_finds_no_error(tmp_path, brain):
+    folder = tmp_path / "bids"
+    scans = scans_of_two(brain)
+    export_bids(folder, [*scans, replace(scans[0], run="run-a", week=23.5)], TABLES_OF_TWO, "1", {"area": "cm2"})
+    done = subprocess.run([VALIDATOR, folder, "--format", "json"], capture_output=True, text=True, check=False)
+    found = json.loads(done.stdout)["issues"]["issues"]
+    assert [issue for issue in found if issue["severity"] == "error"] == []
+    # it does look: a name that BIDS does not know is an error
+    (folder / "sub-01" / "ses-1" / "anat" / "sub-01_ses-1_acq-x_pial.gii").write_text("")
+    done = subprocess.run([VALIDATOR, folder, "--format", "json"], capture_output=True, text=True, check=False)
+    assert "NOT_INCLUDED" in {issue["code"] for issue in json.loads(done.stdout)["issues"]["issues"]}
 
 
 def test_plain_names_are_those_of_the_results(tmp_path, brain):
@@ -81,6 +163,6 @@ def test_plain_names_are_those_of_the_results(tmp_path, brain):
 def test_a_hemisphere_that_is_alone_and_maps_of_any_name_are_exported(tmp_path, brain):
     left, maps = {"left": brain.surfaces["left"]}, {"left": str(tmp_path / "own.shape.gii")}
     write_vertex_maps(maps["left"], {"distance_to_pial_mm": np.zeros(3)})
-    export_bids(tmp_path / "bids", [ExportedBrain("case_1", "real", 22.43, "case_1", left, maps, {})], {}, "1")
-    names = {path.name.removeprefix("sub-case1_ses-2243w_") for path in (tmp_path / "bids").glob("sub-*/*/anat/*")}
-    assert names == {"hemi-L_pial.surf.gii", "hemi-L_desc-DistanceToPialMm_shape.shape.gii"}
+    export_bids(tmp_path / "bids", [replace(brain, surfaces=left, maps=maps, regions={})], {}, "1", {})
+    names = {path.name.removeprefix("sub-case1_") for path in (tmp_path / "bids").glob("sub-*/anat/*")}
+    assert names == {"hemi-L_pial.surf.gii", "hemi-L_distanceToPial.shape.gii"}

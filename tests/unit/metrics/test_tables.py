@@ -50,12 +50,16 @@ def test_without_scans_the_table_is_empty() -> None:
 
 
 def test_wide_has_a_row_per_brain_and_week() -> None:
-    table = wide_table(long_table([METRICS, REGIONS]))
+    table = wide_table(long_table([METRICS, REGIONS]), {})
     assert len(table) == 6
     row = table.set_index(["subject", "run", "week"]).loc[("other", "real", 24.0)]
     assert row["whole_area_cm2"] == 160.0
     assert row["left_mean_curvedness_1_per_mm"] == 0.1
     assert np.isnan(row["left_frontal_area_cm2"])
+    known = wide_table(long_table([METRICS, REGIONS]), {"other": {"sex": "F", "run": "3"}}).set_index("subject")
+    assert list(known.columns[:3]) == ["run", "week", "sex"]
+    assert known.loc["other", "sex"] == "F"
+    assert known["run"].isin(table["run"]).all()
 
 
 def test_asymmetry_of_sides() -> None:
