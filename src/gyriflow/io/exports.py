@@ -36,6 +36,7 @@ IGNORED = """\
 # tables of the whole study, its report, and what is to be kept of the work
 /metrics_*
 /report.html
+figures
 /work
 """
 README = """\
@@ -154,19 +155,25 @@ def export_bids(
     write_json(folder / "dataset_description.json", dataset)
 
 
-def hand_over(exported: AnyPath, folder: AnyPath, subjects_only: bool, source: AnyPath) -> None:
-    """Brings a BIDS derivative to another folder, where what it has of other subjects stays.
+def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool) -> None:
+    """Brings the BIDS derivative of a study to another folder, where what it has of other subjects stays.
 
-    With `subjects_only`, tables of the whole study are left behind. `source` is the data set that it was made of, which
-    `SourceDatasets` then names by its DOI, or else by its folder.
+    Beside each subject's files come the quality pages of its `brains`, and with the `whole` study its tables and its
+    report. `source` is the data set that it was made of, which `SourceDatasets` then names by its DOI or its folder.
     """
     exported, folder, source = Path(exported), Path(folder), Path(source)
     for path in sorted(exported.iterdir()):
         if path.is_dir():
             shutil.rmtree(folder / path.name, ignore_errors=True)
             shutil.copytree(path, folder / path.name)
-        elif not (subjects_only and path.stem in OF_STUDY):
+        elif whole or path.stem not in OF_STUDY:
             _copy(path, folder / path.name)
+    pages = {
+        f"{brain.split('_')[0]}/figures/{brain}_quality.png": f"brains/{brain}/figures/quality.png" for brain in brains
+    }
+    for target, page in (pages | ({"report.html": "report/report.html"} if whole else {})).items():
+        if (exported.parent / page).is_file():
+            _copy(exported.parent / page, folder / target)
     own = source / "dataset_description.json"
     said = read_json(own) if own.is_file() else {}
     doi = str(said.get("DatasetDOI", ""))

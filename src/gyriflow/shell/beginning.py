@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -147,6 +148,51 @@ def write_prediction(
     yield f"{SUBJECT}: {labels} ({scheme}), {weeks[0]:g} GW; atlas {section}; written to {path}"
 
 
+def write_bids(
+    folder: Path, path: Path, participants: Sequence[str], sessions: Sequence[str], files: str, settings: Path | None
+) -> list[str]:
+    """Writes a configuration for the scans of a BIDS data set, and returns their ids.
+
+    Of it are taken the participants and sessions with these labels, all where there are none, and those files whose
+    paths match a pattern. `settings` is a configuration without brains; what it does not say is as `init` has it, and
+    the first scan of each subject that has several is folded. InputError where a scan has several files, no age or no
+    scheme, or nothing is found.
+    """
+    wanted = [{f"{kind}-{label.removeprefix(f'{kind}-')}" for label in labels}
+              for kind, labels in (("sub", participants), ("ses", sessions))]  # fmt: skip
+    found, problems = [], []
+    for brain in recognise(folder, files):
+        entities = SUBJECT_AND_SESSION.match(brain.entry["id"])
+        if entities and all(
+            not labels or name in labels for labels, name in zip(wanted, entities.groups(), strict=True)
+        ):
+            found.append(brain)
+            problems += [f"{brain.entry['id']}: {note}" for note in brain.notes]
+    if problems or not found:
+        raise InputError(
+            "cannot be run as it is" if problems else "has no such participants and sessions",
+            path=folder,
+            found="\n  ".join(["", *problems]) if problems else " ".join(sorted(wanted[0] | wanted[1])) or "no sub-…",
+            remedy="Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'.",
+        )
+    first: dict[str, dict[str, Any]] = {}
+    for brain in found:
+        first.setdefault(str(brain.entry.get("subject")), brain.entry)
+    several = Counter(str(brain.entry.get("subject")) for brain in found)
+    starts = [entry["id"] for subject, entry in first.items() if subject != "None" and several[subject] > 1]
+    weeks = [brain.entry["week"] for brain in found]
+    given = read_yaml(settings) if settings else {}
+    runs = {"reference": {}} | ({"measured": {"preset": "measured"}} if len(set(weeks)) > 1 else {})
+    text = {
+        **{"brains": [_absolute(brain.entry, folder) for brain in found], "start": starts or found[0].entry["id"]},
+        **{"runs": runs, **given},
+        "folding": {"end_week": max(max(weeks), min(weeks) + 1)} | (given.get("folding") or {}),
+        "metrics": (given.get("metrics") or {}) | {"export": "bids"},
+    }
+    write_text(path, yaml.safe_dump(text, sort_keys=False))
+    return [brain.entry["id"] for brain in found]
+
+
 def _growing(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[str, Any]:
     """Returns the series and the weeks of an atlas that lead from one week to another; InputError where none does."""
     if atlas.licence.accept and not accepted:
@@ -202,11 +248,14 @@ def _kind(brain: Found) -> str:
     return f"label volumes ({brain.entry['scheme'] if brain.entry['scheme'] != UNSET else 'scheme unclear'})"
 
 
-def recognise(folder: Path) -> list[Found]:
-    """Returns the brains of a folder and the folders in it, the youngest first; InputError where there are none."""
+def recognise(folder: Path, pattern: str = "*") -> list[Found]:
+    """Returns the brains of a folder and the folders in it, the youngest first; InputError where there are none.
+
+    They are those of files whose paths match a pattern.
+    """
     every = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
     own = [path.parent for path in every if path.name == "dataset_description.json" and _is_own(folder / path)]
-    files = [path for path in every if not any(path.is_relative_to(place) for place in own)]
+    files = [path for path in every if fnmatch(str(path), pattern) and not any(map(path.is_relative_to, own))]
     scans, said = participants(folder)
     found = [*_hemispheres(files, scans), *_volumes(folder, files, scans)]
     if not found:

@@ -21,6 +21,9 @@ STAGES = (
 )
 """Targets of the workflow that a user asks for by name."""
 CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
+LEVELS = ("participant", "group")
+LABELS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
+"""Options of BIDS apps with several values after each other."""
 ELSEWHERE = ("--profile", "--executor", "-e")
 """Options of Snakemake's by which jobs run on other machines."""
 SHELLS = ("bash", "zsh", "fish")
@@ -52,6 +55,12 @@ config_argument = click.argument("config", type=FILE, required=False)
 class Commands(click.Group):
     """Commands that end in one message and the exit code of their error, without a traceback."""
 
+    def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
+        """Reads the arguments; those of a BIDS app, `BIDS OUT participant`, are of the command `bids`."""
+        if args and args[0] not in self.commands and len(args) > 2 and args[2] in LEVELS:
+            args = ["bids", *_one_by_one(args)]
+        return super().parse_args(context, args)
+
     def invoke(self, context: click.Context) -> Any:
         """Runs the command that is asked for."""
         try:
@@ -59,6 +68,18 @@ class Commands(click.Group):
         except GyriflowError as error:
             click.echo(f"gyriflow: {error}", err=True)
             sys.exit(error.exit_code)
+
+
+def _one_by_one(args: Sequence[str]) -> list[str]:
+    """Returns the arguments of a BIDS app with each label under an option of its own."""
+    found, option = [], ""
+    for argument in args:
+        if argument.startswith("-"):
+            option = argument if argument in LABELS else ""
+            found += [] if option else [argument]
+        else:
+            found += [option, argument] if option else [argument]
+    return found
 
 
 def command_name() -> str:
@@ -92,6 +113,8 @@ def main() -> None:
       gyriflow run                  run it; the same command goes on after an interruption
       gyriflow status               how far it is (from another terminal)
       gyriflow view                 open the report
+
+    A BIDS data set: gyriflow BIDS OUT participant, then gyriflow BIDS OUT group (gyriflow bids --help)
 
     A brain of later weeks from one scan: gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
     """
@@ -210,6 +233,57 @@ def predict(
     context.invoke(
         run, directory=directory, cores=cores, stages=(), dry_run=dry_run, verbose=False, further=(str(config),)
     )
+
+
+@main.command()
+@click.argument("data", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="BIDS")
+@click.argument("out", type=FOLDER)
+@click.argument("level", type=click.Choice(LEVELS))
+@click.option(*LABELS[:2], "participants", multiple=True, help="These participants only.")
+@click.option(*LABELS[2:], "sessions", multiple=True, help="These sessions only.")
+@click.option("--files", default="*", help="Pattern of the paths of files to take, where a scan has several.")
+@click.option("--settings", type=FILE, help="Configuration without brains: what is folded, how, and how finely.")
+@click.option("-w", "--work-dir", "work", type=FOLDER, help="Folder of results/. [default: OUT/work]")
+@cores_option
+@click.option("-n", "--dry-run", is_flag=True, help="Write the configuration, say what would run, and run nothing.")
+@click.pass_context
+def bids(
+    context: click.Context,
+    data: Path,
+    out: Path,
+    level: str,
+    participants: Sequence[str],
+    sessions: Sequence[str],
+    files: str,
+    settings: Path | None,
+    work: Path | None,
+    cores: int,
+    dry_run: bool,
+) -> None:
+    """Run a BIDS data set of tissue labels or surfaces, as a BIDS app: BIDS OUT LEVEL.
+
+    The level participant makes surfaces, maps and simulations of each participant in OUT, group the tables and the
+    report of all as well. What is there and up to date is kept; a participant that fails does not hold up the others.
+    """
+    from ..io.exports import hand_over
+    from .beginning import write_bids
+    from .launch import main as launch
+
+    work = work or out / "work"
+    config, exported = work / CONFIG, work / "results" / "export"
+    brains = write_bids(data, config, participants, sessions, files, settings)
+    click.echo(f"{len(brains)} scans: {', '.join(brains)}; {config}")
+    targets = ["quality", "export"] if level == "participant" else ["all", "export"]
+    if dry_run:
+        context.invoke(run, directory=work, cores=cores, stages=(), dry_run=True, verbose=False,
+                       further=(str(config), *targets))  # fmt: skip
+        return
+    options = ["--cores", str(cores), "--keep-going", "--directory", str(work)]
+    code = launch(["--configfile", str(config.resolve()), *options, *targets])
+    if (exported / "dataset_description.json").is_file():
+        hand_over(exported, out, data, brains, whole=level == "group")
+        click.echo(f"derivatives: {out}")
+    sys.exit(code)
 
 
 @main.command()

@@ -118,15 +118,19 @@ def test_brains_of_one_bids_name_are_refused(tmp_path, brain):
 def test_subjects_are_handed_over_beside_others(tmp_path, brain):
     exported, folder, source = (tmp_path / name for name in ("exported", "out", "source"))
     export_bids(exported, scans_of_two(brain), TABLES_OF_TWO, "1", {"area": "cm2"})
+    page = tmp_path / "brains" / "sub-01_ses-1" / "figures" / "quality.png"
+    page.parent.mkdir(parents=True)
+    page.touch()
     (folder / "sub-07").mkdir(parents=True)
     (folder / "sub-01" / "ses-9").mkdir(parents=True)
     source.mkdir()
-    hand_over(exported, folder, True, source)
+    hand_over(exported, folder, source, ["sub-01_ses-1"], whole=False)
     assert {path.name for path in folder.iterdir()} >= {"sub-07", "sub-01", "sub-02", ".bidsignore"}
     assert not (folder / "sub-01" / "ses-9").exists()
+    assert (folder / "sub-01" / "figures" / "sub-01_ses-1_quality.png").exists()
     assert not (folder / "participants.tsv").exists()
     write_json(source / "dataset_description.json", {"DatasetDOI": "10.1/x"})
-    hand_over(exported, folder, False, source)
+    hand_over(exported, folder, source, [], whole=True)
     assert (folder / "participants.tsv").exists()
     assert read_json(folder / "dataset_description.json")["SourceDatasets"] == [{"URL": "doi:10.1/x"}]
 
