@@ -222,8 +222,9 @@ NESTED: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 COMMANDS = tuple(f"segmentation.{key}" for key in SegmentationSettings.model_fields)
 """Keys of brains that are programs: a configuration's, never a table's, which is data."""
+NOT_OF_TABLES = ("id", "segmentation", "phantom", "shape", "covariates")
 COLUMNS = (
-    *(key for key in Brain.model_fields if key not in (*NESTED, "segmentation", "phantom", "shape", "id", "covariates")),
+    *(key for key in Brain.model_fields if key not in (*NESTED, *NOT_OF_TABLES)),
     *(column for columns in NESTED.values() for column in columns),
 )
 """The columns that are keys of brains; any others are covariates."""

@@ -26,6 +26,8 @@ AGES = (*IN_WEEKS, *IN_DAYS)
 """All names of that column, in small letters or capitals."""
 NOTHING = frozenset(("", "n/a"))
 """What stands for no value in BIDS."""
+PROGRAMS = "segmentation."
+"""How keys of brains begin that are programs: a configuration's, never a table's."""
 SUBJECT = re.compile(r"sub-[A-Za-z0-9]{1,100}")
 DAYS = "days"
 UNITS = {

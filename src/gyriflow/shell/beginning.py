@@ -44,7 +44,7 @@ runs:
   reference: {{}}{measured}
 """
 QUICK = """
-# Minutes on a laptop: coarse, to see that all goes well. Without these lines the mesh is fine enough for results to trust.
+# Minutes on a laptop: coarse, to see that all goes well. Without these lines the mesh is fine enough to be trusted.
 surface: {edge_length_mm: 1.5}
 mesh: {mesher: tetgen, order: 1, surface_edge_mm: 1.5, core_edge_mm: 4}
 """
@@ -182,7 +182,7 @@ def write_bids(
     starts = [entry["id"] for subject, entry in first.items() if subject != "None" and several[subject] > 1]
     weeks = [brain.entry["week"] for brain in found]
     given = read_yaml(settings) if settings else {}
-    runs = {"reference": {}} | ({"measured": {"preset": "measured"}} if len(set(weeks)) > 1 else {})
+    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if len(set(weeks)) > 1 else {})
     text = {
         **{"brains": [_absolute(brain.entry, folder) for brain in found], "start": starts or found[0].entry["id"]},
         **{"runs": runs, **given},
