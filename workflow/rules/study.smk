@@ -78,6 +78,12 @@ rule export:
             for kind in ("surfaces", "maps", "regions")
         ],
         [brain["report"] for brain in EXPORTED],
+        [
+            brain["volume"][file]
+            for brain in EXPORTED
+            if brain["volume"]
+            for file in ("labels", "surface", "thickness")
+        ],
         long=rules.group_tables.output.long,
         wide=rules.group_tables.output.wide,
     output:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from .triangles import Floats, Ints, TriangleMesh, corners, face_normals, vertex_normals
+from .triangles import Floats, Ints, TriangleMesh, corners, face_normals, transformed, vertex_normals
 
 AGREEING = 0.5
 """Least cosine between normals that agree: 60 degrees."""
@@ -63,6 +63,23 @@ def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None)
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = low
     return inside.reshape(shape).astype(np.int32), affine
+
+
+def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], affine: Floats) -> NDArray[np.int32]:
+    """Returns an (i, j, k) label volume with 2 in the layer of (n,) thickness in mm below a closed surface, 1 deeper.
+
+    `affine` (4, 4) leads from voxels to mm; what lies beyond the volume is not in it.
+    """
+    labels = np.zeros(shape, dtype=np.int32)
+    index = transformed(mesh, np.linalg.inv(affine)).vertices
+    low, high = np.floor(index.min(axis=0)).astype(int), np.ceil(index.max(axis=0)).astype(int) + 1
+    ticks = [np.arange(max(a, 0), max(min(b, most), 0)) for a, b, most in zip(low, high, shape, strict=True)]
+    voxels = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    centres = voxels @ affine[:3, :3].T + affine[:3, 3]
+    inside = igl.fast_winding_number(mesh.vertices, mesh.faces, centres) > 0.5
+    depth, faces, _ = nearest_on(centres[inside], mesh)
+    labels[tuple(voxels[inside].T)] = np.where(depth <= thickness[mesh.faces[faces]].mean(axis=1), 2, 1)
+    return labels
 
 
 def faces_that_cross(mesh: TriangleMesh) -> Ints:

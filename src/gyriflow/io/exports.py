@@ -4,17 +4,20 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from ..errors import InputError
-from ..geometry.triangles import transformed
+from ..geometry.matching import layer_labels
+from ..geometry.triangles import Floats, transformed
 from ..parameters.terms import STRUCTURES, Side
 from .files import AnyPath, read_json, replaced, write_json, write_table, write_text
 from .poses import read_pose
 from .surfaces import read_surface, read_vertex_maps, write_surface, write_vertex_maps
+from .volumes import LabelVolume, read_label_volume, write_label_volume
 
 MEASURED = "real"
 BIDS_VERSION = "1.10.0"
@@ -46,7 +49,8 @@ Pial surfaces of fetal brains, maps of folding on them, and simulated brains of 
 
 - `*_pial.surf.gii`: surfaces, in the world coordinates (RAS+ mm) of the input's volumes; `*_curv.shape.gii` and others:
   a map with a value at each of their vertices, described with its unit in the file `.json` of its name.
-- `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each.
+- `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each. `*_dseg.nii.gz` are their labels
+  in the grid of the start's: `dseg.tsv`.
 - `participants.tsv` and `sessions.tsv`: gestational ages in weeks. `metrics_wide.tsv` has a row for each brain,
   `metrics_long.tsv` one for each number; `metrics_wide.json` has units.
 """
@@ -63,7 +67,9 @@ class ExportedBrain:
     """A brain at a week, and its files by the sides that it has; regions may be empty.
 
     The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said. Of a
-    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface.
+    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface. The
+    volume, which simulated brains of labels have, names the start's `labels` with `affine_from`, in whose grid theirs
+    are written, and the `surface` and `thickness` of the whole brain.
     """
 
     brain: str
@@ -75,6 +81,7 @@ class ExportedBrain:
     regions: Mapping[Side, str]
     report: str
     covariates: Mapping[str, str]
+    volume: Mapping[str, Any] = field(default_factory=dict)
 
 
 def export_plain(folder: AnyPath, brains: Sequence[ExportedBrain], tables: Mapping[str, pd.DataFrame]) -> None:
@@ -132,6 +139,12 @@ def export_bids(
                 write_vertex_maps(f"{named}{desc}_{suffix}.shape.gii", {quantity: values}, STRUCTURES[side])
             if side in brain.regions:
                 _copy(brain.regions[side], f"{named}{desc or '_desc-regions'}_dseg.label.gii")
+        if brain.volume and pose.together:
+            write_label_volume(
+                folder / subject / (session or "") / "anat" / f"{stem}{desc}_dseg.nii.gz", _labels(brain, pose.inverse)
+            )
+            lookup = pd.DataFrame({"index": [1, 2], "name": ["cerebrum within the cortex", "cortex"]})
+            _write_tsv(folder / "dseg.tsv", lookup)
     for suffix, sidecar in described.items():
         write_json(folder / f"{suffix}.json", sidecar)
     ignored = "\n".join(f"/{suffix}.json" for suffix in sorted(described))
@@ -153,6 +166,14 @@ def export_bids(
     dataset = {"Name": "gyriflow", "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative", "GeneratedBy": made_by}
     # the last file: where it is there, all is
     write_json(folder / "dataset_description.json", dataset)
+
+
+def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
+    """Returns the labels of a simulated brain in the grid of its start's, whose world a (4, 4) motion leads back to."""
+    start = read_label_volume(brain.volume["labels"], brain.volume["affine_from"])
+    mesh = transformed(read_surface(brain.volume["surface"]), back)
+    (thickness,) = read_vertex_maps(brain.volume["thickness"]).values()
+    return LabelVolume(layer_labels(mesh, thickness, start.labels.shape, start.affine), start.affine)
 
 
 def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool) -> None:

@@ -12,6 +12,10 @@ from .paths import DISPLACEMENT, PIAL, SIMILARITY, THICKNESS, VOLUMES, folded_of
 from .runs import Runs
 
 
+MEASURED = "real"
+"""The run of measured brains."""
+
+
 @dataclass(frozen=True)
 class Measured:
     """A brain that is measured.
@@ -182,9 +186,18 @@ class Measuring:
                 "regions": dict(zip(SIDES, measured.regions.values(), strict=False)),
                 "report": PIAL["report"].format(brain=measured.subject),
                 "covariates": self.config.brain(measured.subject).covariates,
+                "volume": self._volume(measured),
             }
             for measured in self.every
         ]
+
+    def _volume(self, measured: Measured) -> dict[str, Any]:
+        """Returns what the labels of a simulated brain are made of; nothing where its start has none."""
+        start = self.config.brain(measured.subject)
+        if measured.run == MEASURED or not start.has_labels:
+            return {}
+        files = {"labels": self.brains.label_volume(start.id), "surface": measured.parts["whole"]}
+        return files | {"thickness": measured.thickness, "affine_from": start.affine_from}
 
     def similarity(self, run: str, brain: str, week: str, measured: str) -> dict[str, list[str]]:
         """Returns the surfaces of a simulated brain and of a measured one, part by part."""
@@ -206,7 +219,7 @@ class Measuring:
         where = f"brains/{brain}/metrics"
         thickness = THICKNESS["measured"].format(brain=brain)
         return Measured(
-            where, brain, "real", self.brains.week(brain), self.brains.sides(brain), f"results/brains/{brain}/surface",
+            where, brain, MEASURED, self.brains.week(brain), self.brains.sides(brain), f"results/brains/{brain}/surface",
             thickness=thickness if brain in self.brains.with_thickness else [],
             report=PIAL["report"].format(brain=brain),
             regions=region_files(f"results/{where}") if brain in self.regioned else {},

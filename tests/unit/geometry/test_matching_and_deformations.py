@@ -5,7 +5,7 @@ from shapes import box, box_mesh, ellipsoid_mesh, sphere
 
 from gyriflow.geometry.deformations import Deformation, carry, carry_back, determinants, transform_points
 from gyriflow.geometry.diffusion import diffuse, vertex_sizes
-from gyriflow.geometry.matching import labels_at, match_points, values_at
+from gyriflow.geometry.matching import labels_at, layer_labels, match_points, values_at
 from gyriflow.geometry.triangles import TriangleMesh, merged, vertex_normals
 
 GRID = np.diag([2.0, 2.0, 2.0, 1.0])
@@ -92,3 +92,20 @@ def test_diffusion_in_a_bar_spreads_with_the_variance_of_the_gaussian_and_keeps_
 def test_sizes_of_vertices_add_up():
     mesh = ellipsoid_mesh(8, (10, 10, 10))
     assert vertex_sizes(mesh.vertices, mesh.tets).sum() == pytest.approx(igl.volume(mesh.vertices, mesh.tets).sum())
+
+
+def test_labels_of_a_layer_below_a_surface():
+    """A ball of 10 mm with a layer of 2 mm above and 4 mm below, in a turned grid that does not hold all of it."""
+    ball = sphere(10.0)
+    thickness = np.where(ball.vertices[:, 2] > 0, 2.0, 4.0)
+    affine = np.array([[0.0, -0.5, 0, 12], [-0.5, 0, 0, 12], [0, 0, 0.5, -12], [0, 0, 0, 1]])
+    labels = layer_labels(ball, thickness, (49, 24, 49), affine)
+    places = transform_points(np.argwhere(labels >= 0), affine)
+    radius = np.linalg.norm(places, axis=1).reshape(labels.shape)
+    up = places[:, 2].reshape(labels.shape)
+    assert places[:, 0].min() > 0
+    clear = (np.abs(radius - 10) > 0.3) & (np.abs(up) > 2)
+    inner = np.where(up > 0, 8, 6)
+    clear &= np.abs(radius - inner) > 0.3
+    expected = np.where(radius > 10, 0, np.where(radius > inner, 2, 1))
+    np.testing.assert_array_equal(labels[clear], expected[clear])

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from shapes import hemisphere
+from shapes import hemisphere, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.poses import Pose
+from gyriflow.geometry.triangles import transformed
 from gyriflow.io.exports import ExportedBrain, export_bids, export_plain, hand_over
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import (
@@ -22,6 +23,7 @@ from gyriflow.io.surfaces import (
     write_vertex_labels,
     write_vertex_maps,
 )
+from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 
 VALIDATOR = shutil.which("bids-validator-deno")
 TABLES = {"metrics_wide": pd.DataFrame({"subject": ["case_1"], "area": [3.5], "depth": [np.nan]})}
@@ -140,11 +142,38 @@ TABLES_OF_TWO = {
 }
 
 
+def labels_of(folder):
+    """Returns a volume of labels, and the sphere and its thickness that those of a simulated brain are made of."""
+    files = {"labels": "labels.nii.gz", "surface": "whole.surf.gii", "thickness": "thickness.shape.gii"}
+    files = {kind: str(folder / name) for kind, name in files.items()}
+    affine = np.diag([1.0, 1, 2, 1])
+    affine[:3, 3] = -20
+    write_label_volume(files["labels"], LabelVolume(np.ones((40, 40, 20), np.int32), affine))
+    ball = sphere(10.0)
+    write_surface(files["surface"], transformed(ball, POSE))
+    write_vertex_maps(files["thickness"], {"thickness_mm": np.full(len(ball.vertices), 3.0)})
+    return files | {"affine_from": "auto"}
+
+
+def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain):
+    folder, volume = tmp_path / "bids", labels_of(tmp_path)
+    export_bids(folder, [brain, replace(brain, run="a", week=24.0, volume=volume)], {}, "1", {})
+    found = read_label_volume(folder / "sub-case1" / "anat" / "sub-case1_desc-agw2400_dseg.nii.gz")
+    start = read_label_volume(volume["labels"])
+    np.testing.assert_array_equal(found.affine, start.affine)
+    assert found.labels.shape == start.labels.shape
+    assert found.labels[20, 20, 10] == 1
+    assert found.labels[28, 20, 10] == 2
+    volumes = np.bincount(found.labels.ravel())[1:] * 2
+    assert volumes == pytest.approx([4 / 3 * np.pi * 7**3, 4 / 3 * np.pi * (10**3 - 7**3)], rel=0.05)
+
+
 @pytest.mark.skipif(not VALIDATOR, reason="no bids-validator-deno on PATH: pip install bids-validator-deno")
 def test_the_bids_validator_finds_no_error(tmp_path, brain):
     folder = tmp_path / "bids"
     scans = scans_of_two(brain)
-    export_bids(folder, [*scans, replace(scans[0], run="run-a", week=23.5)], TABLES_OF_TWO, "1", {"area": "cm2"})
+    simulated = replace(scans[0], run="run-a", week=23.5, volume=labels_of(tmp_path))
+    export_bids(folder, [*scans, simulated], TABLES_OF_TWO, "1", {"area": "cm2"})
     done = subprocess.run([VALIDATOR, folder, "--format", "json"], capture_output=True, text=True, check=False)
     found = json.loads(done.stdout)["issues"]["issues"]
     assert [issue for issue in found if issue["severity"] == "error"] == []
