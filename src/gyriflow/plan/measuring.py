@@ -11,7 +11,6 @@ from .brains import Brains
 from .paths import DISPLACEMENT, PIAL, SIMILARITY, THICKNESS, VOLUMES, folded_of, region_files, surfaces_in
 from .runs import Runs
 
-
 MEASURED = "real"
 """The run of measured brains."""
 
@@ -219,7 +218,8 @@ class Measuring:
         where = f"brains/{brain}/metrics"
         thickness = THICKNESS["measured"].format(brain=brain)
         return Measured(
-            where, brain, MEASURED, self.brains.week(brain), self.brains.sides(brain), f"results/brains/{brain}/surface",
+            where, brain, MEASURED, self.brains.week(brain), self.brains.sides(brain),
+            f"results/brains/{brain}/surface",
             thickness=thickness if brain in self.brains.with_thickness else [],
             report=PIAL["report"].format(brain=brain),
             regions=region_files(f"results/{where}") if brain in self.regioned else {},

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 import yaml
+from click.testing import CliRunner
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.shell import launch
 from gyriflow.shell.beginning import UNSET, fitting_scheme, participants, recognise, week_in, write_configuration
+from gyriflow.shell.commands import main
 from gyriflow.shipped import SHIPPED
 
 ATLAS = SHIPPED / "atlases" / "spina-bifida"
@@ -158,3 +161,50 @@ def test_an_ambiguous_age_is_asked_for_by_file_and_column(tmp_path):
     assert f"week: {tmp_path}/participants.tsv: has a column age that may be" in first.notes[0]
     assert second.entry["id"] == "sub-01-2"
     assert "2 files are of sub-01: keep one" in second.notes
+
+
+@pytest.fixture
+def app(monkeypatch, tmp_path):
+    """Calls gyriflow as a BIDS app with some arguments, and returns what Snakemake gets and the configuration."""
+    data, out, got = tmp_path / "data", tmp_path / "out", []
+    data.mkdir()
+    bids_folder(data)
+    monkeypatch.setattr(launch, "main", lambda asked: got.extend(asked) or 0)
+
+    def call(level, *more, code=0):
+        got.clear()
+        done = CliRunner().invoke(main, [str(data), str(out), level, *more])
+        assert done.exit_code == code, done.output
+        path = out / "work" / "gyriflow.yaml"
+        return done.output if code else (got, yaml.safe_load(path.read_text()))
+
+    return call
+
+
+def test_a_bids_app_folds_the_first_of_several_scans(app, tmp_path):
+    arguments, written = app("participant")
+    assert arguments[-2:] == ["quality", "export"]
+    assert "--keep-going" in arguments
+    assert (written["start"], written["folding"]["end_week"]) == (["sub-01_ses-1"], 24.43)
+    assert (list(written["runs"]), written["metrics"]["export"]) == (["reference", "measured"], "bids")
+    assert [brain.id for brain in load(written, tmp_path).brains] == ["sub-01_ses-1", "sub-01_ses-2"]
+    arguments, _ = app("group")
+    assert arguments[-2:] == ["all", "export"]
+
+
+def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
+    (tmp_path / "own.yaml").write_text("{mesh: {order: 1}, runs: {mine: {}}, folding: {poisson_ratio: 0.4}}")
+    options = ("--participant-label", "02", "01", "--session-label", "ses-2", "--settings", str(tmp_path / "own.yaml"))
+    _, written = app("participant", *options)
+    assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-2"]
+    assert (written["start"], written["runs"], written["mesh"]) == ("sub-01_ses-2", {"mine": {}}, {"order": 1})
+    assert written["folding"] == {"end_week": 25.43, "poisson_ratio": 0.4}
+    assert "no such participants and sessions" in app("participant", "--participant-label", "07", code=2)
+
+
+def test_a_bids_app_asks_which_of_several_files_is_meant(app, tmp_path):
+    place = tmp_path / "data" / "derivatives" / "seg" / "sub-01" / "ses-1" / "anat"
+    (place / "sub-01_ses-1_desc-other_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    assert "2 files are of sub-01_ses-1: keep one" in app("participant", code=2)
+    _, written = app("participant", "--files", "*_desc-brain_dseg.nii.gz")
+    assert len(written["brains"]) == 2
