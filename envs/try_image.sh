@@ -55,8 +55,8 @@ inside() {
     echo "+ $*"
     build run --isolation chroot --volume "$here:$here" --volume "$work/study:/study" --workingdir "$here" "$container" -- "$@"
 }
-inside ./run gyriflow --help | head -n 3
-inside ./run python -c 'import dolfinx, pymeshlab, pytetwild, pyvista; print("dolfinx", dolfinx.__version__)'
-inside ./run snakemake --cores 2 folding --configfile /study/shape.yaml --directory /study
+inside gyriflow --version
+inside python -c 'import dolfinx, pymeshlab, pytetwild, pyvista; print("dolfinx", dolfinx.__version__)'
+inside gyriflow run /study/shape.yaml --cores 2 --stage folding --directory /study
 test -s "$work/study/results/runs/reference/ball/folding/summary.json"
 echo "the image works"
