@@ -141,7 +141,7 @@ CONFIGURATION = {"report_config": 1}
 SHAPE = NEW_RESULTS | {
     "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1, "asymmetry": 1, "centiles": 1,
     "group_tables": 1, "norms_figure": 1, "report_provenance": 1, "view_surfaces": 1, "metrics_table": 1,
-    "centiles_table": 1,
+    "centiles_table": 1, "methods": 1,
 }  # fmt: skip
 ONE_RUN = SHAPE | {
     "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "displacement": 1,

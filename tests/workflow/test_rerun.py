@@ -39,7 +39,7 @@ OF_THE_OTHER_BRAIN = SHAPE | {
     "quality_page": 1, "quality_table": 1, "inputs_figure": 1, "outlines_figure": 2,
 }  # fmt: skip
 # a table of the study is shown by the report
-NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1}
+NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "methods": 1}
 OF_THE_SOLVER = {
     rule: count
     for rule, count in BOTH_RUNS.items()

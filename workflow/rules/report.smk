@@ -43,6 +43,21 @@ rule report_provenance:
         "../scripts/report_provenance.py"
 
 
+rule methods:
+    input:
+        params=PLAN.runs.of(PARAMETERS),
+        summaries=PLAN.runs.of(FOLDING["summary"]),
+        provenance=rules.report_provenance.output[0],
+        template=f"{PAGE}/methods.rst",
+    output:
+        "results/report/methods.rst",
+    params:
+        folded=PLAN.runs.folded,
+        used=REPORTING.method,
+    script:
+        "../scripts/methods.py"
+
+
 rule html_report:
     input:
         rules.figures.input,
@@ -58,6 +73,7 @@ rule html_report:
             f"{STUDY}/displacement_agreement.csv" if PLAN.validating.carried else []
         ),
         provenance=rules.report_provenance.output[0],
+        methods=rules.methods.output[0],
         view=FIGURES.target("view")[0],
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
@@ -138,4 +154,5 @@ localrules:
     calibrate,
     paper,
     parameters,
+    methods,
     html_report,

@@ -27,6 +27,7 @@ with step(snakemake.log[0]):
         runs=read_table(files.runs),
         provenance=read_json(files.provenance),
         metrics=params.metrics,
+        methods=read_text(files.methods),
         configuration=yaml_text(params.config if params.paths else hide_paths(params.config)),
         **{
             name: read_table(files[name])

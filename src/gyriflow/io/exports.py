@@ -39,6 +39,7 @@ IGNORED = """\
 # tables of the whole study, its report, and what is to be kept of the work
 /metrics_*
 /report.html
+/methods.rst
 figures
 /work
 """
@@ -179,8 +180,8 @@ def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
 def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool) -> None:
     """Brings the BIDS derivative of a study to another folder, where what it has of other subjects stays.
 
-    Beside each subject's files come the quality pages of its `brains`, and with the `whole` study its tables and its
-    report. `source` is the data set that it was made of, which `SourceDatasets` then names by its DOI or its folder.
+    Beside each subject's files come the quality pages of its `brains`, with the `whole` study its tables, report and
+    methods. `source` is the data set that it was made of, which `SourceDatasets` then names by its DOI or its folder.
     """
     exported, folder, source = Path(exported), Path(folder), Path(source)
     for path in sorted(exported.iterdir()):
@@ -192,7 +193,8 @@ def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Seque
     pages = {
         f"{brain.split('_')[0]}/figures/{brain}_quality.png": f"brains/{brain}/figures/quality.png" for brain in brains
     }
-    for target, page in (pages | ({"report.html": "report/report.html"} if whole else {})).items():
+    of_all = {name: f"report/{name}" for name in ("report.html", "methods.rst")} if whole else {}
+    for target, page in (pages | of_all).items():
         if (exported.parent / page).is_file():
             _copy(exported.parent / page, folder / target)
     own = source / "dataset_description.json"

@@ -68,6 +68,16 @@ class Reporting:
             for name, field in fields.items()
         }
 
+    @property
+    def method(self) -> dict[str, Any]:
+        """What the text of the methods says of the configuration: its brains, and settings by section."""
+        named = {
+            **{"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}},
+            "metrics": {"curvature_radius_mm", "spangy_proxy"},
+        }
+        used = self.config.model_dump(mode="json", include=named)
+        return {"brains": [brain for brain in self.described if brain["id"] in self.brains.ids], **used}
+
     def labels(self, brain: str) -> dict[str, Any]:
         """Returns what the table of quality says of a brain before it is looked at."""
         settings = self.whole.brain(brain)

@@ -53,6 +53,7 @@ class Results:
     runs, validation, displacement : as for `scores_table`
     provenance : what `software` returns, and files (brain, what, sha256, and path where it may be shown)
     metrics : {setting: {"value", "unit", "description"}}
+    methods : reStructuredText
     warnings : columns subject, run, step, level, message
     configuration : text, without paths unless they may be shown
     """
@@ -62,6 +63,7 @@ class Results:
     runs: pd.DataFrame
     provenance: Mapping[str, Any]
     metrics: Mapping[str, Mapping[str, Any]]
+    methods: str
     configuration: str
     validation: pd.DataFrame | None = None
     displacement: pd.DataFrame | None = None
@@ -85,11 +87,17 @@ def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) 
         "has_view": bool(view["groups"]),
         "sections": sections([item for item in shown if not item.first]),
         "made": made(provenance),
+        "methods": caption_html(results.methods),
         "metrics": html_table(metrics_settings(results.metrics)),
         "files": html_table(input_files(provenance["files"])),
         "versions": html_table(versions(provenance)),
         "configuration": results.configuration,
     }
+
+
+def methods_text(template: str, **used: Any) -> str:
+    """Returns the methods of a study as reStructuredText, with citations: a template filled with what was run."""
+    return Environment(undefined=StrictUndefined, keep_trailing_newline=True).from_string(template).render(**used)
 
 
 def picture(address: str, alt: str) -> str:

@@ -14,7 +14,9 @@ from gyriflow.report.page import (
     Shown,
     assemble,
     brains_table,
+    caption_html,
     hide_paths,
+    methods_text,
     picture,
     report_page,
     run_verdict,
@@ -69,6 +71,7 @@ def page(shown: list[Shown], view: dict | None = None) -> str:
             "files": [{"brain": "young", "what": "labels", "sha256": "12ab"}],
         },
         metrics={"curvature_radius_mm": {"value": 2.4, "unit": "mm", "description": "Radius."}},
+        methods="**Brains.** Two.",
         configuration="start: young\n",
         validation=VALIDATION,
     )
@@ -220,3 +223,35 @@ def test_pictures_are_made_smaller_until_they_fit(tmp_path):
 def test_the_body_of_a_written_page_is_read_back(tmp_path):
     write_html(tmp_path / "a.html", "<p>a</p>\n<p>b</p>")
     assert read_body(tmp_path / "a.html") == "<p>a</p>\n<p>b</p>"
+
+
+def test_the_methods_say_what_was_run():
+    packages = dict.fromkeys(("scikit-image", "fenics-dolfinx", "petsc4py", "lapy", "snakemake"), "9.9")
+    parameters = {
+        **{"start_week": 21.0, "step_s": 43200.0, "material": "neo-hookean", "shear_modulus_cortex_pa": 1500.0},
+        **{"shear_modulus_core_pa": {"map": "core"}, "poisson_ratio": 0.45, "thickness_mm": 1.5, "follow": None},
+        **{"growth_rate_per_s": 2e-7, "core_growth_rate_per_s": 0.0, "stress_memory_gw": 0.0},
+        "contact": {"kind": "global"},
+    }
+    summary = {"weeks": [21.0, 24.5], "steps": 49, "tets": 1234}
+    text = methods_text(
+        (PAGE / "methods.rst").read_text(),
+        brains=[
+            {"week": 21.0, "population": "spina bifida", "source": "labels", "synthetic": False},
+            {"week": 24.5, "population": None, "source": "phantom", "synthetic": True},
+        ],
+        runs=[{"run": "stiff", "start": "young", "parameters": parameters, "summary": summary}],
+        software={"gyriflow": "0.1", "packages": packages},
+        surface={"edge_length_mm": 0.8},
+        mesh={"order": 2, "mesher": "tetgen"},
+        metrics={"curvature_radius_mm": 3.0, "spangy_proxy": "shape_index"},
+    )
+    assert (
+        "2 brains of 21 to 24.5 weeks of gestation (GW) (spina bifida) were processed with gyriflow 0.1. Pial" in text
+    )
+    assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
+    assert "1500 and the values given for each week or place Pa" in text
+    assert "tangentially at 2e-07 per second" in text
+    assert "itself [4]" in text
+    assert "<li><p>Run <em>stiff</em>" in caption_html(text)
+    assert "system-message" not in caption_html(text)
