@@ -69,9 +69,6 @@ rule html_report:
         quality=rules.quality_table.output.csv,
         warnings=rules.study_warnings.output[0],
         validation=f"{STUDY}/validation.csv" if PLAN.validating.pairs else [],
-        displacement=(
-            f"{STUDY}/displacement_agreement.csv" if PLAN.validating.carried else []
-        ),
         provenance=rules.report_provenance.output[0],
         methods=rules.methods.output[0],
         view=FIGURES.target("view")[0],

@@ -18,6 +18,7 @@ with step(snakemake.log[0]):
             picture(addresses[path], entry["title"]) if path in addresses else read_body(path),
             entry["caption"],
             first=path == params.first,
+            technical=entry["technical"],
         )
         for path, entry in ((entry["file"], entry) for entry in params.entries)
     ]
@@ -31,7 +32,7 @@ with step(snakemake.log[0]):
         configuration=yaml_text(params.config if params.paths else hide_paths(params.config)),
         **{
             name: read_table(files[name])
-            for name in ("validation", "displacement", "quality", "warnings")
+            for name in ("validation", "quality", "warnings")
             if files.get(name)
         },
     )

@@ -166,6 +166,9 @@ class EnergySettings(Settings):
 class ReportSettings(Settings):
     """Figures, and assumptions of the estimated energy."""
 
+    figures: Literal["essential", "all"] = setting(
+        "essential", "", "Whether figures of the mesh, the zones and the solver, and all maps are drawn, too."
+    )
     dpi: int = setting(300, "dots per inch", "Resolution of PNG figures; journals ask for 300 to 600.", ge=50, le=1200)
     paths: bool = setting(
         False, "", "Whether the report shows paths of files, which may hold names. It never shows headers of images."

@@ -54,6 +54,9 @@ class Figure:
         The target that asks for it.
     paper
         Whether the target `paper` does, too.
+    technical
+        Whether it is for those who look into the mesh or the solver: folded away in the report, and drawn only where
+        `report.figures` is "all".
     """
 
     name: str
@@ -67,6 +70,7 @@ class Figure:
     of: tuple[Wildcards, ...] = ({},)
     target: str = "figures"
     paper: bool = False
+    technical: bool = False
 
     @property
     def module(self) -> str:
@@ -136,8 +140,15 @@ class Figures:
     def target(self, *names: str) -> list[str]:
         """Returns the files that targets ask for, those of the paper for "paper"."""
         return [
-            file for row in self.all if row.target in names or (row.paper and "paper" in names) for file in row.made()
+            file
+            for row in self.all
+            if (row.target in names and self._wanted(row)) or (row.paper and "paper" in names)
+            for file in row.made()
         ]
+
+    def _wanted(self, figure: Figure) -> bool:
+        """Returns whether the report shows a figure; what other rules make is there anyway."""
+        return not (figure.technical and figure.draw) or self.config.report.figures == "all"
 
     def entries(self) -> list[dict[str, Any]]:
         """Returns what the report says of each figure and table: file, section, title and caption."""
@@ -147,14 +158,16 @@ class Figures:
                 "section": figure.section,
                 "title": self._title(figure, wildcards),
                 "caption": self._caption(figure, wildcards),
+                "technical": figure.technical,
             }
             for figure in self.all
-            if figure.section
+            if figure.section and self._wanted(figure)
             for wildcards in figure.of
         ]
 
     def _title(self, figure: Figure, wildcards: Wildcards) -> str:
-        title = figure.title.format(**wildcards)
+        words = {key: value.removesuffix("_mm").replace("_", " ") for key, value in wildcards.items()}
+        title = figure.title.format(**words)
         named = [value for key, value in wildcards.items() if key in ("run", "brain", "study")]
         return " · ".join([title[0].upper() + title[1:], *named])
 
@@ -262,7 +275,7 @@ class Figures:
             crossing faces, difference in volume, and how much of gaps narrower than 3 mm, as the fissure, is open.""",
             lambda brain: {"quality": MESH["quality"].format(brain=brain)},
             lambda brain: {**self._synthetic(brain), "gates": self.gates},
-            self._each_brain(self.config.start_brains),
+            self._each_brain(self.config.start_brains), technical=True,
         )  # fmt: skip
         # of a mesh that did not pass the gates; made on request
         yield Figure(
@@ -278,7 +291,7 @@ class Figures:
             over the image or the labels, (b) the surface from several sides, (c) cortical thickness where it is known,
             else further sides, and what the steps have warned of.""",
             of=self._each_brain(self.brains.ids),
-            target="quality",
+            target="quality", technical=True,
         )  # fmt: skip
         yield Figure(
             "quality_table", "Quality of the brains", "verdicts", f"{STUDY}/quality.html",
@@ -378,7 +391,7 @@ class Figures:
             "mesh_figure", "Folding", "the mesh, cut open", f"{at}/mesh.png", "pictures.mesh_picture",
             """Mesh at the start of run *{run}*: from the left (a), cut open across, from the front (b), and along,
             from above (c).""",
-            files(**start), self._of_start, self._each_run, paper=True,
+            files(**start), self._of_start, self._each_run, paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "displacement_maps", "Folding", "displacement maps", f"{at}/displacement_maps.png",
@@ -403,14 +416,14 @@ class Figures:
             self._each_run_with(
                 lambda run: "contact_pressure" in self.config.run(run).fields
                 and self.config.run(run).contact.kind == "global"
-            ),
+            ), technical=True,
         )  # fmt: skip
         yield Figure(
             "zones_figure", "Folding", "zones of the boundary", f"{at}/zones.png", "pictures.zones_picture",
             """Zones of the boundary at the start of run *{run}*, from the left (a), from below (b) and on the medial
             sides (c, d): free, clamped (inside the ellipsoid of no growth), the facets of each hemisphere that may
             touch at the fissure, and those between the contact planes. Grey: the inside of the surface.""",
-            files(**start, **of_run), self._of_start, self._each_run, paper=True,
+            files(**start, **of_run), self._of_start, self._each_run, paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "contact_scheme", "Folding", "scheme of contact", f"{at}/contact_scheme.png", "sections.contact_scheme",
@@ -418,14 +431,14 @@ class Figures:
             enlarged, with the pressure that acts (b), and the law of contact (c).""",
             files(**start, **of_run), self._of_start,
             self._each_run_with(lambda run: self.config.run(run).contact.kind != "none"),
-            paper=True,
+            paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "growth_zone_figure", "Folding", "growth on the surface", f"{at}/growth_zone.png", "pictures.field_picture",
             """Tangential growth of the pial surface in the first time step of run *{run}*: from the left (a), from
             below (b), and the medial sides (c, d). Grey: nothing grows, as inside the ellipsoid of no growth and where
             tissue bridges the planes at the fissure. Below zero the surface shrinks.""",
-            files(**start, **of_run), self._of_start, self._each_run, paper=True,
+            files(**start, **of_run), self._of_start, self._each_run, paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "layers_figure", "Folding", "regions and growth in sections", f"{at}/layers.png",
@@ -433,7 +446,7 @@ class Figures:
             """Start brain of run *{run}* in sections through its middle: hemispheres (neither between the contact
             planes), what grows, cortical weight, tangential growth in one time step, and shear modulus. Dashed: the
             ellipsoid of no growth.""",
-            files(**start, **of_run), self._of_start, self._each_run, paper=True,
+            files(**start, **of_run), self._of_start, self._each_run, paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "normals_figure", "Folding", "pial normals at two weeks", f"{at}/normals.png", "sections.normal_arrows",
@@ -444,7 +457,7 @@ class Figures:
                 **files(**start, **of_run, frames=FOLDING["frames"])(run, brain),
                 "maps": self.runs.maps(run, brain),
             },
-            self._of_start, self._each_run, paper=True,
+            self._of_start, self._each_run, paper=True, technical=True,
         )  # fmt: skip
         order = self.config.mesh.order
         kind = "quadratic" if order == 2 else "linear"
@@ -456,13 +469,13 @@ class Figures:
             ratio that all but the worst hundredth of the elements are above (f; 1 is regular); wall time (g).""",
             files(steps=FOLDING["steps"]),
             lambda run, brain: {**self._synthetic(brain), "order": order},
-            self._each_run,
+            self._each_run, technical=True,
         )  # fmt: skip
         yield Figure(
             "study_runs", "Folding", "parameters and summaries of the runs", f"{STUDY}/runs.html",
             caption="""Parameters of the runs and summaries of their simulations; what differs between the runs comes
             first. As numbers in ``results/study/runs.csv``.""",
-            target="metrics",
+            target="metrics", technical=True,
         )  # fmt: skip
         displacement = {"displacement": f"{STUDY}/displacement.csv"}
         yield Figure(
@@ -479,7 +492,7 @@ class Figures:
             "tables.displacement_page",
             """Largest / mean norm of the displacement between output weeks in mm, over all nodes and over the pial
             surface's nodes, with the published values.""",
-            lambda: displacement, lambda: self._synthetic(*self.config.start_brains), paper=True,
+            lambda: displacement, lambda: self._synthetic(*self.config.start_brains), paper=True, technical=True,
         )  # fmt: skip
         last = self.last_week
         real = [row for row in self.measuring.real if week_tag(row.week) == last][:1]
@@ -499,6 +512,11 @@ class Figures:
         )  # fmt: skip
 
     @property
+    def _mapped(self) -> list[str]:
+        """The measures that are drawn as maps."""
+        return list(SHAPE_MEASURES)[: None if self.config.report.figures == "all" else 1]
+
+    @property
     def _of_metrics(self) -> Iterator[Figure]:
         yield Figure(
             "shape_maps", "Metrics", "{measure} maps", f"{RUN}/figures/{{measure}}.png", "pictures.shape_maps",
@@ -512,7 +530,7 @@ class Figures:
                 }
             },
             lambda run, brain, measure: {**self._beside(run, brain), "quantity": measure},
-            tuple({**pair, "measure": measure} for pair, measure in product(self._each_run, SHAPE_MEASURES)),
+            tuple({**pair, "measure": measure} for pair, measure in product(self._each_run, self._mapped)),
         )  # fmt: skip
         metrics = {"metrics": f"{STUDY}/metrics.csv"}
         yield Figure(
@@ -543,7 +561,7 @@ class Figures:
             is cut off or finer than the surface.""",
             lambda: spectra,
             lambda: {**self._runs, **self._of_study(), "week": float(self.last_week or 0), "bands": list(range(1, 7))},
-            ({},) if self.last_week else (),
+            ({},) if self.last_week else (), technical=True,
         )  # fmt: skip
         reference = self.config.norm_reference
         with_norms: tuple[Wildcards, ...] = ({},) if reference else ()
@@ -760,12 +778,12 @@ class Figures:
             "study_resources", "Resources", "time, memory, energy and emissions", f"{STUDY}/resources.html",
             caption="""What the jobs behind this report took, with an estimate of their energy and emissions, whose
             assumptions stand below. As numbers in ``results/study/resources.csv``.""",
-            target="report",
+            target="report", technical=True,
         )  # fmt: skip
         yield Figure(
             "cost_figure", "Resources", "time and energy", f"{STUDY_FIGURES}/cost.png", "resources.cost_chart",
             """Time (a), summed over jobs that may have run side by side, and estimated energy (b) of the stages.""",
-            lambda: {"resources": f"{STUDY}/resources.csv"}, target="report",
+            lambda: {"resources": f"{STUDY}/resources.csv"}, target="report", technical=True,
         )  # fmt: skip
 
     def _start(self, study: str) -> str:

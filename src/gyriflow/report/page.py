@@ -34,6 +34,7 @@ class Shown:
     content : HTML
     caption : reStructuredText
     first : whether it stands on the first page instead
+    technical : whether it is folded away
     """
 
     section: str
@@ -41,6 +42,7 @@ class Shown:
     content: str
     caption: str = ""
     first: bool = False
+    technical: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ class Results:
     Attributes
     ----------
     brains, surfaces, quality : as for `brains_table`
-    runs, validation, displacement : as for `scores_table`
+    runs, validation : as for `scores_table`
     provenance : what `software` returns, and files (brain, what, sha256, and path where it may be shown)
     metrics : {setting: {"value", "unit", "description"}}
     methods : reStructuredText
@@ -66,7 +68,6 @@ class Results:
     methods: str
     configuration: str
     validation: pd.DataFrame | None = None
-    displacement: pd.DataFrame | None = None
     quality: pd.DataFrame | None = None
     warnings: pd.DataFrame | None = None
 
@@ -81,8 +82,8 @@ def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) 
         "title": f"Simulated cortical folding of {starts}",
         "done": what_was_done(results.brains, results.runs),
         "brains": html_table(brains_table(results.brains, results.surfaces, results.quality)),
-        "runs": html_table(scores_table(results.runs, results.validation, results.displacement)),
-        "warnings": "" if results.warnings is None or results.warnings.empty else html_table(results.warnings),
+        "runs": html_table(scores_table(results.runs, results.validation)),
+        "warnings": "" if results.warnings is None or results.warnings.empty else html_table(grouped(results.warnings)),
         "weeks": weeks,
         "has_view": bool(view["groups"]),
         "sections": sections([item for item in shown if not item.first]),
@@ -112,12 +113,22 @@ def caption_html(caption: str) -> Markup:
 
 
 def sections(shown: Sequence[Shown]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """Returns the sections in the order of what is shown, each with its figures and tables, numbered through."""
+    """Returns the sections in the order of what is shown, each with its figures and tables, numbered through.
+
+    Technical ones stand at the end of their section.
+    """
     found: dict[str, list[dict[str, Any]]] = {item.section: [] for item in shown}
     for item in shown:
         found[item.section].append(
-            {"title": item.title, "content": Markup(item.content), "caption": caption_html(item.caption)}
+            {
+                "title": item.title,
+                "content": Markup(item.content),
+                "caption": caption_html(item.caption),
+                "technical": item.technical,
+            }
         )
+    for items in found.values():
+        items.sort(key=lambda item: item["technical"])
     every = [item for items in found.values() for item in items]
     for number, entry in enumerate(every, start=1):
         entry["number"] = number
@@ -185,24 +196,20 @@ def brains_table(
     return pd.DataFrame(rows)
 
 
-def scores_table(
-    runs: pd.DataFrame, validation: pd.DataFrame | None = None, displacement: pd.DataFrame | None = None
-) -> pd.DataFrame:
+def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
     """Returns a row for each run: how it ended, and its scores at the last week that a real brain was compared at.
 
     Parameters
     ----------
-    runs : columns run, subject, start_week, preset, end_week, weeks, min_J, elements_through_cortex,
+    runs : columns run, subject, start_week, end_week, weeks, min_J, elements_through_cortex,
         order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm
     validation : the study's table of validation
-    displacement : the study's table of the agreement of displacements
     """
     names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
     for name, (_, run) in zip(names, runs.iterrows(), strict=True):
-        row = {"run": name, "start": str(run["subject"]), "preset": run.get("preset"), "verdict": run_verdict(run)}
-        of_run = (run["run"], run["start_week"])
-        rows.append(row | _scores(_last(validation, of_run, "week"), _last(displacement, of_run, "to_week")))
+        row = {"run": name, "start": str(run["subject"]), "verdict": run_verdict(run)}
+        rows.append(row | _scores(_last(validation, run["run"], run["start_week"])))
     return pd.DataFrame(rows)
 
 
@@ -220,15 +227,15 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     return "; ".join(said)
 
 
-def _last(table: pd.DataFrame | None, of_run: tuple[str, float], week: str) -> Mapping[str, Any]:
+def _last(table: pd.DataFrame | None, run: str, start_week: float) -> Mapping[str, Any]:
     """Returns the row of a run's last week, nothing where there is none."""
     if table is None:
         return {}
-    own = table[(table["run"] == of_run[0]) & (table["start_week"] == of_run[1])].sort_values(week)
+    own = table[(table["run"] == run) & (table["start_week"] == start_week)].sort_values("week")
     return {} if own.empty else {str(name): value for name, value in own.iloc[-1].items()}
 
 
-def _scores(validation: Mapping[str, Any], displacement: Mapping[str, Any]) -> dict[str, str]:
+def _scores(validation: Mapping[str, Any]) -> dict[str, str]:
     """Returns the scores as text, dashes for what was not compared."""
 
     def shown(name: str, pattern: str, factor: float = 1.0) -> str:
@@ -238,22 +245,23 @@ def _scores(validation: Mapping[str, Any], displacement: Mapping[str, Any]) -> d
     gain = shown("gain_shape_index", "%+.2f")
     if gain != "–":
         gain += f" ({shown('gain_low_shape_index', '%+.2f')} to {shown('gain_high_shape_index', '%+.2f')})"
-    moved = displacement.get("displacement_r", np.nan)
-    check = ", consistency" if displacement.get("test") == "consistency" else ""
     return {
         "compared at": week_label(validation["week"]) if validation else "–",
         "kind": str(validation.get("kind", "–")),
         "distance (mm)": shown("distance_mm", "%.2f"),
-        "distance, 95 % (mm)": shown("distance95_mm", "%.2f"),
-        "cortex, Dice": shown("cortex_dice", "%.2f"),
-        "area, difference (%)": shown("area_difference", "%+.1f", 100),
-        "volume, difference (%)": shown("volume_difference", "%+.1f", 100),
         "shape index, r": shown("r_shape_index", "%.2f"),
         "scaled start, r": shown("r_start_shape_index", "%.2f"),
         "gain (95 %)": gain,
-        "skill": shown("skill_shape_index", "%.2f"),
-        "displacement, r": "–" if pd.isna(moved) else f"{moved:.2f}{check}".replace("-", "−"),
+        "area, difference (%)": shown("area_difference", "%+.1f", 100),
+        "volume, difference (%)": shown("volume_difference", "%+.1f", 100),
     }
+
+
+def grouped(warnings: pd.DataFrame) -> pd.DataFrame:
+    """Returns warnings that say the same once, with the brains and runs that they are of."""
+    of = warnings["subject"].fillna("").astype(str) + warnings["run"].map(lambda run: f", {run}" if run else "")
+    rows = warnings.assign(of=of).groupby(["step", "level", "message"], sort=False)["of"]
+    return rows.agg(lambda names: "; ".join(filter(None, dict.fromkeys(names)))).reset_index()
 
 
 def what_was_done(brains: Sequence[Mapping[str, Any]], runs: pd.DataFrame) -> str:

@@ -12,7 +12,8 @@ from gyriflow.plan import Plan
 
 DRAW = Path(__file__).parents[3] / "workflow" / "scripts" / "draw.py"
 BRAINS = [{"id": name, "week": week, "phantom": {}} for name, week in (("a", 21), ("b", 22), ("c", 23))]
-PLAN = Plan(load({"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}))
+STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}
+PLAN = Plan(load(STUDY | {"report": {"figures": "all"}}))
 PREPARING = {
     node.name: {argument.arg for argument in (*node.args.args, *node.args.kwonlyargs)}
     for node in ast.parse(DRAW.read_text()).body
@@ -38,3 +39,15 @@ def test_captions_and_titles_name_runs_and_brains_and_leave_no_braces():
     assert quality["Quality of the brain · b"].startswith("Quality of *b* before the solve")
     said = [entry["title"] + entry["caption"] for entry in entries if entry["file"] != "results/study/quality.html"]
     assert not [text for text in said if "{" in text or "}" in text]
+
+
+def test_technical_figures_are_drawn_on_request_only():
+    essential, every = (
+        set(Plan(load(STUDY | more)).figures.target("figures")) for more in ({}, {"report": {"figures": "all"}})
+    )
+    assert essential < every
+    run = "results/runs/thin/a/figures"
+    assert {f"{run}/zones.png", f"{run}/curvedness.png"} <= every - essential
+    assert {f"{run}/shape_index.png", "results/study/figures/metrics.png"} <= essential
+    # those that other rules make are there anyway
+    assert "results/study/runs.html" in {entry["file"] for entry in Plan(load(STUDY)).figures.entries()}

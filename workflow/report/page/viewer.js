@@ -144,7 +144,8 @@
   option(chosen, "", "plain surface");
   maps.forEach((map) => option(chosen, map.name, map.label));
   if (simulated.length < 2) runs.closest("label").hidden = simulated.length === 0;
-  slider.min = first; slider.max = last; slider.step = 0.05; slider.value = last;
+  slider.min = first; slider.max = last; slider.step = 0.05;
+  slider.value = simulated.length ? simulated[0].frames[simulated[0].frames.length - 1].week : last;
   const ticks = find("view-weeks");
   [...new Set(weeks)].sort((a, b) => a - b).forEach((week) => option(ticks, week, week));
 
