@@ -134,30 +134,25 @@ def test_nothing_is_to_be_done_after_all_was_made(finished):
 
 
 REPORT = {"html_report": 1, "provenance": 1, "all": 1}
-RESOURCES = REPORT | {"study_resources": 1, "cost_figure": 1}
+RESOURCES = REPORT | {"study_resources": 1}
 NEW_RESULTS = RESOURCES | {"study_warnings": 1}
 # what holds the configuration itself
 CONFIGURATION = {"report_config": 1}
 SHAPE = NEW_RESULTS | {
-    "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "spectral_distance": 1, "asymmetry": 1, "centiles": 1,
-    "group_tables": 1, "norms_figure": 1, "report_provenance": 1, "view_surfaces": 1, "metrics_table": 1,
-    "centiles_table": 1, "methods": 1,
+    "metrics_figure": 1, "spectra_figure": 1, "spectral_distance": 1, "asymmetry": 1, "centiles": 1,
+    "group_tables": 1, "report_provenance": 1, "view_surfaces": 1, "metrics_table": 1, "methods": 1,
 }  # fmt: skip
 ONE_RUN = SHAPE | {
     "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "displacement": 1,
-    "similarity": 1, "study_table": 4, "study_runs": 1, "zones_figure": 1, "steps_figure": 1, "weekly_figure": 1,
-    "displacement_maps": 1, "shape_maps": 4, "displacement_figure": 1, "runs_figure": 1, "growth_zone_figure": 1,
-    "displacement_table": 1, "layers_figure": 1, "normals_figure": 1, "mesh_figure": 1, "contact_scheme": 1,
-    "outlines_figure": 1,
+    "similarity": 1, "study_table": 4, "study_runs": 1, "weekly_figure": 1, "displacement_maps": 1, "shape_maps": 1,
+    "displacement_figure": 1, "runs_figure": 1, "outlines_figure": 1,
 }  # fmt: skip
-OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "displacement_table", "runs_figure"}
+OF_THE_STUDY = {*SHAPE, "study_table", "study_runs", "displacement_figure", "runs_figure"}
 BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count in ONE_RUN.items()}
-MESH = {"tetrahedralise": 1, "quality_figure": 1}
+MESH = {"tetrahedralise": 1}
 FIGURES = {
-    "metrics_figure": 1, "spectra_figure": 1, "bands_figure": 1, "displacement_figure": 1, "quality_figure": 1,
-    "growth_figure": 1, "runs_figure": 1, "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 8,
-    "zones_figure": 2, "growth_zone_figure": 2, "layers_figure": 2, "normals_figure": 2, "steps_figure": 2,
-    "norms_figure": 1, "quality_page": 2, "quality_table": 1, "mesh_figure": 2, "contact_scheme": 2,
+    "metrics_figure": 1, "spectra_figure": 1, "displacement_figure": 1, "growth_figure": 1, "runs_figure": 1,
+    "weekly_figure": 2, "displacement_maps": 2, "shape_maps": 2, "quality_page": 2, "quality_table": 1,
     "outlines_figure": 2, "inputs_figure": 1,
 }  # fmt: skip
 
@@ -170,7 +165,7 @@ FIGURES = {
         (
             "metrics",
             {"curvature_radius_mm": 4.0},
-            SHAPE | {"measure": 6, "study_table": 2, "shape_maps": 8},
+            SHAPE | {"measure": 6, "study_table": 2, "shape_maps": 2},
         ),
         ("runs", {"thick": {"thickness_mm": 3.5}}, ONE_RUN),
         ("folding", {"growth_rate_per_s": 1e-7}, BOTH_RUNS | {"growth_figure": 1}),

@@ -564,7 +564,8 @@ class Figures:
             ({},) if self.last_week else (), technical=True,
         )  # fmt: skip
         reference = self.config.norm_reference
-        with_norms: tuple[Wildcards, ...] = ({},) if reference else ()
+        # of fewer brains there are no centiles
+        with_norms: tuple[Wildcards, ...] = ({},) if len(reference) >= 5 else ()
         caption = f"""Metrics of whole brains over the weeks: stars are the measured brains that make the norm
             ({len(reference)} of them, each compared with the others), the grey band holds 90 % of further brains by a
             quadratic of the week and Student's distribution, bars are 5, 50 and 95 % quantiles where a week has five

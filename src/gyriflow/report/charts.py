@@ -316,7 +316,8 @@ def spectra_weeks_chart(spectra: pd.DataFrame, **shown: Unpack[Shown]) -> Figure
     ----------
     spectra : as for `spectra_chart`
     """
-    bands = FOLD_BANDS
+    known = spectra[spectra["relative_power"].notna()]["band"]
+    bands = [band for band in FOLD_BANDS if (known == band).any()] or FOLD_BANDS
     rows = _of_bands(runs_by_name(spectra), bands)
     sides = _sides_of(rows)
     layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}

@@ -211,7 +211,7 @@ def sizes_table(areas: pd.DataFrame) -> pd.DataFrame:
     columns: dict[str, pd.Series] = {}
     for column, heading, unit in (("area_cm2", "pial area", "cm²"), ("volume_ml", "volume", "mL")):
         wide = areas.pivot_table(index="week", columns="series", values=column, aggfunc="mean")
-        columns |= {f"{heading} ({unit}): {name}": wide[name] for name in names}
+        columns |= {f"{heading} ({unit})" + (f": {name}" if names[1:] else ""): wide[name] for name in names}
         for name in names[1:]:
             columns[f"{heading}: {name} − {names[0]} (%)"] = (100 * (wide[name] / wide[names[0]] - 1)).round(1)
     return pd.DataFrame(columns).rename_axis("week (GW)")

@@ -269,6 +269,8 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     axes.set_ylim(-0.6, max(len(places), 1) - 0.4)
     if len(weeks):
         week_axis(axes, [weeks.min(), beyond])
+        whole = np.arange(np.ceil(weeks.min()), beyond)
+        axes.set_xticks([*whole, beyond], [*(f"{week:g}" for week in whole), "never"])
     else:
         said: dict[str, Any] = {"ha": "center", "transform": axes.transAxes, "color": MUTED_COLOUR}
         axes.text(0.5, 0.5, "no sulcus begins after the start", **said)

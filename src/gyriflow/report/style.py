@@ -235,7 +235,8 @@ def week_axis(axes: Axes, weeks: Iterable[float] | None = None) -> None:
     axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1))
     if weeks is not None:
         values = list(weeks)
-        margin = 0.04 * max(max(values) - min(values), 1.0)
+        # a single week stands in the middle of one
+        margin = max(0.04 * (max(values) - min(values)), (1.08 - max(values) + min(values)) / 2)
         axes.set_xlim(min(values) - margin, max(values) + margin)
 
 

@@ -22,6 +22,11 @@ _TABLE = Environment(autoescape=True).from_string(
     "{% endfor %}</tbody></table>"
 )
 
+OF_THE_SURFACE = ("crossing_faces", "curvature_radius", "thickness_measured_share")
+"""Metrics of how a brain was measured."""
+AROUND_ZERO = ("mean_shape_index", "mean_curvature")
+"""How metrics begin that may be zero, so that a difference in per cent says nothing."""
+
 
 def _named(rows: pd.DataFrame) -> pd.Series:
     """Returns the metric of each row as words, with its unit."""
@@ -39,23 +44,27 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     measured
         Heading of the measured brains' column.
 
+    What says how a surface was measured, not what it is like, is left out.
+
     Returns
     -------
     DataFrame indexed by metric (with its unit) and week; cells without a value are NaN
     """
-    rows = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
+    rows = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & ~metrics["metric"].isin(OF_THE_SURFACE)])
     names = _named(rows)
+    below_zero = set(names[rows["metric"].str.startswith(AROUND_ZERO)])
     order = list(dict.fromkeys(names))
     wide = rows.assign(metric=names).pivot_table(
         index=["metric", "week"], columns="run", values="value", aggfunc="mean", sort=True
     )
     wide = wide.reindex(order, level="metric")
     runs = simulated_runs(rows["run"])
+    signed = wide.index.get_level_values("metric").isin(below_zero)
     real = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
     columns = {measured: real}
     for run in runs:
         columns[run] = wide[run]
-        columns[f"{run}: difference (%)"] = (100 * (wide[run] / real - 1)).round(1)
+        columns[f"{run}: difference (%)"] = (100 * (wide[run] / real - 1)).round(1).where(~signed)
     return pd.DataFrame(columns)
 
 

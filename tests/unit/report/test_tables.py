@@ -15,6 +15,9 @@ def test_metrics_table_gives_the_difference_from_the_measured_brain():
             ("s", "real", 22.0, "whole", "area", 100.0, "cm2"),
             ("s", "thin", 22.0, "left", "area", 55.0, "cm2"),
             ("s", "thin", 22.0, "whole", "gyrification_index", 1.2, "1"),
+            ("s", "thin", 22.0, "whole", "mean_curvature_q05", -0.01, "1/mm"),
+            ("s", "real", 22.0, "whole", "mean_curvature_q05", 0.02, "1/mm"),
+            ("s", "thin", 22.0, "whole", "crossing_faces", 0.0, "1"),
         ],
         columns=["subject", "run", "week", "hemisphere", "metric", "value", "unit"],
     )
@@ -23,6 +26,10 @@ def test_metrics_table_gives_the_difference_from_the_measured_brain():
     assert table.loc[("area (cm²)", 22.0), "thin: difference (%)"] == pytest.approx(10.0)
     assert np.isnan(table.loc[("area (cm²)", 23.0), "real brain"])
     assert table.loc[("gyrification index", 22.0), "thin"] == 1.2
+    # a share of what may be zero says nothing
+    (curvature,) = table.index[table.index.get_level_values("metric").str.contains("curvature")]
+    assert np.isnan(table.loc[curvature, "thin: difference (%)"])
+    assert not table.index.get_level_values("metric").str.contains("crossing").any()
     assert "phantom" in metrics_table(metrics, measured="phantom")
 
 
