@@ -53,6 +53,7 @@ rule prediction:
     params:
         start_week=of(PLAN.brains.week),
         weeks=of(PLAN.validating.atlas_weeks),
+        of_atlas=of(PLAN.validating.predicts),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/prediction.py"

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from gyriflow.comparison.placement import drawn_patches
 from gyriflow.comparison.prediction import endpoints, scaled_to, with_skill
 from gyriflow.comparison.shapes import Shape, ready
 from gyriflow.geometry.tetrahedra import boundary_surface
@@ -21,20 +22,22 @@ with step(snakemake.log[0]):
     for number, week in enumerate(map(float, params.weeks)):
         real = read_surface(files.whole[number])
         real_shape = Shape(read_surface(files.real[number]), **read_vertex_maps(files.real_maps[number]))
+        patch, _ = drawn_patches(real_shape, mirrored=True)
         at = int(np.argmin(np.abs(targets.weeks - week)))
         target = TriangleMesh(targets.positions[at][used], start.faces)
         volume = signed_volume(target)
-        models = {
-            "run": read_surface(files.simulated[number]),
+        # written with the run that grows as the atlas, for those beside it too
+        simple = {
             "scaled": scaled_to(start, volume),
             "atlas": scaled_to(read_surface(files.atlas[number]), volume),
             **{name: TriangleMesh(places[at], start.faces) for name, places in targets.surfaces.items()},
             "target": target,
         }
+        models = {"run": read_surface(files.simulated[number])} | (simple if params.of_atlas else {})
         for model, surface in models.items():
             even = ready(surface, real)
             bend = curvature(even, radius_mm=params.curvature_radius_mm)
-            found = endpoints(surface, real, Shape(even, bend.mean, bend.shape_index), real_shape)
+            found = endpoints(surface, real, Shape(even, bend.mean, bend.shape_index), real_shape, patch)
             row = {"run": names.run, "start": names.brain, "start_week": params.start_week, "week": week}
             rows.append(row | {"horizon": week - params.start_week, "model": model} | found)
     write_table(snakemake.output[0], with_skill(pd.DataFrame(rows)))

@@ -127,11 +127,23 @@ def gain_interval(
     truth: Floats, run: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer], *, seed: int
 ) -> tuple[float, float]:
     """Returns the 95 % interval of r(run) − r(start) when whole patches of the surface are drawn with replacement."""
-    count = int(patch.max()) + 1
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=DRAWS)
-    gains = np.subtract(*(_correlations(drawn @ _patch_sums(truth, other, areas, patch)) for other in (run, start)))
+    drawn = draw_patches(patch, seed=seed)
+    gains = np.subtract(*(drawn_correlations(truth, other, areas, patch, drawn) for other in (run, start)))
     low, high = np.nanquantile(gains, INTERVAL)
     return float(low), float(high)
+
+
+def draw_patches(patch: NDArray[np.integer], *, seed: int) -> Ints:
+    """Returns how often each of p patches is drawn, (DRAWS, p), with replacement."""
+    count = int(patch.max()) + 1
+    return np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=DRAWS)
+
+
+def drawn_correlations(
+    truth: Floats, other: Floats, areas: Floats, patch: NDArray[np.integer], drawn: NDArray[np.integer]
+) -> Floats:
+    """Returns the (DRAWS,) correlations of values at vertices over the patches that are drawn."""
+    return _correlations(drawn @ _patch_sums(truth, other, areas, patch))
 
 
 def _products(one: Floats, other: Floats, weights: Floats) -> Floats:

@@ -139,8 +139,13 @@ class Validating:
 
     @property
     def foretold(self) -> list[tuple[str, str]]:
-        """The compared runs and starts whose growth is another population's."""
-        return [(run, brain) for run, brain in self.pairs if self.predicts(run, brain) and self.atlas_weeks(run, brain)]
+        """The compared runs whose growth is another population's, and predictions from the same starts beside them."""
+        starts = {brain for run, brain in self.pairs if self.predicts(run, brain) and self.atlas_weeks(run, brain)}
+        return [
+            (run, brain)
+            for run, brain in self.pairs
+            if brain in starts and self.atlas_weeks(run, brain) and "explained" not in self.kinds(run, brain).values()
+        ]
 
     def predicts(self, run: str, brain: str) -> bool:
         """Returns whether a run has the growth of another population, and no later brain like the start is read."""

@@ -5,15 +5,23 @@ import pandas as pd
 import pytest
 from shapes import rigid, sphere
 
-from gyriflow.comparison.prediction import BASELINES, distances, endpoints, roughness_mm, scaled_to, with_skill
+from gyriflow.comparison.placement import patches
+from gyriflow.comparison.prediction import (
+    BASELINES,
+    apart,
+    distances,
+    endpoints,
+    roughness_mm,
+    scaled_to,
+    with_skill,
+)
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
 
 from .bumpy import RADIUS, bumpy, shaped
 
 
 def test_spheres_in_each_other_are_apart_by_the_difference_of_their_radii():
-    moved = transformed(sphere(12.0), rigid(20, -30, 40, shift=(5, 6, 7)))
-    found = distances(moved, sphere(10.0))
+    found = distances(apart(sphere(12.0), sphere(10.0)))
     assert found["distance_mm"] == pytest.approx(2.0, abs=0.03)
     assert found["distance95_mm"] == pytest.approx(2.0, abs=0.03)
 
@@ -23,9 +31,20 @@ def test_distances_are_weighted_by_area_and_the_far_ones_are_a_quantile():
     # the two caps beyond 0.9 of a radius have a tenth of a ball's area
     caps = np.abs(ball.vertices[:, 2:]) > 9.0
     raised = TriangleMesh(ball.vertices * np.where(caps, 1.1, 1.0), ball.faces)
-    found = distances(raised, ball)
+    found = distances(apart(raised, ball))
     assert found["distance_mm"] == pytest.approx(0.1, abs=0.05)
     assert found["distance95_mm"] == pytest.approx(1.0, abs=0.15)
+
+
+def test_each_side_of_the_middle_has_its_distance():
+    ball = sphere(10.0)
+    # waves on the right only
+    right = np.where(ball.vertices[:, 0] > 0, 1 + 0.05 * np.cos(np.arctan2(*ball.vertices[:, 1:].T) * 8), 1.0)
+    found = distances(apart(TriangleMesh(ball.vertices * right[:, None], ball.faces), ball))
+    assert found["distance_right_mm"] > 5 * found["distance_left_mm"]
+    assert found["distance_mm"] == pytest.approx((found["distance_left_mm"] + found["distance_right_mm"]) / 2, rel=0.05)
+    half = TriangleMesh(ball.vertices + [20.0, 0, 0], ball.faces)
+    assert np.isnan(distances(apart(half, half))["distance_left_mm"])
 
 
 def test_jagged_vertices_are_rough_and_even_ones_are_not():
@@ -39,17 +58,25 @@ def test_jagged_vertices_are_rough_and_even_ones_are_not():
 
 def test_a_surface_is_worth_most_against_itself():
     real = bumpy(1, height=1.0)
-    own = endpoints(real, real, shaped(real), shaped(real))
+    shape = shaped(real)
+    patch = patches(shape.mesh.vertices, shape.areas, 5.0)
+    moved = transformed(real, rigid(20, -30, 40, shift=(5, 6, 7)))
+    own = endpoints(moved, real, shape, shape, patch)
     assert own["distance_mm"] < 0.02
+    assert own["cortex_dice"] > 0.97
     assert own["crossing_faces"] == 0
-    assert [own[name] for name in ("r_shape_index", "r_mean_curvature", "roughness_ratio")] == pytest.approx([1, 1, 1])
+    for name in ("r_shape_index", "r_shape_index_low", "r_mean_curvature", "roughness_ratio", "curvature_rms_ratio"):
+        assert own[name] == pytest.approx(1), name
     grown = transformed(real, np.diag([1.1, 1.1, 1.1, 1.0]))
-    found = endpoints(grown, real, shaped(real), shaped(real))
+    found = endpoints(grown, real, shape, shape, patch)
     assert found["area_error"] == pytest.approx(0.21)
     assert found["volume_error"] == pytest.approx(0.331)
     assert found["distance_mm"] == pytest.approx(0.1 * RADIUS, rel=0.1)
     other = bumpy(2, height=1.0)
-    assert abs(endpoints(other, real, shaped(other), shaped(real))["r_shape_index"]) < 0.4
+    unlike = endpoints(other, real, shaped(other), shape, patch)
+    assert abs(unlike["r_shape_index"]) < 0.4
+    for name in ("r_shape_index", "distance_mm"):
+        assert unlike[f"{name}_low"] < unlike[name] < unlike[f"{name}_high"]
 
 
 def test_a_surface_is_scaled_to_a_volume():
@@ -63,6 +90,14 @@ def test_skill_is_against_the_best_simple_way_of_the_week():
         [(week, name, value) for week, values in away.items() for name, value in zip(names, values, strict=True)],
         columns=["week", "model", "distance_mm"],
     )
-    found = with_skill(rows).set_index(["week", "model"])["skill"]
+    # draws that are as far apart as the means, or twice as far for all alike, do not change the skill
+    rows["drawn_mm"] = [value * np.array([1.0, 2.0]) for value in rows["distance_mm"]]
+    table = with_skill(rows).set_index(["week", "model"])
+    assert "drawn_mm" not in table
+    found = table["skill"]
+    assert table["skill_low"].to_numpy() == pytest.approx(found.to_numpy())
+    assert table["skill_high"].to_numpy() == pytest.approx(found.to_numpy())
     assert (found[22, "run"], found[22, "scaled"], found[22, "displaced"]) == pytest.approx((0.5, 0.0, -1.0))
     assert (found[23, "run"], found[23, "atlas_deformed"]) == pytest.approx((-1.0, 0.0))
+    alone = with_skill(rows[rows["model"] == "run"])
+    assert alone[["skill", "skill_low", "skill_high"]].isna().all(axis=None)

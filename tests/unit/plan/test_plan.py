@@ -399,6 +399,11 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
         f"results/brains/b{week}/surface/pial.surf.gii" for week in (23, 24)
     ]
     assert "results/study/figures/prediction.png" in found.figures.target("validate")
+    # a run that no brain tells of stands beside it, and one that later brains explain does not
+    runs = {"a": EXPECTED["runs"]["a"], "paper": {}, "measured": {"preset": "measured"}}
+    beside = plan(of_two(tmp_path, 22, 23, 24), runs=runs).validating
+    assert beside.foretold == [("a", "own22"), ("paper", "own22")]
+    assert [beside.predicts(run, "own22") for run in ("a", "paper")] == [True, False]
     # of unknown population, it is compared with the brains that its growth comes from
     unknown = plan(of_two(tmp_path, 22, population=None), **EXPECTED)
     assert not unknown.expecting.reads_only_others("own22")
