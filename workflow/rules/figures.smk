@@ -46,4 +46,5 @@ rule paper:
         FIGURES.target("paper"),
         rules.growth_rates.output if PLAN.chains.grown else [],
         rules.published_tables.output,
+        rules.replication.output,
         rules.studies.input,

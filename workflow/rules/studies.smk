@@ -63,6 +63,28 @@ rule published_tables:
         "../scripts/published_tables.py"
 
 
+# each result of the paper beside the same here, with a verdict
+rule replication:
+    input:
+        published=PUBLISHED,
+        displacement=PLAN.runs.of(DISPLACEMENT)[:1],
+        **{
+            name: expand(f"{STUDY}/{{study}}/{name}.csv", study=CONFIG.studies)
+            for name in ("members", "comparison", "nearest")
+        },
+    output:
+        csv=f"{STUDY}/replication.csv",
+        page=f"{STUDY}/replication.html",
+    params:
+        studies={
+            name: {"varied": list(study.vary), "week": study.compare_week}
+            for name, study in CONFIG.studies.items()
+        },
+        run=PLAN.runs.folded[0],
+    script:
+        "../scripts/replication.py"
+
+
 rule studies:
     input:
         expand(list(rules.study_tables.output), study=CONFIG.studies),

@@ -1,10 +1,12 @@
 """What the FetalFoldSim paper reports, beside the same of this study; its numbers are in a file of the workflow."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import reduce
 from operator import getitem
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 PAPER = "FetalFoldSim paper"
@@ -113,3 +115,110 @@ def cost_table(published: Mapping[str, Any], summaries: Mapping[str, tuple[float
             rows.append({"source": name, "quantity": quantity, "value": value})
     rows += [{"source": PAPER, **row} for row in published["cost"]["rows"]]
     return pd.DataFrame(rows)
+
+
+CLOSE = 0.1
+"""Relative difference of displacements up to which they agree."""
+WEAK = 0.05
+"""Share of the spectrum's power below which a band is very weak."""
+NOT_RUN, AGREES = "not run", "as in the paper"
+REAL = "real "
+
+
+@dataclass(frozen=True, eq=False)
+class StudyTables:
+    """The varied keys of a study, its week, and the tables of the same names in its folder."""
+
+    varied: Sequence[str]
+    week: float
+    members: pd.DataFrame
+    comparison: pd.DataFrame
+    nearest: pd.DataFrame
+
+
+def replication(
+    published: Mapping[str, Any], displacement: pd.DataFrame, studies: Sequence[StudyTables]
+) -> pd.DataFrame:
+    """Returns each result of the paper beside the same here: result, place, paper, here, verdict.
+
+    Displacement has the rows of one run, in the columns of `displacement_table`. Where the paper's study is not among
+    `studies`, the verdict is `NOT_RUN`. Bands are cut at Weyl's number as the paper's, and stand in whole beside it.
+    """
+    rows = [*_displacements(published["displacement"], displacement)]
+    for entry in [*published["nearest"], *published["findings"]]:
+        of_it = [one for one in studies if list(one.varied) == [entry["parameter"]] and one.week == entry["week"]]
+        if "finding" in entry:
+            result, paper = entry["finding"], "so it says"
+            here, verdict = _finding(entry["check"], of_it[0]) if of_it else ("–", NOT_RUN)
+        else:
+            result = f"nearest {entry['parameter']} by {entry['measure']}, {entry['week']} GW"
+            paper = f"{entry['value']:g}"
+            here, verdict = _nearest(entry, of_it[0].nearest) if of_it else ("–", NOT_RUN)
+        rows.append((result, entry["place"], paper, here, verdict))
+    return pd.DataFrame(rows, columns=["result", "place", "paper", "here", "verdict"])
+
+
+def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> Iterator[tuple[str, ...]]:
+    own = published["rows"][0]
+    table = displacement.set_index(["nodes", "from_week"])
+    for column, name in (("max_mm", "largest"), ("mean_mm", "mean")):
+        for week, paper in zip(published["from_weeks"], own[column], strict=True):
+            found = [float(table[column].get((nodes, float(week)), "nan")) for nodes in ("all", "pial")]
+            text, verdict = "–", NOT_RUN
+            if np.isfinite(found[0]):
+                text = f"all nodes {found[0]:.2f}, surface {found[1]:.2f}"
+                away = [value / paper - 1 for value in found]
+                verdict = AGREES if min(map(abs, away)) <= CLOSE else "{:+.0%}, {:+.0%}".format(*away)
+            yield f"{name} displacement, {week}-{week + 1} GW (mm)", published["place"], f"{paper:.2f}", text, verdict
+
+
+def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]:
+    texts, same = [], []
+    for measure, how in ((f"{entry['measure']}_weyl", "cut"), (entry["measure"], "whole bands")):
+        for row in nearest[nearest["measure"] == measure].to_dict("records"):
+            flag = "" if row["flag"] == "ok" else f" ({row['flag']})"
+            texts.append(f"{row['hemisphere']}, {how}: {row[entry['parameter']]:g}{flag}")
+            same.append(row[entry["parameter"]] == entry["value"])
+    return "; ".join(texts) or "–", _verdict(sum(same), len(same))
+
+
+def _finding(check: str, study: StudyTables) -> tuple[str, str]:
+    """Returns what is found of a check in words, and the verdict."""
+    if check == "all_come":
+        fine = study.members["outcome"].eq("finished")
+        return f"{fine.sum()} of {len(fine)} runs", _verdict(fine.sum(), len(fine))
+    cut, whole = (_shares(study.comparison, end) for end in ("_weyl", ""))
+    cut = cut[cut["B4"].notna()]
+    if check == "most_B4":
+        fine = cut["B4"] > cut[["B5", "B6"]].max(axis=1)
+    elif check == "little_B6":
+        # without a mode there is nothing
+        fine = cut["B6"].fillna(0) < WEAK
+    elif check == "right_B4":
+        sides = [cut["B4"].xs(side, level="hemisphere") for side in ("right", "left")]
+        fine = (sides[0] - sides[1]).dropna() > 0
+    else:
+        real = cut.index.get_level_values("brain").str.startswith(REAL)
+        least = cut.loc[real, "B5"].groupby("hemisphere").min()
+        fine = least > cut.loc[~real, "B5"].groupby("hemisphere").max()
+    text, verdict = f"{fine.sum()} of {len(fine)} cases", _verdict(fine.sum(), len(fine))
+    if check == "little_B6" and whole["B6"].max() >= WEAK:
+        return (
+            f"{text} when cut; in whole bands {whole['B6'].min():.2f} to {whole['B6'].max():.2f}",
+            f"{verdict}, by the cut alone",
+        )
+    return text, verdict
+
+
+def _shares(comparison: pd.DataFrame, end: str) -> pd.DataFrame:
+    """Returns the relative powers B4 to B6 of the simulated and the real hemispheres, by brain and hemisphere."""
+    bands = {f"relative_power_B{band}{end}": f"B{band}" for band in (4, 5, 6)}
+    rows = comparison[comparison["measure"].isin(bands)]
+    simulated, real = rows.assign(brain=rows["run"]), rows.assign(brain=REAL + rows["real"], value=rows["real_value"])
+    both = pd.concat([simulated, real]).replace({"measure": bands})
+    table = both.pivot_table("value", ["brain", "hemisphere"], "measure", aggfunc="first")
+    return table.reindex(columns=list(bands.values()))
+
+
+def _verdict(fine: int, of: int) -> str:
+    return NOT_RUN if of == 0 else AGREES if fine == of else "in part" if fine else "otherwise"

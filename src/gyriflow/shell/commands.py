@@ -17,7 +17,7 @@ from ..shipped import CONFIG, DEMO, SHIPPED
 
 STAGES = (
     *("retrieve", "surface", "quality", "mesh", "growth", "folding", "metrics", "figures", "report"),
-    *("studies", "calibrate", "paper", "validate", "export"),
+    *("studies", "calibrate", "paper", "replication", "validate", "export"),
 )
 """Targets of the workflow that a user asks for by name."""
 CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
