@@ -77,5 +77,6 @@ def test_what_the_paper_reports_stands_beside_the_same_of_the_shipped_atlas(work
     assert tuple(table.loc["all thicknesses come to 28 GW", ["here", "verdict"]]) == ("2 of 2 runs", "as in the paper")
     assert table.loc["ratios of 1 to 20 come to 29 GW", "verdict"] == "not run"
     page = (folder / "replication.html").read_text()
+    assert "<p>Study thickness at 28 GW against" in page
     assert "spina bifida aperta, operated" in page
     assert all(name in page for name in ("The FetalFoldSim paper", "dHCP", "2 of 2 runs"))

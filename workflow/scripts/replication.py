@@ -23,4 +23,4 @@ with step(snakemake.log[0]):
     said = [f"Displacements are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}."]
     said += [comparison_caption(name, study.week, study.comparison) for name, study in studies.items()]
     body = html_table(table, caption="The FetalFoldSim paper, and the same here")
-    write_html(snakemake.output.page, "".join(Markup("<p>{}</p>\n").format(line) for line in said) + body)
+    write_html(snakemake.output.page, Markup("").join(Markup("<p>{}</p>\n").format(line) for line in said) + body)
