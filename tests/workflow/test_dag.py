@@ -59,6 +59,7 @@ def test_the_paper_is_planned_with_each_equal_run_once(workflow):
     assert (jobs["study_tables"], jobs["published_tables"], jobs["tetrahedralise"]) == (2, 1, 1)
     # the real brains of 28 and 29 GW; runs once they are solved
     assert jobs["measure"] == 2
+    assert jobs["replication"] == 1
 
 
 def test_a_calibration_is_planned_round_by_round(workflow):
