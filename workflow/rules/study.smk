@@ -75,7 +75,7 @@ rule export:
         [
             list(brain[kind].values())
             for brain in EXPORTED
-            for kind in ("surfaces", "maps", "regions")
+            for kind in ("surfaces", "maps", "regions", "white")
         ],
         [brain["report"] for brain in EXPORTED],
         [

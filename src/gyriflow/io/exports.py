@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from ..errors import InputError
@@ -68,9 +69,9 @@ class ExportedBrain:
     """A brain at a week, and its files by the sides that it has; regions may be empty.
 
     The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said. Of a
-    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface. The
-    volume, which simulated brains of labels have, names the start's `labels` with `affine_from`, in whose grid theirs
-    are written, and the `surface` and `thickness` of the whole brain.
+    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface. White
+    surfaces are the user's files. The volume, which simulated brains of labels have, names the start's `labels` with
+    `affine_from`, in whose grid theirs are written, and the `surface` and `thickness` of the whole brain.
     """
 
     brain: str
@@ -82,6 +83,7 @@ class ExportedBrain:
     regions: Mapping[Side, str]
     report: str
     covariates: Mapping[str, str]
+    white: Mapping[Side, str] = field(default_factory=dict)
     volume: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -112,7 +114,9 @@ def export_bids(
     """
     folder = Path(folder)
     names = _subjects_and_sessions([brain for brain in brains if brain.run == MEASURED])
-    described: dict[str, dict[str, str]] = {"pial": {"Description": "Pial surface, RAS+ mm", "Units": "mm"}}
+    described: dict[str, dict[str, str]] = {
+        kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"} for kind in ("pial", "white")
+    }
     simulated: dict[str, str] = {}
     taken: dict[tuple[str, str], ExportedBrain] = {}
     for brain in brains:
@@ -131,9 +135,12 @@ def export_bids(
         desc = f"_desc-{label}" if label else ""
         for side, surface in brain.surfaces.items():
             named = f"{folder / subject / (session or '') / 'anat' / stem}_hemi-{side[0].upper()}"
-            mesh = read_surface(surface)
-            mesh = transformed(mesh, pose.inverse) if pose.together else mesh
-            write_surface(f"{named}{desc}_pial.surf.gii", mesh, STRUCTURES[side])
+            back = pose.inverse if pose.together else np.eye(4)
+            write_surface(f"{named}{desc}_pial.surf.gii", transformed(read_surface(surface), back), STRUCTURES[side])
+            if side in brain.white:
+                # as given, in the place of the pial one
+                white = transformed(read_surface(brain.white[side]), back @ pose.of_file(side))
+                write_surface(f"{named}_white.surf.gii", white, STRUCTURES[side])
             for quantity, values in read_vertex_maps(brain.maps[side]).items():
                 suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
                 described[suffix] = {"Description": text, "Units": unit}

@@ -185,10 +185,18 @@ class Measuring:
                 "regions": dict(zip(SIDES, measured.regions.values(), strict=False)),
                 "report": PIAL["report"].format(brain=measured.subject),
                 "covariates": self.config.brain(measured.subject).covariates,
+                "white": self._white(measured),
                 "volume": self._volume(measured),
             }
             for measured in self.every
         ]
+
+    def _white(self, measured: Measured) -> dict[Side, str]:
+        """Returns the given white surfaces of a measured brain, by side."""
+        files = self.config.brain(measured.subject).white_files if measured.run == MEASURED else {}
+        if len(measured.sides) == 1:
+            return dict.fromkeys(measured.sides, files["whole"]) if files else {}
+        return {side: files[side] for side in measured.sides if side in files}
 
     def _volume(self, measured: Measured) -> dict[str, Any]:
         """Returns what the labels of a simulated brain are made of; nothing where its start has none."""

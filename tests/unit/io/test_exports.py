@@ -155,6 +155,17 @@ def labels_of(folder):
     return files | {"affine_from": "auto"}
 
 
+def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
+    """Files in LPS, posed with the pial surface by a quarter turn and a shift."""
+    lps = np.diag([-1.0, -1, 1, 1])
+    small = transformed(hemisphere(-1), np.diag([0.5, 0.5, 0.5, 1]))
+    write_surface(tmp_path / "white.surf.gii", transformed(small, lps))
+    write_json(tmp_path / "surface.json", {"pose": Pose(POSE, {"left": POSE @ lps}).plain()})
+    export_bids(tmp_path / "bids", [replace(brain, white={"left": str(tmp_path / "white.surf.gii")})], {}, "1", {})
+    found = read_surface(tmp_path / "bids" / "sub-case1" / "anat" / "sub-case1_hemi-L_white.surf.gii")
+    np.testing.assert_allclose(found.vertices, small.vertices, atol=1e-5)
+
+
 def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain):
     folder, volume = tmp_path / "bids", labels_of(tmp_path)
     export_bids(folder, [brain, replace(brain, run="a", week=24.0, volume=volume)], {}, "1", {})
