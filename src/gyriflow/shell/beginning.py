@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from scipy import ndimage
 
 from ..config.atlas import Atlas, AtlasSettings, atlas_sections
 from ..config.brains import covariates
@@ -304,6 +305,9 @@ def fitting_scheme(labels: np.ndarray) -> tuple[str | None, list[str]]:
     A scheme fits where it knows all labels and what it calls cortex lies around what it calls the cerebrum; of several
     that do, the one with most cortex outside is taken if it stands out.
     """
+    # the air around the head tells nothing, and is most of the volume
+    for box in ndimage.find_objects((labels != 0).astype(np.int8)):
+        labels = np.ascontiguousarray(labels[box])
     present = set(np.unique(labels).tolist()) - {0}
     if present == {1}:
         return "binary", []
