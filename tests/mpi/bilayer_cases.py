@@ -71,9 +71,9 @@ def test_one_quadratic_element_through_the_cortex_does_what_two_linear_ones_do_n
     assert abs(rate_error(2, 1)) < 0.06
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.03, np.inf])
+@pytest.mark.parametrize("memory", [0.0, np.inf])
 def test_waves_grow_as_in_theory_with_quadratic_elements(memory):
-    case = Waved(contrast=20.0, growth=0.01, steps=3, memory=memory, order=2)
+    case = Waved(contrast=20.0, growth=0.01, steps=2, memory=memory, order=2)
     exact = np.log(case.expected()[-1])
     coarse, fine = (np.log(amplified(case, cells, COMM)[-1]) for cells in (1, 2))
     assert (np.abs(fine - exact)[LONG] <= 0.5 * np.abs(coarse - exact)[LONG]).all()

@@ -35,7 +35,6 @@ def alive(folding, path):
 @pytest.mark.parametrize(
     ("kind", "changes"),
     [
-        ("none", {}),
         ("planes", {}),
         ("global", {}),
         ("none", {"support": "free"}),
