@@ -20,7 +20,7 @@ class Sets(LoadScopeScheduling):
     def _split_scope(self, nodeid):
         file, _, case = nodeid.partition("::")
         if file == "tests/mpi/test_ranks.py":
-            # the cases of a file; the first number of ranks compiles the forms
+            # the same cases; the first number of ranks compiles the forms
             return case.rpartition("-")[0]
         # both look at the one finished study
         if file in ("tests/workflow/test_dag.py", "tests/workflow/test_rerun.py"):

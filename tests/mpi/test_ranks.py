@@ -8,13 +8,17 @@ import pytest
 
 pytestmark = pytest.mark.slow
 
+CASES = sorted(str(path) for path in Path(__file__).parent.glob("*_cases.py"))
+PARTS = 4
+"""Starting the ranks takes as long as the cases of some files: so many files share a start."""
+
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
-@pytest.mark.parametrize("cases", sorted(path.name for path in Path(__file__).parent.glob("*_cases.py")))
-def test_cases_hold_on(ranks, cases):
-    path = Path(__file__).with_name(cases)
-    program = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", str(path)]
+@pytest.mark.parametrize("part", range(PARTS))
+def test_cases_hold_on(ranks, part):
+    cases = CASES[part::PARTS]
+    program = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", *cases]
     command = ["mpiexec", "-n", str(ranks), *program]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=400, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=1200, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == ranks, done.stdout

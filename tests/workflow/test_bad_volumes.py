@@ -125,7 +125,7 @@ def study(checkout_copy, tmp_path_factory):
         "surface": {"edge_length_mm": 2.0},
         "folding": {"end_week": 23},
     }
-    return workflow.surfaces(config, "surface")
+    return workflow.surfaces(config, f"results/brains/{GOOD}/surface/thickness.json")
 
 
 def test_the_run_ends_in_2_without_a_traceback(study):

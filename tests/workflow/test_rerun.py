@@ -35,7 +35,7 @@ def changed_files(root, *names, content=OTHER):
 OF_THE_OTHER_BRAIN = SHAPE | {
     "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "growth_table": 1, "measure": 1, "study_table": 5,
     "similarity": 2,
-    "weekly_figure": 2, "shape_maps": 8, "runs_figure": 1, "pial_from_labels": 1, "label_volumes": 1,
+    "weekly_figure": 1, "shape_maps": 2, "pial_from_labels": 1, "label_volumes": 1,
     "quality_page": 1, "quality_table": 1, "inputs_figure": 1, "outlines_figure": 2,
 }  # fmt: skip
 # a table of the study is shown by the report

@@ -2,7 +2,7 @@
 
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, write_table
-from gyriflow.report.quality import quality_table, shown_table
+from gyriflow.report.quality import quality_table, shown_table, thickness_note
 from gyriflow.report.tables import html_table
 from gyriflow.step import step
 
@@ -10,5 +10,5 @@ params = snakemake.params
 with step(snakemake.log[0]):
     table = quality_table([read_json(file) for file in snakemake.input], params.refused, params.order)
     write_table(snakemake.output.csv, table)
-    caption = "Quality of the brains before the solve"
+    caption = f"Quality of the brains before the solve{thickness_note(table)}"
     write_html(snakemake.output.table, html_table(shown_table(table), caption=caption))

@@ -9,7 +9,6 @@ from typing import Any
 from ..config.root import Config
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.terms import ELEMENTS_NEEDED, run_names
-from ..units import week_tag
 from .brains import Brains
 from .chains import Chains
 from .measuring import Measured, Measuring
@@ -21,6 +20,7 @@ from .validating import Validating
 Wildcards = Mapping[str, str]
 STUDY_FIGURES = f"{STUDY}/figures"
 INFLUENCE = f"{STUDY}/{{study}}/figures"
+WEEKLY = f"{STUDY_FIGURES}/weekly.{{brain}}.png"
 
 
 def nothing(**_: str) -> dict[str, Any]:
@@ -186,13 +186,10 @@ class Figures:
         weeks = [set(self.runs.week_tags(*pair)) for pair in self.runs.folded]
         return max(set.intersection(*weeks), default=None) if weeks else None
 
-    @cached_property
+    @property
     def first(self) -> str | None:
-        """The figure that stands on the first page of the report: the weeks of the first run."""
-        if not self.runs.folded:
-            return None
-        run, brain = self.runs.folded[0]
-        return f"{RUN}/figures/weekly.png".format(run=run, brain=brain)
+        """The figure that stands on the first page of the report: the weeks of the first brain that is folded."""
+        return WEEKLY.format(brain=self.runs.folded[0][1]) if self.runs.folded else None
 
     def _synthetic(self, *brains: str) -> dict[str, Any]:
         return {"synthetic": all(self.config.brain(brain).synthetic for brain in brains)}
@@ -223,6 +220,13 @@ class Figures:
         """Returns the measured brains beside a run by week."""
         real = {row.subject: row for row in self.measuring.real}
         return {float(week): real[name] for week, name in self.measuring.beside(run, brain).items()}
+
+    def _runs_from(self, start: str) -> list[str]:
+        return [run for run, brain in self.runs.folded if brain == start]
+
+    def _real_beside_runs(self, start: str) -> dict[float, Measured]:
+        beside = [self._real_beside(run, start) for run in self._runs_from(start)]
+        return {week: row for rows in beside for week, row in rows.items()}
 
     def _each_brain(self, brains: list[str]) -> tuple[Wildcards, ...]:
         return tuple({"brain": brain} for brain in brains)
@@ -262,8 +266,7 @@ class Figures:
             "inputs_figure", "Inputs", "brains that went in", f"{STUDY_FIGURES}/inputs.png", "pictures.brains_picture",
             "The youngest and the oldest brain that went in, at one scale.",
             lambda: {
-                "real": {f"{b}\n{self.brains.week(b):g} GW": PIAL["whole"].format(brain=b) for b in ends},
-                "runs": {},
+                "brains": {f"{b}\n{self.brains.week(b):g} GW": PIAL["whole"].format(brain=b) for b in ends}
             },
             lambda: {**self._synthetic(*ends), "views": ["left", "top", "bottom"]},
             paper=True,
@@ -362,15 +365,24 @@ class Figures:
             return lambda run, brain: {key: path.format(run=run, brain=brain) for key, path in patterns.items()}
 
         yield Figure(
-            "weekly_figure", "Folding", "simulated beside measured brains", f"{at}/weekly.png", "pictures.runs_by_week",
-            """Simulated brain of run *{run}* (blue; a, c) beside the measured brain of the same week (beige; b, d),
-            from the left and from above, at one scale. The first week is the start brain as it was meshed.""",
-            lambda run, brain: {
-                "runs": {"simulated": {w: row.parts["whole"] for w, row in self._surfaces(run, brain).items()}},
-                "real": {week: row.parts["whole"] for week, row in self._real_beside(run, brain).items()},
+            "weekly_figure", "Folding", "simulated beside measured brains", WEEKLY, "pictures.runs_by_week",
+            """Runs from *{brain}* (blue) above the measured brains of the same weeks (beige), from the left and from
+            above, at one scale. The first week is the start brain as it was meshed. What differs between the runs is in
+            ``results/study/runs.csv``.""",
+            lambda brain: {
+                "runs": {
+                    run: {week: row.parts["whole"] for week, row in self._surfaces(run, brain).items()}
+                    for run in self._runs_from(brain)
+                },
+                "real": {week: row.parts["whole"] for week, row in self._real_beside_runs(brain).items()},
             },
-            self._beside,
-            self._each_run,
+            lambda brain: {
+                **self._synthetic(brain),
+                "measured": self.config.measured_name(
+                    [row.subject for row in self._real_beside_runs(brain).values()]
+                ),
+            },
+            tuple({"brain": brain} for brain in dict.fromkeys(brain for _, brain in self.runs.folded)),
             paper=True,
         )  # fmt: skip
         yield Figure(
@@ -493,22 +505,6 @@ class Figures:
             """Largest / mean norm of the displacement between output weeks in mm, over all nodes and over the pial
             surface's nodes, with the published values.""",
             lambda: displacement, lambda: self._synthetic(*self.config.start_brains), paper=True, technical=True,
-        )  # fmt: skip
-        last = self.last_week
-        real = [row for row in self.measuring.real if week_tag(row.week) == last][:1]
-        yield Figure(
-            "runs_figure", "Folding", "runs side by side", f"{STUDY_FIGURES}/runs.png", "pictures.brains_picture",
-            f"""The runs of the study at {float(last or 0):g} GW, with the measured brain of that week where there is
-            one. What differs between the runs is in ``results/study/runs.csv``.""",
-            lambda: {
-                "runs": dict(
-                    zip(run_names(self.runs.folded), self.runs.of(f"{RUN}/surfaces/week-{last}/pial.surf.gii"),
-                        strict=True)
-                ),
-                "real": {self.config.measured_name([row.subject]): row.parts["whole"] for row in real},
-            },
-            lambda: self._of_study(*(row.subject for row in real)),
-            ({},) if last and len(self.runs.folded) > 1 else (),
         )  # fmt: skip
 
     @property

@@ -129,28 +129,18 @@ def runs_by_week(
 
 
 @styled
-def brains_picture(
-    runs: Mapping[str, TriangleMesh],
-    real: Mapping[str, TriangleMesh],
-    *,
-    views: Sequence[str] = SIDE_VIEWS,
-    **shown: Any,
-) -> Figure:
-    """Returns brains side by side, those of runs (blue) before measured ones (beige), a row per view.
+def brains_picture(brains: Mapping[str, TriangleMesh], *, views: Sequence[str] = SIDE_VIEWS, **shown: Any) -> Figure:
+    """Returns measured brains side by side, a row per view.
 
     Parameters
     ----------
-    runs, real : {heading: surface in RAS+ mm}
+    brains : {heading: surface in RAS+ mm}
     """
     rows = [
-        Row(
-            f"{view.name} view",
-            _plain_panels(runs, list(runs), SIMULATED_SURFACE_COLOUR, view)
-            + _plain_panels(real, list(real), REAL_SURFACE_COLOUR, view),
-        )
+        Row(f"{view.name} view", _plain_panels(brains, list(brains), REAL_SURFACE_COLOUR, view))
         for view in named_views(views)
     ]
-    return panel_grid([*runs, *real], rows, **shown)
+    return panel_grid(list(brains), rows, **shown)
 
 
 @styled

@@ -48,10 +48,20 @@ PIXELS_PER_INCH = 200
 COLUMNS = (
     *("subject", "week", "population", "source", "sides", "verdict", "cause", "warning_count", "warnings"),
     *("area_cm2", "area_left_cm2", "area_right_cm2", "volume_ml", "share_of_expected_volume"),
-    *("mean_thickness_mm", "thickness_measured_share", "pose_by", "rotation_deg", "asymmetry_mm", "page"),
+    *(
+        "mean_thickness_mm",
+        "thickness_measured_share",
+        "voxels_through_cortex",
+        "pose_by",
+        "rotation_deg",
+        "asymmetry_mm",
+        "page",
+    ),
 )
 """The columns; the first three, `source` and `sides` are of the configuration, the others of the surface stage."""
 SHOWN = ("subject", "week", "verdict", "cause", "warnings", "area_cm2", "volume_ml", "mean_thickness_mm", "page")
+RESOLVED_VOXELS = 1.5
+"""Labels of cortex below this many voxels are as thick as the voxels allow, not as the cortex is."""
 SEPARATOR = " | "
 """Between the warnings of a brain in its row."""
 
@@ -310,6 +320,7 @@ def quality_row(
         "share_of_expected_volume": report["volume_mL"] / expected_ml * 2 / len(sides),
         "mean_thickness_mm": thickness.get("mean_mm"),
         "thickness_measured_share": thickness.get("measured_area_share"),
+        "voxels_through_cortex": thickness.get("voxels_through_cortex"),
         "pose_by": pose.by,
         "rotation_deg": angle_deg(pose.of_file()[:3, :3]),
         "asymmetry_mm": report.get("asymmetry_mm"),
@@ -339,6 +350,13 @@ def shown_table(table: pd.DataFrame) -> pd.DataFrame:
     rank = table["verdict"].map({"refused": 0, "look": 1, "fine": 2})
     shown = table.loc[rank.sort_values(kind="stable").index, list(SHOWN)]
     return shown.rename(columns={name: plain(name) for name in SHOWN})
+
+
+def thickness_note(table: pd.DataFrame) -> str:
+    """Returns what is to be said of brains whose labels do not resolve the cortex; nothing where there are none."""
+    coarse = table["subject"][table["voxels_through_cortex"] < RESOLVED_VOXELS]
+    said = f"; labels less than {RESOLVED_VOXELS:g} voxels thick say little of the cortex: {', '.join(coarse)}"
+    return said if len(coarse) else ""
 
 
 def facts(row: Mapping[str, Any]) -> dict[str, str]:

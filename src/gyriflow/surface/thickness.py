@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import igl
@@ -31,9 +31,6 @@ from .fissure import sample
 from .labels import Labels, read_cerebrum
 
 log = logging.getLogger(__name__)
-
-# labels of cortex below this many voxels are as thick as the voxels allow, not as the cortex is
-RESOLVED_VOXELS = 1.5
 
 # a vertex has cortex under it where the centre of a voxel of cortex is nearer than this, and lies on the labels' own
 # surface where voxels outside are not much further
@@ -125,13 +122,9 @@ def thickness_from_labels(
     tissue = np.pad(tissue[box], PAD_VOXELS)
     cerebrum, cortex = np.isin(tissue, scheme.cerebrum), np.isin(tissue, scheme.cortex)
     thickness = cortical_thickness(surface, cerebrum, cortex, shifted_affine(affine, first), smoothing_voxels)
-    suggested, voxels = thickness.report["suggested_thickness_mm"], thickness.report["voxels_through_cortex"]
+    suggested = thickness.report["suggested_thickness_mm"]
     log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
-    coarse = f"the cortex's labels are {voxels:.1f} voxels thick: their thickness is a coarse one"
-    warnings = [coarse] if voxels < RESOLVED_VOXELS else []
-    for warning in warnings:
-        log.warning(warning)
-    return replace(thickness, report=thickness.report | {"warnings": warnings})
+    return thickness
 
 
 def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from gyriflow.report.quality import (
     quality_row,
     quality_table,
     shown_table,
+    thickness_note,
     tissue_groups,
 )
 
@@ -95,4 +96,7 @@ def test_verdicts_and_refused_brains_stand_in_one_table():
     assert table["warnings"].tolist()[1] == "one | two"
     # of one hemisphere half a brain is expected
     assert table["share_of_expected_volume"].tolist()[1:] == [1.0, 0.5]
+    assert thickness_note(table) == ""
+    coarse = quality_row(LABELS, REPORT, {"mean_mm": 0.8, "voxels_through_cortex": 1.0}, [], 80.0)
+    assert "say little of the cortex: a" in thickness_note(quality_table([coarse, look], [], ["a", "b"]))
     assert shown_table(quality_table([fine, look], [], ["a", "b"]))["subject"].tolist() == ["b", "a"]

@@ -227,6 +227,7 @@ def test_a_doubtful_shape_near_the_axes_of_files_is_posed_as_these_say(halves, f
         assert np.degrees(Rotation.from_matrix(hemisphere.rotation @ turn).magnitude()) < 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("doubtful")
 def test_a_doubtful_shape_in_any_pose_is_posed_like_the_studys_others_or_refused(halves):
     motions = rigid(31), rigid(32)
