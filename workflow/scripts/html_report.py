@@ -30,11 +30,7 @@ with step(snakemake.log[0]):
         metrics=params.metrics,
         methods=read_text(files.methods),
         configuration=yaml_text(params.config if params.paths else hide_paths(params.config)),
-        **{
-            name: read_table(files[name])
-            for name in ("validation", "quality", "warnings")
-            if files.get(name)
-        },
+        **{name: read_table(files[name]) for name in ("validation", "quality", "warnings") if files.get(name)},
     )
     view = read_json(files.view)
     parts = {name: read_text(path) for name, path in files.items() if name in PARTS}
