@@ -12,7 +12,7 @@ from scipy import ndimage
 from ..errors import InputError
 from ..parameters.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import Floats, Mask, without_stalks
+from .extraction import COMPARABLE, Floats, Mask, main_parts, without_stalks
 
 log = logging.getLogger(__name__)
 
@@ -28,11 +28,17 @@ TOLD_LOSS = 0.005
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1
 # fluid belongs to the cerebrum where it sees the cerebrum's tissue in more than this part of the directions
 ENCLOSED = 0.5
+# ventricles without labels look on it in more of them where no cortex is labelled, on which fissures look
+WHOLLY = 0.93
 # the border between what is enclosed and what is not is smoothed over this many voxels
 SMOOTHING = 2.0
 # parts of the fluid below this share of the largest are crumbs
 CRUMB = 0.02
 EVERY_NEIGHBOUR = np.ones((3, 3, 3), dtype=bool)
+# the smaller hemisphere, of the larger one's volume, where labels say which side is which
+SMALLEST_HEMISPHERE = 0.04
+# ventricles without labels are looked for in what a closing with a ball of this radius adds to the tissue
+CLOSING_MM = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +55,8 @@ class Cerebrum:
 
 
 def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cortex: float = 0.0) -> Cerebrum:
-    """Returns the cerebrum without ventricles that its tissue does not enclose, and what hangs on it by thin stalks.
+    """Returns the cerebrum without ventricles that its tissue does not enclose, what hangs on it by thin stalks, and
+    parts apart from it. Holes in it and ventricles without labels get the label of the nearest tissue.
 
     InputError where the labels are not the scheme's, and where cortex is at less than `least_cortex` of the cerebrum's
     surface.
@@ -63,10 +70,26 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
     if scheme.cortex and (share := require_cortex_outside(labels, scheme, least_cortex)) < LITTLE_CORTEX:
         warnings.append(f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface: check the labels")
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
+    unlabelled = unlabelled_ventricles(labels, scheme, affine)
+    if unlabelled.any():
+        warnings.append(
+            f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie inside it and were filled: "
+            "ventricles without a label?"
+        )
     open_fluid = outside_ventricles(labels, scheme)
-    kept, stalks = without_stalks(mask & ~open_fluid, affine)
+    whole, stalks = without_stalks((mask & ~open_fluid) | unlabelled, affine)
+    kept, parts, apart = main_parts(whole, SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE)
+    if apart > TOLD_LOSS * kept.sum():
+        share = f"{apart * voxel_ml:.2f} mL, {100 * apart / kept.sum():.1f} % of it"
+        warnings.append(f"{parts} parts apart from the brain were dropped: {share}")
     tissue = np.where(mask & ~kept, 0, labels)
+    outer, holes = np.isin(tissue, scheme.cortex), kept & ~mask
+    for empty, named in ((holes, mask & kept), (holes & unlabelled, mask & kept & ~outer)):
+        if empty.any():
+            nearest = ndimage.distance_transform_edt(~named, return_distances=False, return_indices=True)
+            tissue[empty] = labels[tuple(nearest[:, empty])]
     report["outside"] = {"ventricles_mL": float(open_fluid.sum() * voxel_ml), "stalks": stalks}
+    report["outside"] |= {"parts": parts, "parts_mL": float(apart * voxel_ml)}
     lost = report["outside"]["ventricles_mL"] + sum(stalk["volume_mm3"] for stalk in stalks) * ML_PER_MM3
     if lost > 0:
         said = f"{lost:.2f} mL of the cerebrum's labels lie outside it or hang on a thin stalk: left out"
@@ -74,11 +97,11 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
             warnings.append(said)
         else:
             log.info(said)
-    fluid, cortex = np.isin(tissue, scheme.ventricles), np.isin(tissue, scheme.cortex)
+    fluid = (kept & np.isin(labels, scheme.ventricles)) | (kept & unlabelled)
     volumes = {"cerebrum": kept}
     if scheme.cortex:
-        volumes |= {"cortex": cortex, "inside_cortex": kept & ~fluid & ~cortex}
-    if scheme.ventricles:
+        volumes |= {"cortex": outer, "inside_cortex": kept & ~fluid & ~outer}
+    if scheme.ventricles or unlabelled.any():
         volumes |= {"tissue": kept & ~fluid, "ventricles": fluid}
     report["label_volumes_mL"] = {name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()}
     return Cerebrum(tissue, report, warnings)
@@ -192,6 +215,35 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
             out, EVERY_NEIGHBOUR, mask=out | np.isin(number, crumbs)
         )
     return out & np.isin(*_beside_hindbrain(out, labels, scheme))
+
+
+def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
+    """Returns the voxels of ventricles that have no label of the cerebrum, (i, j, k) bool.
+
+    None where some ventricles are labelled. Such voxels look on tissue inside the cortex in more than half of 26
+    directions. Sulci, fissures and cisterns look on cortex, or they are open. Where no
+    cortex is labelled, nearly all directions count. Less than `TOLD_LOSS` of the cerebrum is roughness of the labels.
+    """
+    filled = np.zeros(labels.shape, dtype=bool)
+    cerebrum = np.isin(labels, scheme.cerebrum)
+    if np.isin(labels, scheme.ventricles).any():
+        return filled
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    margin = int(np.ceil(CLOSING_MM / size.min())) + 2
+    (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
+    numbers, tissue = np.pad(labels[box], margin), np.pad(cerebrum[box], margin)
+    near = ndimage.distance_transform_edt(~tissue, sampling=size) <= CLOSING_MM
+    closed = ndimage.distance_transform_edt(near, sampling=size) > CLOSING_MM
+    hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
+    clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
+    seen = ndimage.gaussian_filter(_seen(clear, tissue & ~np.isin(numbers, scheme.cortex)), 0.5 * SMOOTHING)
+    seen /= np.maximum(ndimage.gaussian_filter(clear.astype(np.float32), 0.5 * SMOOTHING), 1e-6)
+    number, _ = ndimage.label(clear & (seen > (ENCLOSED if scheme.cortex else WHOLLY)), EVERY_NEIGHBOUR)
+    sizes = np.bincount(number.ravel(), minlength=2)[1:]
+    found = np.isin(number, np.flatnonzero(sizes >= max(1, CRUMB * sizes.max())) + 1)
+    if found.sum() > TOLD_LOSS * cerebrum.sum():
+        filled[box] = found[(slice(margin, -margin),) * 3]
+    return filled
 
 
 def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> tuple[NDArray[np.int32], list[int]]:

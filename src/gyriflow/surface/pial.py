@@ -58,7 +58,15 @@ from .fissure import (
     to_the_right,
     upright,
 )
-from .labels import LEAST_CORTEX_OUTSIDE, TOLD_LOSS, Labels, border_share, read_cerebrum, require_sides
+from .labels import (
+    LEAST_CORTEX_OUTSIDE,
+    SMALLEST_HEMISPHERE,
+    TOLD_LOSS,
+    Labels,
+    border_share,
+    read_cerebrum,
+    require_sides,
+)
 from .plausible import (
     DOUBTFUL_BRAIN,
     DOUBTFUL_RATIO,
@@ -83,8 +91,6 @@ Side = Literal["left", "right"]
 FISSURE_REACH_MM = 3.0
 # cosine between the mid-plane's normal and the line from left to right labels: 45°
 SAME_AXIS = 0.7
-# of the larger hemisphere's volume
-SMALLEST_HEMISPHERE = 0.04
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
 # the distance of the medial wall of a hemisphere that is alone from the mid-sagittal plane

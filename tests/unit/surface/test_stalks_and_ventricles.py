@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 from shapes import phantom
 
 from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
 from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
+from gyriflow.shipped import SHIPPED
 from gyriflow.surface.extraction import isosurface, smooth_mask, without_stalks
-from gyriflow.surface.labels import outside_ventricles
+from gyriflow.surface.labels import outside_ventricles, read_cerebrum, unlabelled_ventricles
 from gyriflow.surface.repair import surface_without_stalks
 
 AFFINE = np.diag([0.8, 0.8, 0.8, 1.0])
@@ -98,3 +101,60 @@ def test_without_labels_of_the_hindbrain_all_that_is_open_is_outside():
     out = outside_ventricles(labels, LabelScheme(name="mine", cerebrum=(1, 2), ventricles=(2,)))
     assert out[15:25, 15:25, 4:18].all()
     assert not out[:, :, 24:].any()
+
+
+UNNAMED = LabelScheme(
+    name="unnamed", cerebrum=(1, 5, 6, 8), known={2: "CSF", 3: "cerebellum", 4: "CSF", 7: "brainstem"}
+)
+SOLID = LabelScheme(name="solid", cerebrum=(1, 2, 5, 6, 8), known={3: "cerebellum", 4: "CSF", 7: "brainstem"})
+
+
+@pytest.fixture(scope="module")
+def atlas_brain():
+    volume = read_label_volume(SHIPPED / "atlases/spina-bifida/fetal_SB_atlas_GA25_notoperated/parcellation.nii.gz")
+    return volume.labels, volume.affine
+
+
+@pytest.mark.parametrize(
+    ("given", "scheme"), [(0, SCHEMES["spina-bifida-atlas"]), (4, SCHEMES["spina-bifida-atlas"]), (2, UNNAMED)]
+)
+def test_ventricles_without_labels_are_filled_and_no_fissure_or_cistern(atlas_brain, given, scheme):
+    labels, affine = atlas_brain
+    known = SCHEMES["spina-bifida-atlas"]
+    ventricles = (labels == VENTRICLES) & ~outside_ventricles(labels, known)
+    found = unlabelled_ventricles(np.where(labels == VENTRICLES, given, labels), scheme, affine)
+    assert (found & ventricles).sum() > 0.98 * ventricles.sum()
+    assert (found & ~ventricles).sum() < 0.01 * ventricles.sum()
+
+
+@pytest.mark.parametrize("scheme", [SOLID, SCHEMES["spina-bifida-atlas"]])
+def test_nothing_is_filled_where_the_cerebrum_is_whole(atlas_brain, scheme):
+    assert not unlabelled_ventricles(*(atlas_brain[0], scheme, atlas_brain[1])).any()
+
+
+def test_a_filled_ventricle_is_told_and_counts_as_ventricle_and_not_as_tissue(atlas_brain):
+    labels, affine = atlas_brain
+    with_labels, without = (
+        read_cerebrum(given, affine, SCHEMES["spina-bifida-atlas"])
+        for given in (labels, np.where(labels == VENTRICLES, 0, labels))
+    )
+    assert any("ventricles without a label" in warning for warning in without.warnings)
+    assert not any("without a label" in warning for warning in with_labels.warnings)
+    for name, volume in with_labels.report["label_volumes_mL"].items():
+        assert without.report["label_volumes_mL"][name] == pytest.approx(volume, rel=0.01)
+
+
+def test_stray_voxels_and_voids_change_neither_the_cerebrum_nor_its_volume(brain):
+    labels, affine = brain
+    scheme, random = SCHEMES["spina-bifida-atlas"], np.random.default_rng(0)
+    clean = read_cerebrum(labels, affine, scheme)
+    inside = ndimage.binary_erosion(np.isin(labels, CEREBRUM), iterations=2)
+    far = ~ndimage.binary_dilation(labels > 0, iterations=2)
+    noise = random.random(labels.shape)
+    strewn = np.where(far & (noise < 0.02), 5, np.where(inside & (noise < 0.02), 0, labels))
+    found = read_cerebrum(strewn, affine, scheme)
+    assert (strewn != labels).sum() > 1000
+    assert np.array_equal(np.isin(found.tissue, CEREBRUM), np.isin(clean.tissue, CEREBRUM))
+    expected = clean.report["label_volumes_mL"]["cerebrum"]
+    assert found.report["label_volumes_mL"]["cerebrum"] == pytest.approx(expected, rel=1e-6)
+    assert any("parts apart from the brain were dropped" in warning for warning in found.warnings)
