@@ -59,6 +59,15 @@ def step(log: str, *inputs: str) -> Iterator[None]:
         print(f"gyriflow: {message}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
+    except MemoryError as error:
+        message = (
+            f"{', '.join(inputs)}: memory ran out ({error or 'no more was given'}). Free memory, run fewer jobs at "
+        )
+        message += "once, or give the volume larger voxels"
+        logging.error("%s", message)
+        print(f"gyriflow: {message}", file=sys.stderr)
+        record_exit_code(KILLED)
+        sys.exit(KILLED)
     except KeyboardInterrupt:
         record_exit_code(INTERRUPTED)
         sys.exit(INTERRUPTED)

@@ -66,6 +66,14 @@ def test_an_unknown_error_keeps_its_traceback(exit_file, tmp_path):
 
 
 @pytest.mark.fault(38)
+def test_memory_that_ran_out_is_said_with_the_input(exit_file, tmp_path, capsys):
+    with pytest.raises(SystemExit) as end, step(str(tmp_path / "log"), "a.nii"):
+        raise MemoryError("Unable to allocate 9.1 GiB")
+    assert (end.value.code, recorded_exit_code(exit_file)) == (137, 137)
+    assert capsys.readouterr().err.startswith("gyriflow: a.nii: memory ran out (Unable to allocate 9.1 GiB). Free")
+
+
+@pytest.mark.fault(38)
 def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path):
     log = tmp_path / "log"
     log.write_text("before\n")

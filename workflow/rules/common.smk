@@ -22,16 +22,14 @@ shell.prefix(
 def validated_config():
     """Returns the configuration as models, and what the input files hold; ends in 2 where it is not valid."""
     from gyriflow.config import load
-    from gyriflow.io.yaml_files import read_yaml
+    from gyriflow.io.yaml_files import read_keys
 
     try:
         base = Path.cwd()
         for path in workflow.configfiles:
             # Snakemake's own reading keeps the last of two equal keys
             file = Path(workflow.workdir_init, path)
-            content = read_yaml(file)
-            keys = set(content) if isinstance(content, dict) else set()
-            if keys & {"brains", "atlas", "participants"}:
+            if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
         found = load(config, base, keep_going=keeps_going())
         Plan(found).expecting.require_chains()
@@ -54,6 +52,9 @@ REFUSED = {
     if brain in [known.id for known in WHOLE_CONFIG.brains]
 }
 CONFIG = WHOLE_CONFIG.without(REFUSED)
+if REFUSED and not CONFIG.brains:
+    # each has told its cause
+    sys.exit(0)
 PLAN = Plan(CONFIG)
 if workflow.is_main_process:
     for row in WHOLE_CONFIG.left_out.values():

@@ -1,6 +1,14 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
+from gyriflow.shell.cost import surface_memory_mib
+
 # how unequal and how asymmetric hemispheres may be
 LIMITS = CONFIG.surface.model_dump(include={"max_hemisphere_ratio", "max_asymmetry"})
+
+
+def surface_memory(wildcards):
+    """Returns the memory in MiB that the labels of a brain may need, foreseen from their header."""
+    brain = wildcards.brain
+    return surface_memory_mib(PLAN.brains.label_volume(brain), PLAN.brains.week(brain))
 
 
 def surface_settings(*names):
@@ -16,7 +24,7 @@ rule pial_from_labels:
     wildcard_constraints:
         brain=one_of(PLAN.brains.from_source("labels", "segmentation", "phantom")),
     resources:
-        mem_mb=4000,
+        mem_mb=surface_memory,
         runtime=30,
     params:
         **of_brain("week", "affine_from"),
@@ -39,7 +47,7 @@ rule cortical_thickness:
     wildcard_constraints:
         brain=one_of(PLAN.brains.with_cortex),
     resources:
-        mem_mb=4000,
+        mem_mb=surface_memory,
         runtime=30,
     params:
         **of_brain("affine_from"),

@@ -10,7 +10,10 @@ from gyriflow.surface.thickness import thickness_from_labels
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], files.labels):
-    scheme, volume = LabelScheme(**params.scheme), read_label_volume(files.labels, affine_from=params.affine_from)
+    scheme, volume = (
+        LabelScheme(**params.scheme),
+        read_label_volume(files.labels, affine_from=params.affine_from, cropped=True),
+    )
     surface, pose = read_surface(files.surface), read_pose(files.report)
     thickness = thickness_from_labels(volume.labels, volume.affine, scheme, surface, pose, **params.settings)
     write_vertex_maps(snakemake.output.thickness, {"cortical thickness (mm)": thickness.values_mm})

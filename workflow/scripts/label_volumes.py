@@ -13,7 +13,10 @@ from gyriflow.units import ML_PER_MM3
 
 labels, output, params = snakemake.input.labels, snakemake.output, snakemake.params
 with step(snakemake.log[0], labels):
-    scheme, volume = LabelScheme(**params.scheme), read_label_volume(labels, affine_from=params.affine_from)
+    scheme, volume = (
+        LabelScheme(**params.scheme),
+        read_label_volume(labels, affine_from=params.affine_from, cropped=True),
+    )
     numbers, voxels = np.unique(volume.labels[volume.labels > 0], return_counts=True)
     volumes = dict(zip(numbers.tolist(), voxels * abs(np.linalg.det(volume.affine[:3, :3])) * ML_PER_MM3, strict=True))
     rows = [(number, scheme.labels.get(number, ""), value) for number, value in volumes.items()]

@@ -11,7 +11,7 @@ file, output, params = snakemake.input[0], snakemake.output, snakemake.params
 with step(snakemake.log[0], file):
     of_both = {"side": params.side, "week": params.week, **params.settings}
     if params.scheme:
-        volume = read_label_volume(file, affine_from=params.affine_from)
+        volume = read_label_volume(file, affine_from=params.affine_from, cropped=True)
         scheme = LabelScheme(**params.scheme)
         surface = from_labels(volume.labels, volume.affine, scheme, **of_both, **params.of_labels)
     else:

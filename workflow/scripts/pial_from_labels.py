@@ -11,7 +11,10 @@ from gyriflow.surface.pial import from_labels
 labels, output, params = snakemake.input.labels, snakemake.output, snakemake.params
 with step(snakemake.log[0], labels):
     require_checksums(params.known)
-    scheme, volume = LabelScheme(**params.scheme), read_label_volume(labels, affine_from=params.affine_from)
+    scheme, volume = (
+        LabelScheme(**params.scheme),
+        read_label_volume(labels, affine_from=params.affine_from, cropped=True),
+    )
     surface = from_labels(volume.labels, volume.affine, scheme, week=params.week, **params.settings)
     write_brain(output, surface.whole, surface.left, surface.right)
     write_json(output.report, surface.report)

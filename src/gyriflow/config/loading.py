@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..io.yaml_files import read_yaml
+from ..io.yaml_files import read_keys
 from ..parameters.folding import VARYING
 from ..parameters.settings import PROBLEM, dotted, line, messages
 from .atlas import Atlas, AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections
@@ -139,7 +139,7 @@ def _atlases(raw: Any, base_dir: Path) -> tuple[list[UsedAtlas], list[str]]:
             problems += [line((*path, *place), text) for place, text in messages(error, AtlasSettings)]
             continue
         try:
-            used = UsedAtlas(settings, Atlas.model_validate(read_yaml(settings.description)))
+            used = UsedAtlas(settings, Atlas.model_validate(read_keys(settings.description)))
         except InputError as error:
             problems.append(f"{where}.file: {error}")
         except ValidationError as error:

@@ -9,7 +9,7 @@ from pydantic import PrivateAttr, field_validator
 
 from ..errors import InputError
 from ..io.schemes import SCHEMES
-from ..io.yaml_files import read_yaml
+from ..io.yaml_files import read_keys
 from ..parameters.folding import VARYING, FoldingSettings, output_weeks
 from ..parameters.schemes import LabelScheme, SchemeSettings
 from ..parameters.settings import Settings, refused, setting
@@ -137,7 +137,7 @@ class Config(Settings):
     @property
     def atlases(self) -> list[UsedAtlas]:
         """The atlases with what their descriptions say, as the files lie at this moment."""
-        return [UsedAtlas(section, Atlas(**read_yaml(section.description))) for section in self.atlas]
+        return [UsedAtlas(section, Atlas(**read_keys(section.description))) for section in self.atlas]
 
     @cached_property
     def known_files(self) -> dict[str, tuple[str, str]]:

@@ -7,6 +7,7 @@ from pydantic import Discriminator, Field, Tag
 from ..parameters.settings import Settings, setting
 from ..parameters.terms import (
     CURVATURE_RADIUS_MM,
+    MOST_HOLE_MM,
     SPANGY_MODES,
     SPANGY_PROXY,
     SPANGY_WAVELENGTH,
@@ -30,7 +31,9 @@ class SurfaceSettings(Settings):
         1.0, "mm", "Edge length of the remeshed surface, on which metrics are measured.", gt=0.1, le=5
     )
     smoothing_iterations: int = setting(10, "", "Iterations of Taubin smoothing.", ge=0, le=200)
-    max_hole_mm: float = setting(3.0, "mm", "Largest hole that is closed; a larger one is an error.", ge=0, le=20)
+    max_hole_mm: float = setting(
+        3.0, "mm", "Largest hole that is closed; a larger one is an error.", ge=0, le=MOST_HOLE_MM
+    )
     fissure_mm: float = setting(
         1.5, "mm", "Width to which the fissure is opened where labels show none; 0: not at all.", ge=0, le=5
     )

@@ -30,6 +30,8 @@ UNEXPECTED = "unexpected error"
 RAISED = re.compile(r"^(\w[\w.]*(?:Error|Exception|Interrupt|Warning)\b.*)$", re.MULTILINE)
 OF_SNAKEMAKE = "WorkflowError"
 """How the names of exceptions end that say no more than that a step has failed; logs of jobs on a cluster end so."""
+LOGGED = re.compile(r"\d{4}-\d\d-\d\d \S+ (?:INFO|WARNING) ")
+KILLED = "it was killed, most probably because memory ran out: its log ends without a message"
 LINES_OF_OTHERS = 5
 _PLACES = (
     re.compile(r"results/brains/(?P<subject>[^/]+)/(?:metrics/)?logs/(?P<step>[^/]+)\.log"),
@@ -57,7 +59,10 @@ def messages_in(text: str) -> Iterator[Message]:
 
 
 def cause(text: str) -> str:
-    """Returns why a job failed, from its log: gyriflow's own message, else the exception, else the last lines."""
+    """Returns why a job failed, from its log: gyriflow's own message, else the exception, else the last lines.
+
+    A step that fails says so. Where its log ends without a word, it was killed.
+    """
     # what the program has said last is what it says on the terminal, before what was logged
     said = [found["error"].strip() for found in MESSAGE.finditer(text) if found["error"]]
     errors = said or [message.text for message in messages_in(text) if message.own and message.level == "error"]
@@ -66,7 +71,10 @@ def cause(text: str) -> str:
     raised = [line for line in RAISED.findall(text) if not line.partition(":")[0].endswith(OF_SNAKEMAKE)]
     if raised:
         return f"unexpected {raised[-1]}"
-    return "\n".join([line for line in text.splitlines() if line.strip()][-LINES_OF_OTHERS:])
+    lines = [line for line in text.splitlines() if line.strip()]
+    if lines and LOGGED.match(lines[-1]):
+        return KILLED
+    return "\n".join(lines[-LINES_OF_OTHERS:])
 
 
 def events_in(text: str) -> list[dict[str, Any]]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from ..parameters.schemes import SCHEME_FILES, LabelScheme, SchemeSettings
 from ..parameters.settings import validated
-from .yaml_files import read_yaml
+from .yaml_files import read_keys
 
 
 class Schemes(Mapping[str, LabelScheme]):
@@ -16,7 +16,7 @@ class Schemes(Mapping[str, LabelScheme]):
     def __getitem__(self, name: str) -> LabelScheme:
         if name not in self._known:
             path = SCHEME_FILES[name]
-            settings = validated(SchemeSettings, read_yaml(path), str(path))
+            settings = validated(SchemeSettings, read_keys(path), str(path))
             self._known[name] = LabelScheme(name=name, **settings.model_dump())
         return self._known[name]
 

@@ -42,14 +42,43 @@ class LabelVolume:
     affine: NDArray[np.float64]
 
 
-def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto") -> LabelVolume:
+def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:
     """Returns the label volume of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
+
+    A `cropped` one ends a voxel beyond its labels, so that an empty border takes no memory.
 
     `affine_from` says which of NIfTI's two matrices counts; "auto" takes the one that is set and refuses two that
     disagree. InputError for missing or truncated files, values that are no whole numbers, NaN, unclear orientation.
     """
     values, affine = read_values(path, affine_from, "labels")
+    if cropped:
+        values, affine = _without_empty_border(values, affine)
     return LabelVolume(_whole_numbers(values, path), affine)
+
+
+def _without_empty_border(
+    values: NDArray[np.number], affine: NDArray[np.float64]
+) -> tuple[NDArray[np.number], NDArray[np.float64]]:
+    box = []
+    for axis, size in enumerate(values.shape):
+        filled = np.flatnonzero(values.any(axis=tuple({0, 1, 2} - {axis})))
+        if not len(filled):
+            return values, affine
+        box.append(slice(max(int(filled[0]) - 1, 0), min(int(filled[-1]) + 2, size)))
+    moved = affine.copy()
+    moved[:3, 3] += moved[:3, :3] @ [side.start for side in box]
+    return values[tuple(box)], moved
+
+
+def voxels_of(path: AnyPath) -> tuple[int, float]:
+    """Returns the number of voxels of a volume and the volume of one in mm³, from its header alone."""
+    with reading(path, "an image"):
+        image = nib.load(path)
+        if not isinstance(image, SpatialImage):
+            raise InputError("is no volume", path=path, found=type(image).__name__)
+    unit = _length_unit(image.header, path) if isinstance(image, nib.Nifti1Pair) else "mm"
+    size = MM_PER_NIFTI_UNIT[unit] * np.array(image.header.get_zooms()[:3], dtype=float)
+    return math.prod(map(int, image.shape[:3])), float(size.prod())
 
 
 def read_values(

@@ -66,6 +66,15 @@ def read_yaml(path: AnyPath) -> Any:
     return content
 
 
+def read_keys(path: AnyPath) -> dict[str, Any]:
+    """Returns the keys of a YAML (or JSON) file with their values; InputError where it has none."""
+    content = read_yaml(path)
+    if not isinstance(content, dict):
+        found = "nothing" if content is None else f"a {type(content).__name__}"
+        raise InputError("holds no keys", path=path, found=found, expected="keys with values, such as `week: 21`")
+    return content
+
+
 def yaml_text(content: Any) -> str:
     """Returns content as YAML."""
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)

@@ -25,6 +25,10 @@ from ..geometry.triangles import (
 )  # fmt: skip
 from ..parameters.terms import CURVATURE_RADIUS_MM
 
+RESOLVED_RADII = 4.0
+"""The shortest wavelength of folds that count as resolved, in radii. ∫ H² is short there by 3 % for folds a quarter as
+deep as long, by 21 % for shallow ones; by 17 and 43 % at 2.6 radii, by 58 and 74 % at 1.7."""
+
 log = logging.getLogger(__name__)
 
 EDGES_PER_RADIUS = 2.0

@@ -29,6 +29,7 @@ from ..parameters.terms import (
 )
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import (
+    RESOLVED_RADII,
     Curvature,
     continue_smoothly,
     curvature,
@@ -170,6 +171,7 @@ def folding_rows(sides: list[Hemisphere]) -> list[Row]:
         ("mean_curvedness", mean(bend.curvedness), "1/mm"),
         ("sulcal_area_share", mean(bend.shape_index < 0), "1"),
         ("curvature_radius", mean(bend.radius_mm), "mm"),
+        ("curvature_wavelength", RESOLVED_RADII * mean(bend.radius_mm), "mm"),
         ("mean_sulcal_depth", mean(depth), "mm"),
         ("sulcal_depth_95", float(deep), "mm"),
         *((name, value, "1") for name, value in curvature_integrals(bend, weights).items()),

@@ -17,8 +17,8 @@ MEASURED = "real"
 """The run of measured brains."""
 
 OF_THE_ANALYSIS = (
-    *("crossing_faces", "curvature_radius", "spangy_modes", "spangy_captured_share", "weyl_number"),
-    "thickness_measured_share",
+    *("crossing_faces", "curvature_radius", "curvature_wavelength", "spangy_modes", "spangy_captured_share"),
+    *("weyl_number", "thickness_measured_share"),
 )
 """Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
 

@@ -151,7 +151,8 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
             return path, "is missing"
         case "model_type":
             return path, f"found {details['input']!r}; it should hold keys and values"
-    expected = details["msg"].removeprefix("Value error, ").removeprefix("Input should ")
+    # pydantic begins with what the value is: "String should", "Tuple should"
+    expected = re.sub(r"^(Value error, )?(\w+ should )?", "", details["msg"])
     return path, f"found {details['input']!r}; it should {expected}"
 
 

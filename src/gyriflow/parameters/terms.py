@@ -24,6 +24,8 @@ REGION_FIELDS: tuple[VertexField, ...] = (
 
 Mesher = Literal["pytetwild", "tetgen"]
 """The programs that fill a surface with tetrahedra."""
+MOST_HOLE_MM = 20.0
+"""The largest hole of a surface that can be asked to be closed."""
 Coordinates = Literal["auto", "ras", "lps"]
 """Axes of the coordinates in surface files; `auto`: to be found."""
 AffineSource = Literal["auto", "sform", "qform"]

@@ -539,7 +539,8 @@ class Figures:
         yield Figure(
             "metrics_table", "Metrics", "metrics, table", f"{STUDY}/metrics_table.html", "tables.metrics_page",
             """Metrics of whole brains per week: the measured brain, each run, and the run's difference from the
-            measured brain. All numbers, per hemisphere too, are in ``results/study/metrics.csv``.""",
+            measured brain. Curvature of folds shorter than ``curvature_wavelength`` is flattened, and with it
+            ``mean_curvature_norm``. All numbers, per hemisphere too, are in ``results/study/metrics.csv``.""",
             lambda: metrics, self._of_study,
         )  # fmt: skip
         spectra = {"spectra": f"{STUDY}/spectra.csv"}

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..io.files import files_in, read_json, write_text
 from ..io.schemes import SCHEMES
 from ..io.volumes import read_label_volume
-from ..io.yaml_files import read_yaml
+from ..io.yaml_files import read_keys
 from ..parameters.following import BEFORE_GW
 from ..parameters.settings import validated
 from ..shipped import SHIPPED
@@ -138,7 +138,7 @@ def write_prediction(
             raise InputError("has labels of an unclear scheme", path=labels, found=fitting, remedy="Name it: --scheme")
     entry |= {"scheme": scheme} | ({"image": str(image.resolve())} if image else {})
     settings = validated(AtlasSettings, atlas_sections(atlas or SHIPPED_ATLAS)[0][1], "--atlas")
-    series = _growing(Atlas(**read_yaml(settings.description)), weeks, accepted)
+    series = _growing(Atlas(**read_keys(settings.description)), weeks, accepted)
     section = settings.model_dump(exclude_defaults=True) | series | ({"accept_licence": True} if accepted else {})
     folding = {"preset": "expected", "end_week": weeks[1]}
     text = yaml.safe_dump({"brains": [entry], "atlas": section, "start": SUBJECT, "folding": folding}, sort_keys=False)

@@ -23,14 +23,14 @@ from ..folding.predicted_memory import predicted_memory_mib
 from ..io.downloads import require_checksums
 from ..io.files import read_json
 from ..io.volumes import read_label_volume
-from ..io.yaml_files import read_yaml
+from ..io.yaml_files import read_keys
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import ELEMENTS_NEEDED
 from ..parameters.varying import Varying, curve_at
 from ..shipped import SHIPPED
-from ..surface.labels import cerebrum_mask, require_cortex_outside
+from ..surface.labels import LEAST_CORTEX_OUTSIDE, read_cerebrum
 from ..surface.plausible import require_plausible_size
-from .cost import MEASURED, Job, Prediction, predict
+from .cost import LEAST_SURFACE_MIB, MEASURED, Job, Prediction, predict, surface_memory_mib
 from .launch import OF_PROFILES
 from .launch import main as launch
 from .terminal import DRAWN, ORDER, as_duration, where_of
@@ -90,7 +90,7 @@ def check_study(
 
     InputError for a configuration that is not valid, with all its problems.
     """
-    settings = load(read_yaml(path), path.resolve().parent)
+    settings = load(read_keys(path), path.resolve().parent)
     yield f"{path}: {_contents(settings)}", False
     said = list(input_problems(settings)) if read_files else []
     yield from ((f"  {line}", bad) for line, bad in said)
@@ -113,7 +113,7 @@ def work_of_study(
     With `show`, Snakemake lists every job on the terminal first.
     """
     jobs = plan(path, directory, further, show=show)
-    for line, _ in _work(jobs, load(read_yaml(path), path.resolve().parent), directory, cores, None):
+    for line, _ in _work(jobs, load(read_keys(path), path.resolve().parent), directory, cores, None):
         yield line
 
 
@@ -192,13 +192,16 @@ def _check_files(brain: Brain, config: Config) -> Iterator[str]:
     require_checksums({path: config.known_files[path] for path in files})
     volume = brain.label_volume
     if volume is not None and Path(volume).is_file():
-        read = read_label_volume(volume, brain.affine_from)
+        need, there = surface_memory_mib(volume, brain.week), psutil.virtual_memory().total / 2**20
+        if need > max(there, LEAST_SURFACE_MIB):
+            yield f"its voxels need about {_gib(need)} of memory, {_gib(there)} are here: give it larger voxels"
+        read = read_label_volume(volume, brain.affine_from, cropped=True)
         labels, scheme = read.labels, LabelScheme(**config.scheme(brain))
-        cerebrum = cerebrum_mask(labels, scheme)
         # the wall of a hemisphere that is alone may have no cortex
-        if scheme.cortex and brain.hemisphere is None:
-            require_cortex_outside(labels, scheme)
+        found = read_cerebrum(labels, read.affine, scheme, LEAST_CORTEX_OUTSIDE if brain.hemisphere is None else 0.0)
+        yield from found.warnings
         if brain.hemisphere is None:
+            cerebrum = np.isin(found.tissue, scheme.cerebrum)
             size = cerebrum.sum() * abs(np.linalg.det(read.affine[:3, :3]))
             extents = np.ptp(np.argwhere(cerebrum), axis=0) * np.linalg.norm(read.affine[:3, :3], axis=0)
             yield from require_plausible_size(float(size), extents, brain.week)

@@ -13,9 +13,12 @@ from ..config.brains import Brain
 from ..config.root import Config
 from ..config.runs import Run
 from ..config.stages import MeshSettings
+from ..errors import InputError
 from ..io.files import read_json
+from ..io.volumes import voxels_of
 from ..parameters.terms import ELEMENT_FIELDS
-from ..units import SECONDS_PER_GW
+from ..surface.plausible import expected_volume_ml
+from ..units import ML_PER_MM3, SECONDS_PER_GW
 
 MEASURED = Path(__file__).with_name("measured.json")
 """Written by `benchmarks/cost.py`."""
@@ -24,6 +27,9 @@ MIB = 2**20
 LEAST_S = 0.5
 LEAST_MIB, LEAST_MINUTES = 2000, 60
 """What the job of any folding needs: Python, dolfinx, compiled forms, and processors slower than those measured on."""
+LEAST_SURFACE_MIB = 4000
+BYTES_IN_FILE, BYTES_IN_BRAIN = 16, 800
+"""What the surface of a label volume takes for each voxel of the file, and each voxel of the brain in it."""
 FOLDINGS = ("simulate", "simulate_member")
 """Rules that solve a folding; those of studies and calibrations may diverge."""
 OF_NODES = ("tetrahedralise", "carried_mesh", "parameter_maps", "regions")
@@ -203,6 +209,20 @@ def folding_needs(
         max(ceil(predicted.memory_mib * predicted.error["memory"]), LEAST_MIB),
         max(ceil(predicted.wall_seconds * predicted.error["time"] / 60), LEAST_MINUTES),
     )
+
+
+def surface_memory_mib(labels: str, week: float) -> int:
+    """Returns the memory in MiB that the surface of a label volume may take, at least `LEAST_SURFACE_MIB`.
+
+    It follows from the file's header and the usual size of a brain at its week. A file that is not there yet, or cannot
+    be read, is taken for a usual one.
+    """
+    try:
+        voxels, voxel_mm3 = voxels_of(labels)
+    except InputError:
+        return LEAST_SURFACE_MIB
+    inside = min(voxels, expected_volume_ml(week) / (voxel_mm3 * ML_PER_MM3))
+    return max(LEAST_SURFACE_MIB, ceil((BYTES_IN_FILE * voxels + BYTES_IN_BRAIN * inside) / MIB))
 
 
 def run_of(name: str, config: Config) -> Run:

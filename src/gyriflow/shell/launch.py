@@ -10,6 +10,7 @@ import fcntl
 import io
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,7 +24,7 @@ from typing import IO
 
 from ..errors import GyriflowError, InputError, StorageError
 from ..io.files import read_json, write_json
-from ..io.yaml_files import read_yaml
+from ..io.yaml_files import read_keys
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, INTERRUPTED, recorded_exit_code
 
@@ -51,6 +52,8 @@ REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 
 OF_PROFILES = "for setting default command line arguments."
 """How the line ends that Snakemake prints of its profiles before any logger is there."""
+FULL_BYTES = 4 * 2**20
+"""With less space left, a run that ended without a code of its own has met a full disk."""
 HELD: list[IO[str]] = []
 """Files whose locks this process holds."""
 SAYS_ITSELF = frozenset(
@@ -139,7 +142,7 @@ def refuse_bad_configfiles(arguments: Sequence[str]) -> None:
             given = option in ("--configfile", "--configfiles")
         if given and argument:
             try:
-                read_yaml(argument)
+                read_keys(argument)
             except InputError as error:
                 remedy = ". Targets stand before --configfile, or after another option"
                 raise InputError(f"configuration {error}{'' if Path(argument).exists() else remedy}") from error
@@ -247,6 +250,16 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
     path.unlink(missing_ok=True)
 
 
+def exit_code(code: int, recorded: int | None, directory: Path) -> int:
+    """Returns the code of a run from Snakemake's and that of the first failed step; says so where the disk is full."""
+    if code and recorded in (None, 1) and shutil.disk_usage(directory).free < FULL_BYTES:
+        print(
+            f"gyriflow: {directory.resolve()}: the disk is full. Free space; the same command goes on", file=sys.stderr
+        )
+        return StorageError.exit_code
+    return (recorded or code) if code else 0
+
+
 def main(arguments: Sequence[str]) -> int:
     """Runs Snakemake and returns the exit code: its own, or that of the first failed step."""
     for name, value in SETTINGS.items():
@@ -295,7 +308,7 @@ def main(arguments: Sequence[str]) -> int:
     may_finish = REFUSED_FILE not in os.environ and not looks_only(arguments)
     if code and may_finish and KEEP_GOING.intersection(arguments) and (refused := failed_brains(directory, began)):
         finish_without(refused, arguments, directory)
-    return (recorded or code) if code else 0
+    return exit_code(code, recorded, directory)
 
 
 if __name__ == "__main__":

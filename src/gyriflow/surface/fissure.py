@@ -32,6 +32,8 @@ DIRECTIONS = 400
 STARTS = 5
 # the left-right axis is looked for within this angle of the world's x axis
 SEARCH_DEG = 60.0
+# how much farther from its mirror image a surface may be in the plane of its coordinates than in the best one
+NEARLY, NEARLY_MM = 1.1, 0.05
 # smaller tilts are left as they are: the plane is not known better than this
 LEAST_TILT_DEG = 0.5
 # of the distances to the mirror image, those above this quantile count as asymmetry
@@ -80,17 +82,24 @@ class MidPlane:
     scatter_mm: float
 
 
-def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG) -> MidPlane:
+def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG, *, named: bool = False) -> MidPlane:
     """Returns the mid-sagittal plane of a closed, outward surface whose left-right axis is within an angle of x.
 
     Planes of mirror symmetry are the candidates; each is fitted to the fissure, that is, to the middle between medial
     walls that face each other. The best has both little asymmetry and much fissure. In an asymmetric brain the plane
-    of symmetry and the fissure differ, and the fissure decides.
+    of symmetry and the fissure differ, and the fissure decides. In coordinates that the user has named, a plane
+    x = const that is nearly as good a mirror as the best is kept: a body of revolution has many.
     """
     weights = vertex_areas(mesh)
     chosen = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
     sample, tree = mesh.vertices[chosen], cKDTree(mesh.vertices)
-    candidates = [_fit_to_fissure(mesh, *plane) for plane in _symmetry_planes(sample, tree, search_deg)]
+    planes = _symmetry_planes(sample, tree, search_deg)
+    if named:
+        x, middle = np.array([1.0, 0.0, 0.0]), float(sample[:, 0].mean())
+        distance = _mirror_distance(x, middle, sample, tree)
+        if distance < NEARLY * min(asymmetry for _, _, asymmetry in planes) + NEARLY_MM:
+            return _fit_to_fissure(mesh, x, middle, distance)
+    candidates = [_fit_to_fissure(mesh, *plane) for plane in planes]
     return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))
 
 

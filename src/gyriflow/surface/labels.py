@@ -20,6 +20,8 @@ Labels = NDArray[np.integer[Any]]
 
 # brains of the example atlas have cortex at 86 % of their surface and more, read by wrong schemes at 48 % and less
 LEAST_CORTEX_OUTSIDE = 0.5
+# pairs of voxels of both hemispheres lie side by side as their labels say in nearly all brains
+LEAST_PARTED = 0.9
 # cortex at less than this fraction of the cerebrum's surface is reported
 LITTLE_CORTEX = 0.7
 # a loss beyond this fraction of a brain is reported
@@ -67,10 +69,10 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
     if missing := missing_tissues(labels, scheme):
         report["missing_tissues"] = missing
         log.info("tissues that this brain does not have: %s", ", ".join(missing[:20]))
-    if scheme.cortex and (share := require_cortex_outside(labels, scheme, least_cortex)) < LITTLE_CORTEX:
-        warnings.append(f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface: check the labels")
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = unlabelled_ventricles(labels, scheme, affine)
+    if scheme.cortex and (share := require_cortex_outside(labels, scheme, least_cortex, unlabelled)) < LITTLE_CORTEX:
+        warnings.append(f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface: check the labels")
     if unlabelled.any():
         warnings.append(
             f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie inside it and were filled: "
@@ -80,8 +82,8 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
     whole, stalks = without_stalks((mask & ~open_fluid) | unlabelled, affine)
     kept, parts, apart = main_parts(whole, SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE)
     if apart > TOLD_LOSS * kept.sum():
-        share = f"{apart * voxel_ml:.2f} mL, {100 * apart / kept.sum():.1f} % of it"
-        warnings.append(f"{parts} parts apart from the brain were dropped: {share}")
+        lost_parts = f"{apart * voxel_ml:.2f} mL, {100 * apart / kept.sum():.1f} % of it"
+        warnings.append(f"{parts} parts apart from the brain were dropped: {lost_parts}")
     tissue = np.where(mask & ~kept, 0, labels)
     outer, holes = np.isin(tissue, scheme.cortex), kept & ~mask
     for empty, named in ((holes, mask & kept), (holes & unlabelled, mask & kept & ~outer)):
@@ -148,12 +150,14 @@ def missing_tissues(labels: Labels, scheme: LabelScheme) -> list[str]:
     return [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number not in present]
 
 
-def require_cortex_outside(labels: Labels, scheme: LabelScheme, least: float = LEAST_CORTEX_OUTSIDE) -> float:
-    """Returns how much of the cerebrum's surface has cortex at it, from 0 to 1.
+def require_cortex_outside(
+    labels: Labels, scheme: LabelScheme, least: float = LEAST_CORTEX_OUTSIDE, unlabelled: Mask | bool = False
+) -> float:
+    """Returns how much of the cerebrum's surface has cortex at it, from 0 to 1; of it and its `unlabelled` ventricles.
 
     InputError where it is less than `least`: the scheme is another volume's, whose labels happen to be known.
     """
-    cerebrum = np.pad(np.isin(labels, scheme.cerebrum), 1)
+    cerebrum = np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1)
     outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
     cortex = ndimage.binary_dilation(np.pad(np.isin(labels, scheme.cortex), 1))
     share = float((outside & cortex).sum() / outside.sum())
@@ -168,22 +172,30 @@ def require_cortex_outside(labels: Labels, scheme: LabelScheme, least: float = L
 
 
 def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right: Floats) -> None:
-    """Raises InputError where labels of the left hemisphere lie to the right of those of the right hemisphere.
+    """Raises InputError where labels of the left hemisphere lie to the right of those of the right one, or among them.
 
     `to_right` (3,) is the direction from left to right in the coordinates that the (4, 4) affine leads to.
     """
     if not (np.isin(labels, scheme.left).any() and np.isin(labels, scheme.right).any()):
         return
     left, right = (
-        float(to_right @ affine[:3, :3] @ np.argwhere(np.isin(labels, side)).mean(axis=0))
+        np.sort(np.argwhere(np.isin(labels, side)) @ (affine[:3, :3].T @ to_right))
         for side in (scheme.left, scheme.right)
     )
-    if left >= right:
+    if (apart := float(right.mean() - left.mean())) <= 0:
         raise InputError(
             "labels of the left hemisphere lie on the right",
-            found=f"{left - right:.1f} mm to the right of those of the right hemisphere",
+            found=f"{-apart:.1f} mm to the right of those of the right hemisphere",
             expected="left at the smaller x (RAS+)",
             remedy="The volume's affine mirrors the brain, or the scheme's sides are swapped.",
+        )
+    parted = float(np.searchsorted(left, right).mean() / len(left))
+    if parted < LEAST_PARTED:
+        raise InputError(
+            f"what the scheme {scheme.name!r} calls left and right are no hemispheres",
+            found=f"voxels of the right one to the right of those of the left one in {100 * parted:.0f} % of pairs",
+            expected=f"{100 * LEAST_PARTED:.0f} % or more",
+            remedy="Choose the scheme of this volume.",
         )
 
 

@@ -38,6 +38,7 @@ from .extraction import (
     remove_bridges,
     shifted_affine,
     smooth_mask,
+    unambiguous,
 )
 from .fissure import (
     Fissure,
@@ -72,6 +73,7 @@ from .plausible import (
     DOUBTFUL_RATIO,
     USUAL,
     Limits,
+    doubts_of_proportions,
     narrowness,
     require_common_pose,
     require_one,
@@ -79,7 +81,15 @@ from .plausible import (
     require_plausible_size,
     require_whole,
 )
-from .pose import doubts_of_hemispheres, pair_by_shape, pose_of_hemisphere, pose_of_labels, pose_surface_by_shape, poses
+from .pose import (
+    doubts_of_hemispheres,
+    pair_by_shape,
+    pose_of_hemisphere,
+    pose_of_labels,
+    pose_of_volume_by_shape,
+    pose_surface_by_shape,
+    poses,
+)
 from .repair import KEPT, after_repairs, make_sound, pieces, require_sound, sound_pieces, with_volume
 
 log = logging.getLogger(__name__)
@@ -93,6 +103,12 @@ FISSURE_REACH_MM = 3.0
 SAME_AXIS = 0.7
 # beyond this part of the brain's width the mid-sagittal plane is doubtful
 DOUBTFUL_ASYMMETRY = 0.03
+# a hemisphere of 4 % of the other one's volume has about a tenth of its area
+MOST_UNEQUAL = 15.0
+# of a mask's voxels, those that the repair of its topology may add and take; brains take a few thousandths
+MOST_REPAIRED = 0.08
+# voxels as large as this show the shape of a brain well enough for its pose
+OF_SHAPE_MM = 1.5
 # the distance of the medial wall of a hemisphere that is alone from the mid-sagittal plane
 BESIDE_MM = 0.5
 
@@ -128,12 +144,13 @@ def from_labels(
 ) -> PialSurface:
     """Returns the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
-    A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say. The cerebrum's mask is smoothed
-    (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an isosurface, which is smoothed, remeshed to
-    `edge_length_mm` and turned so that the mid-sagittal plane is x = const, and set outwards by what smoothing took of
-    the volume. Where the scheme separates cortex from the tissue inside and cortex labels of both sides touch, the
-    fissure is opened there to `fissure_mm` (0: left shut). It is half-way between the labels of the two sides where the
-    scheme has them. With `side` the volume holds that hemisphere only, which is posed as `from_surface` does.
+    A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say, or without these its shape. The
+    cerebrum's mask is smoothed (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an isosurface,
+    which is smoothed, remeshed to `edge_length_mm` and turned so that the mid-sagittal plane is x = const, and set
+    outwards by what smoothing took of the volume. Where the scheme separates cortex from the tissue inside and cortex
+    labels of both sides touch, the fissure is opened there to `fissure_mm` (0: left shut). It is half-way between the
+    labels of the two sides where the scheme has them. With `side` the volume holds that hemisphere only, which is posed
+    as `from_surface` does.
 
     InputError for labels that don't fit the scheme or the week, for one hemisphere alone without `side`, and for a
     whole brain or labels of the other hemisphere with it. MeshError where the surface stays tangled.
@@ -142,10 +159,11 @@ def from_labels(
     cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else LEAST_CORTEX_OUTSIDE)
     warnings, tissue = told(cerebrum.warnings), cerebrum.tissue
     pose = Pose() if side else pose_of_labels(labels, affine, scheme)
-    warnings += told(pose.warnings)
     if side:
         _require_no_other(tissue, scheme, side)
-    affine = pose.world @ affine
+    if pose is not None:
+        warnings += told(pose.warnings)
+        affine = pose.world @ affine
     mask = np.isin(tissue, scheme.cerebrum)
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
     box, first = crop(mask)
@@ -156,10 +174,18 @@ def from_labels(
     report = {"scheme": scheme.name, **cerebrum.report, "mask_volume_mL": volume * ML_PER_MM3, "border_share": share}
     mask, tissue, affine = np.pad(mask[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS), shifted_affine(affine, first)
     field = smooth_mask(mask, smoothing_voxels)
+    if not side:
+        warnings += told(_require_both(tissue, scheme, field, affine, share))
+    if pose is None:
+        every = max(int(OF_SHAPE_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
+        coarse = unambiguous(field[::every, ::every, ::every])
+        rough = isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
+        pose = pose_of_volume_by_shape(rough, sided=bool(scheme.left and scheme.right))
+        warnings += told(pose.warnings)
+        affine = pose.world @ affine
     grid, to_right, opened = affine, None, {}
     if not side:
         core = mask & ~np.isin(tissue, scheme.cortex)
-        warnings += told(_require_both(tissue, scheme, field, affine, share))
         # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
         walls = isosurface(smooth_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
         plane = mid_plane(walls)
@@ -184,6 +210,14 @@ def from_labels(
             field, affine, opened["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
     # where labels say which side is which, a hemisphere may be far smaller than the other one
     field, topology = make_simple(field, COMPARABLE if to_right is None else SMALLEST_HEMISPHERE)
+    repaired = topology["voxels_cut_from_bridges"] + topology["voxels_filled_in_tunnels"]
+    if (share := repaired * float(abs(np.linalg.det(affine[:3, :3]))) / volume) > MOST_REPAIRED:
+        raise InputError(
+            "the cerebrum is full of tunnels and handles",
+            found=f"{100 * share:.0f} % of its volume in them",
+            expected=f"at most {100 * MOST_REPAIRED:.0f} %",
+            remedy="Choose the scheme of this volume; check the labels.",
+        )
     rough = isosurface(field, affine)
     if side:
         require_one(rough)
@@ -250,13 +284,13 @@ def from_hemispheres(
     even = [make_sound(mesh, smoothing_iterations, edge_length_mm) for mesh in (left, right)]
     warnings += told(warning for side in even for warning in side.warnings)
     left, right = (side.mesh for side in even)
-    plane = mid_plane(merged(left, right))
+    plane = mid_plane(merged(left, right), named=coordinates != "auto")
     require_common_pose(plane.asymmetry_mm, length, limits)
     gap, to_right = least_gap(left, right), plane.normal
     left, right, moved = set_apart(left, right, gap_mm, to_right)
     if moved > 0:
         warnings += told([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm"])
-        plane = mid_plane(merged(left, right))
+        plane = mid_plane(merged(left, right), named=coordinates != "auto")
     apart = {side: motion(shift=sign * moved * to_right) for side, sign in zip(SIDES, (-1.0, 1.0), strict=True)}
     pose = pose.each({side: shift @ pose.of_file(side) for side, shift in apart.items()})
     measures = {"gap_before_mm": gap, "moved_apart_mm": moved}
@@ -308,7 +342,7 @@ def from_surface(
         report = {"source": "hemisphere", "side": side, **report}
         return _single_hemisphere(even.mesh, side, pose, week, report, warnings)
     mesh = transformed(even.mesh, pose.of_file())
-    plane = mid_plane(mesh)
+    plane = mid_plane(mesh, named=coordinates != "auto")
     fissure = fissure_between(mesh, plane)
     warnings += told(doubts_of_shift(fissure))
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
@@ -384,7 +418,15 @@ def _upright(
         doubts.append("no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
     if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
         doubts.append(f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
+    doubts += doubts_of_proportions(np.ptp(whole.vertices, axis=0))
     areas = sorted((area(left), area(right)))
+    if areas[1] > MOST_UNEQUAL * areas[0]:
+        raise InputError(
+            "one hemisphere is too small to be one",
+            found=f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²",
+            expected=f"at most {MOST_UNEQUAL:g} times as much",
+            remedy="Check the label scheme and the midline.",
+        )
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
         doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
     facts = {

@@ -19,8 +19,10 @@ Floats = NDArray[np.float64]
 EARLY, LATE = (25.4, 92.0), (36.6, 304.0)
 # from small fetuses with pathologies to adults, and the log-linear growth is a coarse one
 LEAST, MOST = 0.2, 6.0
-# means of atlases from 21 to 36 GW are 0.57 to 1.24 of it; in voxels of 0.8 mm instead of mm, 1.95 times as much
-DOUBTFUL_LEAST, DOUBTFUL_MOST = 0.4, 1.6
+# means of atlases from 21 to 36 GW are 0.57 to 1.27 of it; in voxels of 0.8 mm instead of mm, 1.95 times as much
+DOUBTFUL_LEAST, DOUBTFUL_MOST = 0.55, 1.45
+# width and height over length are 0.74 to 0.83 and 0.63 to 0.72 in atlases
+WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
@@ -51,7 +53,7 @@ def expected_volume_ml(week: float) -> float:
 
 
 def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -> list[str]:
-    """Returns what is doubtful about a cerebrum's volume at its week: below 0.4 or above 1.6 of the published one.
+    """Returns what is doubtful about a cerebrum's volume at its week: below 0.55 or above 1.45 of the published one.
 
     InputError where it is out of all proportion, less than a fifth or more than six times, with a guess of the unit.
     `extents_mm` (3,) only appears in the message.
@@ -69,10 +71,21 @@ def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -
         f"the cerebrum's size is not that of week {week:g}",
         found=f"{volume:.3g} mL, {' x '.join(f'{extent:.3g}' for extent in extents_mm)} mm",
         expected=f"{LEAST * expected:.0f} to {MOST * expected:.0f} mL",
-        remedy=f"The file seems to be in {guess}: give it in mm, or with its unit in the header."
+        remedy=f"The file seems to be in {guess}, or its header names another unit than its numbers have: give it in "
+        "mm, with mm in the header."
         if guess
         else "Check the file's unit, its week, and which labels make the cerebrum.",
     )
+
+
+def doubts_of_proportions(extents_mm: Floats) -> list[str]:
+    """Returns what is doubtful about a posed brain's width, length and height (3,): a wrong edge of the voxels."""
+    width, length, height = map(float, extents_mm)
+    return [
+        f"the {name} is {share:.2f} of the length, {least} to {most} in most brains: are the voxels' edges right?"
+        for name, share, (least, most) in (("width", width / length, WIDTHS), ("height", height / length, HEIGHTS))
+        if not least <= share <= most
+    ]
 
 
 def narrowness(mesh: TriangleMesh) -> float:

@@ -66,12 +66,16 @@ DIGITS = 6
 # from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over weeks 21 to 34 of the example atlas
 TO_CEREBELLUM = np.array([0.0, -0.58, -0.81])
 TO_BRAINSTEM = np.array([0.0, -0.30, -0.95])
+# how far they are at least, in cube roots of its volume: 0.37 and more in weeks 21 to 36
+LEAST_OUTSIDE = 0.25
 # left and right of the labels weigh as much as the hindbrain does
 TO_RIGHT = np.array([1.0, 0.0, 0.0])
 # brains turned by less stand as their files say: this is how far atlases and scans differ
 LEAST_TURN_DEG = 60.0
 # brains turned by more, up to that, are kept and told: atlases and scans rarely differ as much
-DOUBTFUL_TURN_DEG = 25.0
+DOUBTFUL_TURN_DEG = 15.0
+# told of volumes without labelled sides, which tell a turned brain from a mirrored one
+OR_MIRRORED = "if its array has an axis reversed or two exchanged instead, left and right are exchanged now: check them"
 # two directions nearer to each other than this (in radians) say nothing of the turn about them
 LEAST_SPREAD = 0.06
 # a brain that is turned is turned by quarters, as wrong axis codes do, where these are as near as this
@@ -455,11 +459,11 @@ def _places(pairs: Sequence[Pair], frames: list[str | None]) -> list[Floats]:
     return [pair.size_mm * np.array([np.interp(pair.size_mm, sizes, values) for values in centres]) for pair in pairs]
 
 
-def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose:
-    """Returns the pose from cerebellum, brainstem and labelled sides; the file's where too few of them are labelled.
+def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose | None:
+    """Returns the pose from cerebellum, brainstem and labelled sides; None where too few of them are labelled.
 
-    It is the file's too where the two differ by less than 60°, with a warning from 25° on. InputError
-    where the labels of left and right are mirrored: no rotation brings them to their sides.
+    It is the file's where the two differ by less than 60°, with a warning from 15° on. InputError where the labels of
+    left and right are mirrored: no rotation brings them to their sides.
     """
     centres = {
         name: affine[:3, :3] @ np.argwhere(np.isin(labels, numbers)).mean(axis=0)
@@ -474,6 +478,15 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     }
     expected = {"cerebellum": TO_CEREBELLUM, "brainstem": TO_BRAINSTEM}
     found = {name: centres[name] - centres["cerebrum"] for name in expected if name in centres}
+    size = float(np.cbrt(np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3]))))
+    for name, way in found.items():
+        if (share := float(np.linalg.norm(way)) / size) < LEAST_OUTSIDE:
+            raise InputError(
+                f"what the scheme {scheme.name!r} calls the {name} lies inside what it calls the cerebrum",
+                found=f"its centre {share:.2f} of the cerebrum's size (the cube root of its volume) from the middle",
+                expected=f"{LEAST_OUTSIDE} or more",
+                remedy="Choose the scheme of this volume.",
+            )
     rotation = None
     if len(found) == 2:
         theirs, ours = (
@@ -497,14 +510,13 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
             )
         rotation = turn
     if rotation is None:
-        return Pose()
+        return None
     by = " and ".join([*found, *(["the labelled sides"] if sides is not None else [])])
     rotation = _turn_by_quarters(rotation)
     angle = angle_deg(rotation)
     if angle >= LEAST_TURN_DEG:
-        return turned(
-            rotation, by, "ras", f"the brain was turned by {angle:.0f}°, as {by} say: its affine has other axes"
-        )
+        said = f"the brain was turned by {angle:.0f}°, as {by} say: its affine has other axes"
+        return turned(rotation, by, "ras", said if sides is not None else f"{said}; {OR_MIRRORED}")
     doubt = f"{by} say that the brain is turned by about {angle:.0f}°, which was kept: check the file's axes"
     return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
 
@@ -574,6 +586,28 @@ def pose_surface_by_shape(mesh: TriangleMesh, coordinates: str) -> Pose:
             remedy="Pose it and set coordinates: ras or lps.",
         )
     return turned(rotation, "shape", "ras", f"the brain was turned by {angles['ras']:.0f}°, as its shape says")
+
+
+def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
+    """Returns the pose of a label volume from the surface of its cerebrum, in the coordinates of the volume.
+
+    The file's is kept where the shape is within 60° of it or says none, with a warning. `sided` is whether labels say
+    which side is which.
+    """
+    unchecked = Pose(warnings=("neither labels nor shape say how the brain lies: its pose is the file's, unchecked",))
+    try:
+        found = pose_surface_by_shape(mesh, "auto")
+    except InputError:
+        return unchecked
+    if found.by == "default":
+        return unchecked
+    rotation = _turn_by_quarters(found.of_file()[:3, :3])
+    angle = angle_deg(rotation)
+    if angle >= LEAST_TURN_DEG:
+        said = f"the brain was turned by {angle:.0f}°, as its shape says: its affine has other axes"
+        return turned(rotation, "shape", "ras", said if sided else f"{said}; {OR_MIRRORED}")
+    doubt = f"the shape says that the brain is turned by about {angle:.0f}°, which was kept: check the file's axes"
+    return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
 
 
 def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:

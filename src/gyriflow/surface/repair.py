@@ -13,7 +13,7 @@ import pyvista as pv
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from ..errors import MeshError
+from ..errors import InputError, MeshError
 from ..geometry.matching import nearest_on
 from ..geometry.remeshing import from_meshlab, in_meshlab, remesh, self_intersecting_faces, untangle
 from ..geometry.triangles import (
@@ -33,6 +33,7 @@ from ..geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
+from ..parameters.terms import MOST_HOLE_MM
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .extraction import EDGE_SLOPE, Floats, isosurface, make_simple, without_stalks
 from .labels import TOLD_LOSS
@@ -45,6 +46,8 @@ SAME_MM = 1e-5
 COMPARABLE = 0.3
 # lengths of brains and hemispheres
 SMALLEST_MM, LARGEST_MM = 15.0, 300.0
+# a vertex is off its surface at this distance from the middle of its neighbours, and so many times theirs from it
+SPIKE_MM, SPIKE_SPREADS = 5.0, 3.0
 # voxels in which a surface is looked at for stalks
 STALK_VOXEL_MM = 0.8
 # cuts follow the triangles, so that they are wider than the stalks
@@ -88,6 +91,27 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
         for stalk in stalks
     ]
     return Sound(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
+
+
+def require_no_spikes(mesh: TriangleMesh) -> None:
+    """Raises InputError where a vertex lies far from the middle of its neighbours, which are near each other."""
+    one, other = np.concatenate([pairs := edges(mesh)[0], pairs[:, ::-1]]).T
+    count = np.bincount(one, minlength=len(mesh.vertices))
+    middle = np.zeros_like(mesh.vertices, dtype=np.float64)
+    np.add.at(middle, one, mesh.vertices[other])
+    middle /= np.maximum(count, 1)[:, None]
+    spread = np.zeros(len(count))
+    np.maximum.at(spread, one, np.linalg.norm(mesh.vertices[other] - middle[one], axis=1))
+    distance = np.linalg.norm(mesh.vertices - middle, axis=1)
+    far = np.flatnonzero((count > 2) & (distance > np.maximum(SPIKE_MM, SPIKE_SPREADS * spread)))
+    if len(far):
+        place = mesh.vertices[far[0]].round(1).tolist()
+        raise InputError(
+            "vertices lie far off the surface around them",
+            found=f"{len(far)}, such as that at {place}, {distance[far[0]]:.0f} mm off",
+            expected=f"at most {SPIKE_MM:g} mm",
+            remedy="Export the surface again, or move these vertices back.",
+        )
 
 
 def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:
@@ -162,9 +186,10 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
 
     Equal vertices are joined, degenerate and double faces removed, non-manifold edges opened, holes up to
     `max_hole_mm` across closed, faces turned outward, small pieces and pieces inside others dropped.
-    MeshError for larger holes and for surfaces that stay open.
+    MeshError for larger holes and for surfaces that stay open, InputError for vertices far off the surface.
     """
     mesh, doubles = _drop_doubles(mesh)
+    require_no_spikes(mesh)
     # not before: faces that meet in several copies of a vertex would count
     cutting = int(self_intersecting_faces(mesh).sum())
     mesh, opened = _make_manifold(mesh)
@@ -247,7 +272,9 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, d
             "the surface has holes that are too large to close",
             found=f"{len(wide)} of {len(loops)} holes, up to {wide[0]:.1f} mm across",
             expected=f"at most {max_hole_mm:g} mm (max_hole_mm)",
-            remedy="Give a closed surface, or raise max_hole_mm if the opening may be covered.",
+            remedy="Give a closed surface, or raise surface.max_hole_mm if the opening may be covered."
+            if wide[0] <= MOST_HOLE_MM
+            else "Give a closed surface: holes of this size are not to be covered.",
         )
     vertices, faces = [mesh.vertices], [mesh.faces]
     directed = {tuple(pair) for pair in mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()}

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from gyriflow.io.jobs import GrowingFile, cause, events_in, gather_messages, read_benchmarks, read_messages
+from gyriflow.io.jobs import KILLED, GrowingFile, cause, events_in, gather_messages, read_benchmarks, read_messages
 
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 PATTERNS = {
@@ -91,6 +91,7 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path):
             "unexpected ValueError: no such week",
         ),
         ("mpiexec: one\n\ntwo\n", "mpiexec: one\ntwo"),
+        ("2026-11-22 00:54:57,955 INFO gyriflow.io: read\n", KILLED),
         ("", ""),
     ],
 )  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 from shapes import rigid
 
 from gyriflow.errors import InputError
-from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
+from gyriflow.io.volumes import LabelVolume, read_label_volume, voxels_of, write_label_volume
 
 AFFINE = np.array([[0.8, 0, 0, -10], [0, 0.9, 0, 5], [0, 0, 1.0, 20], [0, 0, 0, 1.0]])
 
@@ -171,3 +171,21 @@ def test_written_volume_comes_back(tmp_path, labels, shear):
     assert np.array_equal(back.labels, labels)
     assert back.affine == pytest.approx(affine, abs=1e-5)
     assert nib.load(tmp_path / "a.nii.gz").get_data_dtype() == np.uint8
+
+
+def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path, labels):
+    path = saved(tmp_path / "a.nii.gz", np.pad(labels, ((20, 30), (10, 0), (0, 40))))
+    whole, volume = read_label_volume(path), read_label_volume(path, cropped=True)
+    # a voxel around the labels, but not beyond the volume's own end
+    assert volume.labels.shape == (5, 4, 5)
+    for label in (7, 2):
+        assert position(volume, label) == pytest.approx(position(whole, label))
+    empty = saved(tmp_path / "b.nii.gz", np.zeros((3, 4, 5), dtype=np.int16))
+    assert read_label_volume(empty, cropped=True).labels.shape == (3, 4, 5)
+
+
+@pytest.mark.parametrize(("unit", "per_mm"), [("mm", 1.0), ("meter", 1e-3)])
+def test_voxels_are_counted_and_measured_by_the_header_alone(tmp_path, labels, unit, per_mm):
+    path = saved(tmp_path / "a.nii", labels, np.diag([per_mm] * 3 + [1.0]) @ AFFINE, unit)
+    count, size = voxels_of(path)
+    assert (count, size) == (120, pytest.approx(0.72, rel=1e-5))

@@ -3,7 +3,7 @@
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.io.yaml_files import read_yaml, write_yaml
+from gyriflow.io.yaml_files import read_keys, read_yaml, write_yaml
 
 
 def test_what_is_written_is_read(tmp_path):
@@ -33,3 +33,10 @@ def test_a_file_that_is_no_yaml_or_missing_is_refused(tmp_path):
         read_yaml(tmp_path / "x.yaml")
     with pytest.raises(InputError, match="cannot be read"):
         read_yaml(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(("text", "found"), [("", "nothing"), ("# a comment\n", "nothing"), ("- a\n", "a list")])
+def test_a_file_without_keys_is_refused(tmp_path, text, found):
+    (tmp_path / "x.yaml").write_text(text)
+    with pytest.raises(InputError, match=rf"x\.yaml: holds no keys; found {found}; expected keys"):
+        read_keys(tmp_path / "x.yaml")

@@ -19,7 +19,7 @@ from gyriflow.geometry.triangles import (
     submesh,
     vertex_normals,
 )
-from gyriflow.metrics.curvature import continue_smoothly, curvature
+from gyriflow.metrics.curvature import RESOLVED_RADII, continue_smoothly, curvature
 from gyriflow.metrics.laplace_beltrami import laplacian
 
 Level = Callable[[np.ndarray], np.ndarray]
@@ -208,3 +208,20 @@ def test_continuation_of_a_constant_and_of_a_gradient() -> None:
     np.testing.assert_array_equal(filled[known], mesh.vertices[known, 0])
     assert filled.min() > 2.99  # nothing beyond the known values at 3 and 16
     assert filled.max() < 16.01
+
+
+@pytest.mark.parametrize(("wavelength", "least", "most"), [(12.0, 0.95, 1.0), (7.9, 0.78, 0.88), (5.2, 0.3, 0.5)])
+def test_folds_shorter_than_four_radii_are_flattened(wavelength, least, most):
+    # folds a quarter as deep as long
+    x, y = np.meshgrid(np.arange(70) * 0.5, np.arange(30) * 0.5, indexing="ij")
+    k, height = 2 * np.pi / wavelength, wavelength / 8
+    numbers = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    bend = curvature(TriangleMesh(np.stack([x, y, height * np.cos(k * x)], -1).reshape(-1, 3), faces), radius_mm=3.0)
+    stretch = np.sqrt(1 + (height * k * np.sin(k * x.ravel())) ** 2)
+    exact = 0.5 * height * k**2 * np.cos(k * x.ravel()) / stretch**3
+    inner = bend.reliable & (np.abs(x.ravel() - 17.25) < 12.0)
+    found, expected = (np.sum((values**2 * stretch)[inner]) for values in (bend.mean, exact))
+    assert least < found / expected < most
+    assert RESOLVED_RADII * 3.0 == 12.0

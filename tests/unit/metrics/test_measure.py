@@ -57,6 +57,8 @@ def test_two_spheres(apart: BrainMetrics) -> None:
         assert value(apart, name, "mean_curvedness") == pytest.approx(1 / radius, rel=0.02)
         assert value(apart, name, "sulcal_area_share") == 0.0
         assert value(apart, name, "curvature_radius") >= 3.0
+        four_radii = 4 * value(apart, name, "curvature_radius")
+        assert value(apart, name, "curvature_wavelength") == pytest.approx(four_radii)
         assert value(apart, name, "mean_sulcal_depth") == pytest.approx(0.0, abs=0.05)
         assert value(apart, name, "crossing_faces") == 0
         assert value(apart, name, "intrinsic_curvature_index") == pytest.approx(1.0, rel=0.02)

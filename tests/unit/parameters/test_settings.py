@@ -72,3 +72,17 @@ def test_problems_in_lists_and_tables_have_their_paths():
 def test_nothing_given_is_all_defaults_and_truth_values_are_no_numbers():
     assert Stack.model_validate({"layers": []}) == Stack() == Stack.model_validate(None)
     assert found(Stack, {"total": True}) == {"total": "found True; it should be a number or text, not true or false"}
+
+
+def test_bounds_of_texts_and_lists_read_as_sentences():
+    class Named(Settings):
+        """A name and a pair."""
+
+        name: str = setting("a", "", "Letters.", pattern="^[a-z]+$")
+        pair: tuple[int, ...] = setting((1, 2), "", "Two or more.", min_length=2)
+
+    with pytest.raises(ValidationError) as caught:
+        Named.model_validate({"name": "A 1", "pair": [1]})
+    said = [text for _, text in messages(caught.value, Named)]
+    assert said[0] == "found 'A 1'; it should match pattern '^[a-z]+$'"
+    assert said[1].startswith("found [1]; it should have at least 2 items")

@@ -1,12 +1,22 @@
 """What a study is predicted to take: sizes against meshes that were made, sums and cores by hand."""
 
+import nibabel as nib
 import numpy as np
 import pytest
 
 from gyriflow.config import load
 from gyriflow.config.stages import MeshSettings
 from gyriflow.io.files import read_json
-from gyriflow.shell.cost import MEASURED, Job, cubes, folding_needs, predict, typical_seconds
+from gyriflow.shell.cost import (
+    LEAST_SURFACE_MIB,
+    MEASURED,
+    Job,
+    cubes,
+    folding_needs,
+    predict,
+    surface_memory_mib,
+    typical_seconds,
+)
 
 STUDY = {
     "brains": [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 22, "phantom": {}}],
@@ -112,3 +122,14 @@ def test_what_was_measured_has_all_that_predictions_need():
     assert 1 < predicted.core_seconds < 1e5
     assert 1 < predicted.error["time"] < 4
     assert typical_seconds()["simulate"] > typical_seconds()["study_table"]
+
+
+def test_the_memory_of_a_surface_follows_the_header(tmp_path):
+    for name, edge, size in (("usual", 0.8, 100), ("fine", 0.25, 320), ("padded", 0.8, 512)):
+        image = nib.Nifti1Image(np.zeros((size,) * 3, dtype=np.uint8), np.diag([edge] * 3 + [1.0]))
+        image.header.set_xyzt_units("mm")
+        nib.save(image, tmp_path / f"{name}.nii")
+    usual, fine, padded = (surface_memory_mib(str(tmp_path / f"{n}.nii"), 25.0) for n in ("usual", "fine", "padded"))
+    assert usual == surface_memory_mib(str(tmp_path / "none.nii"), 25.0) == LEAST_SURFACE_MIB
+    assert fine > 1.2 * LEAST_SURFACE_MIB
+    assert padded < fine

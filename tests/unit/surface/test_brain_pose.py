@@ -12,7 +12,7 @@ from gyriflow.geometry.triangles import transformed
 from gyriflow.io.schemes import SCHEMES
 from gyriflow.phantom import pathologies
 from gyriflow.surface.plausible import narrowness
-from gyriflow.surface.pose import doubts_of_hemispheres, pose_of_labels, pose_surface_by_shape
+from gyriflow.surface.pose import doubts_of_hemispheres, pose_of_labels, pose_of_volume_by_shape, pose_surface_by_shape
 
 TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]
 
@@ -31,7 +31,7 @@ def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
     assert "the brain was turned by" in pose.warnings[0]
 
 
-@pytest.mark.parametrize("degrees", [(0, 0, 0), (10, 0, 0), (15, 0, 0), (-12, 10, 14)])
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (5, 0, 0), (-15, 0, 0), (-6, 5, 7)])
 def test_small_tilts_are_the_files_own(brain, degrees):
     labels, affine = brain
     pose = pose_of_labels(labels, rigid(*degrees) @ affine, SCHEMES["spina-bifida-atlas"])
@@ -40,7 +40,7 @@ def test_small_tilts_are_the_files_own(brain, degrees):
 
 
 @pytest.mark.parametrize(
-    ("degrees", "angle"), [((30, 0, 0), 30), ((45, 0, 0), 45), ((0, 45, 0), 45), ((-20, 25, 30), 46)]
+    ("degrees", "angle"), [((25, 0, 0), 25), ((30, 0, 0), 30), ((45, 0, 0), 45), ((0, 45, 0), 45), ((-20, 25, 30), 46)]
 )
 def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
     labels, affine = brain
@@ -76,8 +76,31 @@ def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(brai
 
 def test_labels_without_hindbrain_and_sides_tell_no_pose(brain):
     labels, affine = brain
-    pose = pose_of_labels((labels > 0).astype(int), affine, SCHEMES["binary"])
-    assert (pose.by, pose.warnings, pose.world.tolist()) == ("file", (), np.eye(4).tolist())
+    assert pose_of_labels((labels > 0).astype(int), affine, SCHEMES["binary"]) is None
+
+
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 0, 180), (90, 0, 0), (0, 180, 0)])
+def test_volumes_without_a_hindbrain_are_posed_by_their_shape(brain, degrees):
+    labels, affine = brain
+    mesh = transformed(cerebrum_surface(labels, affine), rigid(*degrees))
+    pose = pose_of_volume_by_shape(mesh, sided=False)
+    np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
+    assert ["left and right are exchanged now" in warning for warning in pose.warnings] == [True] * any(degrees)
+
+
+def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
+    pose = pose_of_volume_by_shape(transformed(ellipsoid((24, 33, 22)), rigid(*(50, 40, 30))), sided=False)
+    assert np.array_equal(pose.world, np.eye(4))
+    assert "unchecked" in pose.warnings[0]
+
+
+def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
+    labels, affine = brain
+    scheme = SCHEMES["spina-bifida-atlas"]
+    assert "left and right are exchanged now" in pose_of_labels(labels[:, ::-1], affine, scheme).warnings[0]
+    sided = pathologies.add_sides(*brain)
+    turned = pose_of_labels(sided, rigid(0, 0, 180) @ affine, SCHEMES["dhcp-19"])
+    assert "exchanged" not in turned.warnings[0]
 
 
 @pytest.mark.parametrize("pathology", [None, "without_callosum", "holoprosencephaly", "wide_hemisphere"])

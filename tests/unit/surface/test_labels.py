@@ -5,12 +5,15 @@ import pytest
 
 from gyriflow.errors import InputError
 from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.shipped import SHIPPED
 from gyriflow.surface.labels import (
     cerebrum_mask,
     missing_tissues,
     require_cortex_outside,
     require_sides,
 )
+from gyriflow.surface.pose import pose_of_labels
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
 
@@ -99,3 +102,21 @@ def test_labels_of_the_left_on_the_right_are_refused():
     require_sides(labels, scheme, np.eye(4), np.array([1.0, 0, 0]))
     with pytest.raises(InputError, match="left hemisphere lie on the right"):
         require_sides(labels, scheme, np.diag([-1.0, 1, 1, 1]), np.array([1.0, 0, 0]))
+
+
+@pytest.fixture(scope="module")
+def feta():
+    """The shipped atlas' brain of 25 GW in the labels of FeTA."""
+    volume = read_label_volume(SHIPPED / "atlases/spina-bifida/fetal_SB_atlas_GA25_notoperated/parcellation.nii.gz")
+    return np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])[volume.labels], volume.affine
+
+
+def test_sides_that_are_no_hemispheres_are_another_schemes(feta):
+    with pytest.raises(InputError, match=r"'dhcp-19' calls left and right are no hemispheres.*found .* 49 % of pairs"):
+        require_sides(feta[0], SCHEMES["dhcp-19"], feta[1], np.array([1.0, 0, 0]))
+
+
+def test_a_hindbrain_inside_the_cerebrum_is_another_schemes(feta):
+    assert pose_of_labels(*feta, SCHEMES["feta-7"]).by == "file"
+    with pytest.raises(InputError, match=r"'drawem-9' calls the cerebellum lies inside"):
+        pose_of_labels(*feta, SCHEMES["drawem-9"])

@@ -31,7 +31,7 @@ from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 from gyriflow.surface.fissure import least_gap, left_faces, set_apart, split
 from gyriflow.surface.pial import from_hemispheres, from_labels, from_surface
-from gyriflow.surface.plausible import expected_volume_ml, require_plausible_size
+from gyriflow.surface.plausible import doubts_of_proportions, expected_volume_ml, require_plausible_size
 from gyriflow.surface.repair import pieces
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
@@ -138,10 +138,28 @@ def test_small_large_and_adult_brains_pass(week, volume_ml):
     require_plausible_size(volume_ml * 1e3, np.ones(3), week)
 
 
-@pytest.mark.parametrize(("share", "doubted"), [(0.57, False), (1.24, False), (0.8**-3, True), (0.3, True)])
+@pytest.mark.parametrize(
+    ("share", "doubted"), [(0.57, False), (1.27, False), (0.8**-3, True), (0.3, True), (0.5, True), (1.5, True)]
+)
 def test_a_volume_far_from_that_of_the_week_is_doubted(share, doubted):
     said = require_plausible_size(share * expected_volume_ml(24.0) * 1e3, np.ones(3), 24.0)
     assert [f"has {100 * share:.0f} % of the volume expected at week 24" in doubt for doubt in said] == [True] * doubted
+
+
+def test_a_brain_of_another_week_is_doubted():
+    size = expected_volume_ml(25.0) * 1e3
+    assert require_plausible_size(size, np.ones(3), 25.0) == []
+    assert "is the week right" in require_plausible_size(size, np.ones(3), 34.0)[0]
+    assert "is the week right" in require_plausible_size(1.3**3 * size, np.ones(3), 25.0)[0]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_wrong_edge_of_the_voxels_is_told_by_the_brains_proportions(axis):
+    # the spina bifida atlas at 31 GW
+    extents = np.array([75.0, 92.0, 66.0])
+    assert doubts_of_proportions(extents) == []
+    extents[axis] *= 1.3
+    assert "are the voxels' edges right?" in doubts_of_proportions(extents)[0]
 
 
 @pytest.mark.fault(4)

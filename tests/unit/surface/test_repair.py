@@ -1,10 +1,12 @@
 """Surfaces from files: what is broken is repaired and counted, or refused."""
 
+import re
+
 import numpy as np
 import pytest
 from shapes import sphere, torus
 
-from gyriflow.errors import MeshError
+from gyriflow.errors import InputError, MeshError
 from gyriflow.geometry.remeshing import remesh, self_intersecting_faces, untangle
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume, submesh
 from gyriflow.surface.repair import clean, make_even, pieces, rebuild, smooth_taubin
@@ -36,8 +38,31 @@ def test_small_hole_is_closed_and_reported():
 def test_large_hole_is_refused_with_its_size():
     whole = ball()
     mesh, _ = submesh(whole, whole.vertices[whole.faces][:, :, 2].max(axis=1) < 8.0)
-    with pytest.raises(MeshError, match=r"1 of 1 holes, up to 1[12]\.\d mm.*at most 3 mm"):
+    with pytest.raises(MeshError, match=r"1 of 1 holes, up to 1[12]\.\d mm.*at most 3 mm.*raise surface\.max_hole_mm"):
         clean(mesh, 3.0)
+    wide = TriangleMesh(3.0 * mesh.vertices, mesh.faces)
+    with pytest.raises(MeshError, match=r"up to 3\d\.\d mm.*Give a closed surface: holes of this size"):
+        clean(wide, 20.0)
+
+
+@pytest.mark.parametrize("shift", [60.0, -25.0], ids=["spike", "dent"])
+def test_a_vertex_far_off_the_surface_is_refused_with_its_place(shift):
+    whole = ball()
+    vertices = whole.vertices.copy()
+    vertices[7] *= 1.0 + shift / RADIUS
+    place = re.escape(str(vertices[7].round(1).tolist()))
+    with pytest.raises(InputError, match=rf"lie far off the surface.*found 1, such as that at {place}, \d\d mm off"):
+        clean(TriangleMesh(vertices, whole.faces), 3.0)
+
+
+def test_large_triangles_and_fans_are_no_spikes():
+    clean(sphere(40.0, 0), 3.0)
+    # a flat end of 24 mm across, closed by a fan of long triangles
+    whole = sphere(20.0, 4)
+    kept = whole.vertices[whole.faces][:, :, 2].max(axis=1) < 16.0
+    mesh, report = clean(submesh(whole, kept)[0], 30.0)
+    assert report["holes_closed"] == 1
+    clean(mesh, 3.0)
 
 
 def test_faces_inside_out_are_turned():
