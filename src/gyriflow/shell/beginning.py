@@ -182,7 +182,7 @@ def write_bids(
     several = Counter(str(brain.entry.get("subject")) for brain in found)
     starts = [entry["id"] for subject, entry in first.items() if subject != "None" and several[subject] > 1]
     weeks = [brain.entry["week"] for brain in found]
-    given = read_yaml(settings) if settings else {}
+    given = read_keys(settings) if settings else {}
     runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if len(set(weeks)) > 1 else {})
     text = {
         **{"brains": [_absolute(brain.entry, folder) for brain in found], "start": starts or found[0].entry["id"]},
