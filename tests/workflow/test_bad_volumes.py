@@ -211,3 +211,20 @@ def test_images_are_segmented_and_shown_where_they_are_given(workflow):
         3,
         2,
     )
+
+
+def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):
+    (workflow.directory / "torn.nii.gz").write_text("no volume")
+    brain = {"id": "a", "week": 21, "labels": "torn.nii.gz", "scheme": "binary"}
+    name = workflow.write("study.yaml", {"brains": [brain], "start": "a", "folding": {"end_week": 22}})
+    outcome = workflow.run("--keep-going", "--cores", "1", "--configfile", name)
+    assert outcome.returncode == 2
+    assert "torn.nii.gz: cannot be read as an image" in outcome.stderr
+    assert "ValueError" not in outcome.stdout + outcome.stderr
+
+
+def test_an_empty_configuration_is_refused(workflow):
+    (workflow.directory / "study.yaml").write_text("# nothing\n")
+    outcome = workflow.run("-n", "--configfile", "study.yaml")
+    assert outcome.returncode == 2
+    assert "study.yaml: holds no keys; found nothing" in outcome.stderr

@@ -13,7 +13,7 @@ import pyvista as pv
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from ..errors import InputError, MeshError
+from ..errors import MeshError
 from ..geometry.matching import nearest_on
 from ..geometry.remeshing import from_meshlab, in_meshlab, remesh, self_intersecting_faces, untangle
 from ..geometry.triangles import (
@@ -85,6 +85,11 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
             f"{repairs['pieces_dropped']} pieces apart from the brain or inside it were dropped: "
             f"{100 * dropped / (kept + dropped):.1f} % of the area"
         )
+    if spikes := repairs["vertices_moved_back"]:
+        said = "1 vertex lay" if spikes == 1 else f"{spikes} vertices lay"
+        warnings.append(
+            f"{said} far off the surface and {'was' if spikes == 1 else 'were'} moved to the neighbours' middle"
+        )
     mesh, stalks = surface_without_stalks(mesh)
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ hung on a stalk of {stalk['stalk_mm2']:.0f} mm²: cut off"
@@ -93,8 +98,8 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
     return Sound(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
 
 
-def require_no_spikes(mesh: TriangleMesh) -> None:
-    """Raises InputError where a vertex lies far from the middle of its neighbours, which are near each other."""
+def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Returns a surface whose vertices far off their neighbours are in the middle of these, and the number of them."""
     one, other = np.concatenate([pairs := edges(mesh)[0], pairs[:, ::-1]]).T
     count = np.bincount(one, minlength=len(mesh.vertices))
     middle = np.zeros_like(mesh.vertices, dtype=np.float64)
@@ -103,15 +108,10 @@ def require_no_spikes(mesh: TriangleMesh) -> None:
     spread = np.zeros(len(count))
     np.maximum.at(spread, one, np.linalg.norm(mesh.vertices[other] - middle[one], axis=1))
     distance = np.linalg.norm(mesh.vertices - middle, axis=1)
-    far = np.flatnonzero((count > 2) & (distance > np.maximum(SPIKE_MM, SPIKE_SPREADS * spread)))
-    if len(far):
-        place = mesh.vertices[far[0]].round(1).tolist()
-        raise InputError(
-            "vertices lie far off the surface around them",
-            found=f"{len(far)}, such as that at {place}, {distance[far[0]]:.0f} mm off",
-            expected=f"at most {SPIKE_MM:g} mm",
-            remedy="Export the surface again, or move these vertices back.",
-        )
+    far = (count > 2) & (distance > np.maximum(SPIKE_MM, SPIKE_SPREADS * spread))
+    if not far.any():
+        return mesh, 0
+    return TriangleMesh(np.where(far[:, None], middle, mesh.vertices), mesh.faces), int(far.sum())
 
 
 def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:
@@ -184,14 +184,15 @@ def make_even(
 def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
-    Equal vertices are joined, degenerate and double faces removed, non-manifold edges opened, holes up to
-    `max_hole_mm` across closed, faces turned outward, small pieces and pieces inside others dropped.
-    MeshError for larger holes and for surfaces that stay open, InputError for vertices far off the surface.
+    Equal vertices are joined, degenerate and double faces removed, vertices far off their neighbours moved between
+    these, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small pieces and
+    pieces inside others dropped.
+    MeshError for larger holes and for surfaces that stay open.
     """
     mesh, doubles = _drop_doubles(mesh)
-    require_no_spikes(mesh)
     # not before: faces that meet in several copies of a vertex would count
     cutting = int(self_intersecting_faces(mesh).sum())
+    mesh, spikes = without_spikes(mesh)
     mesh, opened = _make_manifold(mesh)
     mesh, dropped = _main_pieces(mesh)
     mesh, holes = _fill_holes(mesh, max_hole_mm)
@@ -207,7 +208,15 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
             remedy="Repair the surface by hand, or make it anew from a label volume.",
         )
     turned = {"pieces_turned_outward": int(sum(inward))}
-    return mesh, {**doubles, "faces_that_cut_others": cutting, **opened, **dropped, **holes, **turned}
+    return mesh, {
+        **doubles,
+        "faces_that_cut_others": cutting,
+        "vertices_moved_back": spikes,
+        **opened,
+        **dropped,
+        **holes,
+        **turned,
+    }
 
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
