@@ -188,6 +188,15 @@ def test_a_participant_has_a_brain_for_each_session(folder):
     assert found.scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
 
 
+def test_sessions_of_all_may_stand_in_one_table(folder):
+    write(folder, ("participant_id", "gestational_age"), ("sub-1", "30"), ("sub-2", "23"))
+    rows = ("participant_id\tsession_id\tga", "sub-1\t1\t21", "sub-1\t2\t24+1")
+    (folder / "bids" / "sessions.tsv").write_text("\n".join(rows) + "\n")
+    section = {"file": "bids/participants.tsv", "columns": {"labels": "a.nii.gz", "scheme": "feta-7"}}
+    found = load({"participants": section, "start": "sub-2", "folding": FOLDING}, folder)
+    assert {brain.id: brain.week for brain in found.brains} == {"sub-1_ses-1": 21, "sub-1_ses-2": 24.14, "sub-2": 23}
+
+
 def test_rows_of_one_id_are_problems_where_one_cannot_be_used(folder):
     head, row = ("id", "week", "labels", "scheme"), ("a.nii.gz", "feta-7")
     write(folder, head, ("sub-1", "24", *row), ("sub-2", "n/a", *row), ("sub-2", "170", *row))
