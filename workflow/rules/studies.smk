@@ -66,12 +66,12 @@ rule published_tables:
 # each result of the paper beside the same here, with a verdict
 rule replication:
     input:
-        published=PUBLISHED,
-        displacement=PLAN.runs.of(DISPLACEMENT)[:1],
         **{
             name: expand(f"{STUDY}/{{study}}/{name}.csv", study=CONFIG.studies)
             for name in ("members", "comparison", "nearest")
         },
+        published=PUBLISHED,
+        displacement=PLAN.runs.of(DISPLACEMENT)[:1],
     output:
         csv=f"{STUDY}/replication.csv",
         page=f"{STUDY}/replication.html",
