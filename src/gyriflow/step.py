@@ -53,21 +53,16 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     logging.captureWarnings(True)
     try:
         yield
-    except GyriflowError as error:
-        message = str(error) if error.names_file or not inputs else f"{', '.join(inputs)}: {error}"
+    except (GyriflowError, MemoryError) as error:
+        message, code, named = f"memory ran out ({error}). Free memory, or run fewer jobs at once", KILLED, False
+        if isinstance(error, GyriflowError):
+            message, code, named = str(error), error.exit_code, error.names_file
+        if inputs and not named:
+            message = f"{', '.join(inputs)}: {message}"
         logging.error("%s", message)
         print(f"gyriflow: {message}", file=sys.stderr)
-        record_exit_code(error.exit_code)
-        sys.exit(error.exit_code)
-    except MemoryError as error:
-        message = (
-            f"{', '.join(inputs)}: memory ran out ({error or 'no more was given'}). Free memory, run fewer jobs at "
-        )
-        message += "once, or give the volume larger voxels"
-        logging.error("%s", message)
-        print(f"gyriflow: {message}", file=sys.stderr)
-        record_exit_code(KILLED)
-        sys.exit(KILLED)
+        record_exit_code(code)
+        sys.exit(code)
     except KeyboardInterrupt:
         record_exit_code(INTERRUPTED)
         sys.exit(INTERRUPTED)

@@ -105,8 +105,6 @@ SAME_AXIS = 0.7
 DOUBTFUL_ASYMMETRY = 0.03
 # a hemisphere of 4 % of the other one's volume has about a tenth of its area
 MOST_UNEQUAL = 15.0
-# of a mask's voxels, those that the repair of its topology may add and take; brains take a few thousandths
-MOST_REPAIRED = 0.08
 # voxels as large as this show the shape of a brain well enough for its pose
 OF_SHAPE_MM = 1.5
 # the distance of the medial wall of a hemisphere that is alone from the mid-sagittal plane
@@ -210,21 +208,9 @@ def from_labels(
             field, affine, opened["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
     # where labels say which side is which, a hemisphere may be far smaller than the other one
     field, topology = make_simple(field, COMPARABLE if to_right is None else SMALLEST_HEMISPHERE)
-    repaired = topology["voxels_cut_from_bridges"] + topology["voxels_filled_in_tunnels"]
-    if (share := repaired * float(abs(np.linalg.det(affine[:3, :3]))) / volume) > MOST_REPAIRED:
-        raise InputError(
-            "the cerebrum is full of tunnels and handles",
-            found=f"{100 * share:.0f} % of its volume in them",
-            expected=f"at most {100 * MOST_REPAIRED:.0f} %",
-            remedy="Choose the scheme of this volume; check the labels.",
-        )
     rough = isosurface(field, affine)
     if side:
         require_one(rough)
-    dropped = topology["voxels_dropped"] * float(abs(np.linalg.det(affine[:3, :3])))
-    if dropped > TOLD_LOSS * volume:
-        told_loss = f"{dropped * ML_PER_MM3:.2f} mL, {100 * dropped / volume:.1f} % of it"
-        warnings += told([f"{topology['parts_dropped']} parts apart from the brain were dropped: {told_loss}"])
     even = make_sound(rough, smoothing_iterations, edge_length_mm)
     warnings += told(even.warnings)
     expected = after_repairs(volume, topology, affine) - opened.get("fissure_opened_mL", 0.0) / ML_PER_MM3

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
-from shapes import phantom, sphere
+from shapes import phantom, rigid, sphere
 
+from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
 from gyriflow.io.schemes import SCHEMES
 from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM
 from gyriflow.surface.pial import from_labels
 from gyriflow.surface.repair import after_repairs, with_volume
@@ -48,6 +50,30 @@ def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet(bent):
 def test_a_scheme_of_ones_own_names_its_tissues():
     scheme = LabelScheme(name="mine", cerebrum=(2, 1), cortex=(2,), known={9: "outer CSF", 1: "inside"})
     assert scheme.labels == {1: "inside", 2: "cortex", 9: "outer CSF"}
+
+
+def test_a_side_of_a_few_voxels_is_no_hemisphere():
+    labels, affine = phantom(21.0, 2.0)
+    scheme, sided = SCHEMES["dhcp-19"], pathologies.add_sides(labels, affine)
+    left = np.argwhere(np.isin(sided, scheme.left))
+    # all but the 40 voxels farthest to the left become the right hemisphere's
+    outermost = left[np.argsort(left @ affine[0, :3])][40:]
+    sided[tuple(outermost.T)] = dict(zip(scheme.left, scheme.right, strict=True))[3]
+    with pytest.raises(InputError, match=r"too small to be one; found areas of \d\.\d\d and \d\d\.\d\d cm²"):
+        from_labels(sided, affine, scheme, week=21.0, edge_length_mm=3.0)
+
+
+@pytest.mark.parametrize("degrees", [(90, 0, 0), (0, 0, 180)])
+def test_a_volume_without_a_hindbrain_has_the_surface_of_the_brain_that_stands_right(degrees):
+    labels, affine = phantom(24.0, 1.6)
+    mask = np.isin(labels, (1, 2, 5, 6, 8)).astype(int)
+    surfaces = [
+        from_labels(mask, rigid(*turn) @ affine, SCHEMES["binary"], week=24.0, edge_length_mm=2.0)
+        for turn in ((0, 0, 0), degrees)
+    ]
+    assert [surface.pose.by for surface in surfaces] == ["file", "shape"]
+    right, turned = (np.array(surface.report["extents_mm"]) for surface in surfaces)
+    np.testing.assert_allclose(turned, right, rtol=0.02)
 
 
 def test_smoothing_keeps_volume_and_area(bent):
