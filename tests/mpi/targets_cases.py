@@ -15,7 +15,7 @@ from gyriflow.folding.targets import inverse_exponential, log_growth
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.diffusion import vertex_sizes
+from gyriflow.geometry.diffusion import cell_sizes, vertex_sizes
 from gyriflow.geometry.tetrahedra import linear_pieces
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
@@ -56,6 +56,10 @@ def grown(folding, state, steps):
     return state
 
 
+def volume(vertices):
+    return cell_sizes(vertices, linear_pieces(BODY)).sum()
+
+
 def away(state, target):
     """Returns how far vertices are from where they are to be, root mean square in mm, without rigid motion."""
     now = state.positions * MM_PER_M
@@ -78,6 +82,13 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
     assert told[7] == pytest.approx(away(first, targets[23.0]), rel=1e-6)
     assert all(later < earlier for earlier, later in pairwise(told[:7]))
     assert (COMM.bcast(last.positions) == last.positions).all()
+
+    # growth found is what it takes, wherever it was made up for: 4 % in each direction, and the bend
+    traces = first.grown[:3].sum(axis=0)
+    assert np.average(traces, weights=vertex_sizes(BODY.vertices, linear_pieces(BODY))) == pytest.approx(
+        np.log(volume(targets[22.0]) / volume(BODY.vertices)), rel=0.05
+    )
+    assert first.grown_s == 7 * DAY_S
 
     motion = rigid(20, -35, 50, shift=(8.0, -3.0, 5.0))
     turned = {week: transform_points(at, motion) for week, at in targets.items()}

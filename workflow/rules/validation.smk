@@ -59,6 +59,30 @@ rule prediction:
         "../scripts/prediction.py"
 
 
+rule deviation:
+    input:
+        unpack(of(PLAN.validating.deviation)),
+    output:
+        **DEVIATION,
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        **of_brain("sides"),
+        labels=of(PLAN.validating.deviating),
+    script:
+        "../scripts/deviation.py"
+
+
+rule deviation_scores:
+    input:
+        f"{STUDY}/deviation.csv",
+    output:
+        f"{STUDY}/deviation_centiles.csv",
+    script:
+        "../scripts/deviation_scores.py"
+
+
 rule registration_ceiling:
     input:
         unpack(of(PLAN.validating.ceiling)),
@@ -157,4 +181,5 @@ rule validate:
             if files
         ],
         rules.horizon.output if PLAN.validating.pairs else [],
+        rules.deviation_scores.output if PLAN.validating.expected else [],
         PLAN.figures.target("validate"),

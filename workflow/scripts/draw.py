@@ -18,6 +18,7 @@ from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.parameters.terms import BASE, CORTEX
 from gyriflow.step import step
+from gyriflow.units import SECONDS_PER_GW
 
 # what functions need besides, each imports itself: its figure alone depends on it
 READERS = {
@@ -73,10 +74,17 @@ def displacement_maps(frames, **shown):
     return {"displacements": maps, **shown}
 
 
-def scalar_maps(frames, quantity, **shown):
-    """Returns the contact pressure at the output weeks, on the surface of the start: there no fold hides it."""
+def scalar_maps(frames, quantity, params=None, **shown):
+    """Returns contact pressure on the surface of the start, where no fold hides it, or growth on that of the week."""
     start, *weeks = read_weeks(frames)
     surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, start), read_tets(frames)))
+    if params is not None:
+        steps, maps, directions = SECONDS_PER_GW / params.step_s, {}, {}
+        for a, b in pairwise((start, *weeks)):
+            growth = steps * read_field(frames, b, "tangential_growth_per_step")[pial]
+            maps[a, b] = TriangleMesh(read_positions(frames, b)[pial], surface.faces), 100 * np.expm1(2 * growth)
+            directions[a, b] = read_field(frames, b, "growth_direction_per_step")[pial]
+        return {"maps": {"growth": maps}, "directions": directions, "quantity": quantity, **shown}
     maps = {week: (surface, read_field(frames, week, quantity)[pial]) for week in weeks}
     return {"maps": {"simulated": maps}, "quantity": quantity, **shown}
 

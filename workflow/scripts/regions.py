@@ -25,7 +25,8 @@ with step(snakemake.log[0]):
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
     growth = growth_at_start(parameters, GrowthInputs.of(mesh, zones, maps), mesh.vertices)
-    fields = layer_fields(mesh.vertices, zones, growth.parameters, maps, parameters.start_week, REGION_FIELDS)
+    of_start = parameters.start_week, REGION_FIELDS, growth.logarithm()
+    fields = layer_fields(mesh.vertices, zones, growth.parameters, maps, *of_start)
     boundary = TriangleMesh(mesh.vertices, zones.facets)
     if parameters.side is None:
         on_left = nearer_left(boundary, *map(read_surface, files.sides))

@@ -23,7 +23,7 @@ from ..parameters.varying import Maps
 Floats = NDArray[np.float64]
 ROOMS = ("folding", "mechanics", "geometry", "parameters", "units")
 """Where the modules lie on which the course of a run depends."""
-ARRAYS = ("positions", "last", "before_last", "stretch")
+ARRAYS = ("positions", "last", "before_last", "stretch", "grown")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,10 @@ class State:
         remembered (see `memory`).
     learnt : sequence of float or None
         What growth that follows has learnt of the brain's response.
+    grown : (6, n) float or None
+        Logarithm of growth since the last output week, where it is not by rates.
+    grown_s : float
+        Time since then.
     rows : tuple of dict
         The step table so far.
     """
@@ -63,6 +67,8 @@ class State:
     successes: int = 0
     stretch: Floats | None = None
     learnt: Sequence[float] | None = None
+    grown: Floats | None = None
+    grown_s: float = 0.0
     rows: tuple[dict, ...] = field(default=())
 
     @classmethod
@@ -87,8 +93,10 @@ class State:
         row: dict,
         stretch: Floats | None = None,
         learnt: Sequence[float] | None = None,
+        log_growth: Floats | None = None,
     ) -> "State":
         """Returns the state after an accepted step with its (n, 3) displacement in m; what it left and taught."""
+        grown = self.grown if self.grown is None or log_growth is None else self.grown + log_growth
         return replace(
             self,
             positions=self.positions + displacement,
@@ -100,6 +108,8 @@ class State:
             successes=self.successes + 1,
             stretch=stretch,
             learnt=learnt,
+            grown=log_growth if grown is None else grown,
+            grown_s=self.grown_s + step_s,
             rows=(*self.rows, row),
         )
 

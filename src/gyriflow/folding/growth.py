@@ -115,6 +115,10 @@ class Growth(ABC):
     def inverse(self, tissue: Tissue) -> Floats:
         """Returns G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
 
+    def logarithm(self) -> Floats | None:
+        """Returns ln G (6, n) at all vertices, None where growth is by the rates of the parameters."""
+        return None
+
     def again(self, after: Size) -> "Growth | None":
         """Returns how a step that has led to a size is to be done again, None where it need not or cannot be."""
         return None

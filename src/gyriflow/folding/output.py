@@ -20,6 +20,7 @@ from ..parameters.varying import Maps
 from ..units import MM_PER_M, week_tag
 from .growth import increments_at
 from .layers import PialSearch, cortical_weight, shear_modulus
+from .stress import unpacked
 from .zones import Zones
 
 log = logging.getLogger(__name__)
@@ -87,27 +88,50 @@ def layer_fields(
     maps: Maps,
     week: float,
     wanted: Iterable[str],
+    log_growth: Floats | None = None,
 ) -> dict[str, NDArray]:
     """Returns the fields of a shape that are among `wanted` (names as in the parameter `fields`), per vertex.
 
-    Positions are (n, 3) in mm. The names of the arrays carry their units.
+    Positions are (n, 3) in mm. The names of the arrays carry their units. Growth is by the parameters' rates, or has
+    the logarithm (6, n).
     """
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
     weight = cortical_weight(distance, parameters.thickness_at(week, maps))
-    along, across = increments_at(parameters, weight, zones.growth, maps, week, parameters.step_s)
+    if log_growth is None:
+        increments = increments_at(parameters, weight, zones.growth, maps, week, parameters.step_s)
+        growth = dict(zip(("tangential_growth_per_step", "radial_growth_per_step"), increments, strict=True))
+    else:
+        growth = growth_along(log_growth, search.nearest_normals(positions_mm))
     mu = shear_modulus(parameters, weight, maps, week)
     material = MATERIALS[parameters.material](parameters.poisson_ratio)
     fields: dict[str, dict[str, NDArray]] = {
         "distance": {"distance_to_pial_mm": distance},
         "cortex_weight": {"cortex_weight": weight},
-        "growth": {"tangential_growth_per_step": along, "radial_growth_per_step": across},
+        "growth": growth,
         "shear_modulus": {"shear_modulus_pa": mu},
         "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * mu},
         "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in wanted else {},
         "zones": {"zone": vertex_zones(zones, len(positions_mm)), "growing": zones.growth},
     }
     return {name: values for key in wanted if key in fields for name, values in fields[key].items()}
+
+
+def growth_along(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
+    """Returns the fields of growth with the logarithm (6, n) at vertices with the (n, 3) unit normals of the surface.
+
+    Its direction is that along the surface in which it is largest; its length is by how much it exceeds the growth
+    across that direction.
+    """
+    tensors, outwards = unpacked(log_growth.T), normals[:, :, None] * normals[:, None, :]
+    along = np.eye(3) - outwards
+    # the normal, with −1, comes first
+    values, axes = np.linalg.eigh(along @ tensors @ along - outwards)
+    return {
+        "tangential_growth_per_step": values[:, 1:].mean(axis=1),
+        "radial_growth_per_step": (tensors * outwards).sum(axis=(1, 2)),
+        "growth_direction_per_step": axes[:, :, 2] * (values[:, 2:] - values[:, 1:2]),
+    }
 
 
 def vertex_zones(zones: Zones, count: int) -> NDArray[np.int32]:
@@ -127,15 +151,17 @@ def save_frame(
     maps: Maps,
     contact: dict[str, Floats],
     elements: dict[str, Floats],
+    log_growth: Floats | None,
 ) -> None:
     """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name.
 
-    `contact` holds the (n,) fields that contact has left, `elements` the (m,) fields of the elements.
+    `contact` holds the (n,) fields that contact has left, `elements` the (m,) fields of the elements; `log_growth` as
+    for `layer_fields`.
     """
     fields: dict[str, NDArray] = {"positions": positions * MM_PER_M}
     if "displacement" in parameters.fields:
         fields["displacement_mm"] = (positions - start) * MM_PER_M
-    fields |= layer_fields(fields["positions"], zones, parameters, maps, week, parameters.fields)
+    fields |= layer_fields(fields["positions"], zones, parameters, maps, week, parameters.fields, log_growth)
     fields |= contact
     write_frame(frame_path(folder, week), week, fields, elements)
 

@@ -52,15 +52,19 @@ def run(
     start = mesh.vertices * M_PER_MM
     weeks = parameters.output_weeks
 
-    def save(week: float, positions: Floats) -> None:
-        """Writes the frame of a week; all ranks have to take part."""
+    def save(week: float, state: State) -> State:
+        """Writes the frame of a week and returns the state to go on with; all ranks have to take part."""
         contact, elements = folding.fields.of_contact(parameters.fields), folding.fields.of_elements(parameters.fields)
+        # a mean over the steps since the last frame: before the first one, that step's
+        grown = folding.growth.logarithm() if state.grown is None else state.grown * (parameters.step_s / state.grown_s)
+        shown = folding.growth.parameters
         if comm.rank == 0:
-            save_frame(folder, week, positions, start, zones, folding.growth.parameters, maps, contact, elements)
+            save_frame(folder, week, state.positions, start, zones, shown, maps, contact, elements, grown)
+        return replace(state, grown=None, grown_s=0.0)
 
     if state is None:
         state = State.at_start(start, parameters.step_s)
-        save(weeks[0], start)
+        state = save(weeks[0], state)
     first, resumed, diverged = len(state.rows), time.monotonic(), None
     for before, week in pairwise(weeks):
         until = seconds_to(week, parameters)
@@ -74,7 +78,7 @@ def run(
                 break
             arrived = until - state.time_s < 1e-9 * until
             if arrived:
-                save(week, state.positions)
+                state = save(week, state)
             if comm.rank == 0:
                 if arrived:
                     for missed in missed_curves([row for row in state.rows if row["week"] > before + 1e-9]):

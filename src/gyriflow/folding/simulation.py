@@ -133,7 +133,7 @@ class Folding:
             "elements_through_cortex": elements_through(self.domain, tissue.depth, self._thickness_m(growth.start)),
             "rung": RUNGS[count.rung],
         }
-        after = state.after(u, step_s, row, left, self.growth.learnt(size))
+        after = state.after(u, step_s, row, left, self.growth.learnt(size), self.growth.logarithm())
         self.domain.place(after.positions)
         row["radius_ratio_01"] = worst_quality(self.domain)
         row["seconds"] = time.monotonic() - began

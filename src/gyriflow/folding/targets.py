@@ -43,6 +43,9 @@ class TargetGrowth(Growth):
     def inverse(self, tissue: Tissue) -> Floats:
         return inverse_exponential(unpacked(np.moveaxis(tissue.from_vertices(self.strain), 0, -1)))
 
+    def logarithm(self) -> Floats:
+        return self.strain
+
     def row(self, after: Size) -> dict[str, Any]:
         return super().row(after) | {"to_target_mm": self.away_mm}
 

@@ -20,6 +20,9 @@ MAP_UNITS = {
     "sulcal_depth_mm": "mm",
     "local_gyrification_index": "1",
     "thickness_mm": "mm",
+    "distance_mm": "mm",
+    "log_area": "1",
+    "thickness_difference_mm": "mm",
 }
 """The maps whose means are given by region, and their units."""
 

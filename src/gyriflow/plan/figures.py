@@ -12,7 +12,7 @@ from ..parameters.terms import ELEMENTS_NEEDED, run_names
 from .brains import Brains
 from .chains import Chains
 from .measuring import Measured, Measuring
-from .paths import BRAIN, CALIBRATION, FOLDING, GROWTH, MESH, PARAMETERS, PIAL, REGIONS, RUN, STUDY
+from .paths import BRAIN, CALIBRATION, DEVIATION, FOLDING, GROWTH, MESH, PARAMETERS, PIAL, REGIONS, RUN, STUDY
 from .runs import Runs
 from .studying import Studying
 from .validating import Validating
@@ -21,6 +21,7 @@ Wildcards = Mapping[str, str]
 STUDY_FIGURES = f"{STUDY}/figures"
 INFLUENCE = f"{STUDY}/{{study}}/figures"
 WEEKLY = f"{STUDY_FIGURES}/weekly.{{brain}}.png"
+AROUND = ("left", "right", "top", "bottom")
 
 
 def nothing(**_: str) -> dict[str, Any]:
@@ -228,6 +229,20 @@ class Figures:
         beside = [self._real_beside(run, start) for run in self._runs_from(start)]
         return {week: row for rows in beside for week, row in rows.items()}
 
+    def _deviations(self, run: str, brain: str) -> dict[float, list[str]]:
+        """Returns by week the surface that a run expects and the maps of how the real brain deviates."""
+        surfaces, maps = self._surfaces(run, brain), DEVIATION["maps"].format(run=run, brain=brain, week="{week}")
+        weeks = self.validating.compared(run, brain)
+        return {float(week): [surfaces[float(week)].parts["whole"], maps.format(week=week)] for week in weeks}
+
+    def _expected(self, run: str, brain: str) -> dict[str, Any]:
+        """Returns the brains that a run expects, the real ones, and maps, at four of the compared weeks at most."""
+        deviations = self._deviations(run, brain)
+        weeks = sorted(deviations, reverse=True)[:: -(-len(deviations) // 4)]
+        found, real = ({w: row.parts["whole"] for w, row in rows.items() if w in (*weeks, self.brains.week(brain))}
+                       for rows in (self._surfaces(run, brain), self._real_beside(run, brain)))  # fmt: skip
+        return {"runs": {"expected": found}, "real": real, "deviations": {w: deviations[w] for w in weeks}}
+
     def _each_brain(self, brains: list[str]) -> tuple[Wildcards, ...]:
         return tuple({"brain": brain} for brain in brains)
 
@@ -421,7 +436,7 @@ class Figures:
             files(frames=FOLDING["frames"]),
             lambda run, brain: {
                 **self._synthetic(brain),
-                "views": ["left", "right", "top", "bottom"],
+                "views": list(AROUND),
                 # stress that each step forgets is written per week
                 "quantity": f"contact_pressure_pa{'' if self.config.runs[run].stress_memory_gw else '_per_gw'}",
             },
@@ -451,6 +466,17 @@ class Figures:
             below (b), and the medial sides (c, d). Grey: nothing grows, as inside the ellipsoid of no growth and where
             tissue bridges the planes at the fissure. Below zero the surface shrinks.""",
             files(**start, **of_run), self._of_start, self._each_run, paper=True, technical=True,
+        )  # fmt: skip
+        yield Figure(
+            "growth_found_figure", "Folding", "growth found", f"{at}/growth_found.png", "pictures.scalar_maps",
+            """Growth of area along the pial surface that takes run *{run}* from week to week towards the shapes that it
+            is to have, on the surface at the interval's end. Lines: the direction along the surface in which it is
+            largest, the longer the more it exceeds the growth across.""",
+            files(frames=FOLDING["frames"], **of_run),
+            lambda run, brain: {
+                **self._synthetic(brain), "quantity": "area_growth_percent_per_gw", "views": ["left", "top", "bottom"]
+            },
+            self._each_run_with(lambda run: self.runs.closed(run) and "growth" in self.config.run(run).fields),
         )  # fmt: skip
         yield Figure(
             "layers_figure", "Folding", "regions and growth in sections", f"{at}/layers.png",
@@ -666,6 +692,32 @@ class Figures:
             """The same as numbers, unscaled but for r. Skill is 1 − distance over that of the best simpler way of the
             week; roughness is that of the real surface's. All columns are in ``results/study/prediction.csv``.""",
             lambda: prediction, of=foretold, target="validate",
+        )  # fmt: skip
+        expected = tuple({"run": run, "brain": brain} for run, brain in self.validating.expected)
+        yield Figure(
+            "expected_figure", "Validation", "start, expected and real brains", f"{RUN}/figures/expected.png",
+            "pictures.runs_by_week",
+            """The start and what was to be expected of it (blue; a, c) beside the real brains (beige; b, d), from the
+            left and from above, at one scale. Below, on the expected surface, how far the real one lies outside (red)
+            or inside (blue) of it, both laid onto each other rigidly.""",
+            self._expected, self._beside, expected, target="validate",
+        )  # fmt: skip
+        yield Figure(
+            "deviation_figure", "Validation", "deviation from the expected: {quantity}",
+            f"{RUN}/figures/deviation_{{quantity}}.png", "pictures.shape_maps",
+            """How real brains deviate from what run *{run}* expects of them, on the expected surface: logarithm of the
+            real over the expected area, or thickness less that of the start as the run has it grow. By region, with z
+            among the study's other brains, in ``results/study/deviation_centiles.csv``.""",
+            lambda run, brain, quantity: {
+                "brains": {"real less expected": {w: [of] for w, of in self._deviations(run, brain).items()}}
+            },
+            lambda run, brain, quantity: {**self._beside(run, brain), "quantity": quantity, "views": list(AROUND)},
+            tuple(
+                {**pair, "quantity": name}
+                for pair, name in product(expected, ("log_area", "thickness_difference_mm"))
+                if name == "log_area" or pair["brain"] in self.brains.with_thickness
+            ),
+            target="validate",
         )  # fmt: skip
         yield Figure(
             "onset_figure", "Validation", "weeks in which sulci begin", f"{STUDY_FIGURES}/onset.png",

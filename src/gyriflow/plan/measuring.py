@@ -86,7 +86,7 @@ class Measuring:
     @cached_property
     def real(self) -> list[Measured]:
         """The measured brains."""
-        return [self._real(brain) for brain in self.brains.ids]
+        return [self.of_brain(brain) for brain in self.brains.ids]
 
     @cached_property
     def simulated(self) -> list[Measured]:
@@ -222,7 +222,8 @@ class Measuring:
             for week in self.runs.week_tags(run, brain)
         ]
 
-    def _real(self, brain: str) -> Measured:
+    def of_brain(self, brain: str) -> Measured:
+        """Returns a measured brain."""
         where = f"brains/{brain}/metrics"
         thickness = THICKNESS["measured"].format(brain=brain)
         return Measured(

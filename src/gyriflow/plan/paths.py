@@ -97,6 +97,7 @@ READY = {
 }
 """What all runs from a start brain are compared with in a week: surfaces that are ready, with their curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
+DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}
 VALIDATION = f"{RUN}/metrics/validation.csv"
 AGREEMENT = f"{RUN}/metrics/displacement_agreement.csv"
 ONSET = f"{RUN}/metrics/onset.csv"

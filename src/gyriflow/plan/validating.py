@@ -11,7 +11,7 @@ from .brains import Brains
 from .chains import Chains
 from .expecting import Expecting
 from .measuring import Measuring
-from .paths import AGREEMENT, CEILING, CURVES, ONSET, PIAL, PREDICTION, READY, RUN, VALIDATION, region_files
+from .paths import AGREEMENT, CEILING, CURVES, DEVIATION, ONSET, PIAL, PREDICTION, READY, RUN, VALIDATION, region_files
 from .runs import Runs
 
 Kind = Literal["explained", "predicted"]
@@ -151,6 +151,33 @@ class Validating:
         """Returns whether a run has the growth of another population, and no later brain like the start is read."""
         return self.runs.expects(run) and self.expecting.reads_only_others(brain)
 
+    @property
+    def expected(self) -> list[tuple[str, str]]:
+        """The compared runs that tell what was to be expected of a real brain."""
+        return [pair for pair in self.pairs if self.predicts(*pair)]
+
+    def deviation(self, run: str, brain: str, week: str) -> dict[str, str | list[str]]:
+        """Returns the files that tell how the real brain of a week deviates from what a run expects.
+
+        Those of `thickness` are in the order of the surfaces; there are none where one is not known.
+        """
+        measured, weeks = self.measuring, (self.brains.week(brain), float(week))
+        start, real = (measured.of_brain(name) for name in (brain, self.compared(run, brain)[week]))
+        first, expected = (measured.simulated_at(run, brain, at) for at in weeks)
+        rows = {"start": start, "first": first, "expected": expected, "real": real}
+        known = all(row.thickness for row in rows.values())
+        return {
+            **{name: row.parts["whole"] for name, row in rows.items()},
+            "thickness": [str(row.thickness) for row in rows.values()] if known else [],
+            "sides": expected.hemispheres,
+            "regions": list(expected.regions.values()),
+        }
+
+    def deviating(self, run: str, brain: str, week: str) -> dict[str, Any]:
+        """Returns the first columns of its table."""
+        real = self.config.brain(self.compared(run, brain)[week])
+        return {"run": run, "start": brain, "week": real.week, "real": real.id, "subject": real.subject or real.id}
+
     def atlas_weeks(self, run: str, brain: str) -> list[str]:
         """Returns the compared weeks of such a run in which its atlas has a brain."""
         known = {week_tag(week) for week in self.expecting.weeks(brain, "another")}
@@ -177,6 +204,11 @@ class Validating:
         """The tables of validation by name, and the files that each is joined from."""
         return {
             "prediction": [PREDICTION.format(run=run, brain=brain) for run, brain in self.foretold],
+            "deviation": [
+                DEVIATION["table"].format(run=run, brain=brain, week=week)
+                for run, brain in self.expected
+                for week in self.compared(run, brain)
+            ],
             "validation": [VALIDATION.format(run=run, brain=brain) for run, brain in self.pairs],
             "displacement_agreement": [AGREEMENT.format(run=run, brain=brain) for run, brain in self.carried],
             "registration_ceiling": [CEILING.format(brain=brain) for brain in self.with_ceiling],

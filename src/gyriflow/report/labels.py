@@ -34,10 +34,20 @@ PRESSURES = {
     "contact_pressure_pa_per_gw": "contact pressure built up in a week (Pa/GW)",
 }
 DISPLACEMENT = "displacement_mm"
+AREA_GROWTH = "area_growth_percent_per_gw"
+DISTANCE = "distance_mm"
+DEVIATIONS = {
+    DISTANCE: "distance, outwards (mm)",
+    "log_area": "logarithm of the area's ratio",
+    "thickness_difference_mm": "difference of thickness (mm)",
+}
+"""How a real brain deviates from the expected one."""
 MAPS = {
     **{name: measure.label for name, measure in SHAPE_MEASURES.items()},
     **PRESSURES,
+    **DEVIATIONS,
     DISPLACEMENT: "displacement since the start (mm)",
+    AREA_GROWTH: "growth of area (% per week)",
 }
 """The quantities that are drawn as maps, with the labels of their colour bars."""
 WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth per step (10⁻³)", "shear modulus (Pa)"

@@ -37,6 +37,7 @@ class Panel:
     material : how it takes the light
     mark : (3,) a point of the surface around which a ring is drawn, dotted where it lies on the side turned away
     edges : whether the edges of its triangles are drawn
+    lines : (k, 2, 3) ends of lines that are drawn on it
     """
 
     mesh: TriangleMesh
@@ -46,6 +47,7 @@ class Panel:
     material: Material = TISSUE
     mark: Floats | None = None
     edges: bool = False
+    lines: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +214,7 @@ def _draw_row(
             pixels_per_mm=PIXELS_PER_INCH * layout.inches_per_mm,
             material=panel.material,
             edges=panel.edges,
+            lines=panel.lines,
         )
         axes.imshow(
             image, extent=(-layout.half_width_mm, layout.half_width_mm, -half_height, half_height), aspect="auto"

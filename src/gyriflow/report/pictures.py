@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
-from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, submesh
+from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, submesh, vertex_normals
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.terms import (
     BASE,
@@ -28,7 +28,7 @@ from ..parameters.terms import (
     ZONE_NAMES,
 )
 from ..units import CM2_PER_MM2
-from .labels import GROWTH, MAPS, PRESSURES, column_label, plain, value_labels
+from .labels import AREA_GROWTH, DEVIATIONS, DISTANCE, GROWTH, MAPS, PRESSURES, column_label, plain, value_labels
 from .panels import Panel, Row, panel_grid
 from .scene import (
     MAP,
@@ -66,6 +66,10 @@ SIGNED = "RdBu_r"
 ROUNDING = 1e-9
 _MOST = 0.995
 """Part of the vertices that a colour scale reaches."""
+LINES_MM, LONG = 4.0, 0.9
+"""How far lines that show directions are apart, and the part of the vectors that they show the length of."""
+SEEN_FLAT = 0.3
+"""Cosine of the angle between a normal and a view from which on lines are drawn: beyond, the outline shortens them."""
 ABSENT = "ended\nbefore\nthis week"
 """What stands in the place of a member of a study that has not come to the week."""
 ZONE_COLOURS = {
@@ -104,6 +108,7 @@ def runs_by_week(
     runs: Mapping[str, Mapping[float, TriangleMesh]],
     real: Mapping[float, TriangleMesh],
     *,
+    deviations: Mapping[float, tuple[TriangleMesh, Mapping[str, Floats]]] | None = None,
     views: Sequence[str] = SIDE_VIEWS,
     measured: str = REAL_BRAIN,
     **shown: Any,
@@ -115,6 +120,8 @@ def runs_by_week(
     runs : {run: {week: surface in RAS+ mm}}
     real : {week: surface in RAS+ mm}
         A week that one of them lacks leaves its place empty.
+    deviations : {week: (surface, maps)}
+        Of which `labels.DISTANCE` is shown below.
     """
     groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items()}
     groups |= {measured: (real, REAL_SURFACE_COLOUR)}
@@ -125,6 +132,13 @@ def runs_by_week(
         for name, (meshes, colour) in groups.items()
         if meshes
     ]
+    away = {week: (mesh, maps[DISTANCE]) for week, (mesh, maps) in (deviations or {}).items()}
+    if away:
+        scale = scale_of(DISTANCE, np.concatenate([values for _, values in away.values()]))
+        for view in named_views(views):
+            panels = [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys]
+            rows.append(Row(f"distance\n{view.name} view", panels))
+        shown["colour_bars"] = [(scale, MAPS[DISTANCE])]
     return panel_grid([column_label(key) for key in keys], rows, measured=measured, **shown)
 
 
@@ -189,7 +203,7 @@ def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
 def signed_scale(values: Floats) -> ScalarMappable:
     """Returns a scale that is pale at zero and as wide on both sides, for values of which some are below zero."""
     known = np.abs(values[np.isfinite(values)])
-    end = round_up(float(np.quantile(known, _MOST)))
+    end = round_up(float(np.quantile(known, _MOST))) if known.any() else 1.0
     return colour_scale(SIGNED, -end, end, cut=bool((known > end).any()))
 
 
@@ -211,6 +225,8 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     """
     if quantity not in MAPS:
         raise InputError("unknown quantity", found=quantity, expected=list(MAPS))
+    if quantity in DEVIATIONS or (quantity == AREA_GROWTH and goes_below_zero(values)):
+        return signed_scale(values)
     if quantity in PRESSURES:
         return magnitude_scale(values[values > 0], PRESSURE_COLOURS)
     measure = SHAPE_MEASURES.get(quantity)
@@ -261,6 +277,7 @@ def scalar_maps(
     maps: Mapping[str, Mapping[Any, SurfaceMap]],
     *,
     quantity: str,
+    directions: Mapping[Any, Floats] | None = None,
     views: Sequence[str] = SIDE_VIEWS,
     **shown: Any,
 ) -> Figure:
@@ -272,13 +289,21 @@ def scalar_maps(
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
     quantity
         A name of `labels.MAPS`; pressures leave the surface grey where nothing touches.
+    directions : {week or run: (n, 3) vectors at the vertices}
+        Drawn as lines in proportion to these, but for the longest tenth, which are alike.
 
     InputError for another quantity or an unknown view.
     """
     scale = scale_of(quantity, np.concatenate([values for group in maps.values() for _, values in group.values()]))
-    keys = _ordered(*maps.values())
+    keys, directions = _ordered(*maps.values()), directions or {}
+    lengths = [np.linalg.norm(vectors, axis=1) for vectors in directions.values()] or [np.ones(1)]
+    long = float(np.quantile(np.concatenate(lengths), LONG))
+    shares = {key: np.asarray(vectors / long, dtype=float) for key, vectors in directions.items()}
     rows = [
-        Row(f"{group}\n{view.name} view", [_map_panel(known.get(key), scale, view, quantity) for key in keys])
+        Row(
+            f"{group}\n{view.name} view",
+            [_map_panel(known.get(key), scale, view, quantity, shares.get(key)) for key in keys],
+        )
         for view in named_views(views)
         for group, known in maps.items()
     ]
@@ -289,11 +314,28 @@ def scalar_maps(
     return panel_grid([column_label(key) for key in keys], rows, colour_bars=bars, legend=legend, **shown)
 
 
-def _map_panel(known: SurfaceMap | None, scale: ScalarMappable, view: View, quantity: str) -> Panel | None:
+def _map_panel(
+    known: SurfaceMap | None, scale: ScalarMappable, view: View, quantity: str, directions: Floats | None = None
+) -> Panel | None:
     if known is None:
         return None
     mesh, values = known
-    return Panel(mesh, paint(values, scale, zero_is_nothing=quantity in PRESSURES), view, material=MAP)
+    lines = None if directions is None else direction_lines(mesh, directions, view)
+    return Panel(mesh, paint(values, scale, zero_is_nothing=quantity in PRESSURES), view, material=MAP, lines=lines)
+
+
+def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
+    """Returns the (k, 2, 3) ends of lines along (n, 3) vectors, one in each cube of `LINES_MM` of what faces a view.
+
+    A vector of length 1 or more gives a line as long as a cube.
+    """
+    normals = vertex_normals(mesh)
+    chosen = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[1]
+    chosen = chosen[normals[chosen] @ view.towards > SEEN_FLAT]
+    half = directions[chosen] * (LINES_MM / 2) / np.linalg.norm(directions[chosen], axis=1, keepdims=True).clip(1)
+    # a little above the surface, which else would hide parts of them
+    at = mesh.vertices[chosen] + LINES_MM / 8 * normals[chosen]
+    return np.stack([at - half, at + half], axis=1)
 
 
 @styled

@@ -179,6 +179,7 @@ def render(
     pixels_per_mm: float,
     material: Material = TISSUE,
     edges: bool = False,
+    lines: Floats | None = None,
 ) -> Image:
     """Returns a picture of the surface in parallel projection, its bounding box in the middle.
 
@@ -187,6 +188,7 @@ def render(
     colours : (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1
     edges
         Whether the edges of the triangles are drawn.
+    lines : (k, 2, 3) ends of lines that are drawn where the surface does not hide them
 
     Returns
     -------
@@ -219,6 +221,9 @@ def render(
         plotter.add_mesh(
             surface, color=NEUTRAL_COLOUR, ambient=_INSIDE.ambient, diffuse=_INSIDE.diffuse, culling="front"
         )
+        if lines is not None:
+            ends = pv.line_segments_from_points(lines.reshape(-1, 3))
+            plotter.add_mesh(ends, color="black", line_width=0.005 * PIXELS_PER_INCH, lighting=False)
         for position, intensity in _LAMPS:
             plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2

@@ -1,6 +1,7 @@
 """Charts of what simulations are worth beside real brains: gain, horizon, onset of sulci, studies, calibrations."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any, Unpack
 
 import matplotlib as mpl
@@ -202,31 +203,24 @@ def prediction_chart(prediction: pd.DataFrame, **shown: Unpack[Shown]) -> Figure
         Columns run, start, horizon, model (`run` or a simpler way), r_shape_index and distance_mm.
     """
     columns = {"r_shape_index": "shape index, r with the real brain", "distance_mm": "distance from it (mm)"}
-    starts = list(dict.fromkeys(prediction["start"]))
+    places = list(product(dict.fromkeys(prediction["start"]), columns))
     layout: dict[str, Any] = {"per_row": 2, "panel_in": 2.4, "foot_in": 0.9, "sharex": True, "sharey": "col"}
-    figure, panels, colours = run_panels(2 * len(starts), prediction["run"], shown, **layout)
-    ways = [model for model in dict.fromkeys(prediction["model"]) if model != "run"]
-    dashes = dict(zip(ways, reversed(run_colours([*colours, *ways]).values()), strict=False))
-    for number, axes in enumerate(panels):
-        start, (column, title) = starts[number // 2], list(columns.items())[number % 2]
-        of_start = prediction[prediction["start"] == start]
-        for run, rows in of_start[of_start["model"] == "run"].groupby("run", sort=False):
-            axes.plot(rows["horizon"], rows[column], "o-", color=colours[str(run)], zorder=3)
-        # what is simpler is the same for all runs
-        for way, colour in dashes.items():
-            line = of_start[of_start["model"] == way].groupby("horizon")[column].first()
-            axes.plot(line.index, line, ".--", color=colour, linewidth=1.0)
-        axes.set_title(f"{start}: {title}" if len(starts) > 1 else title)
+    figure, panels, colours = run_panels(len(places), prediction["run"], shown, **layout)
+    # what is simpler is the same for all runs
+    lines = prediction.assign(line=prediction["run"].where(prediction["model"] == "run", prediction["model"]))
+    shades = run_colours([*colours, *lines["line"]])
+    ways = dict(zip([name for name in shades if name not in colours], reversed(shades.values()), strict=False))
+    for axes, (start, column) in zip(panels, places, strict=True):
+        for name, rows in lines[lines["start"] == start].groupby("line", sort=False):
+            line = rows.groupby("horizon")[column].first()
+            axes.plot(line.index, line, ".--" if name in ways else "o-", color=(ways | colours)[str(name)])
+        axes.set_title(f"{start}: {columns[column]}")
+        axes.set_xlabel("weeks after the start")
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
         axes.margins(x=0.1)
         light_grid(axes)
-        if number >= len(panels) - 2:
-            axes.set_xlabel("weeks after the start")
     from_zero(panels[1])
-    extra = [
-        Line2D([], [], color=colour, marker=".", linestyle="--", label=FORETOLD.get(way, plain(way)))
-        for way, colour in dashes.items()
-    ]
+    extra = [Line2D([], [], color=c, linestyle="--", label=FORETOLD.get(way, plain(way))) for way, c in ways.items()]
     run_legend(figure, colours, extra=extra)
     return figure
 

@@ -159,28 +159,20 @@ def displacement_page(displacement: pd.DataFrame, **shown: Any) -> str:
     return html_table(displacement_summary(displacement), caption=caption, **shown)
 
 
-def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
-    """Returns what foretold brains and simpler ways to foretell them are worth: a row per start, week and way.
+def prediction_page(prediction: pd.DataFrame) -> str:
+    """Returns what foretold brains and simpler ways are worth as HTML: a row per start, week and way.
 
     Parameters
     ----------
-    prediction
-        The study's prediction.csv.
+    prediction : the study's prediction.csv
     """
-    shown = {
-        **{"r_shape_index": "shape index, r", "distance_mm": "distance (mm)", "distance95_mm": "95 % of it (mm)"},
-        **{name: plain(name) for name in ("area_error", "volume_error", "crossing_faces", "roughness_ratio", "skill")},
-    }
     ways = prediction["model"].map(lambda way: FORETOLD.get(way, plain(way)))
     table = prediction.assign(way=ways.where(prediction["model"] != "run", prediction["run"]))
     # what is simpler is the same for all runs
     table = table.drop_duplicates(["start", "week", "way"]).set_index(["start", "week", "way"])
-    return table[[*shown]].rename(columns=shown).rename_axis(["start", "week (GW)", "way"])
-
-
-def prediction_page(prediction: pd.DataFrame) -> str:
-    """Returns `prediction_table` as HTML."""
-    return html_table(prediction_table(prediction), caption="Foretold brains beside the real ones", digits=3)
+    shown = ["r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error"]
+    table = table[[*shown, "crossing_faces", "roughness_ratio", "skill"]].rename(columns=plain)
+    return html_table(table, caption="Foretold brains beside the real ones", digits=3)
 
 
 def html_table(

@@ -24,8 +24,16 @@ def some_state(steps=3):
     state = State.at_start(np.zeros((4, 3)), 100.0)
     rng = np.random.default_rng(1)
     for i in range(steps):
-        state = state.after(rng.normal(size=(4, 3)), 100.0, {"step": i + 1, "week": 21.0 + i, "rung": "cg"})
+        row = {"step": i + 1, "week": 21.0 + i, "rung": "cg"}
+        state = state.after(rng.normal(size=(4, 3)), 100.0, row, log_growth=np.full((6, 4), 0.1))
     return state
+
+
+def test_growth_of_the_steps_is_summed():
+    state = some_state()
+    assert state.grown == pytest.approx(np.full((6, 4), 0.3))
+    assert state.grown_s == 300.0
+    assert State.at_start(np.zeros((4, 3)), 1.0).after(np.zeros((4, 3)), 1.0, {}).grown is None
 
 
 def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ellipsoid import RUN, SEMI_AXES
-from shapes import ellipsoid_mesh
+from shapes import ellipsoid_mesh, rigid
 
 from gyriflow.errors import SolverError
 from gyriflow.folding.growth import GrowthByRates, GrowthInputs, Size, StepStart, map_at
 from gyriflow.folding.growth_models import growth_at_start
-from gyriflow.folding.output import layer_fields
+from gyriflow.folding.output import growth_along, layer_fields
 from gyriflow.folding.steering import (
     FIRST_GAIN,
     MET,
@@ -29,6 +29,7 @@ from gyriflow.folding.steering import (
     steered_step,
     value_on,
 )
+from gyriflow.folding.stress import packed
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, area
 from gyriflow.parameters.folding import STRAIN, VENTRICLES, parameters_from
@@ -100,6 +101,20 @@ def test_a_run_that_follows_begins_with_the_growth_that_leads_to_its_curves():
     assert shown.max() == pytest.approx(max(rates.tangential, rates.core) * followed.step_s, rel=1e-3)
     # a prescribed growth is the run's own
     assert growth_at_start(plain, inputs, mesh.vertices).parameters == plain
+
+
+def test_growth_in_any_direction_is_shown_along_the_surface_across_it_and_by_its_direction():
+    # two vertices: one with a normal along z, one with another turned by 40° about x
+    turn = rigid(40, 0, 0)[:3, :3]
+    first = np.array([[0.02, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, -0.3]])
+    tensors = np.stack([first, turn @ first @ turn.T])
+    normals = np.stack([[0.0, 0.0, 1.0], turn[:, 2]])
+    found = growth_along(packed(tensors).T, normals)
+    assert found["tangential_growth_per_step"] == pytest.approx([0.035, 0.035])
+    assert found["radial_growth_per_step"] == pytest.approx([-0.3, -0.3])
+    directions = found["growth_direction_per_step"]
+    directions = directions * np.sign((directions * [[0, 1, 0], turn[:, 1]]).sum(axis=1))[:, None]
+    assert directions == pytest.approx(0.03 * np.stack([[0.0, 1.0, 0.0], turn[:, 1]]))
 
 
 def test_free_growth_of_a_body_is_known():

@@ -411,3 +411,31 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
     # a later scan of the same subject is its own, whatever it is called
     scans = [brain | ({"subject": "s"} if brain["id"] in ("own22", "b24") else {}) for brain in of_two(tmp_path, 22)]
     assert not plan(scans, **EXPECTED).expecting.reads_only_others("own22")
+
+
+def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(tmp_path):
+    scans = of_two(tmp_path, 22, 23, 24)
+    scans[0]["subject"] = scans[2]["subject"] = "s"
+    found = plan(scans, **EXPECTED)
+    files = found.validating.deviation("a", "own22", "24.00")
+    assert files["expected"] == "results/runs/a/own22/surfaces/week-24.00/pial.surf.gii"
+    assert files["real"] == "results/brains/own24/surface/pial.surf.gii"
+    places = [path.split("/")[-2] for path in files["thickness"]]
+    assert places == ["surface", "week-22.00", "week-24.00", "surface"]
+    subjects = [found.validating.deviating("a", "own22", week)["subject"] for week in ("23.00", "24.00")]
+    assert subjects == ["own23", "s"]
+    assert len(found.validating.tables["deviation"]) == 2
+    names = ("expected", "deviation_log_area", "deviation_thickness_difference_mm")
+    assert {f"results/runs/a/own22/figures/{name}.png" for name in names} <= {*found.figures.target("validate")}
+    # whose growth is its own explains
+    own = plan(of_two(tmp_path, 22, 23, atlas=()), runs={"a": {"preset": "measured"}}, folding={"end_week": 23})
+    assert own.validating.tables["deviation"] == []
+
+
+def test_of_many_weeks_every_other_one_is_shown_with_the_start_and_the_last(tmp_path):
+    weeks = tuple(range(22, 31))
+    found = plan(of_two(tmp_path, *weeks, atlas=weeks), folding={"end_week": 30}, **EXPECTED)
+    (shown,) = [row for row in found.figures.all if row.name == "expected_figure"]
+    brains = shown.inputs(run="a", brain="own22")
+    assert list(brains["real"]) == list(brains["runs"]["expected"]) == [22, 24, 26, 28, 30]
+    assert sorted(brains["deviations"]) == [24, 26, 28, 30]

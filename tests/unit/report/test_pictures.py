@@ -10,14 +10,16 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.io.figures import write_figure
 from gyriflow.parameters.terms import ZONE_NAMES
-from gyriflow.report.labels import GROWTH
+from gyriflow.report.labels import AREA_GROWTH, GROWTH
 from gyriflow.report.panels import round_length
 from gyriflow.report.pictures import (
     ABSENT,
     CORE_COLOUR,
     CORTEX_COLOUR,
+    LINES_MM,
     ZONE_COLOURS,
     brains_picture,
+    direction_lines,
     displacement_maps,
     field_picture,
     influence_picture,
@@ -252,6 +254,29 @@ def test_a_field_that_goes_below_zero_has_a_scale_as_wide_on_both_sides():
     assert minus[2] > minus[0]
     assert zero.min() > 0.9
     assert plus[0] > plus[2]
+
+
+def test_lines_on_a_map_run_along_directions_where_these_are_seen():
+    right = np.tile([0.0, 0.5, 0.0], (len(SMOOTH.vertices), 1)) * (SMOOTH.vertices[:, :1] > 0)
+    ends = direction_lines(SMOOTH, right, VIEWS["right"])
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) == pytest.approx(0.5 * LINES_MM)
+    longest = direction_lines(SMOOTH, 5 * right, VIEWS["right"])
+    assert np.linalg.norm(longest[:, 1] - longest[:, 0], axis=1) == pytest.approx(LINES_MM)
+    # one in each cube
+    assert len(np.unique(np.floor(ends.mean(axis=1) / LINES_MM), axis=0)) > 0.6 * len(ends)
+    maps = {"growth": {(21.0, 22.0): (SMOOTH, np.full(len(right), 0.1))}}
+    figure = scalar_maps(maps, quantity=AREA_GROWTH, directions={(21.0, 22.0): right}, views=("right", "left"))
+    dark = [(picture(figure, number) < 60).all(axis=-1).sum() for number in (0, 1)]
+    assert dark[0] > 1000
+    assert dark[1] == 0
+
+
+def test_how_far_real_brains_lie_outside_is_shown_below_them():
+    away = np.linspace(-1, 2, 8)
+    runs, deviations = {"simulated": {22.0: BRAIN, 23.0: BRAIN}}, {23.0: (BRAIN, {"distance_mm": away})}
+    figure = runs_by_week(runs, {23.0: BRAIN}, deviations=deviations, views=("left",))
+    assert colour_bar(figure, "outwards (mm)").get_xlim() == (-2.0, 2.0)
+    assert [axes.get_label() for axes in pictures(figure)][-1] == "distance\nleft view, column 1"
 
 
 def test_what_was_not_measured_is_keyed():
