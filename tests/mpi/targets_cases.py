@@ -96,6 +96,17 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
     np.testing.assert_allclose(again.positions, grown(folding, start, 2).positions, atol=1e-3 * M_PER_MM)
 
 
+def test_a_step_across_a_target_goes_on_towards_the_next_one():
+    shapes = {21.5: bent(0.5), 22.0: bent(1.5), 23.0: bent(2)}
+    folding, start = towards(shapes)
+    before = grown(folding, start, 3)
+    # half a day before 21.5, and half a day after it
+    across = grown(folding, before, 1)
+    assert away(across, shapes[21.5]) > 0.1
+    assert away(across, 6 / 7 * shapes[21.5] + 1 / 7 * shapes[22.0]) < 0.05
+    assert away(grown(folding, across, 3), shapes[22.0]) < 0.05
+
+
 def test_a_run_that_was_stopped_within_a_week_ends_where_another_ends():
     folding, start = towards({22.0: bent(1), 23.0: bent(2)}, **TIGHT)
     middle = grown(folding, start, 3)

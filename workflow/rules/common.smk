@@ -20,7 +20,10 @@ shell.prefix(
 
 
 def validated_config():
-    """Returns the configuration as models, and what the input files hold; ends in 2 where it is not valid."""
+    """Returns the configuration as models, what the input files hold, and why brains cannot be folded.
+
+    Ends with a message and exit code 2 where it is not valid.
+    """
     from gyriflow.config import load
     from gyriflow.io.yaml_files import read_keys
 
@@ -32,31 +35,36 @@ def validated_config():
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
         found = load(config, base, keep_going=keeps_going())
-        Plan(found).expecting.require_chains()
+        # without the brains that an earlier pass of this call has refused, others may lead nowhere: these are left out
+        unled = Plan(found.without(refused_brains())).expecting.unled()
+        if unled and not refused_brains():
+            raise next(iter(unled.values()))
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             require_own_results(Path.cwd(), files, found, record=not runs_nothing())
         record = workflow.is_main_process and not runs_nothing()
-        return found, input_contents(Path.cwd(), found, record)
+        return found, input_contents(Path.cwd(), found, record), unled
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
 
 
-WHOLE_CONFIG, CONTENTS = validated_config()
+WHOLE_CONFIG, CONTENTS, UNLED = validated_config()
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
 REFUSED = {
     brain: cause
     for brain, cause in refused_brains().items()
     if brain in [known.id for known in WHOLE_CONFIG.brains]
 }
-CONFIG = WHOLE_CONFIG.without(REFUSED)
+CONFIG = WHOLE_CONFIG.without(REFUSED, unfolded=UNLED)
 if REFUSED and not CONFIG.brains:
     # each has told its cause
     sys.exit(0)
 PLAN = Plan(CONFIG)
 if workflow.is_main_process:
+    for cause in UNLED.values():
+        print(f"gyriflow: not folded: {cause}", file=sys.stderr)
     for row in WHOLE_CONFIG.left_out.values():
         print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 

@@ -86,6 +86,8 @@ rule targets:
     params:
         start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
         weeks=of(PLAN.expecting.weeks),
+        further_weeks=of(PLAN.expecting.further_weeks),
+        posed=of(PLAN.expecting.posed),
     script:
         "../scripts/targets.py"
 

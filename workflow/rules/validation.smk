@@ -52,7 +52,8 @@ rule prediction:
         runtime=60,
     params:
         start_week=of(PLAN.brains.week),
-        weeks=of(PLAN.validating.atlas_weeks),
+        weeks=lambda wildcards: list(PLAN.validating.compared(**wildcards)),
+        atlas_weeks=lambda wildcards: PLAN.expecting.weeks(wildcards.brain, "another"),
         of_atlas=of(PLAN.validating.predicts),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, linear_pieces
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.growth.carrying import carry_mesh
-from gyriflow.growth.local import local_growth, local_strain
+from gyriflow.growth.local import growth_over_weeks
 from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import CarriedMesh, read_correspondence, write_carried_mesh
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
@@ -19,17 +19,10 @@ with step(snakemake.log[0]):
     start = TetrahedralMesh(transform_points(mesh.vertices, pose.inverse), mesh.tets)
     maps = [[read_correspondence(path) for path in paths] for paths in (files.earlier, files.later)]
     positions = carry_mesh(start, *maps)
-    cells = {"volume": linear_pieces(mesh), "area": boundary_faces(mesh)[0]}
+    # directions are those of the mesh's pose
+    turned, own = positions @ pose.world[:3, :3].T, len(maps[0])
     growth = {
-        length: {
-            kind: local_growth(positions, found, params.weeks, length, own=len(maps[0]))
-            for kind, found in cells.items()
-        }
+        length: growth_over_weeks(mesh, turned, params.weeks, length, own, params.strain)
         for length in params.smoothing_mm
     }
-    if params.strain:
-        # directions are those of the mesh's pose
-        turned = positions @ pose.world[:3, :3].T
-        for length, kinds in growth.items():
-            kinds["strain"] = local_strain(turned, cells["volume"], params.weeks, length, own=len(maps[0]))
     write_carried_mesh(snakemake.output[0], CarriedMesh(np.array(params.weeks), positions, growth))

@@ -1,7 +1,6 @@
 """Where the vertices of a brain's surface are in another brain whose surface has the same ones."""
 
-from gyriflow.geometry.deformations import MatchedSurfaces, transform_points
-from gyriflow.geometry.triangles import transformed
+from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.matched_surfaces import match_surfaces
 from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import write_matched_surfaces
@@ -13,5 +12,4 @@ with step(snakemake.log[0], files.earlier, files.later):
     found, report = match_surfaces(read_surface(files.earlier), read_surface(files.later))
     # correspondences are between the brains' own worlds, as registrations are
     first, second = (read_pose(path).inverse for path in (files.earlier_report, files.later_report))
-    own = MatchedSurfaces(transformed(found.first, first), transform_points(found.second, second))
-    write_matched_surfaces(snakemake.output[0], own, report)
+    write_matched_surfaces(snakemake.output[0], between_moved(found, first, second), report)

@@ -2,6 +2,7 @@
 
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface, linear_pieces
+from gyriflow.growth.local import growth_over_weeks
 from gyriflow.growth.regional import regional_maps, target_maps
 from gyriflow.io.files import read_json
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
@@ -15,7 +16,8 @@ from gyriflow.step import step
 files, maps, given = snakemake.input, {}, snakemake.params
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
-    facets, pose = boundary_faces(mesh)[0], read_pose(files.surface)
+    facets, pose, follow = boundary_faces(mesh)[0], read_pose(files.surface), given.follow
+    targets = read_targets(files.targets) if files.targets else None
     for name, source in given.maps.items():
         path = ", ".join(source["map"])
         if source["surface"]:
@@ -26,13 +28,15 @@ with step(snakemake.log[0]):
             volume, motion = read_volume_map(path, given.affine_from), pose.of_volume(path)
             maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
         on_mesh.require_within(maps[name], given.bounds[name], path)
-    if files.carried:
-        carried, follow = read_carried_mesh(files.carried), given.follow
-        growth, cells = carried.growth[follow["smoothing_mm"]], {"volume": linear_pieces(mesh), "area": facets}
+    if follow and (targets or files.carried):
+        shapes, length = targets or read_carried_mesh(files.carried), follow["smoothing_mm"]
+        asked = (mesh, shapes.positions, shapes.weeks, length, 0, follow["directional"] > 0)
+        growth = growth_over_weeks(*asked) if targets else shapes.growth[length]
+        cells = {"volume": linear_pieces(mesh), "area": facets}
         sizes = {kind: vertex_sizes(mesh.vertices, found) for kind, found in cells.items()}
         right = mesh.vertices[:, 0] > read_json(files.surface)["fissure_x_mm"]
-        maps |= regional_maps(carried.weeks, growth, sizes, mesh.vertices, right, follow)
-    if files.targets and (targets := read_targets(files.targets)):
+        maps |= regional_maps(shapes.weeks, growth, sizes, mesh.vertices, right, follow)
+    elif targets:
         maps |= target_maps(targets.weeks[1:], targets.positions[1:])
     if path := files.labels:
         voxels, motion = read_label_volume(path, affine_from=given.affine_from), pose.of_volume(path)

@@ -9,6 +9,7 @@ from gyriflow.io.yaml_files import write_yaml
 from gyriflow.step import step
 
 files, weeks, settings = snakemake.input, snakemake.params.weeks, dict(snakemake.params.settings)
+regional_weeks = snakemake.params.regional_weeks
 with step(snakemake.log[0]):
     for name, column in FOLDING_RATES.items():
         if settings[name] == "estimated":
@@ -19,11 +20,14 @@ with step(snakemake.log[0]):
             settings[name] = {"weeks": dict(zip(*(numbers.tolist() for numbers in curve), strict=True))}
     if files.targets:
         targets = read_targets(files.targets)
-        at = targets.weeks.tolist()
-        settings["follow"] |= {
-            name: dict(zip(at, sizes.tolist(), strict=True)) for name, sizes in targets.sizes.items()
-        }
-        settings["targets"] = {week: target_map(week) for week in at[1:]}
+        at, follow = targets.weeks.tolist(), settings["follow"]
+        for name, sizes in targets.sizes.items():
+            if follow[name] == "measured":
+                follow[name] = dict(zip(at, sizes.tolist(), strict=True))
+        if follow["loop"] == "closed":
+            settings["targets"] = {week: target_map(week) for week in at[1:]}
+        elif follow["regional"] or follow["directional"]:
+            regional_weeks = at
     if settings["follow"] is not None:
         curves = read_table(files.curves) if files.curves else None
         shrink = settings["allow_negative_growth"] or bool(files.targets)
@@ -31,8 +35,8 @@ with step(snakemake.log[0]):
         settings["follow"] = settings["follow"] | sizes
         if THICKNESS in sizes:
             settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}
-        if snakemake.params.regional_weeks:
-            settings |= map_names(snakemake.params.regional_weeks, settings["follow"], snakemake.params.unmatched)
+        if regional_weeks:
+            settings |= map_names(regional_weeks, settings["follow"], snakemake.params.unmatched)
     surface = read_json(files.surface)
     start = {"start_week": weeks[0], "output_weeks": list(weeks), "fissure_x_mm": surface["fissure_x_mm"]}
     start["side"] = surface.get("side")

@@ -14,12 +14,15 @@ from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
+from gyriflow.units import week_tag
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 with step(snakemake.log[0]):
     targets, rows = read_targets(files.targets), []
     start, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
-    for number, week in enumerate(map(float, params.weeks)):
+    brains_of_atlas = dict(zip(map(week_tag, params.atlas_weeks), files.atlas, strict=True))
+    for number, tag in enumerate(params.weeks):
+        week = float(tag)
         real = read_surface(files.whole[number])
         real_shape = Shape(read_surface(files.real[number]), **read_vertex_maps(files.real_maps[number]))
         patch, _ = drawn_patches(real_shape, mirrored=True)
@@ -27,17 +30,15 @@ with step(snakemake.log[0]):
         target = TriangleMesh(targets.positions[at][used], start.faces)
         volume = signed_volume(target)
         # written with the run that grows as the atlas, for those beside it too
-        simple = {
-            "scaled": scaled_to(start, volume),
-            "atlas": scaled_to(read_surface(files.atlas[number]), volume),
-            **{name: TriangleMesh(places[at], start.faces) for name, places in targets.surfaces.items()},
-            "target": target,
-        }
+        simple = {"scaled": scaled_to(start, volume)}
+        simple |= {name: TriangleMesh(places[at], start.faces) for name, places in targets.surfaces.items()}
+        atlas = read_surface(brains_of_atlas[tag]) if tag in brains_of_atlas else simple["atlas"]
+        simple |= {"atlas": scaled_to(atlas, volume), "target": target}
         models = {"run": read_surface(files.simulated[number])} | (simple if params.of_atlas else {})
         for model, surface in models.items():
             even = ready(surface, real)
             bend = curvature(even, radius_mm=params.curvature_radius_mm)
             found = endpoints(surface, real, Shape(even, bend.mean, bend.shape_index), real_shape, patch)
             row = {"run": names.run, "start": names.brain, "start_week": params.start_week, "week": week}
-            rows.append(row | {"horizon": week - params.start_week, "model": model} | found)
+            rows.append(row | {"horizon": round(week - params.start_week, 6), "model": model} | found)
     write_table(snakemake.output[0], with_skill(pd.DataFrame(rows)))

@@ -1,10 +1,10 @@
 """The shapes that the mesh of a start brain is to have in later weeks."""
 
+from itertools import pairwise
+
 import numpy as np
 
-from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.tetrahedra import TetrahedralMesh
-from gyriflow.geometry.triangles import transformed
+from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.expected import carry_sharply, foretell, sizes_of
 from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import Targets, read_correspondence, write_targets
@@ -15,19 +15,20 @@ from gyriflow.step import step
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
-    pose = read_pose(files.report)
-    start = TetrahedralMesh(transform_points(mesh.vertices, pose.inverse), mesh.tets)
-    # brains correspond in the world of their files, not in their poses
-    surfaces = [
-        transformed(read_surface(path), read_pose(report).inverse)
-        for path, report in zip(files.surfaces, files.reports, strict=True)
+    surfaces = [read_surface(path) for path in files.surfaces]
+    # mesh and surfaces are in their poses; brains correspond there, or in the worlds of their files
+    poses = pairwise(read_pose(path).world for path in (files.report, *files.reports))
+    pairs = [
+        between_moved(
+            read_correspondence(path),
+            *(np.eye(4) if there else pose for there, pose in zip(posed, pair, strict=True)),
+        )
+        for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
     ]
-    pairs = [read_correspondence(path) for path in files.correspondences]
     if snakemake.wildcards.whose == "own":
-        weeks, positions, others = [params.start_week, *params.weeks], carry_sharply(start, pairs, surfaces), {}
+        weeks, positions, others = [params.start_week, *params.weeks], carry_sharply(mesh, pairs, surfaces), {}
     else:
-        weeks, positions, others = foretell(start, params.start_week, pairs, surfaces, params.weeks)
-    others = {name: [transform_points(places, pose.world) for places in found] for name, found in others.items()}
-    positions = [transform_points(places, pose.world) for places in positions]
-    targets = Targets(np.array(weeks), np.stack(positions), sizes_of(mesh, positions), others)
+        known = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
+        weeks, positions, others = foretell(mesh, *known)
+    targets = Targets(np.array(weeks), positions, sizes_of(mesh, positions), others)
     write_targets(snakemake.output[0], targets)

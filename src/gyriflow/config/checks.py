@@ -193,8 +193,11 @@ def _too_few_weeks(brains: Sequence[Brain]) -> str:
 
 def mesh_sizes(config: "Config") -> Iterator[Problem]:
     """Yields what is wrong where meshes are made for the end of the runs, by what measured brains are stretched."""
-    without = sorted(brain for brain in config.start_brains if config.estimated_from(brain) is None)
-    if config.mesh.sized_for == "end" and without:
+    # runs of studies are known where nothing is wrong with these
+    if config.mesh.sized_for == "start" or [*studies(config), *calibration(config)]:
+        return
+    without = sorted(brain for brain in config.start_brains if config.stretched_by(brain) is None)
+    if without:
         text = (
             f"`end` needs brains of other weeks that belong with {', '.join(without)}, which tell how far the surface "
             "is stretched; list them, or give a smaller surface_edge_mm"
@@ -310,7 +313,7 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
     if key.endswith(AMPLITUDE):
         curve = key.removesuffix(AMPLITUDE)
         value = getattr(base, curve) if curve in VARYING else None
-        if curve in CURVES and base.follow is None:
+        if curve in CURVES and (base.follow is None or base.follow.loop == "closed"):
             yield "the base run follows no curve"
         elif curve not in CURVES and value != "estimated" and not (isinstance(value, Varying) and value.weeks):
             yield f"{curve} is no curve in the base run"

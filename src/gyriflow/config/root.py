@@ -15,6 +15,7 @@ from ..parameters.schemes import LabelScheme, SchemeSettings
 from ..parameters.settings import Settings, refused, setting
 from ..parameters.synthetic import PhantomSettings
 from ..parameters.varying import Varying, files_of
+from ..units import week_tag
 from .atlas import Atlas, AtlasSettings, UsedAtlas
 from .brains import Brain, ParticipantsSettings
 from .checks import CHECKS
@@ -102,10 +103,19 @@ class Config(Settings):
         self._left_out = rows
         return self
 
-    def without(self, names: Collection[str]) -> "Config":
-        """Returns the configuration without some brains, which is left to be finished where these are refused."""
+    def without(self, names: Collection[str], *, unfolded: Collection[str] = ()) -> "Config":
+        """Returns the configuration without some brains, which is left to be finished where these are refused.
+
+        Those that are `unfolded` are kept, but no run starts from them. No other brain is folded in their place.
+        """
+        if not names and not unfolded:
+            return self
         kept = tuple(brain for brain in self.brains if brain.id not in names)
-        return self.model_copy(update={"brains": kept}) if names else self
+        left = {
+            run: tuple(brain for brain in self.starts(run) if brain not in {*names, *unfolded}) for run in self.runs
+        }
+        runs = {name: run.model_copy(update={"start": left[name]}) for name, run in self.runs.items()}
+        return self.model_copy(update={"brains": kept, "runs": runs})
 
     def measured_name(self, brains: Iterable[str]) -> str:
         """Returns the name of measured brains in figures and tables: their populations if known.
@@ -194,17 +204,47 @@ class Config(Settings):
         settings = self.run(run)
         weeks = output_weeks(self.brain(brain).week, settings.end_week, settings.output_every_gw)
         if run in self.runs:
-            return weeks
-        compared = {
-            study.compare_week
-            for name, study in self.studies.items()
-            if run in [member.run for member in self.members[name]]
-        }
-        return sorted({*weeks, *compared})
+            foretold = any(self.expects(other) for other, start in self.folded if start == brain)
+            compared = set(self.compared_weeks(brain) if foretold else ())
+        else:
+            compared = {
+                study.compare_week
+                for name, study in self.studies.items()
+                if run in [member.run for member in self.members[name]]
+            }
+        known = {week_tag(week) for week in weeks}
+        return sorted([*weeks, *(week for week in compared if week < weeks[-1] and week_tag(week) not in known)])
+
+    def expects(self, run: str) -> bool:
+        """Returns whether a run has the growth of another population than the start's."""
+        follow = self.run(run).follow
+        return follow is not None and follow.growth_of == "another"
+
+    def comparable(self, brain: str) -> list[Brain]:
+        """Returns the brains that a start brain may be compared with.
+
+        They have the same hemispheres, and are of its population where it has one.
+        """
+        own, sides = self.brain(brain).population, self.brain(brain).sides
+        return [other for other in self.brains if own in (None, other.population) and other.sides == sides]
+
+    def compared_weeks(self, brain: str) -> list[float]:
+        """Returns the weeks after a start brain of the real brains that it may be compared with, one a file name."""
+        start = self.brain(brain).week
+        later = [other.week for other in self.comparable(brain) if other.week > start and not other.synthetic]
+        return list({week_tag(week): week for week in sorted(later)}.values())
+
+    @property
+    def ends(self) -> list[tuple[str, str, float]]:
+        """Run, start brain and last week of all that is folded, for studies and the calibration too."""
+        ends = [(run, self.run(run).end_week) for run in (*self.runs, *self.study_runs)]
+        if self.calibrate is not None:
+            ends.append((self.calibrate.base, self.calibrate.compare_week))
+        return [(run, brain, end) for run, end in ends for brain in self.starts(run)]
 
     def last_week(self, brain: str) -> float:
-        """Returns the last week that a run folds a start brain to."""
-        return max(self.runs[run].end_week for run, start in self.folded if start == brain)
+        """Returns the last week that a start brain is folded to."""
+        return max(end for _, start, end in self.ends if start == brain)
 
     @property
     def growth_series(self) -> dict[str, list[str]]:
@@ -244,9 +284,19 @@ class Config(Settings):
         """Returns the series that `estimated` rates are taken from where a brain is the start; None without one."""
         return estimated_from(self.growth_series, self.growth.estimated_from, brain)
 
-    def another_series(self, brain: str) -> str | None:
-        """Returns the growth series of another population than a start brain's: that of `growth.estimated_from`, or
-        the only one; None where there is none or more than one."""
+    def own_series(self, brain: str) -> str:
+        """Returns the growth series that a brain is in, of several that of `growth.estimated_from`; "" for none."""
+        own = [name for name, ids in self.growth_series.items() if brain in ids]
+        return min(own, key=lambda name: name != self.growth.estimated_from, default="")
+
+    def stretched_by(self, brain: str) -> str | None:
+        """Returns the series that tells how far a start's surface is stretched: another's where a run foretells it."""
+        expects = any(self.expects(run) for run, start, _ in self.ends if start == brain)
+        return next(iter(self.other_series(brain)), None) if expects else self.estimated_from(brain)
+
+    def other_series(self, brain: str) -> list[str]:
+        """Returns the growth series of other populations with a brain's hemispheres; of several, that of
+        `growth.estimated_from` alone where it is one."""
         start = self.brain(brain)
         own = start.population
         others = [
@@ -257,7 +307,7 @@ class Config(Settings):
             and all(self.brain(other).sides == start.sides for other in ids)
         ]
         named = self.growth.estimated_from
-        return named if named in others else others[0] if len(others) == 1 else None
+        return [named] if named in others else others
 
     @property
     def norm_reference(self) -> list[str]:

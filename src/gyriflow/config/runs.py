@@ -76,6 +76,14 @@ class Run(FoldingSettings):
         None, "", "Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the study's `start`."
     )
 
+    # not of parameters, which hold the sizes of the shapes
+    @check
+    def _shapes_have_their_own_sizes(self) -> Iterator[Problem]:
+        for key in ("area_cm2", "volume_ml"):
+            if self.follow is not None and self.follow.loop == "closed" and getattr(self.follow, key) != "measured":
+                text = "has no meaning where growth leads to whole shapes: set it to measured, or loop to open"
+                yield Problem(text, ("follow", key))
+
 
 # growth
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
+from ..geometry.deformations import transform_points
 from ..geometry.diffusion import cell_sizes, diffuse, vertex_sizes
 from ..parameters.folding import AXES, FoldingParameters
-from ..units import SECONDS_PER_GW
 from .growth import Floats, Growth, GrowthInputs, Size, StepStart
 from .layers import Tissue
 from .stress import packed, unpacked
@@ -85,15 +85,25 @@ class GrowthToTargets:
         return cls(p, inputs, targets, p.follow.smoothing_mm)
 
     def growth(self, start: StepStart) -> Growth:
-        """Returns the growth of a step: its part of what is left to the next target."""
-        week, places = start.week(self.parameters, 0.0), start.positions_mm
-        ahead = min((known for known in self.targets if known > week + SOON_GW), default=max(self.targets))
-        left = max(ahead - week, SOON_GW)
+        """Returns the growth of a step: its part of what is left to the next target.
+
+        A step across a target leads to the shape between it and the one after it.
+        """
+        week, end, places = start.week(self.parameters, 0.0), start.week(self.parameters, 1.0), start.positions_mm
         sizes = vertex_sizes(places, self.inputs.pieces)
-        motion = rigid_fit(self.targets[ahead], places, sizes)
-        missing = self.targets[ahead] @ motion[:3, :3].T + motion[:3, 3] - places
-        part = min(1.0, start.step_s / SECONDS_PER_GW / left)
-        strain = log_growth(places, self.inputs.pieces, part * missing, self.smoothing_mm)
+
+        def laid(shape: Floats, onto: Floats) -> Floats:
+            return transform_points(shape, rigid_fit(shape, onto, sizes))
+
+        ahead = sorted(known for known in self.targets if known > week + SOON_GW) or [max(self.targets)]
+        missing = laid(self.targets[ahead[0]], places) - places
+        before, since = places, week
+        while len(ahead) > 1 and ahead[0] < end - SOON_GW:
+            since = ahead.pop(0)
+            before = laid(self.targets[since], places)
+        share = min(1.0, (end - since) / max(ahead[0] - since, SOON_GW))
+        aim = before + share * (laid(self.targets[ahead[0]], before) - before)
+        strain = log_growth(places, self.inputs.pieces, aim - places, self.smoothing_mm)
         away = float(np.sqrt(np.average((missing**2).sum(axis=1), weights=sizes)))
         growing = self.inputs.zones.growth[:, None]
         return TargetGrowth(self.parameters, start, (strain * growing).T, away)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from .triangles import Floats, TriangleMesh, frozen
+from .triangles import Floats, TriangleMesh, frozen, transformed
 
 INVERSION_ROUNDS = 100
 INVERTED_MM = 1e-3
@@ -54,6 +54,14 @@ Correspondence = Deformation | MatchedSurfaces
 def transform_points(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
     """Returns (n, 3) points under a (4, 4) affine map."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
+
+
+def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Correspondence:
+    """Returns what two brains' correspondence is after (4, 4) rigid motions of the first and of the second."""
+    if isinstance(pair, MatchedSurfaces):
+        return MatchedSurfaces(transformed(pair.first, first), transform_points(pair.second, second))
+    turned = (pair.displacement @ first[:3, :3].T).astype(pair.displacement.dtype)
+    return Deformation(second @ pair.matrix @ np.linalg.inv(first), turned, first @ pair.affine)
 
 
 def displacement_at(deformation: Deformation, points: Floats) -> Floats:

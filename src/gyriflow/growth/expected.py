@@ -1,19 +1,20 @@
 """What is to be expected of a brain: its mesh carried sharply through an atlas' weeks, with what sets it apart kept."""
 
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
-from ..geometry.deformations import Correspondence, MatchedSurfaces, carry
+from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, transform_points
 from ..geometry.diffusion import cell_sizes, continue_harmonically, diffuse, vertex_sizes
 from ..geometry.matching import match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
 from ..parameters.following import BEFORE_GW
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .carrying import carry_mesh
+from .carrying import carry_over_weeks
 from .matched_surfaces import follow_surfaces
 
 PULL_MM = (4.0, 3.0, 2.0, 1.5, 1.0, 1.0, 1.0)
@@ -54,39 +55,65 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
     return np.asarray(vertices)
 
 
-def carry_sharply(mesh: TetrahedralMesh, pairs: Sequence[Correspondence], surfaces: Sequence[TriangleMesh]) -> Floats:
+def carry_sharply(
+    mesh: TetrahedralMesh, pairs: Sequence[Correspondence], surfaces: Sequence[TriangleMesh] | None
+) -> Floats:
     """Returns the (w + 1, n, 3) positions of a mesh's vertices carried through w brains, its boundary on theirs.
 
     Registration smooths: it carries a surface to within half a millimetre of the brain's own and flattens its folds. So
     the boundary is fitted onto that brain's surface week by week, and the inside goes along harmonically. Matched
-    surfaces need no fit.
+    surfaces need no fit: a run of them is followed from where the boundary lies on the first.
 
     Parameters
     ----------
     mesh
-        Of the first brain, in the world that brains correspond in.
+        Of the first brain, in the space that it corresponds in.
     pairs
         Leading from each brain to the next.
     surfaces
-        The pial surfaces of the others in the same world.
+        The pial surfaces of the others in the spaces that these correspond in; None: nothing is fitted.
+
+    InputError where points leave the grid of a registration, or the boundary lies beside matched surfaces.
     """
     boundary, used = boundary_surface(mesh)
     pieces = linear_pieces(mesh)
     positions = [mesh.vertices]
-    for pair, surface in zip(pairs, surfaces, strict=True):
-        before = positions[-1]
-        if isinstance(pair, MatchedSurfaces):
-            places = before
-            moved = follow_surfaces(TriangleMesh(before[used], boundary.faces), [pair])[-1]
-        else:
-            places = carry(pair, before)
-            moved = fit_onto_surface(TriangleMesh(places[used], boundary.faces), surface)
+
+    def go(places: Floats, moved: Floats) -> None:
         positions.append(places + continue_harmonically(mesh.vertices, pieces, used, moved - places[used]))
+
+    for _, group in groupby(enumerate(pairs), lambda numbered: type(numbered[1])):
+        numbered, before = list(group), positions[-1]
+        if matched := [pair for _, pair in numbered if isinstance(pair, MatchedSurfaces)]:
+            for moved in follow_surfaces(TriangleMesh(before[used], boundary.faces), matched)[1:]:
+                go(before, moved)
+        for number, pair in numbered:
+            if isinstance(pair, Deformation):
+                places = carry_over_weeks(positions[-1], [pair])[-1]
+                carried = TriangleMesh(places[used], boundary.faces)
+                go(places, carried.vertices if surfaces is None else fit_onto_surface(carried, surfaces[number]))
     return np.stack(positions)
 
 
+def positions_at(week: float, atlas: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
+    """Returns the (n, 3) positions of an atlas at a week from its (k, n, 3) in k weeks, linear between two of them.
+
+    The later one is laid onto the earlier rigidly, points counted by their (n,) sizes.
+    """
+    first = int(np.clip(np.searchsorted(np.asarray(weeks), week, side="right") - 1, 0, len(weeks) - 2))
+    part = (week - weeks[first]) / (weeks[first + 1] - weeks[first])
+    motion = rigid_fit(atlas[first + 1], atlas[first], sizes)
+    return np.asarray((1 - part) * atlas[first] + part * transform_points(atlas[first + 1], motion))
+
+
 def expected_positions(
-    mesh: TetrahedralMesh, start_week: float, atlas: Floats, weeks: Sequence[float], *, own_mm: float = OWN_MM
+    mesh: TetrahedralMesh,
+    start_week: float,
+    atlas: Floats,
+    weeks: Sequence[float],
+    *,
+    also: Sequence[float] = (),
+    own_mm: float = OWN_MM,
 ) -> tuple[list[float], Floats]:
     """Returns the weeks from the start on, and the (w, n, 3) positions in which a mesh is expected then, in mm.
 
@@ -99,8 +126,8 @@ def expected_positions(
         The start brain's, in mm.
     atlas
         (k, n, 3) positions of its vertices in the atlas' weeks.
-    weeks
-        Those k weeks, ascending.
+    weeks, also
+        Those k weeks, ascending, and further ones that are wanted.
     own_mm
         What sets the brain apart is smoothed by this much; with 0 all of it is kept.
 
@@ -116,19 +143,16 @@ def expected_positions(
     sizes = vertex_sizes(mesh.vertices, pieces)
 
     def laid_onto(places: Floats, onto: Floats) -> Floats:
-        motion = rigid_fit(places, onto, sizes)
-        return np.asarray(places @ motion[:3, :3].T + motion[:3, 3])
+        return transform_points(places, rigid_fit(places, onto, sizes))
 
-    first = int(np.clip(np.searchsorted(np.asarray(weeks), start_week, side="right") - 1, 0, len(weeks) - 2))
-    part = (start_week - weeks[first]) / (weeks[first + 1] - weeks[first])
-    now = (1 - part) * atlas[first] + part * laid_onto(atlas[first + 1], atlas[first])
-    now = laid_onto(now, mesh.vertices)
+    now = laid_onto(positions_at(start_week, atlas, weeks, sizes), mesh.vertices)
     apart = mesh.vertices - now
     smooth = diffuse(mesh.vertices, pieces, apart, own_mm)
     size = cell_sizes(now, pieces).sum()
     found = {start_week: mesh.vertices}
-    for week, places in zip(weeks, atlas, strict=True):
+    for week in sorted({*weeks, *also}):
         if week > start_week + 1e-6:
+            places = positions_at(week, atlas, weeks, sizes)
             scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
             fading = np.exp((start_week - week) / FADING_GW)
             found[float(week)] = laid_onto(places, now) + scale * (smooth + fading * (apart - smooth))
@@ -141,29 +165,30 @@ def foretell(
     pairs: Sequence[Correspondence],
     surfaces: Sequence[TriangleMesh],
     weeks: Sequence[float],
+    also: Sequence[float] = (),
 ) -> tuple[list[float], Floats, dict[str, list[Floats]]]:
     """Returns the weeks from the start on, the (w, n, 3) positions in which a mesh is expected, and its boundary's.
 
-    The latter are where simpler ways put the boundary's vertices: `atlas_deformed`, the atlas' brain with all that sets
-    the start apart from it, and `displaced`, the start moved as registration alone sees the atlas move.
+    The latter are where simpler ways put the boundary's vertices: `atlas`, the atlas' brain itself, `atlas_deformed`,
+    this brain with all that sets the start apart from it, and `displaced`, the start moved as registration alone sees
+    the atlas move.
 
     Parameters
     ----------
     mesh
-        The start brain's, in the world that brains correspond in.
+        The start brain's, in the space that it corresponds in.
     pairs
         Leading from the start to the atlas' first week, and from each of these weeks to the next.
-    surfaces, weeks
-        The atlas' pial surfaces, and their weeks.
+    surfaces, weeks, also
+        The atlas' pial surfaces in the spaces that they correspond in, their weeks, and further ones that are wanted.
     """
+    used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
     carried = carry_sharply(mesh, pairs, surfaces)[1:]
-    known, positions = expected_positions(mesh, start_week, carried, weeks)
-    used = boundary_surface(mesh)[1]
-    ways = {"atlas_deformed": carried, "displaced": carry_mesh(mesh, [], pairs)[1:]}
-    others = {
-        name: [places[used] for places in expected_positions(mesh, start_week, way, weeks, own_mm=0)[1]]
-        for name, way in ways.items()
-    }
+    known, positions = expected_positions(mesh, start_week, carried, weeks, also=also)
+    others = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in known]}
+    for name, way in (("atlas_deformed", carried), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
+        _, places = expected_positions(mesh, start_week, way, weeks, also=also, own_mm=0)
+        others[name] = [at[used] for at in places]
     return known, positions, others
 
 

@@ -8,7 +8,19 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.diffusion import cell_sizes, diffuse, vertex_sizes
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, linear_pieces
 from ..geometry.triangles import Floats
+
+
+def growth_over_weeks(
+    mesh: TetrahedralMesh, positions: Floats, weeks: Sequence[float], sigma_mm: float, own: int, with_strain: bool
+) -> dict[str, Floats]:
+    """Returns `local_growth` of a mesh's volume and of its boundary's area, and `local_strain` on demand, by kind."""
+    cells = {"volume": linear_pieces(mesh), "area": boundary_faces(mesh)[0]}
+    growth = {kind: local_growth(positions, found, weeks, sigma_mm, own=own) for kind, found in cells.items()}
+    if with_strain:
+        growth["strain"] = local_strain(positions, cells["volume"], weeks, sigma_mm, own=own)
+    return growth
 
 
 def local_growth(

@@ -107,7 +107,7 @@ class Targets:
     weeks : (w,) float
         Gestational weeks, ascending, the mesh's own first.
     positions : (w, n, 3) float
-        Of the vertices, in mm, in the pose of the mesh.
+        Of the vertices, in mm, in any pose.
     sizes : {"area_cm2" or "volume_ml": (w,) float}
         Of the mesh's boundary.
     surfaces : {name: w arrays (m, 3) of float}

@@ -151,8 +151,11 @@ class FoldingSettings(Settings):
     contact: Contact = setting(Contact(), "", "Contact.")
     no_growth: NoGrowth = setting(NoGrowth(), "", "Tissue that does not grow.")
     output_every_gw: float = setting(
-        1.0, "GW", "Interval between output weeks, besides the first and the last.", ge=0.01, le=10
-    )
+        1.0, "GW",
+        "Interval between output weeks, besides the first and the last, and where some run foretells the start "
+        "(`follow.growth_of: another`) those of the brains to compare with.",
+        ge=0.01, le=10,
+    )  # fmt: skip
     fields: tuple[FieldName, ...] = setting(
         ("displacement", "cortex_weight", "growth"), "", "Fields for ParaView at each output week."
     )

@@ -72,7 +72,7 @@ class Follow(Settings):
     growth_of: Literal["own", "another"] = setting(
         "own", "",
         "Whose growth that is: of the start's `own` series, or of `another` population, such as an atlas. The brain is "
-        "then expected to move as the atlas does and to keep what sets it apart: a prediction. Needs `loop: closed`.",
+        "then expected to move as the atlas does and to keep what sets it apart: a prediction.",
     )  # fmt: skip
     known_until_gw: Week | None = setting(
         None, "GW",
@@ -89,12 +89,13 @@ class Follow(Settings):
 
     @check
     def _closed_loop_takes_whole_shapes(self) -> Iterator[Problem]:
-        if self.loop == "open" and self.growth_of == "another":
-            yield Problem("growth of another population needs loop: closed", ("growth_of",))
-        if self.growth_of == "another" and self.thickness_mm == "measured":
-            yield Problem(
-                "is measured on the start's own later brains, which a prediction must not know", ("thickness_mm",)
-            )
+        if self.growth_of == "another":
+            for key in ("thickness_mm", "ventricles_ml"):
+                if getattr(self, key) == "measured":
+                    text = "is measured on the start's own later brains, which a prediction must not know"
+                    yield Problem(text, (key,))
+            if self.known_until_gw is not None:
+                yield Problem("has no meaning with growth of another population", ("known_until_gw",))
         if self.loop == "open":
             return
         for key in OPEN_ONLY:

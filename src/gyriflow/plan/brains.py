@@ -126,15 +126,3 @@ class Brains:
         """Returns what a brain is called in tables: its population, or synthetic or unknown."""
         found = self.config.brain(brain)
         return found.population or ("synthetic" if found.synthetic else "unknown")
-
-    def comparable(self, brain: str) -> list[Brain]:
-        """Returns the brains that a start brain may be compared with.
-
-        They have the same hemispheres, and are of its population where it has one.
-        """
-        start = self.config.brain(brain)
-        return [
-            other
-            for other in self.config.brains
-            if start.population in (None, other.population) and other.sides == start.sides
-        ]

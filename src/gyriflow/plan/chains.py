@@ -8,6 +8,7 @@ from typing import Any
 
 from ..config.root import Config
 from ..parameters.following import Follow
+from ..units import week_tag
 from .brains import Brains
 from .paths import CARRIED_MESH, MATCHED, PIAL, REGISTERED, region_files
 from .runs import Runs
@@ -63,7 +64,7 @@ class Chains:
 
     def unmatched(self, brain: str) -> str | None:
         """Returns why the surfaces of a start brain's growth series are not matched, None where they are."""
-        return self.config.unmatched_surfaces.get(self.config.estimated_from(brain) or "")
+        return self.config.unmatched_surfaces.get(self.config.own_series(brain))
 
     def matched(self, *brains: str) -> bool:
         """Returns whether brains have surfaces with the same vertices."""
@@ -131,19 +132,19 @@ class Chains:
 
         Where no brains tell of local growth there is none; the run's parameters say why.
         """
-        known = self.runs.regional(run) and brain in self.with_chain
+        known = self._registered(run) and brain in self.with_chain
         return CARRIED_MESH.format(brain=brain) if known else []
 
     def regional_weeks(self, run: str, brain: str) -> list[float]:
         """Returns the weeks between which a run has regional growth."""
-        return self.weeks(brain) if self.runs.regional(run) else []
+        return self.weeks(brain) if self._registered(run) else []
 
     def stretched(self, brain: str) -> dict[str, Any] | None:
         """Returns what tells how far a mesh will be stretched if it is made for the end of the runs, else nothing."""
         if self.config.mesh.sized_for == "start":
             return None
         end = self.config.last_week(brain)
-        return {"series": self.config.estimated_from(brain), "week": self.brains.week(brain), "end_week": end}
+        return {"series": self.config.stretched_by(brain), "week": self.brains.week(brain), "end_week": end}
 
     @property
     def folding_rate_per_s(self) -> Any:
@@ -164,13 +165,16 @@ class Chains:
             "correspondence": self.correspondence(given, brain),
         }
 
-    def posed(self, brain: str) -> list[bool]:
-        """Returns whether the brain of the regions and the brain that gets them correspond in the surfaces' pose.
+    def in_pose(self, *pair: str) -> list[bool]:
+        """Returns for two brains whether they correspond in the pose of their surfaces.
 
         Masks of surfaces do; other brains correspond in the world of their files.
         """
-        pair = self.config.regions_from(brain) or brain, brain
         return [not self.config.brain(name).has_labels and not self.matched(*pair) for name in pair]
+
+    def posed(self, brain: str) -> list[bool]:
+        """Returns the same for the brain of the regions and the brain that gets them."""
+        return self.in_pose(self.config.regions_from(brain) or brain, brain)
 
     def correspondences_earlier(self, brain: str) -> list[str]:
         """Returns these files from each brain of a start brain's chain to the next, up to the start."""
@@ -189,21 +193,25 @@ class Chains:
         return sorted({follow.smoothing_mm for follow in self._regional_from(brain)})
 
     def _series_of(self, brain: str) -> list[str]:
-        return self.config.growth_series.get(self.config.estimated_from(brain) or "", [])
+        return self.config.growth_series.get(self.config.own_series(brain), [])
 
     def _correspond(self, brain: str, other: str) -> bool:
         """Returns whether local growth is known between a start brain and another one of its growth series."""
         volumes = self.config.brain(brain).has_labels and self.config.brain(other).has_labels
-        return volumes or {brain, other} <= self.matched_series.get(self.config.estimated_from(brain) or "", set())
+        return volumes or {brain, other} <= self.matched_series.get(self.config.own_series(brain), set())
 
     def _one_a_week(self, brain: str, within: Callable[[float], bool]) -> list[str]:
         """Returns a start brain and those of its series that correspond to it and are of some weeks, by week."""
-        chosen = {self.brains.week(brain): brain}
+        chosen = {week_tag(self.brains.week(brain)): brain}
         for other in self._series_of(brain):
             if within(self.brains.week(other)) and self._correspond(brain, other):
-                chosen.setdefault(self.brains.week(other), other)
-        return [chosen[week] for week in sorted(chosen)]
+                chosen.setdefault(week_tag(self.brains.week(other)), other)
+        return sorted(chosen.values(), key=self.brains.week)
+
+    def _registered(self, run: str) -> bool:
+        """Returns whether a run's regional growth is measured on the start's own series."""
+        return self.runs.regional(run) and not self.config.expects(run)
 
     def _regional_from(self, brain: str) -> list[Follow]:
-        runs = {run for run, start in self.runs.folded if start == brain and self.runs.regional(run)}
+        runs = {run for run, start, _ in self.config.ends if start == brain and self._registered(run)}
         return [follow for run in runs if (follow := self.config.run(run).follow) is not None]

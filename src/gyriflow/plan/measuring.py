@@ -143,7 +143,7 @@ class Measuring:
         Later scans of the start's own subject come first.
         """
         subject = self.config.brain(brain).subject
-        ordered = sorted(self.brains.comparable(brain), key=lambda other: subject is None or other.subject != subject)
+        ordered = sorted(self.config.comparable(brain), key=lambda other: subject is None or other.subject != subject)
         found = {
             week: [other.id for other in ordered if week_tag(other.week) == week]
             for week in self.runs.week_tags(run, brain)[1:]

@@ -54,9 +54,9 @@ class Runs:
         """Returns whether a run grows towards known shapes."""
         return self.followed(run, "loop") == "closed"
 
-    def expects(self, run: str) -> bool:
-        """Returns whether a run has the growth of another population than the start's."""
-        return self.followed(run, "growth_of") == "another"
+    def shaped(self, run: str) -> bool:
+        """Returns whether a run's growth and sizes are those of shapes that its brain is to have."""
+        return self.closed(run) or self.config.expects(run)
 
     def follows_measured(self, run: str, *keys: str) -> bool:
         """Returns whether a run follows one of some curves as it is measured."""
@@ -114,7 +114,7 @@ class Runs:
 
     def curves(self, run: str) -> str | list[str]:
         """Returns the table of the measured curves where a run follows one of them."""
-        sizes = () if self.closed(run) else ("area_cm2", "volume_ml")
+        sizes = () if self.shaped(run) else ("area_cm2", "volume_ml")
         sizes = (*sizes, "thickness_mm", "ventricles_ml")
         return CURVES["curves"] if self.follows_measured(run, *sizes) else []
 

@@ -71,7 +71,7 @@ class Validating:
         """Returns the surface of the real brain of the latest week before one that a start may be compared with."""
         known = {
             other.week: other.id
-            for other in reversed(self.brains.comparable(brain))
+            for other in reversed(self.config.comparable(brain))
             if other.week < float(week) and not other.synthetic
         }
         return PIAL["whole"].format(brain=known[max(known)])
@@ -140,16 +140,16 @@ class Validating:
     @property
     def foretold(self) -> list[tuple[str, str]]:
         """The compared runs whose growth is another population's, and predictions from the same starts beside them."""
-        starts = {brain for run, brain in self.pairs if self.predicts(run, brain) and self.atlas_weeks(run, brain)}
+        starts = {brain for run, brain in self.pairs if self.predicts(run, brain)}
         return [
             (run, brain)
             for run, brain in self.pairs
-            if brain in starts and self.atlas_weeks(run, brain) and "explained" not in self.kinds(run, brain).values()
+            if brain in starts and "explained" not in self.kinds(run, brain).values()
         ]
 
     def predicts(self, run: str, brain: str) -> bool:
         """Returns whether a run has the growth of another population, and no later brain like the start is read."""
-        return self.runs.expects(run) and self.expecting.reads_only_others(brain)
+        return self.config.expects(run) and self.expecting.reads_only_others(brain)
 
     @property
     def expected(self) -> list[tuple[str, str]]:
@@ -178,17 +178,9 @@ class Validating:
         real = self.config.brain(self.compared(run, brain)[week])
         return {"run": run, "start": brain, "week": real.week, "real": real.id, "subject": real.subject or real.id}
 
-    def atlas_weeks(self, run: str, brain: str) -> list[str]:
-        """Returns the compared weeks of such a run in which its atlas has a brain."""
-        known = {week_tag(week) for week in self.expecting.weeks(brain, "another")}
-        return [week for week in self.compared(run, brain) if week in known]
-
     def prediction(self, run: str, brain: str) -> dict[str, list[str]]:
-        """Returns the surfaces that tell what such a run is worth, week by week; `atlas` is the atlas' own brain."""
-        weeks = self.atlas_weeks(run, brain)
-        own = (brain, "another")
-        tags = map(week_tag, self.expecting.weeks(*own))
-        atlas = dict(zip(tags, self.expecting.surfaces(*own), strict=True))
+        """Returns the surfaces that tell what such a run is worth, week by week, and those of the atlas."""
+        weeks = self.compared(run, brain)
         patterns = {
             "simulated": f"{RUN}/surfaces/week-{{week}}/pial.surf.gii",
             **{name: READY[name] for name in ("real", "real_maps")},
@@ -196,7 +188,7 @@ class Validating:
         return {
             **{name: [at.format(run=run, brain=brain, week=week) for week in weeks] for name, at in patterns.items()},
             "whole": [self.real_surface(brain, week) for week in weeks],
-            "atlas": [atlas[week] for week in weeks],
+            "atlas": self.expecting.surfaces(brain, "another"),
         }
 
     @property

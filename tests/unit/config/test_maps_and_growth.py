@@ -155,7 +155,11 @@ def test_a_mesh_for_the_end_of_the_runs_needs_brains_that_tell_how_far_it_is_str
 @pytest.mark.parametrize(
     ("follow", "told"),
     [
-        ({"growth_of": "another"}, "growth_of: growth of another population needs loop: closed"),
+        ({"growth_of": "another"}, ""),
+        ({"growth_of": "another", "known_until_gw": 22}, "known_until_gw: has no meaning with growth of another"),
+        ({"growth_of": "another", "ventricles_ml": "measured"}, "follow.ventricles_ml: is measured on the start's own"),
+        ({"growth_of": "another", "area_cm2": {21: 99, 30: 252}}, ""),
+        ({"loop": "closed", "area_cm2": {21: 99, 30: 252}}, "area_cm2: has no meaning where growth leads to whole"),
         ({"loop": "closed", "known_until_gw": 22}, "known_until_gw: has no meaning where growth leads to whole shapes"),
         ({"loop": "closed", "growth_of": "another"}, ""),
         ({"loop": "open", "known_until_gw": 22}, ""),
@@ -164,6 +168,13 @@ def test_a_mesh_for_the_end_of_the_runs_needs_brains_that_tell_how_far_it_is_str
 def test_growth_towards_shapes_knows_whole_shapes(follow, told):
     found = problems(study({"follow": follow}))
     assert not found if not told else [line for line in found if told in line]
+
+
+def test_sizes_by_hand_are_refused_in_studies_of_growth_towards_shapes_too():
+    table = {"follow": {"area_cm2": {21: 99, 30: 252}}}
+    vary = {"base": "reference", "compare_week": 22, "vary": {"follow.loop": ["open", "closed"]}}
+    (found,) = problems(study(table, studies={"loops": vary}))
+    assert "has no meaning where growth leads to whole shapes: set it to measured" in found
 
 
 def test_what_is_expected_is_a_preset():

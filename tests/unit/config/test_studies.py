@@ -140,7 +140,10 @@ def test_what_is_wrong_with_a_calibration_is_said(change, said):
 
 
 def test_curves_of_the_base_run_may_be_scaled():
-    runs = {"reference": {"growth_rate_per_s": {"weeks": {21: 1e-7, 25: 2e-7}}}, "led": {"preset": "measured"}}
+    runs = {"reference": {"growth_rate_per_s": {"weeks": {21: 1e-7, 25: 2e-7}}}, "led": {"follow": {}}}
     config(runs=runs, calibrate=CALIBRATION | {"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}})
     led = {"base": "led", "parameters": {"follow.area_cm2.amplitude": [0.5, 2]}}
     config(runs=runs, calibrate=CALIBRATION | led)
+    # growth towards shapes follows none
+    closed = {"led": {"preset": "measured"}, "reference": {}}
+    assert "amplitude: the base run follows no curve" in refusal(runs=closed, calibrate=CALIBRATION | led)

@@ -1,9 +1,17 @@
 import igl
 import numpy as np
 import pytest
-from shapes import box, box_mesh, ellipsoid_mesh, sphere
+from shapes import box, box_mesh, ellipsoid_mesh, rigid, sphere
 
-from gyriflow.geometry.deformations import Deformation, carry, carry_back, determinants, transform_points
+from gyriflow.geometry.deformations import (
+    Deformation,
+    MatchedSurfaces,
+    between_moved,
+    carry,
+    carry_back,
+    determinants,
+    transform_points,
+)
 from gyriflow.geometry.diffusion import diffuse, vertex_sizes
 from gyriflow.geometry.matching import labels_at, layer_labels, match_points, values_at
 from gyriflow.geometry.triangles import TriangleMesh, merged, vertex_normals
@@ -33,6 +41,23 @@ def test_points_go_through_displacement_and_then_the_matrix():
 
 def test_points_come_back():
     assert carry_back(bent(3.0), carry(bent(3.0), POINTS)) == pytest.approx(POINTS, abs=2e-3)
+
+
+def test_a_correspondence_of_moved_brains_says_the_same_of_the_same_places():
+    rng = np.random.default_rng(3)
+    affine = np.diag([2.0, 3.0, 2.0, 1.0])
+    affine[:3, 3] = -8.0
+    matrix = rigid(20, 0, 5, shift=(1, 2, 3)) @ np.diag([1.1, 1.2, 1.3, 1.0])
+    first, second = rigid(10, -70, 150, shift=(4.0, 5.0, 6.0)), rigid(80, 20, -30, shift=(-9.0, 0.0, 1.0))
+    points = rng.uniform(-6, 6, (50, 3))
+    found = Deformation(matrix, rng.normal(size=(9, 6, 9, 3)), affine)
+    moved = between_moved(found, first, second)
+    at_second = transform_points(carry(found, points), second)
+    assert carry(moved, transform_points(points, first)) == pytest.approx(at_second)
+    surface = TriangleMesh(points, np.array([[0, 1, 2], [3, 4, 5]]))
+    pair = between_moved(MatchedSurfaces(surface, 2 * points), first, second)
+    assert pair.first.vertices == pytest.approx(transform_points(points, first))
+    assert pair.second == pytest.approx(transform_points(2 * points, second))
 
 
 def test_determinant_is_the_growth_of_volume():

@@ -1,5 +1,7 @@
 """What is to be expected of a brain: surfaces met sharply, and growth carried through a known map."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -92,6 +94,40 @@ def test_matched_surfaces_are_followed_as_they_are():
     assert positions[1] == pytest.approx(BALL.vertices * [1.1, 1.2, 1.3], abs=0.05)
 
 
+def test_points_beyond_the_grid_of_a_registration_are_refused():
+    away = TetrahedralMesh(BALL.vertices + [60.0, 0.0, 0.0], BALL.tets)
+    with pytest.raises(InputError, match="points lie beyond the grid that the registration knows"):
+        carry_sharply(away, [shift_map(1.0)], [sphere(20.0)])
+
+
+def test_a_start_outside_an_atlas_of_matched_surfaces_follows_them_from_where_it_is_registered_to():
+    turn = rigid(10, 20, 30)[:3, :3]
+    first = sphere(20.0, centre=(9.0, 0.0, 0.0))
+    later = [sphere(20.0).vertices @ turn.T * factor for factor in ([1.2, 1.1, 1.0], [1.5, 1.2, 1.1])]
+    surfaces = [first, *(TriangleMesh(places, first.faces) for places in later)]
+    pairs = [shift_map(1.0, (9.0, 0.0, 0.0)), *(MatchedSurfaces(one, two.vertices) for one, two in pairwise(surfaces))]
+    weeks, positions, others = foretell(BALL, 22.0, pairs, surfaces, WEEKS)
+    assert weeks == WEEKS
+    boundary, used = boundary_surface(BALL)
+    ends = BALL.vertices[used] @ turn.T * [1.5, 1.2, 1.1]
+    assert others["atlas"][2] == pytest.approx(ends, abs=0.1)
+    wanted = sizes_of(BALL, positions)["volume_ml"]
+    assert wanted[2] / wanted[0] == pytest.approx(1.5 * 1.2 * 1.1, rel=0.01)
+    for places in others.values():
+        assert signed_volume(TriangleMesh(places[2], boundary.faces)) == pytest.approx(1e3 * wanted[2], rel=0.02)
+
+
+def test_a_run_of_matched_surfaces_is_followed_from_its_first():
+    inner = sphere(19.5)
+    sheared = inner.vertices + inner.vertices[:, 2:] * [1.0, 0.0, 0.0]
+    pairs = [MatchedSurfaces(inner, sheared), MatchedSurfaces(TriangleMesh(sheared, inner.faces), inner.vertices)]
+    positions = carry_sharply(BALL, pairs, None)
+    used = boundary_surface(BALL)[1]
+    assert np.abs(positions[1] - BALL.vertices)[used].max() > 10.0
+    # matched anew in the middle, points beside the surface would come back elsewhere
+    assert positions[2] == pytest.approx(BALL.vertices, abs=1e-6)
+
+
 def atlas_of(places, weeks=WEEKS):
     """Returns an atlas that grows unevenly, at (n, 3) places, in a pose of its own each week."""
 
@@ -134,6 +170,17 @@ def test_a_brain_between_two_weeks_has_gone_a_part_of_the_way():
     # as of the week before it would be a brain too large, all its life
     early = expected_positions(start, 22.0, atlas, WEEKS, own_mm=0)[1][-1]
     assert early == pytest.approx(1.04 * 1.2 * places, abs=1e-6)
+
+
+def test_a_brain_is_expected_in_further_weeks_between_those_of_the_atlas():
+    _, posed = atlas_of(BALL.vertices)
+    weeks, positions = expected_positions(BALL, 22.4, posed, WEEKS, also=[23.4, 22.9])
+    assert weeks == [22.4, 22.9, 23.0, 23.4, 24.0]
+    plain = expected_positions(BALL, 22.4, posed, WEEKS)[1]
+    assert positions[[0, 2, 4]] == pytest.approx(plain)
+    half = 0.6 * positions[2] + 0.4 * positions[4]
+    assert without_pose(positions[3], half) < 0.05
+    assert without_pose(positions[3], positions[2]) > 0.5
 
 
 def test_a_longer_brain_stays_as_much_longer():
@@ -212,9 +259,12 @@ def test_simpler_ways_start_where_the_brain_is_and_sizes_are_those_of_the_bounda
     weeks, positions, others = foretell(BALL, 22.0, pairs, surfaces, [22.0, 23.0])
     assert weeks == [22.0, 23.0]
     used = boundary_surface(BALL)[1]
-    assert set(others) == {"atlas_deformed", "displaced"}
+    assert set(others) == {"atlas", "atlas_deformed", "displaced"}
+    # the atlas' own brain lies on the finer sphere
+    assert others["atlas"][0] == pytest.approx(BALL.vertices[used], abs=0.1)
     for places in others.values():
-        assert places[0] == pytest.approx(BALL.vertices[used])
+        if places is not others["atlas"]:
+            assert places[0] == pytest.approx(BALL.vertices[used])
         assert places[1] == pytest.approx(1.1 * BALL.vertices[used], abs=0.1)
     sizes = sizes_of(BALL, positions)
     assert sizes["volume_ml"][1] / sizes["volume_ml"][0] == pytest.approx(1.1**3, rel=0.01)

@@ -113,6 +113,8 @@ def test_a_mesh_is_carried_with_the_smoothing_that_its_runs_ask_for(real):
     assert chains.regional_weeks("uniform", "b21") == []
     runs["far"]["follow"] |= {"directional": 0.5}
     assert plan(real, runs=runs).chains.with_strain("b21")
+    lengths = {"base": "near", "vary": {"follow.smoothing_mm": [2.0, 3.0]}, "compare_week": 24}
+    assert plan(real, runs=runs, studies={"lengths": lengths}).chains.smoothing_mm("b21") == [2, 3, 7]
 
 
 def test_surfaces_are_registered_by_a_mask(tmp_path):
@@ -377,17 +379,129 @@ def test_a_closed_loop_of_its_own_goes_through_the_later_brains_of_its_series(re
     assert found.runs.curves("own") == found.chains.carried_mesh("own", "b21") == []
 
 
+def unled(found):
+    """Returns what is said of the start brains that no brains lead to the end of a run."""
+    return {brain: str(error) for brain, error in found.expecting.unled().items()}
+
+
 def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_the_end(tmp_path):
-    for brains in (of_two(tmp_path, 22, 24, atlas=()), of_two(tmp_path, 22, atlas=(21, 23))):
-        with pytest.raises(InputError, match=r"brains of one series of another population with .* up to 24 GW"):
-            plan(brains, **EXPECTED).expecting.require_chains()
     third = [labels(tmp_path, week, population="third") | {"id": f"third{week}"} for week in (22, 24)]
     both = [*of_two(tmp_path, 22), *third]
-    with pytest.raises(InputError, match="found own22; the last is of 22 GW"):
-        plan(both, **EXPECTED).expecting.require_chains()
-    named = plan(both, growth={"estimated_from": "third"}, **EXPECTED).expecting
-    named.require_chains()
-    assert named.chain("own22", "another") == ["own22", "third22", "third24"]
+    for brains, found in (
+        (of_two(tmp_path, 22, 24, atlas=()), "none; the growth series are volume"),
+        (of_two(tmp_path, 22, atlas=(21, 23)), "own22 (22 GW), b21 (21 GW), b23 (23 GW)"),
+        # more than a week before the first brain of the atlas
+        (of_two(tmp_path, 22, atlas=(23.5, 24)), "own22 (22 GW), b23.5 (23.5 GW), b24 (24 GW)"),
+        (both, "several series: atlas, third"),
+    ):
+        said = unled(plan(brains, **EXPECTED))["own22"]
+        assert f"found {found}; expected brains of one series of another population" in said
+        assert "from 22 to 24 GW" in said
+    named = plan(both, growth={"estimated_from": "third"}, **EXPECTED)
+    assert unled(named) == {}
+    assert named.expecting.chain("own22", "another") == ["own22", "third22", "third24"]
+
+
+def test_a_start_before_all_weeks_of_the_atlas_is_led_by_two(tmp_path):
+    found = plan(of_two(tmp_path, 20.5), folding={"end_week": 21}, **EXPECTED)
+    assert found.expecting.chain("own20.5", "another") == ["own20.5", "b21", "b22"]
+
+
+def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(tmp_path):
+    brains, own = of_two(tmp_path, 22, 23, 24), {"runs": {"a": {"preset": "measured"}}}
+    found = plan(brains, growth={"estimated_from": "atlas"}, **own)
+    assert found.expecting.chain("own22", "own") == ["own22", "own23", "own24"]
+    assert found.chains.carried == ["own22"]
+    assert unled(found) == {}
+    alone = unled(plan(of_two(tmp_path, 22), growth={"estimated_from": "atlas"}, **own))["own22"]
+    assert "found none; the growth series are atlas" in alone
+    assert "Add later brains to its series (growth.brains)" in alone
+    early = unled(plan(of_two(tmp_path, 22, 23), **own))["own22"]
+    assert "found own22 (22 GW), own23 (23 GW); expected brains of the start's own growth series" in early
+
+
+@pytest.mark.parametrize("preset", ["measured", "expected"])
+def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(tmp_path, preset):
+    runs, brains = {"runs": {"a": {"preset": preset}}}, of_two(tmp_path, 22, 24, 26)
+    later = {"base": "a", "compare_week": 26}
+    study = {"studies": {"late": later | {"vary": {"thickness_mm": [1.0, 2.0]}}}}
+    search = {"calibrate": later | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}}
+    assert unled(plan(brains, **runs)) == {}
+    whose = "own" if preset == "measured" else "another"
+    for more in (study, search):
+        assert plan(brains, **runs, **more).config.last_week("own22") == 26
+        assert plan(brains, **runs, **more).expecting.weeks("own22", "own")[-1] == 26
+        if whose == "another":
+            # its atlas ends at 25 GW
+            assert "from 22 to 26 GW" in unled(plan(brains, **runs, **more))["own22"]
+
+
+def test_a_refused_brain_leaves_the_others_as_they_are(tmp_path):
+    runs = {"a": {"preset": "expected"}, "first": {"start": "first", "end_week": 23}}
+    config = plan(of_two(tmp_path, 22, 23), start=["own22", "own23"], runs=runs).config
+    assert unled(Plan(config)) == {}
+    # no other brain is folded in its place
+    assert Plan(config.without(["own22"])).runs.folded == [("a", "own23")]
+    # without the end of the atlas one run has nowhere to go, which is no matter of the other
+    refused = Plan(config.without(["b24", "b25"]))
+    assert set(unled(refused)) == {"own22", "own23"}
+    left = Plan(config.without(["b24", "b25"], unfolded=["own23"]))
+    assert left.runs.folded == [("a", "own22"), ("first", "own22")]
+    assert left.config.brain("own23").week == 23
+
+
+def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(tmp_path):
+    own = (22.4, 23, 23.4, 23.7, 23.701, 26)
+    found = plan(of_two(tmp_path, *own), **EXPECTED)
+    assert found.config.weeks("a", "own22.4") == pytest.approx([22.4, 23, 23.4, 23.701, 24])
+    assert found.expecting.weeks("own22.4", "another") == [22, 23, 24]
+    assert found.expecting.further_weeks("own22.4", "another") == [23.4, 23.701]
+    assert found.expecting.further_weeks("own22.4", "own") == []
+    assert found.validating.compared("a", "own22.4") == {"23.00": "own23", "23.40": "own23.4", "23.70": "own23.7"}
+    files = found.validating.prediction("a", "own22.4")
+    assert [len(files[name]) for name in ("simulated", "real", "whole", "atlas")] == [3, 3, 3, 3]
+    # so are runs beside it; others keep the weeks that are asked for
+    beside = plan(of_two(tmp_path, *own), runs=EXPECTED["runs"] | {"plain": {}})
+    assert beside.config.weeks("plain", "own22.4") == found.config.weeks("a", "own22.4")
+    assert beside.validating.foretold == [("a", "own22.4"), ("plain", "own22.4")]
+    assert plan(of_two(tmp_path, *own)).config.weeks("reference", "own22.4") == [22.4, 23.4, 24]
+
+
+def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_their_files(tmp_path):
+    (tmp_path / "pial.gii").touch()
+    (tmp_path / "labels.nii.gz").touch()
+    surface = {"pial": str(tmp_path / "pial.gii"), "population": "own"}
+    start = brain(22, **surface) | {"id": "own22"}
+    found = plan([start, *of_two(tmp_path)], **EXPECTED)
+    assert found.expecting.posed("own22", "another") == [[True, False], [False, False], [False, False]]
+    # matched vertices say where they are in the world
+    matched = [brain(week, pial=str(tmp_path / "pial.gii"), population="atlas") for week in (22, 24)]
+    mixed = plan([labels(tmp_path, 22, population="own") | {"id": "own22"}, *matched], **EXPECTED)
+    object.__setattr__(mixed.chains, "matched_series", {"atlas": {"b22", "b24"}})
+    assert mixed.expecting.posed("own22", "another") == [[False, True], [False, False]]
+
+
+def test_another_growth_with_an_open_loop_is_measured_on_the_shapes_that_are_expected(tmp_path):
+    local = {"growth_of": "another", "regional": 1, "directional": 1}
+    found = plan(of_two(tmp_path, 22, 23, 24), runs={"a": {"follow": local}, "own": {"follow": REGIONAL}})
+    assert found.expecting.targets("a", "own22") == "results/brains/own22/mesh/targets.another.h5"
+    assert found.expecting.targets("own", "own22") == []
+    assert set(found.validating.kinds("a", "own22").values()) == {"predicted"}
+    assert found.validating.foretold == [("a", "own22")]
+    assert found.runs.maps("a", "own22") == "results/runs/a/own22/folding/maps.h5"
+    # nothing of it comes from the start's own later brains
+    assert found.runs.curves("a") == found.chains.carried_mesh("a", "own22") == []
+    assert found.chains.regional_weeks("a", "own22") == []
+    assert not found.chains.with_strain("own22")
+    assert "own22" in unled(plan(of_two(tmp_path, 22, atlas=(21, 23)), runs={"a": {"follow": local}}))
+
+
+def test_a_mesh_for_the_end_of_a_prediction_is_sized_by_the_other_population(tmp_path):
+    for runs, series in (({"a": {"preset": "measured"}}, "own"), (EXPECTED["runs"], "atlas")):
+        found = plan(of_two(tmp_path, 22, 24), mesh={"sized_for": "end"}, runs=runs)
+        assert found.chains.stretched("own22") == {"series": series, "week": 22, "end_week": 24}
+    with pytest.raises(InputError, match="sized_for"):
+        plan(of_two(tmp_path, 22, 24, atlas=()), mesh={"sized_for": "end"}, **EXPECTED)
 
 
 def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read(tmp_path):
@@ -396,7 +510,7 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
     assert found.validating.kinds("a", "own22") == {23.0: "predicted", 24.0: "predicted"}
     assert found.validating.foretold == [("a", "own22")]
     assert found.validating.prediction("a", "own22")["atlas"] == [
-        f"results/brains/b{week}/surface/pial.surf.gii" for week in (23, 24)
+        f"results/brains/b{week}/surface/pial.surf.gii" for week in (22, 23, 24)
     ]
     assert "results/study/figures/prediction.png" in found.figures.target("validate")
     # a run that no brain tells of stands beside it, and one that later brains explain does not
