@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from shapes import box_mesh, ellipsoid_mesh, phantom_halves, rigid, sphere
+from shapes import box_mesh, ellipsoid, ellipsoid_mesh, phantom_halves, rigid, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.folding.targets import log_growth
@@ -188,8 +188,7 @@ def test_a_longer_brain_stays_as_much_longer():
     start = TetrahedralMesh(BALL.vertices * [1.0, 2.0, 1.0], BALL.tets)
     _, positions = expected_positions(start, 22.0, atlas, WEEKS, own_mm=0)
     assert positions[-1] == pytest.approx(1.2 * start.vertices, abs=1e-6)
-    smooth = np.ptp(expected_positions(start, 22.0, atlas, WEEKS)[1][-1], axis=0)
-    assert smooth[1] / smooth[0] > 1.7
+    assert expected_positions(start, 22.0, atlas, WEEKS)[1][-1] == pytest.approx(1.2 * start.vertices, abs=1e-6)
 
 
 def test_small_bumps_of_a_brain_fade_and_its_size_stays():
@@ -209,42 +208,54 @@ def test_a_brain_before_or_after_the_atlas_is_refused(week):
 
 
 def test_growth_comes_through_a_known_map_turned_by_its_rotation():
-    """Growth L of an atlas is Rᵀ L R in a brain that a map with rotation R leads from.
+    """Growth L of an atlas is Rᵀ L R in a brain that a map with rotation R leads from, to 5 %, registrations known.
 
-    What sets a brain apart is added as displacements, so that this holds where R differs little from place to place.
+    This holds for a map that turns by any angle, makes longer or shorter, bends within 30 mm by tenths of a
+    millimetre, and whose turn varies by 4 degrees over 30 mm: what sets a brain apart is added as displacements, which
+    the local rotation does not turn.
     """
-    mesh = box_mesh((12, 12, 12), (60.0, 60.0, 60.0))
-    pieces = linear_pieces(mesh)
-    x = mesh.vertices
+    axes = np.array([30.0, 36.0, 27.0])
+    mesh, fine = ellipsoid_mesh(12, tuple(axes)), ellipsoid(axes, 5)
+    pieces, x = linear_pieces(mesh), mesh.vertices
 
-    # the atlas' place of each point of the brain: turned, twisted by up to 5 degrees, and bent
+    # the atlas' place of each point of the brain
     def psi(p):
-        angles = np.radians(30.0 + 5.0 * p[:, 2] / 30.0)
+        angles = np.radians(30.0 + 4.0 * p[:, 2] / 30.0)
         turned = Rotation.from_rotvec(angles[:, None] * [0.0, 0.0, 1.0]).apply(p)
-        return turned + 0.4 * np.sin(p[:, [1, 2, 0]] / 20.0)
+        return turned * [1.05, 0.98, 1.02] + 0.4 * np.sin(p[:, [1, 2, 0]] / 20.0)
 
+    # faster where y is positive, and along x
     def grows(p):
-        return p + np.stack([0.08 * p[:, 0] + 0.02 * p[:, 1], 0.02 * p[:, 0] - 0.02 * p[:, 1], 0.03 * p[:, 2]], axis=1)
+        linear = p @ np.array([[0.08, 0.02, 0.0], [0.02, -0.02, 0.0], [0.0, 0.0, 0.03]])
+        return p + linear * (1 + 0.3 * np.sin(p[:, 1:2] / 15.0))
 
-    first = psi(x)
-    _, positions = expected_positions(mesh, 22.0, np.stack([first, grows(first)]), [22.0, 23.0])
-    found = log_growth(x, pieces, positions[1] - x, 0.0)
-    known = log_growth(first, pieces, grows(first) - first, 0.0)
-    inner = np.abs(x).max(axis=1) < 16
-    edges = [np.swapaxes(at[pieces[:, 1:]] - at[pieces[:, :1]], 1, 2) for at in (x, first)]
-    F = edges[1] @ np.linalg.inv(edges[0])
-    sizes = np.zeros(len(x))
-    mean = np.zeros((len(x), 3, 3))
-    for corner in pieces.T:
-        np.add.at(mean, corner, F)
-        np.add.at(sizes, corner, 1)
-    u, _, vt = np.linalg.svd(mean[inner] / sizes[inner, None, None])
+    first = psi(fine.vertices)
+    surfaces = [TriangleMesh(at, fine.faces) for at in (first, grows(first))]
+    pairs = [sampled(psi, fine.vertices), sampled(grows, first)]
+    _, positions, _ = foretell(mesh, 22.0, pairs, surfaces, [22.0, 23.0])
+    found = tensors(log_growth(x, pieces, positions[1] - x, 0.0))
+    known = tensors(log_growth(psi(x), pieces, grows(psi(x)) - psi(x), 0.0))
+    h = 1e-4 * np.eye(3)
+    u, _, vt = np.linalg.svd(np.stack([(psi(x + e) - psi(x - e)) / 2e-4 for e in h], axis=2))
     R = u @ vt
-    wanted = np.swapaxes(R, 1, 2) @ tensors(known[inner]) @ R
-    # without the rotation they would be wrong by much more than what is allowed
-    size = np.linalg.norm(wanted, axis=(1, 2)).mean()
-    assert np.linalg.norm(tensors(known[inner]) - wanted, axis=(1, 2)).mean() > 0.2 * size
-    assert np.linalg.norm(tensors(found[inner]) - wanted, axis=(1, 2)).mean() < 0.05 * size
+    wanted = np.swapaxes(R, 1, 2) @ known @ R
+
+    def size(parts):
+        return np.average(np.linalg.norm(parts, axis=(1, 2)), weights=vertex_sizes(x, pieces))
+
+    # without the rotation they would be wrong by far more than what is allowed
+    assert size(known - wanted) > 0.5 * size(wanted)
+    assert size(found - wanted) < 0.05 * size(wanted)
+
+
+def sampled(moved, points, spacing_mm=3.0):
+    """Returns a map of space as a registration knows it, on a grid round points."""
+    low = points.min(axis=0) - 6.0
+    shape = np.ceil((np.ptp(points, axis=0) + 12.0) / spacing_mm).astype(int) + 1
+    affine = np.diag([spacing_mm, spacing_mm, spacing_mm, 1.0])
+    affine[:3, 3] = low
+    at = low + spacing_mm * np.indices(shape).reshape(3, -1).T
+    return Deformation(np.eye(4), (moved(at) - at).reshape(*shape, 3), affine)
 
 
 def tensors(parts):
