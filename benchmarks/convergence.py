@@ -14,6 +14,11 @@ Runs are done one at a time on one rank, coarse ones first, while the processor 
 left of the budget. What is in FOLDER already is not done again. Each run prints a JSON line; the last line is one JSON
 object with all of them. FOLDER holds `runs.csv`, `weeks.csv` (metrics), `differences.csv` (pairs of runs) and
 `time_steps.csv`.
+
+    ./run python benchmarks/convergence.py --folder FOLDER --parts solver --run MESH PARAMS [MAPS]
+
+varies the tolerance of Newton's method and the time step of a study's run instead: `tolerances.csv` and `run_steps.csv`
+give the error of positions at its end.
 """
 
 import argparse
@@ -42,7 +47,7 @@ from gyriflow.io.frames import read_positions, read_tets
 from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.io.yaml_files import write_yaml
+from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.metrics.measure import Settings, folding_rows, measure_hemisphere, size_rows, spectrum_rows
 from gyriflow.metrics.similarity import distances
@@ -94,6 +99,7 @@ DAY_S = 86400.0
 STEPS_DAYS = (2.0, 1.0, 0.5)
 FINEST_STEP_DAYS = 0.0625
 STEPS_UNTIL_GW, STEPS_NODES = 23.0, 1.41
+TOLERANCES = (1e-9, 1e-6, 1e-5, 1e-4, 1e-3)
 
 
 @cache
@@ -204,7 +210,13 @@ class Case:
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--folder", type=Path, required=True, help="for meshes, runs and tables; runs there are kept")
-    parser.add_argument("--parts", nargs="+", choices=("resolution", "steps"), default=["resolution", "steps"])
+    parser.add_argument(
+        "--parts", nargs="+", choices=("resolution", "steps", "solver"), default=["resolution", "steps"]
+    )
+    parser.add_argument(
+        "--run", type=Path, nargs="+", help="mesh and params.yaml of a run, with maps.h5 if it has some"
+    )
+    parser.add_argument("--run-steps-days", type=float, nargs="+", default=[0.125, 0.25, 0.5, 1.0, 1.75])
     parser.add_argument("--budget-min", type=float, default=50.0, help="processor minutes of solving")
     parser.add_argument("--thickness-mm", type=float, default=2.0)
     parser.add_argument("--nodes", type=float, nargs="+", default=list(NODES_TO_CORTEX), help="to the thickness")
@@ -224,12 +236,13 @@ def write_mesh(folder: Path, case: Case, thickness_mm: float) -> tuple[Path, int
     return file, len(read_tetrahedral_mesh(file).vertices)
 
 
-def fold(mesh: Path, out: Path, parameters: dict[str, Any]) -> dict[str, Any]:
+def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict[str, Any]:
     """Returns the summary of a run on one rank, done where it has not been; an interrupted one goes on."""
     if not (out / "summary.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         write_yaml(out / "params.yaml", parameters)
         program = [sys.executable, "-m", "gyriflow.folding", str(mesh), "--params", str(out / "params.yaml")]
+        program += [f"--maps={file}" for file in maps]
         with (out / "log").open("w") as log:
             done = subprocess.run([*program, "--out", str(out)], stdout=log, stderr=log, check=False)
         if done.returncode != 0:
@@ -326,22 +339,41 @@ def compare(arguments: argparse.Namespace, cases: list[Case]) -> tuple[pd.DataFr
 def time_steps(arguments: argparse.Namespace) -> pd.DataFrame:
     """Returns the error of each length of the step against the shortest, on one coarse mesh."""
     mesh, _ = write_mesh(arguments.folder / "meshes", Case(2, STEPS_NODES), arguments.thickness_mm)
+    own = {"contact": {"kind": "none"}, "end_week": STEPS_UNTIL_GW}
+    runs = {days: parameters_of(arguments, step_s=days * DAY_S, **own) for days in (FINEST_STEP_DAYS, *STEPS_DAYS)}
+    return errors("step_days", runs, arguments.folder / "steps", mesh)
+
+
+def errors(varied: str, runs: dict[float, dict[str, Any]], folder: Path, mesh: Path, *maps: Path) -> pd.DataFrame:
+    """Returns the error of positions at the end of each run against the first, and what it took."""
     rows, exact = [], None
-    for days in (FINEST_STEP_DAYS, *STEPS_DAYS):
-        out = arguments.folder / "steps" / f"{days:g}"
-        own = {"step_s": days * DAY_S, "contact": {"kind": "none"}, "end_week": STEPS_UNTIL_GW}
-        found = fold(mesh, out, parameters_of(arguments, **own))
+    for value, parameters in runs.items():
+        out = folder / f"{value:g}"
+        found = fold(mesh, out, parameters, *maps)
         if "failed" in found:
-            rows.append({"step_days": days, **found})
+            rows.append({varied: value, **found})
             continue
-        before, after = (read_positions(out / "frames.h5", week) for week in (START_WEEK, STEPS_UNTIL_GW))
+        ends = parameters["start_week"], parameters["end_week"]
+        before, after = (read_positions(out / "frames.h5", week) for week in ends)
         exact = after if exact is None else exact
         apart, moved = np.linalg.norm(after - exact, axis=1), np.linalg.norm(exact - before, axis=1)
-        row = {"step_days": days, "cpu_seconds": found["cpu_seconds"]}
+        row = {varied: value} | {name: found[name] for name in ("steps", "newton", "krylov", "cpu_seconds")}
         row |= {"rms_mm": float(np.sqrt((apart**2).mean())), "largest_mm": float(apart.max())}
         rows.append(row | {"share": row["rms_mm"] / float(np.sqrt((moved**2).mean()))})
         print(json.dumps(rows[-1]), flush=True)
     return pd.DataFrame(rows)
+
+
+def solver_errors(arguments: argparse.Namespace) -> dict[str, pd.DataFrame]:
+    """Returns the errors that tolerance and time step of a study's run leave, against its least of each."""
+    mesh, file, *maps = arguments.run
+    given = read_yaml(file)
+    tolerances = {value: given | {"solver": given["solver"] | {"newton_tolerance": value}} for value in TOLERANCES}
+    steps = {days: given | {"step_s": days * DAY_S} for days in arguments.run_steps_days}
+    return {
+        "tolerances": errors("newton_tolerance", tolerances, arguments.folder / "tolerances", mesh, *maps),
+        "run_steps": errors("step_days", steps, arguments.folder / "run_steps", mesh, *maps),
+    }
 
 
 def main(arguments: argparse.Namespace) -> None:
@@ -350,6 +382,10 @@ def main(arguments: argparse.Namespace) -> None:
         steps = time_steps(arguments)
         write_table(arguments.folder / "time_steps.csv", steps)
         result["time_steps"] = steps.to_dict("records")
+    if "solver" in arguments.parts:
+        for name, table in solver_errors(arguments).items():
+            write_table(arguments.folder / f"{name}.csv", table)
+            result[name] = table.to_dict("records")
     if "resolution" in arguments.parts:
         runs = [(case, row) for case, row in resolution_runs(arguments)]
         folded = [case for case, row in runs if "failed" not in row]

@@ -106,13 +106,14 @@ def test_a_smoother_that_elements_have_outgrown_estimates_its_bounds_anew(monkey
 
 
 @pytest.mark.parametrize("support", ["box", "free"])
-def test_newtons_method_begins_at_its_guess_where_that_leaves_less(support):
+def test_newtons_method_begins_at_the_first_good_guess(support):
     folding, state = closing_sulcus("global", support=support)
     state = after_steps(folding, state, 3)
     folding.begin(state, state.step_s)
     folding.solver.solve(folding.domain.local(state.last))
     found = folding.problem.displacement.copy()
     assert folding.solver.solve(found).newton == 0
+    assert folding.solver.solve(-found, found, 0.5 * found).newton == 0
     assert np.abs(folding.problem.displacement - found).max() <= 1e-9 * np.abs(found).max()
     assert folding.solver.solve(0.5 * found).newton > 0
 

@@ -15,6 +15,7 @@ from boxes import (
 from petsc4py import PETSc
 from shapes import box_mesh
 
+from gyriflow.folding import newton
 from gyriflow.folding.ladder import GMRES, KEPT, REBUILT, SHIFTED, NotConvergedError
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
@@ -79,7 +80,7 @@ def test_an_easy_step_stays_on_the_first_rung():
     assert solved(clamped_box())[0].rung == KEPT
 
 
-STIFFENED_LIMIT = 40
+STIFFENED_LIMIT = 15
 
 
 def stiffened_box_solved_by(solver):
@@ -105,7 +106,7 @@ def test_a_stale_preconditioner_is_rebuilt_where_conjugate_gradients_fail_with_i
     # a rebuilt preconditioner is as good as a new one: all that is lost are the attempts with kept and with new bounds
     fresh = stiffened_box_solved_by(tight_solver())
     assert fresh.rung == KEPT
-    assert count.krylov <= fresh.krylov + 2 * STIFFENED_LIMIT
+    assert count.krylov <= 1.2 * fresh.krylov + 2 * STIFFENED_LIMIT
 
 
 def test_the_smoother_follows_the_tangent():
@@ -134,7 +135,9 @@ def test_a_tangent_that_is_not_positive_definite_is_shifted():
     assert u[:, 2].max() > 1e-3
 
 
-def test_gmres_takes_a_tangent_that_is_not_symmetric():
+def test_gmres_takes_a_tangent_that_is_not_symmetric(monkeypatch):
+    # these forces have no energy, which directions that are solved loosely need not lower
+    monkeypatch.setattr(newton, "LOOSE", 1e-6)
     problem = clamped_box()
     problem.contributions.append(Springs(problem, 2.0, turned=4.0))
     count, _ = solved(problem, newton_tolerance=1e-8, krylov_tolerance=1e-6, max_krylov=60)

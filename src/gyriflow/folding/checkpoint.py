@@ -76,15 +76,18 @@ class State:
         """Returns the state before the first step, free of stress."""
         return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
 
-    def predicted(self, step_s: float) -> Floats:
-        """Returns the (n, 3) first guess in m for a step of a given length: the two last steps' rates extended."""
+    def predicted(self, step_s: float) -> list[Floats]:
+        """Returns (n, 3) first guesses in m for a step of a given length, the best one first where growth is steady.
+
+        They are the two last steps' rates extended, and the last one's alone, for the step after growth has changed.
+        """
         if self.last_s == 0:
-            return np.zeros_like(self.last)
+            return []
         rate = self.last / self.last_s
         if self.before_last_s == 0:
-            return rate * step_s
+            return [rate * step_s]
         slope = (rate - self.before_last / self.before_last_s) / ((self.last_s + self.before_last_s) / 2)
-        return (rate + slope * (self.last_s + step_s) / 2) * step_s
+        return [(rate + slope * (self.last_s + step_s) / 2) * step_s, rate * step_s]
 
     def after(
         self,

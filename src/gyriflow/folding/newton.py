@@ -19,11 +19,9 @@ GAIN = 1e-6
 """Relative fall of the energy from which an iteration counts as progress, and not towards their limit."""
 PATIENCE = 10
 """Most iterations, progress or not, over their limit."""
-NEAR = 100.0
-"""Multiple of the tolerance below which the tangent of the iteration before is as good as a new one."""
-SLOW = 1e3
+SLOW = 10.0
 """Multiple of the tolerance below which an iteration that gains less than half calls for the true tangent."""
-LOOSE = 0.03
+LOOSE = 0.1
 """Relative tolerance of a linear solve that need not be good."""
 
 
@@ -31,11 +29,11 @@ LOOSE = 0.03
 class NewtonSettings:
     """Tolerances and limits of the iteration.
 
-    `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side. Where one
-    linear solve can end the step, it is solved as far as that takes, down to a tenth of `krylov_tolerance`.
+    `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side: see
+    `linear_tolerance`.
     """
 
-    newton_tolerance: float = 1e-6
+    newton_tolerance: float = 1e-4
     krylov_tolerance: float = 1e-3
     max_newton: int = 20
     max_krylov: int = 300
@@ -98,6 +96,25 @@ class Iterate:
     exhausted: bool = False
 
 
+def linear_tolerance(enough: float, left: float, least: float) -> float:
+    """Returns the part of the residual that a linear solve may leave (forcing terms as of Eisenstat and Walker 1996).
+
+    Parameters
+    ----------
+    enough
+        The part that ends the step.
+    left
+        What the last iteration left of its residual: the next one leaves about the square, however well it is solved.
+    least
+        The tolerance of solves in which the iteration converges fast.
+    """
+    if left**2 > LOOSE:
+        return max(LOOSE, enough)
+    good = max(least, left**2)
+    # a little farther where that ends the step
+    return enough if enough >= 0.1 * good else good
+
+
 class NewtonSolver:
     """Solves for the displacement of one step after the other with objects made once.
 
@@ -124,13 +141,13 @@ class NewtonSolver:
         self.residual_floor = residual_floor
         self.ladder = LinearLadder(problem, settings.max_krylov)
         self._residual = problem.new_vector()
+        self._first_left = 0.0  # part of the residual that the first iteration of the step before left
         self._trial = problem.new_vector()
         self._direction = problem.new_vector()
-        self._first_left = 0.0  # part of the residual that the first iteration of the step before left
         self.inverting: NDArray[np.float64] | None = None
 
-    def solve(self, guess: NDArray[np.float64]) -> StepCount:
-        """Solves for the displacement from a guess (k, 3) in m; it is left in the problem.
+    def solve(self, *guesses: NDArray[np.float64]) -> StepCount:
+        """Solves for the displacement from the first good one of some guesses (k, 3) in m; it is left in the problem.
 
         Raises
         ------
@@ -143,8 +160,8 @@ class NewtonSolver:
         if not np.isfinite(at_rest):
             raise NotConvergedError("the forces without any displacement are not finite")
         tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
-        iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(guess, at_rest))
-        tangent, before, stalled = None, np.inf, 0
+        iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(guesses, at_rest))
+        before, stalled = np.inf, 0
         while iterate.norm > tolerance and not iterate.exhausted:
             norm = iterate.norm
             # where folds snap or slide past each other, the energy falls far before the residual does
@@ -156,17 +173,17 @@ class NewtonSolver:
                 )
             count.newton += 1
             slow = before / 2 < norm <= SLOW * tolerance
-            reduction = self._reduction(norm, before, tolerance)
-            if tangent is None or norm > NEAR * tolerance or norm > before / 4:
-                # one that is off by no more than the linear solve may leave is as good as a new one
-                tangent = problem.tangent(within=0.0 if slow else reduction)
+            left = norm / before if count.newton > 1 else max(norm / at_rest, self._first_left)
+            reduction = linear_tolerance(0.4 * tolerance / norm, left, self.settings.krylov_tolerance)
+            # one that is off by no more than the linear solve may leave is as good as a new one
+            tangent = problem.tangent(within=0.0 if slow else reduction)
             try:
                 iterate = self._iterate(iterate, tangent, reduction, count, convexify=not slow)
             except NotConvergedError:
-                if not problem.kept_tangent:
+                least = self.settings.krylov_tolerance
+                if not problem.kept_tangent and reduction <= least:
                     raise
-                tangent = problem.tangent()
-                iterate = self._iterate(iterate, tangent, reduction, count, convexify=not slow)
+                iterate = self._iterate(iterate, problem.tangent(), min(reduction, least), count, convexify=not slow)
             stalled += iterate.gain < GAIN
             if count.newton == 1:
                 self._first_left = iterate.norm / norm
@@ -188,24 +205,19 @@ class NewtonSolver:
         self.problem.set_displacement(displacement)
         return self.problem.residual(self._residual)
 
-    def _begin(self, guess: NDArray[np.float64], at_rest: float) -> float:
-        """Goes to the guess, or stays at rest where that leaves less; returns the norm of the residual there."""
-        problem = self.problem
-        guess = problem.admissible(guess)
-        problem.set_displacement(problem.largest_step(guess) * guess)
-        norm = problem.residual(self._residual) if problem.smallest_volume_ratio() > 0 else np.nan
-        # false where the norm is not a number
-        return norm if norm < at_rest else self._residual_at(np.zeros_like(problem.displacement))
+    def _begin(self, guesses: Sequence[NDArray[np.float64]], at_rest: float) -> float:
+        """Goes to the first guess that leaves less than half of the residual at rest, or stays at rest.
 
-    def _reduction(self, norm: float, before: float, tolerance: float) -> float:
-        """Returns the part of the residual that the linear solve may leave."""
-        floor = self.settings.krylov_tolerance
-        enough = 0.4 * tolerance / norm
-        if not self.problem.convex:
-            # while forces change abruptly from one iterate to the next, a direction need not be better than the last
-            left = norm / before if np.isfinite(before) else self._first_left
-            floor = max(floor, min(LOOSE, left**2))
-        return enough if enough >= 0.1 * floor else floor
+        Returns the norm of the residual there.
+        """
+        problem = self.problem
+        for guess in map(problem.admissible, guesses):
+            problem.set_displacement(problem.largest_step(guess) * guess)
+            if problem.smallest_volume_ratio() > 0:
+                norm = problem.residual(self._residual)
+                if norm < 0.5 * at_rest:  # false where it is not a number
+                    return norm
+        return self._residual_at(np.zeros_like(problem.displacement))
 
     def _advance(self, iterate: Iterate, *, convex: bool) -> Iterate:
         """Moves along the direction as far as energy and elements allow; returns where that leads.

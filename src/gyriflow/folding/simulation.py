@@ -175,11 +175,11 @@ class Folding:
 
     def _grow(self, tissue: Tissue, growth: Growth, state: State, step_s: float) -> tuple[Floats, StepCount]:
         """Solves a step, again while its growth asks for it; returns its (n, 3) displacement in m and what it took."""
-        guess, counts = self.domain.local(state.predicted(step_s)), []
+        guesses, counts = [self.domain.local(guess) for guess in state.predicted(step_s)], []
         while True:
-            counts.append(self.solver.solve(guess))
-            guess = self.problem.displacement.copy()
-            u = self.domain.gathered(guess[: self.domain.owned])
+            counts.append(self.solver.solve(*guesses))
+            guesses = [self.problem.displacement.copy()]
+            u = self.domain.gathered(guesses[0][: self.domain.owned])
             again = growth.again(self.inputs.size((state.positions + u) * MM_PER_M))
             if again is None:
                 self.growth, self.fields.step_s = growth, step_s

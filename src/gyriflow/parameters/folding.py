@@ -93,7 +93,7 @@ class NoGrowth(Settings):
 class Solver(Settings):
     """The nonlinear and the linear solver."""
 
-    newton_tolerance: float = setting(1e-6, "", "Residual at which Newton stops, over its value at u = 0.", gt=0, lt=1)
+    newton_tolerance: float = setting(1e-4, "", "Residual at which Newton stops, over its value at u = 0.", gt=0, lt=1)
     krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
     max_newton: int = setting(20, "", "Newton iterations without progress before a step is halved.", ge=1, le=200)
     max_halvings: int = setting(6, "", "Halvings of the time step before the run ends.", ge=0, le=30)

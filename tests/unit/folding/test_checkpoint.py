@@ -45,12 +45,20 @@ def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
     state = State.at_start(at(0.0), 1.0)
     for before, after in pairwise(times[:3]):
         state = state.after(at(after) - at(before), after - before, {})
-    np.testing.assert_allclose(state.predicted(1.5), at(3.0) - at(1.5), rtol=1e-13)
+    np.testing.assert_allclose(state.predicted(1.5)[0], at(3.0) - at(1.5), rtol=1e-13)
 
 
-def test_equal_steps_give_twice_the_last_less_the_one_before():
+def test_equal_steps_give_twice_the_last_less_the_one_before_and_then_the_last():
     state = some_state()
-    np.testing.assert_allclose(state.predicted(100.0), 2 * state.last - state.before_last, rtol=1e-12)
+    extended, steady = state.predicted(100.0)
+    np.testing.assert_allclose(extended, 2 * state.last - state.before_last, rtol=1e-12)
+    np.testing.assert_allclose(steady, state.last, rtol=1e-12)
+
+
+def test_before_the_second_step_there_is_no_change_of_rates():
+    assert some_state(0).predicted(100.0) == []
+    state = some_state(1)
+    np.testing.assert_allclose(state.predicted(50.0), [state.last / 2], rtol=1e-12)
 
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path):
