@@ -195,7 +195,7 @@ def _finding(check: str, study: StudyTables) -> tuple[str, str]:
         # without a mode there is nothing
         fine = cut["B6"].fillna(0) < WEAK
     elif check == "right_B4":
-        sides = cut["B4"].unstack("hemisphere").reindex(columns=["right", "left"])
+        sides = cut.pivot_table("B4", "brain", "hemisphere").reindex(columns=["right", "left"])
         fine = (sides["right"] - sides["left"]).dropna() > 0
     else:
         real = cut.index.get_level_values("brain").str.startswith(REAL)
