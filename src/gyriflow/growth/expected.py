@@ -24,7 +24,7 @@ REACH_MM = 4.0
 OWN_MM = 8.0
 """Standard deviation of the Gaussian that what sets a brain apart from the atlas is smoothed with.
 
-What is smaller than a gyrus says nothing of folds that are still to come. What is of the whole brain is kept as it is.
+What is smaller than a gyrus says nothing of folds that are still to come.
 """
 FADING_GW = 1.0
 """Time in which what is smaller fades."""
@@ -95,17 +95,6 @@ def carry_sharply(
     return np.stack(positions)
 
 
-def of_the_whole(places: Floats, values: Floats, weights: Floats) -> Floats:
-    """Returns the quadratic polynomial of (n, 3) places that is nearest to (n, 3) values: size, proportions, bends.
-
-    Smoothing would flatten it towards the boundary.
-    """
-    x = (places - places.mean(axis=0)) / np.ptp(places)
-    terms = np.column_stack([np.ones(len(x)), x, x**2, x * np.roll(x, 1, axis=1)])
-    root = np.sqrt(weights)[:, None]
-    return np.asarray(terms @ np.linalg.lstsq(terms * root, values * root)[0])
-
-
 def positions_at(week: float, atlas: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
     """Returns the (n, 3) positions of an atlas at a week from its (k, n, 3) in k weeks, linear between two of them.
 
@@ -158,8 +147,7 @@ def expected_positions(
 
     now = laid_onto(positions_at(start_week, atlas, weeks, sizes), mesh.vertices)
     apart = mesh.vertices - now
-    whole = of_the_whole(mesh.vertices, apart, sizes)
-    smooth = whole + diffuse(mesh.vertices, pieces, apart - whole, own_mm)
+    smooth = diffuse(mesh.vertices, pieces, apart, own_mm)
     size = cell_sizes(now, pieces).sum()
     found = {start_week: mesh.vertices}
     for week in sorted({*weeks, *also}):

@@ -188,7 +188,8 @@ def test_a_longer_brain_stays_as_much_longer():
     start = TetrahedralMesh(BALL.vertices * [1.0, 2.0, 1.0], BALL.tets)
     _, positions = expected_positions(start, 22.0, atlas, WEEKS, own_mm=0)
     assert positions[-1] == pytest.approx(1.2 * start.vertices, abs=1e-6)
-    assert expected_positions(start, 22.0, atlas, WEEKS)[1][-1] == pytest.approx(1.2 * start.vertices, abs=1e-6)
+    smooth = np.ptp(expected_positions(start, 22.0, atlas, WEEKS)[1][-1], axis=0)
+    assert smooth[1] / smooth[0] > 1.7
 
 
 def test_small_bumps_of_a_brain_fade_and_its_size_stays():
@@ -208,11 +209,50 @@ def test_a_brain_before_or_after_the_atlas_is_refused(week):
 
 
 def test_growth_comes_through_a_known_map_turned_by_its_rotation():
-    """Growth L of an atlas is Rᵀ L R in a brain that a map with rotation R leads from, to 5 %, registrations known.
+    """Growth L of an atlas is Rᵀ L R in a brain that a map with rotation R leads from.
 
-    This holds for a map that turns by any angle, makes longer or shorter, bends within 30 mm by tenths of a
-    millimetre, and whose turn varies by 4 degrees over 30 mm: what sets a brain apart is added as displacements, which
-    the local rotation does not turn.
+    What sets a brain apart is added as displacements, so that this holds where R differs little from place to place.
+    """
+    mesh = box_mesh((12, 12, 12), (60.0, 60.0, 60.0))
+    pieces = linear_pieces(mesh)
+    x = mesh.vertices
+
+    # the atlas' place of each point of the brain: turned, twisted by up to 5 degrees, and bent
+    def psi(p):
+        angles = np.radians(30.0 + 5.0 * p[:, 2] / 30.0)
+        turned = Rotation.from_rotvec(angles[:, None] * [0.0, 0.0, 1.0]).apply(p)
+        return turned + 0.4 * np.sin(p[:, [1, 2, 0]] / 20.0)
+
+    def grows(p):
+        return p + np.stack([0.08 * p[:, 0] + 0.02 * p[:, 1], 0.02 * p[:, 0] - 0.02 * p[:, 1], 0.03 * p[:, 2]], axis=1)
+
+    first = psi(x)
+    _, positions = expected_positions(mesh, 22.0, np.stack([first, grows(first)]), [22.0, 23.0])
+    found = log_growth(x, pieces, positions[1] - x, 0.0)
+    known = log_growth(first, pieces, grows(first) - first, 0.0)
+    inner = np.abs(x).max(axis=1) < 16
+    edges = [np.swapaxes(at[pieces[:, 1:]] - at[pieces[:, :1]], 1, 2) for at in (x, first)]
+    F = edges[1] @ np.linalg.inv(edges[0])
+    sizes = np.zeros(len(x))
+    mean = np.zeros((len(x), 3, 3))
+    for corner in pieces.T:
+        np.add.at(mean, corner, F)
+        np.add.at(sizes, corner, 1)
+    u, _, vt = np.linalg.svd(mean[inner] / sizes[inner, None, None])
+    R = u @ vt
+    wanted = np.swapaxes(R, 1, 2) @ tensors(known[inner]) @ R
+    # without the rotation they would be wrong by much more than what is allowed
+    size = np.linalg.norm(wanted, axis=(1, 2)).mean()
+    assert np.linalg.norm(tensors(known[inner]) - wanted, axis=(1, 2)).mean() > 0.2 * size
+    assert np.linalg.norm(tensors(found[inner]) - wanted, axis=(1, 2)).mean() < 0.05 * size
+
+
+def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
+    """Growth of an atlas is right to 5 % in all of a brain that a known map leads from, carried through registrations.
+
+    This holds where all that sets the brain apart is kept (`own_mm` 0), for a map that turns by any angle, makes longer
+    or shorter, bends by tenths of a millimetre, and whose turn varies by 4 degrees over 30 mm. What the usual 8 mm
+    smooth away returns to the atlas, also a part of a difference in size: growth is then off by 12 to 20 % here.
     """
     axes = np.array([30.0, 36.0, 27.0])
     mesh, fine = ellipsoid_mesh(12, tuple(axes)), ellipsoid(axes, 5)
@@ -232,8 +272,7 @@ def test_growth_comes_through_a_known_map_turned_by_its_rotation():
     first = psi(fine.vertices)
     surfaces = [TriangleMesh(at, fine.faces) for at in (first, grows(first))]
     pairs = [sampled(psi, fine.vertices), sampled(grows, first)]
-    _, positions, _ = foretell(mesh, 22.0, pairs, surfaces, [22.0, 23.0])
-    found = tensors(log_growth(x, pieces, positions[1] - x, 0.0))
+    carried = carry_sharply(mesh, pairs, surfaces)[1:]
     known = tensors(log_growth(psi(x), pieces, grows(psi(x)) - psi(x), 0.0))
     h = 1e-4 * np.eye(3)
     u, _, vt = np.linalg.svd(np.stack([(psi(x + e) - psi(x - e)) / 2e-4 for e in h], axis=2))
@@ -245,7 +284,10 @@ def test_growth_comes_through_a_known_map_turned_by_its_rotation():
 
     # without the rotation they would be wrong by far more than what is allowed
     assert size(known - wanted) > 0.5 * size(wanted)
-    assert size(found - wanted) < 0.05 * size(wanted)
+    for own_mm, least, most in ((0.0, 0.0, 0.05), (8.0, 0.1, 0.2)):
+        _, positions = expected_positions(mesh, 22.0, carried, [22.0, 23.0], own_mm=own_mm)
+        found = tensors(log_growth(x, pieces, positions[1] - x, 0.0))
+        assert least * size(wanted) <= size(found - wanted) < most * size(wanted)
 
 
 def sampled(moved, points, spacing_mm=3.0):
