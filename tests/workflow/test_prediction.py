@@ -72,7 +72,10 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
     brains = [*brains_of(workflow, "a", 1, 21, 22, 23), *brains_of(workflow, "b", 2, 21.5, 22.6, 23)]
     name = workflow.write("study.yaml", STUDY | {"brains": brains, "start": "b21.5"})
     tables = [f"results/study/{table}.csv" for table in ("prediction", "validation")]
-    outcome = workflow.run(*tables, "--cores", "2", "--configfile", name, timeout_s=1500)
+    names = ("expected", "growth_found", "deviation_log_area", "deviation_thickness_difference_mm")
+    drawn = [f"results/runs/expected/b21.5/figures/{figure}.png" for figure in names]
+    further = ["results/study/deviation_centiles.csv", "results/study/figures/prediction.png", *drawn]
+    outcome = workflow.run(*tables, *further, "--cores", "2", "--configfile", name, timeout_s=1500)
     assert outcome.returncode == 0, outcome.stdout[-1000:] + outcome.stderr[-3000:]
     prediction, validation = (pd.read_csv(workflow.directory / table) for table in tables)
     assert set(prediction["model"]) == {"run", *BASELINES}
@@ -91,6 +94,12 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
         assert rows.loc["atlas", "distance_mm"] < 1.5
     steps = pd.read_csv(workflow.directory / "results/runs/expected/b21.5/folding/steps.csv")
     assert steps["to_target_mm"].iloc[-1] < 0.3
+    # the real brain deviates as it is larger or smaller
+    deviation = pd.read_csv(workflow.directory / further[0]).query("hemisphere == 'whole' and run == 'expected'")
+    areas = deviation[deviation["metric"] == "log_area"].set_index("week")["value"]
+    errors = prediction.query("run == 'expected' and model == 'run'").set_index("week")["area_error"]
+    for week, value in areas.items():
+        assert value == pytest.approx(-np.log1p(errors[week]), abs=0.05)
 
 
 def fits_onto(mesh, other):
