@@ -259,8 +259,10 @@ def _scores(validation: Mapping[str, Any]) -> dict[str, str]:
 
 def grouped(warnings: pd.DataFrame) -> pd.DataFrame:
     """Returns warnings that say the same once, with the brains and runs that they are of."""
-    of = warnings["subject"].fillna("").astype(str) + warnings["run"].map(lambda run: f", {run}" if run else "")
-    rows = warnings.assign(of=of).groupby(["step", "level", "message"], sort=False)["of"]
+    # of a brain's step there is no run
+    named = warnings[["subject", "run"]].fillna("").astype(str)
+    places = [", ".join(filter(None, place)) for place in named.itertuples(index=False)]
+    rows = warnings.assign(of=places).groupby(["step", "level", "message"], sort=False)["of"]
     return rows.agg(lambda names: "; ".join(filter(None, dict.fromkeys(names)))).reset_index()
 
 

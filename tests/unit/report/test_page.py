@@ -137,7 +137,7 @@ def test_technical_figures_are_folded_away_at_the_end_of_their_section():
 
 def test_a_warning_of_several_brains_is_told_once():
     said = {"step": "surface", "level": "warning", "message": ["thin", "thin", "wide"]}
-    table = grouped(pd.DataFrame({"subject": ["a", "b", "a"], "run": ["", "", "r"]} | said))
+    table = grouped(pd.DataFrame({"subject": ["a", "b", "a"], "run": [np.nan, np.nan, "r"]} | said))
     assert list(zip(table["message"], table["of"], strict=True)) == [("thin", "a; b"), ("wide", "a, r")]
 
 
