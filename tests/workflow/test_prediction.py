@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 from shapes import cerebrum_surface, rigid, save_gifti, save_labels
 
-from gyriflow.comparison.prediction import BASELINES
 from gyriflow.geometry.alignment import angle_deg, fit_onto, mean_distance, rigid_fit, searched
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
@@ -13,6 +12,7 @@ from gyriflow.io.registrations import read_targets
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.phantom.brain import phantom_labels
+from gyriflow.report.labels import FORETOLD
 
 STUDY = {
     "surface": {"edge_length_mm": 2.0},
@@ -78,7 +78,7 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
     outcome = workflow.run(*tables, *further, "--cores", "2", "--configfile", name, timeout_s=1500)
     assert outcome.returncode == 0, outcome.stdout[-1000:] + outcome.stderr[-3000:]
     prediction, validation = (pd.read_csv(workflow.directory / table) for table in tables)
-    assert set(prediction["model"]) == {"run", *BASELINES}
+    assert set(prediction["model"]) == {"run", *FORETOLD}
     assert list(prediction["horizon"].unique()) == pytest.approx([1.1, 1.5])
     assert set(validation["kind"]) == {"predicted"}
     assert set(validation["week"]) == {22.6, 23.0}

@@ -23,21 +23,16 @@ from ..geometry.triangles import (
 from .placement import INTERVAL, MEASURES, correlation, draw_patches, drawn_correlations
 from .shapes import EDGE_MM, Shape, cortex_dice
 
-BASELINES = {
-    "scaled": "the start brain, scaled to the volume that is foretold: no folding",
-    "atlas": "the atlas' own brain of the week, scaled to that volume",
-    "atlas_deformed": "the atlas' brain with all that sets the start apart from the atlas",
-    "displaced": "the start moved by the atlas' displacement as registration alone sees it",
-    "target": "what the run grows towards: the expected surface without mechanics",
-}
-"""Simpler ways to foretell a brain, by name."""
 FAR = 0.95
 """Quantile of the distance that stands for its largest values."""
 
 
-def apart(found: TriangleMesh, real: TriangleMesh) -> list[tuple[TriangleMesh, Floats]]:
-    """Returns two surfaces with even triangles, and how far their vertices are from the other in mm, as they lie."""
-    both = ((remesh(found, EDGE_MM), real), (remesh(real, EDGE_MM), found))
+def apart(found: TriangleMesh, real: TriangleMesh, real_even: TriangleMesh) -> list[tuple[TriangleMesh, Floats]]:
+    """Returns two surfaces with even triangles, and how far their vertices are from the other in mm, as they lie.
+
+    `real_even` is the real one made `ready`.
+    """
+    both = ((remesh(found, EDGE_MM), real), (real_even, found))
     return [(even, nearest_on(even.vertices, other)[0]) for even, other in both]
 
 
@@ -99,7 +94,7 @@ def endpoints(found: TriangleMesh, real: TriangleMesh, shape: Shape, real_shape:
         Of each vertex of the real shape, as of `drawn_patches`.
     """
     placed = transformed(found, fit_onto(found, real))
-    pair, points, areas = apart(placed, real), real_shape.mesh.vertices, real_shape.areas
+    pair, points, areas = apart(placed, real, real_shape.mesh), real_shape.mesh.vertices, real_shape.areas
     match = match_points(points, vertex_normals(real_shape.mesh), shape.mesh)
     values = {name: values_at(match, getattr(shape, name)) for name in MEASURES}
     drawn = draw_patches(patch, seed=0)
@@ -138,7 +133,7 @@ def with_skill(rows: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     rows
-        Columns week, model (`run` or one of `BASELINES`), distance_mm, and drawn_mm of the same draws; it is left out.
+        Columns week, model (`run`, or a simpler way), distance_mm, and drawn_mm of the same draws; it is left out.
     """
     simple = rows[~rows["model"].isin(["run", "target"])]
     best = simple.loc[simple.groupby("week")["distance_mm"].idxmin()].set_index("week")

@@ -85,7 +85,7 @@ def validation_row(
     wanted = (np.nan, np.nan) if curve is None else (curve[0] * CM2_PER_MM2, curve[1] * ML_PER_MM3)
     row: dict[str, Any] = asdict(comparison) | {"horizon": comparison.horizon}
     placed = transformed(simulated, fit_onto(simulated, real_brain))
-    row |= distances(apart(placed, real_brain)) | {"cortex_dice": cortex_dice(placed, real_brain)}
+    row |= distances(apart(placed, real_brain, real.mesh)) | {"cortex_dice": cortex_dice(placed, real_brain)}
     row |= {f"{who}{name}": value for who, size in sizes.items() for name, value in size.items()}
     row |= {"curve_area_cm2": wanted[0], "curve_volume_ml": wanted[1]}
     for name, unit, aim in (("area", "cm2", wanted[0]), ("volume", "ml", wanted[1])):

@@ -7,7 +7,6 @@ from shapes import rigid, sphere
 
 from gyriflow.comparison.placement import patches
 from gyriflow.comparison.prediction import (
-    BASELINES,
     apart,
     distances,
     endpoints,
@@ -15,13 +14,19 @@ from gyriflow.comparison.prediction import (
     scaled_to,
     with_skill,
 )
+from gyriflow.comparison.shapes import ready
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
+from gyriflow.report.labels import FORETOLD
 
 from .bumpy import RADIUS, bumpy, shaped
 
 
+def lying_apart(found, real):
+    return distances(apart(found, real, ready(real, real)))
+
+
 def test_spheres_in_each_other_are_apart_by_the_difference_of_their_radii():
-    found = distances(apart(sphere(12.0), sphere(10.0)))
+    found = lying_apart(sphere(12.0), sphere(10.0))
     assert found["distance_mm"] == pytest.approx(2.0, abs=0.03)
     assert found["distance95_mm"] == pytest.approx(2.0, abs=0.03)
 
@@ -31,7 +36,7 @@ def test_distances_are_weighted_by_area_and_the_far_ones_are_a_quantile():
     # the two caps beyond 0.9 of a radius have a tenth of a ball's area
     caps = np.abs(ball.vertices[:, 2:]) > 9.0
     raised = TriangleMesh(ball.vertices * np.where(caps, 1.1, 1.0), ball.faces)
-    found = distances(apart(raised, ball))
+    found = lying_apart(raised, ball)
     assert found["distance_mm"] == pytest.approx(0.1, abs=0.05)
     assert found["distance95_mm"] == pytest.approx(1.0, abs=0.15)
 
@@ -40,11 +45,11 @@ def test_each_side_of_the_middle_has_its_distance():
     ball = sphere(10.0)
     # waves on the right only
     right = np.where(ball.vertices[:, 0] > 0, 1 + 0.05 * np.cos(np.arctan2(*ball.vertices[:, 1:].T) * 8), 1.0)
-    found = distances(apart(TriangleMesh(ball.vertices * right[:, None], ball.faces), ball))
+    found = lying_apart(TriangleMesh(ball.vertices * right[:, None], ball.faces), ball)
     assert found["distance_right_mm"] > 5 * found["distance_left_mm"]
     assert found["distance_mm"] == pytest.approx((found["distance_left_mm"] + found["distance_right_mm"]) / 2, rel=0.05)
     half = TriangleMesh(ball.vertices + [20.0, 0, 0], ball.faces)
-    assert np.isnan(distances(apart(half, half))["distance_left_mm"])
+    assert np.isnan(lying_apart(half, half)["distance_left_mm"])
 
 
 def test_jagged_vertices_are_rough_and_even_ones_are_not():
@@ -84,7 +89,7 @@ def test_a_surface_is_scaled_to_a_volume():
 
 
 def test_skill_is_against_the_best_simple_way_of_the_week():
-    names = ["run", *BASELINES]
+    names = ["run", *FORETOLD]
     away = {22: [0.3, 0.6, 0.8, 0.9, 1.2, 0.1], 23: [0.9, 0.9, 0.8, 0.45, 1.2, 0.2]}
     rows = pd.DataFrame(
         [(week, name, value) for week, values in away.items() for name, value in zip(names, values, strict=True)],
