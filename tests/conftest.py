@@ -18,10 +18,7 @@ class Sets(LoadScopeScheduling):
     """Deals out files, whose tests share what takes long to set up, and what else is not to be parted."""
 
     def _split_scope(self, nodeid):
-        file, _, case = nodeid.partition("::")
-        if file == "tests/mpi/test_ranks.py":
-            # the same cases; the first number of ranks compiles the forms
-            return case.rpartition("-")[0]
+        file, _, _ = nodeid.partition("::")
         # both look at the one finished study
         if file in ("tests/workflow/test_dag.py", "tests/workflow/test_rerun.py"):
             return "finished"

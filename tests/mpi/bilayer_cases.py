@@ -12,6 +12,8 @@ from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_
 from verification_cases.modes import Slab, amplifications, critical_growth, growth_rates
 from verification_cases.slab import Waved, amplified
 
+pytestmark = [pytest.mark.slow, pytest.mark.one_rank]
+
 LONG = slice(0, 3)
 """The longest waves, which coarse meshes resolve."""
 ORDER = 1.5

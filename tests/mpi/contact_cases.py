@@ -134,6 +134,7 @@ def two_balls():
     return TetrahedralMesh(vertices, np.concatenate([ball.tets, ball.tets + len(ball.vertices)]))
 
 
+@pytest.mark.slow
 def test_ten_thousand_large_random_steps_cross_nothing():
     mesh = two_balls()
     facets, _ = boundary_faces(mesh)
@@ -188,6 +189,7 @@ def test_no_pair_is_missed_where_the_distance_has_grown():
     assert contact.forces() == pytest.approx(other.forces(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_large_random_steps_of_a_groove_cross_nothing():
     # unlike balls, the walls of a groove face each other, and a step that is not cut does cross them
     mesh = slab_with_a_sulcus()

@@ -35,11 +35,11 @@ def alive(folding, path):
 @pytest.mark.parametrize(
     ("kind", "changes"),
     [
-        ("planes", {}),
         ("global", {}),
-        ("none", {"support": "free"}),
+        pytest.param("planes", {}, marks=pytest.mark.one_rank),
+        pytest.param("none", {"support": "free"}, marks=pytest.mark.one_rank),
         # the tangent has to be raised in every step
-        ("none", {"stress_memory_gw": "infinite"}),
+        pytest.param("none", {"stress_memory_gw": "infinite"}, marks=pytest.mark.one_rank),
     ],
 )
 def test_objects_do_not_add_up(kind, changes, tmp_path_factory):

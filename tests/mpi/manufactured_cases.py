@@ -8,6 +8,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.manufactured import CASES, rates, solved
 
+pytestmark = [pytest.mark.slow, pytest.mark.one_rank]
+
 
 @pytest.mark.parametrize("case", CASES)
 def test_errors_fall_with_the_square_of_the_edge_and_those_of_gradients_with_the_edge(case):

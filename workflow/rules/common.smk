@@ -20,7 +20,8 @@ shell.prefix(
 
 
 def validated_config():
-    """Returns the configuration as models, what the input files hold, and why brains cannot be folded.
+    """Returns the configuration as models, the plan without refused brains, what the input files hold, and why brains
+    cannot be folded.
 
     Ends with a message and exit code 2 where it is not valid.
     """
@@ -36,32 +37,34 @@ def validated_config():
                 base = file.resolve().parent
         found = load(config, base, keep_going=keeps_going())
         # without the brains that an earlier pass of this call has refused, others may lead nowhere: these are left out
-        unled = Plan(found.without(refused_brains())).expecting.unled()
+        plan = Plan(found.without(refused_brains()))
+        unled = plan.expecting.unled()
         if unled and not refused_brains():
             raise next(iter(unled.values()))
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             require_own_results(Path.cwd(), files, found, record=not runs_nothing())
         record = workflow.is_main_process and not runs_nothing()
-        return found, input_contents(Path.cwd(), found, record), unled
+        return found, plan, input_contents(Path.cwd(), found, record), unled
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
 
 
-WHOLE_CONFIG, CONTENTS, UNLED = validated_config()
+WHOLE_CONFIG, PLAN, CONTENTS, UNLED = validated_config()
+if UNLED:
+    PLAN = Plan(PLAN.config.without((), unfolded=UNLED))
+CONFIG = PLAN.config
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
 REFUSED = {
     brain: cause
     for brain, cause in refused_brains().items()
     if brain in [known.id for known in WHOLE_CONFIG.brains]
 }
-CONFIG = WHOLE_CONFIG.without(REFUSED, unfolded=UNLED)
 if REFUSED and not CONFIG.brains:
     # each has told its cause
     sys.exit(0)
-PLAN = Plan(CONFIG)
 if workflow.is_main_process:
     for cause in UNLED.values():
         print(f"gyriflow: not folded: {cause}", file=sys.stderr)

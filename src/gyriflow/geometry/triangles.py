@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts are imported where they are used, which a dry run need not wait for
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -75,7 +74,7 @@ def face_normals(mesh: TriangleMesh) -> Floats:
 def scatter_to_vertices(mesh: TriangleMesh, face_values: NDArray) -> Floats:
     """Returns per vertex the sum of (m,) or (m, k) values over its faces."""
     corner = np.repeat(np.arange(len(mesh.faces)), 3)
-    incidence = sparse.csr_matrix(
+    incidence = scipy.sparse.csr_matrix(
         (np.ones(corner.size), (mesh.faces.ravel(), corner)), shape=(len(mesh.vertices), len(mesh.faces))
     )
     return incidence @ face_values
@@ -126,11 +125,11 @@ def euler_number(mesh: TriangleMesh) -> int:
 
 def face_components(mesh: TriangleMesh) -> Ints:
     """Returns the (m,) number of the connected component of each face, the largest area first (0)."""
-    graph = sparse.coo_matrix(
+    graph = scipy.sparse.coo_matrix(
         (np.ones(2 * len(mesh.faces)), (mesh.faces[:, [0, 1]].ravel(), mesh.faces[:, [1, 2]].ravel())),
         shape=(len(mesh.vertices),) * 2,
     )
-    _, label = connected_components(graph, directed=False)
+    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
     order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
     rank = np.empty_like(order)

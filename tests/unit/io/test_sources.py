@@ -19,6 +19,7 @@ def package(tmp_path, monkeypatch):
         "mesh/__init__.py": "import numpy",
         "mesh/quality.py": "import gyriflow.units",
         "mesh/gates.yaml": "least: 1",
+        "mesh/fill.py": "from .. import (\n    surface,  # a room\n    units as u,\n)\nimport os, gyriflow.unused as other",
         "unused.py": "",
     }
     for name, text in contents.items():
@@ -37,6 +38,7 @@ def package(tmp_path, monkeypatch):
         ("surface/labels.py", {"surface"}),
         ("mesh/quality.py", {"units"}),
         ("mesh/__init__.py", set()),
+        ("mesh/fill.py", {"surface", "units", "unused"}),
     ],
 )
 def test_imports_are_found_at_the_top_and_in_functions(package, module, rooms):
@@ -48,6 +50,16 @@ def test_modules_behind_a_program_are_followed_through_others(package, tmp_path)
     program.write_text("from gyriflow.surface.labels import read")
     names = {path.relative_to(package).as_posix() for path in modules_behind(program)}
     assert names == {"__init__.py", "surface/__init__.py", "surface/labels.py", "surface/repair.py", "units.py"}
+
+
+def test_imports_of_other_functions_do_not_count_where_one_is_named(package, tmp_path):
+    program = tmp_path / "draw.py"
+    program.write_text(
+        "import gyriflow.units\n\n\ndef one(\n    a,\n) -> None:\n    from gyriflow.mesh import quality\n\n\n"
+        "def one_more():\n    import gyriflow.unused\n"
+    )
+    for function, rooms in (("one", {"units", "mesh"}), ("one_more", {"units", "unused"})):
+        assert {room_of(path) for path in imported_modules(program, function)} - {"__init__"} == rooms
 
 
 def test_a_change_of_a_module_or_of_data_beside_it_changes_the_hash(package, tmp_path):
