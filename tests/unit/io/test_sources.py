@@ -19,7 +19,7 @@ def package(tmp_path, monkeypatch):
         "mesh/__init__.py": "import numpy",
         "mesh/quality.py": "import gyriflow.units",
         "mesh/gates.yaml": "least: 1",
-        "mesh/fill.py": "from .. import (\n    surface,  # a room\n    units as u,\n)\nimport os, gyriflow.unused as other",
+        "mesh/fill.py": "from .. import (\n    surface,  # one\n    units as u,\n)\nimport gyriflow.unused as o",
         "unused.py": "",
     }
     for name, text in contents.items():
