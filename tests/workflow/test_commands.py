@@ -19,7 +19,7 @@ def gyriflow(workflow, *arguments):
 def test_help_names_every_command_and_how_a_study_goes(workflow):
     said = gyriflow(workflow, "--help").stdout
     assert said.startswith("Usage: gyriflow")
-    for command in ("init", "check", "run", "status", "view", "compare", "completion"):
+    for command in ("init", "check", "run", "status", "view"):
         assert f"\n  {command} " in said
 
 
@@ -82,15 +82,6 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours_and_cost(workflow)
     assert cost == pytest.approx(hours / 2, rel=0.1)
     # the memory of a cluster is not that of this machine
     assert "are free" not in re.search(r"\nmemory .*", said)[0]
-
-
-def test_completion_scripts_are_printed(workflow):
-    for shell, words in (
-        ("bash", "complete -o nosort -F"),
-        ("zsh", "#compdef gyriflow"),
-        ("fish", "complete --no-files"),
-    ):
-        assert words in gyriflow(workflow, "completion", shell).stdout
 
 
 def test_view_and_status_say_what_is_missing(workflow):

@@ -10,7 +10,6 @@ from typing import Any
 
 import click
 from click.core import ParameterSource
-from click.shell_completion import get_completion_class
 
 from ..errors import GyriflowError, InputError
 from ..shipped import CONFIG, DEMO, SHIPPED
@@ -26,7 +25,6 @@ LABELS = ("--participant-label", "--participant_label", "--session-label", "--se
 """Options of BIDS apps with several values after each other."""
 ELSEWHERE = ("--profile", "--executor", "-e")
 """Options of Snakemake's by which jobs run on other machines."""
-SHELLS = ("bash", "zsh", "fish")
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -308,51 +306,6 @@ def view(directory: Path, only_print: bool) -> None:
     click.echo(report)
     if not only_print:
         click.launch(str(report))
-
-
-@main.command()
-@click.argument("first", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.argument("second", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option(
-    "--tolerance",
-    type=click.FloatRange(0),
-    default=1e-6,
-    show_default=True,
-    help="Relative difference that counts as none.",
-)
-def compare(first: Path, second: Path, tolerance: float) -> None:
-    """Compare two results folders: settings, versions, inputs, and every number of their tables.
-
-    Ends with 0 where all numbers agree, with 1 where some differ.
-    """
-    from .compare import compare_results
-
-    found = compare_results(first, second, tolerance)
-    if found.settings:
-        click.echo("\n".join(["settings that differ:", *(f"  {line}" for line in found.settings)]))
-    for file, text in found.differences:
-        click.echo(f"{file}: {text}")
-    click.echo(
-        f"{found.numbers} numbers of {found.tables} tables compared: "
-        + (f"all within {tolerance:g}" if not found.differences else f"{len(found.differences)} differences")
-    )
-    sys.exit(bool(found.differences))
-
-
-@main.command()
-@click.argument("shell", type=click.Choice(SHELLS))
-def completion(shell: str) -> None:
-    """Print the script that completes commands and options in a SHELL.
-
-    \b
-    For bash:  gyriflow completion bash >> ~/.bashrc
-    For zsh:   gyriflow completion zsh >> ~/.zshrc
-    For fish:  gyriflow completion fish > ~/.config/fish/completions/gyriflow.fish
-    """
-    complete = get_completion_class(shell)
-    if complete is None:
-        raise click.ClickException(f"no completion for {shell}")
-    click.echo(complete(main, {}, "gyriflow", "_GYRIFLOW_COMPLETE").source())
 
 
 def _chosen(config: Path | None, directory: Path) -> Path:
