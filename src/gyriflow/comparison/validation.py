@@ -25,7 +25,7 @@ from ..geometry.triangles import (
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .placement import MEASURES, SKILLED_FROM, placement
 from .prediction import apart, distances
-from .shapes import Shape, against_real, cortex_dice, fold_measures
+from .shapes import Shape, against_real, cortex_dice
 
 type Kind = Literal["explained", "predicted"]
 """Whether growth came from the weeks that are compared, or from another brain, atlas or only earlier weeks."""
@@ -75,8 +75,7 @@ def validation_row(
     `cortex_dice`, both of the surfaces as they are, laid onto each other rigidly; area_cm2, volume_ml and the same with
     real_ and curve_ in front; area_error and volume_error against the curve and area_difference and volume_difference
     from the real brain, as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
-    `placement.placement`, `shapes.against_real` and `shapes.fold_measures`, the latter for the real brain with real_ in
-    front.
+    `placement.placement` and `shapes.against_real`.
 
     `simulated` and `real_brain` are closed surfaces in mm as they are; `curve` the area (mm²) and volume (mm³) that the
     run was to follow in this week, if any; the shapes are ready and laid onto the real brain, as for `placement`.
@@ -92,10 +91,7 @@ def validation_row(
         row[f"{name}_error"] = row[f"{name}_{unit}"] / aim - 1
         row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"real_{name}_{unit}"] - 1
     row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=comparison.seed, mirrored=mirrored)
-    row |= against_real(run, real)
-    measures = {"": fold_measures(run), "real_": fold_measures(real)}
-    # relative area is that of the surfaces as they are
-    return {f"{who}{name}": value for who, found in measures.items() for name, value in found.items()} | row
+    return row | against_real(run, real)
 
 
 def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
