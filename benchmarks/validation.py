@@ -4,8 +4,9 @@
 
 STUDY_FOLDER is where the study ran (with `results/study/` in it), its `results`, or `results/study` itself. The tables
 `validation.csv` and `displacement_agreement.csv` there are read. The last line is one JSON object: for each run by its
-name `worst_area_error`, `worst_volume_error`, `skill_shape_index`, `skill_mean_curvature`, `curvature_rms_ratio`,
-`displacement_r`, `displacement_slope` and the skill by horizon, explained and predicted weeks apart under `horizon`;
+name `worst_area_error`, `worst_volume_error` of all weeks, `skill_shape_index`, `skill_mean_curvature`,
+`curvature_rms_ratio`, `displacement_r`, `displacement_slope` of the last week or interval, and under `horizon` gain and
+skill by weeks since the start, explained and predicted weeks apart;
 where the metrics are there too, `largest_difference` of either hemisphere from the real one in the last week, by
 metric.
 """
@@ -13,12 +14,14 @@ metric.
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from gyriflow.comparison.validation import over_starts, summary
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_table
+
+MOVES = ["displacement_r", "displacement_slope"]
 
 
 def tables(folder: Path) -> Path:
@@ -34,6 +37,22 @@ def tables(folder: Path) -> Path:
     )
 
 
+def summary(rows: pd.DataFrame, moves: pd.DataFrame) -> dict[str, Any]:
+    """Returns what the rows of one run's validation and displacement say; None where there is no number."""
+    last = rows[rows["week"] == rows["week"].max()]
+    final = moves[moves["to_week"] == moves["to_week"].max()] if len(moves) else pd.DataFrame(columns=MOVES)
+    numbers = {f"worst_{name}": rows[name].abs().max() for name in ("area_error", "volume_error")}
+    numbers |= last[["skill_shape_index", "skill_mean_curvature", "curvature_rms_ratio"]].mean().to_dict()
+    numbers |= final[MOVES].mean().to_dict()
+    found: dict[str, Any] = {name: float(value) if pd.notna(value) else None for name, value in numbers.items()}
+    worth = [f"{name}_{measure}" for name in ("gain", "skill") for measure in ("shape_index", "mean_curvature")]
+    horizons = {
+        str(kind): json.loads(part.groupby("horizon")[worth].mean().to_json(orient="index"))
+        for kind, part in rows.groupby("kind")
+    }
+    return {"kind": str(rows["kind"].iloc[0]), "last_week": float(last["week"].iloc[0])} | found | {"horizon": horizons}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("study", type=Path)
@@ -46,13 +65,17 @@ def main() -> None:
     shown += ["r_start_shape_index", "r_adjacent_shape_index", "gain_low_shape_index", "gain_high_shape_index"]
     shown += ["skill_shape_index", "skill_mean_curvature", "curvature_rms_ratio"]
     print(validation[[name for name in shown if name in validation]].to_string(index=False, float_format="%.3f"))
-    found = summary(validation, displacement)
+    found = {
+        str(run): summary(rows, displacement[displacement["run"] == run] if len(displacement) else displacement)
+        for run, rows in validation.groupby("run", sort=False)
+    }
     horizons = folder / "horizon.csv"
     if horizons.exists():
-        shown = ["model", "kind", "known_gw", "horizon", "starts", "gain_shape_index", "gain_mean_curvature"]
-        shown += ["skill_shape_index", "skill_mean_curvature", "displacement_r", "displacement_r_scaling"]
+        shown = ["gain_shape_index", "gain_mean_curvature", "skill_shape_index", "skill_mean_curvature"]
+        shown += ["displacement_r", "displacement_r_scaling"]
         print("\nby horizon, over the starts:")
-        print(over_starts(read_table(horizons))[shown].to_string(index=False, float_format="%.3f"))
+        groups = read_table(horizons).groupby(["model", "kind", "known_gw", "horizon"], dropna=False)
+        print(groups[shown].mean().to_string(float_format="%.3f"))
     agreement = folder / "folding_agreement.csv"
     if agreement.exists():
         table = read_table(agreement)

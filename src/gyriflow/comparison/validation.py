@@ -1,4 +1,4 @@
-"""What a study's simulations are worth: a row per run and week, what these say in short and by horizon.
+"""What a study's simulations are worth: a row per run and week, and what these say by horizon.
 
 Beside them how the surface moves and how much it is folded, each against the real brain.
 """
@@ -23,7 +23,7 @@ from ..geometry.triangles import (
     vertex_areas,
 )
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .placement import MEASURES, SKILLED_FROM, placement
+from .placement import MEASURES, placement
 from .prediction import apart, distances
 from .shapes import Shape, against_real, cortex_dice
 
@@ -103,72 +103,6 @@ def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
     )
 
 
-def summary(validation: pd.DataFrame, displacement: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """Returns what the tables say of each run, by its name.
-
-    Validation are rows of `validation_row`; displacement those of `displacement_table` with the columns run, start_week
-    and seed, and may be empty.
-
-    Returns
-    -------
-    dict
-        For each run: kind; worst_area_error and worst_volume_error (largest fractions against the curve, of all weeks);
-        skill_shape_index, skill_mean_curvature, curvature_rms_ratio, last_week (the last week compared, means over
-        seeds and starts); displacement_r, displacement_slope (of the last interval up to that week);
-        skill_by_horizon for each measure, {weeks since the start: mean}, with the gain r − r(start) at horizon 1, where
-        there is no skill; gain_by_horizon; horizon, the same by kind, so that explained and predicted weeks of several
-        starts are not mixed (`by_kind`). None where there is no number.
-
-    InputError where a column is missing.
-    """
-    of_measures = {kind: [f"{kind}_{measure}" for measure in MEASURES] for kind in ("skill", "gain")}
-    _require(
-        validation,
-        ["run", "kind", "week", "horizon", "area_error", *of_measures["skill"], *of_measures["gain"]],
-        "validation",
-    )
-    if len(displacement):
-        _require(displacement, ["run", "to_week", *MOVES[:2]], "displacement")
-    found = {}
-    for name, rows in validation.groupby("run", sort=False):
-        last = rows[rows["week"] == rows["week"].max()]
-        run: dict[str, Any] = {
-            "kind": str(rows["kind"].iloc[0]),
-            "last_week": float(last["week"].iloc[0]),
-            "worst_area_error": _number(rows["area_error"].abs().max()),
-            "worst_volume_error": _number(rows["volume_error"].abs().max()),
-        }
-        run |= {column: _number(last[column].mean()) for column in [*of_measures["skill"], "curvature_rms_ratio"]}
-        moves = displacement[displacement["run"] == name] if len(displacement) else displacement
-        final = moves[moves["to_week"] == moves["to_week"].max()] if len(moves) else None
-        run |= {column: None if final is None else _number(final[column].mean()) for column in MOVES[:2]}
-        means = rows.groupby("horizon")[[*of_measures["skill"], *of_measures["gain"]]].mean()
-        skills, gains = (
-            {
-                measure: {f"{at:g}": _number(row[f"{kind(at)}_{measure}"]) for at, row in means.iterrows()}
-                for measure in MEASURES
-            }
-            for kind in (lambda at: "gain" if at <= SKILLED_FROM else "skill", lambda _: "gain")
-        )
-        found[str(name)] = run | {"skill_by_horizon": skills, "gain_by_horizon": gains, "horizon": by_kind(rows)}
-    return found
-
-
-def by_kind(rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """Returns {kind: {measure: {horizon: gain, skill and number of starts}}} of rows of one run's validation."""
-    return {
-        str(kind): {
-            measure: {
-                f"{horizon:g}": {name: _number(at[f"{name}_{measure}"].mean()) for name in ("gain", "skill")}
-                | {"starts": at["start_week"].nunique()}
-                for horizon, at in of_kind.groupby("horizon")
-            }
-            for measure in MEASURES
-        }
-        for kind, of_kind in rows.groupby("kind")
-    }
-
-
 def horizon_table(
     validation: pd.DataFrame,
     displacement: pd.DataFrame,
@@ -179,8 +113,10 @@ def horizon_table(
 
     Parameters
     ----------
-    validation, displacement
-        As for `summary`.
+    validation
+        Rows of `validation_row`.
+    displacement
+        Those of `displacement_table` with the columns run, start_week and seed; may be empty.
     models
         What runs are called that differ in their start, their seed or in what is known only, by run.
     known_until_gw
@@ -211,14 +147,6 @@ def horizon_table(
     return table
 
 
-def over_starts(horizons: pd.DataFrame) -> pd.DataFrame:
-    """Returns the means over the start weeks of a table of `horizon_table`, with how many there are in `starts`."""
-    groups = horizons.groupby(["model", "kind", "known_gw", "horizon"], dropna=False, sort=True)
-    table = groups[[*(name for name in GAINS if "low" not in name and "high" not in name), *MOVES]].mean().reset_index()
-    table.insert(4, "starts", groups["start_week"].nunique().to_numpy())
-    return table
-
-
 def _sizes(mesh: TriangleMesh) -> dict[str, float]:
     surface, volume = area(mesh), signed_volume(mesh)
     return {
@@ -226,21 +154,6 @@ def _sizes(mesh: TriangleMesh) -> dict[str, float]:
         "volume_ml": volume * ML_PER_MM3,
         "relative_area": surface / volume ** (2 / 3),
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _require(table: pd.DataFrame, columns: list[str], name: str) -> None:
-    missing = [column for column in columns if column not in table.columns]
-    if missing:
-        raise InputError(
-            f"the {name} table lacks columns",
-            found=", ".join(map(str, table.columns)),
-            expected=", ".join(missing),
-            remedy="It was written by another version: make it again.",
-        )
 
 
 def vector_agreement(one: Floats, measured: Floats, weights: Floats) -> tuple[float, float]:

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.comparison.validation import by_kind, horizon_table, over_starts
+from gyriflow.comparison.validation import horizon_table
 from gyriflow.report.scores import horizon_chart
 
 MODELS = {"known": "known", "late": "known", "other": "other"}
@@ -65,23 +65,6 @@ def test_each_start_and_horizon_has_a_row_and_kinds_are_apart(table):
     )
     assert table["displacement_r"].tolist() == pytest.approx([np.nan, 0.9, *[np.nan] * 4], nan_ok=True)
     assert horizon_table(VALIDATION, pd.DataFrame(), MODELS, UNTIL)["displacement_r"].isna().all()
-
-
-def test_means_over_starts_are_of_one_kind(table):
-    means = over_starts(table)
-    assert means[["kind", "horizon", "starts"]].to_numpy().tolist() == [
-        ["explained", 1, 2],
-        ["explained", 2, 1],
-        ["predicted", 1, 1],
-        ["predicted", 2, 1],
-        ["predicted", 1, 1],
-    ]
-    assert means["gain_shape_index"].tolist() == pytest.approx([0.25, 0.2, -0.1, -0.2, 0.0])
-    mixed = pd.concat([VALIDATION[VALIDATION["run"] == run] for run in ("known", "late")])
-    found = by_kind(mixed)
-    assert found["predicted"]["shape_index"]["2"] == {"gain": -0.2, "skill": -0.4, "starts": 1}
-    assert found["explained"]["shape_index"]["1"]["starts"] == 2
-    assert found["explained"]["shape_index"]["1"]["skill"] is None
 
 
 def test_the_chart_has_a_line_for_each_start_and_panels_for_each_kind(table):
