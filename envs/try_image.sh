@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # envs/try_image.sh [FOLDER]: builds the image of envs/Dockerfile with buildah from Debian's packages alone, without a
-# registry, and tries it: the command, the imports, and a shape that is meshed and folded on two ranks.
+# registry, and tries it: the command, the imports, and a scan of a BIDS folder that is folded on two ranks.
 # Needs root, buildah, mmdebstrap and about 8 GB in FOLDER (default: a temporary one). All of it is removed at the end.
 set -euo pipefail
 
@@ -39,24 +39,26 @@ build bud --isolation chroot --pull-never --quiet "${volumes[@]}" --tag gyriflow
     >"$work/log" 2>&1 || { tail -n 30 "$work/log"; exit 1; }
 build images --format '{{.Name}}:{{.Tag}} {{.Size}}'
 
-mkdir "$work/study"
-cat >"$work/study/shape.yaml" <<'STUDY'
-brains: [{id: ball, week: 21, shape: {kind: sphere, radius_mm: 20}}]
-start: ball
+# a scan of the shipped atlas, of very coarse triangles
+scan=$work/study/data/derivatives/seg/sub-01/anat
+mkdir -p "$scan"
+cp "$here/atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz" "$scan/sub-01_dseg.nii.gz"
+printf 'participant_id\tgestational_age\nsub-01\t21\n' >"$work/study/data/participants.tsv"
+cat >"$work/study/settings.yaml" <<'STUDY'
 surface: {edge_length_mm: 3.0}
-mesh: {order: 1, surface_edge_mm: 3.0, core_edge_mm: 6.0, mesher: tetgen, max_surface_distance_mm: 0.5}
-folding: {end_week: 21.5, thickness_mm: 4.0, support: free, no_growth: {kind: none}, contact: {kind: none}, ranks: 2}
-metrics: {curvature_radius_mm: 9.0}
+mesh: {order: 1, surface_edge_mm: 3.0, core_edge_mm: 6.0, mesher: tetgen, max_surface_distance_mm: 1.5}
+folding: {thickness_mm: 4.0, step_s: 302400, ranks: 2}
+metrics: {curvature_radius_mm: 7.0, spangy_modes: 60}
 runs: {reference: {}}
 STUDY
 container=$(build from --pull-never gyriflow)
-# as with `docker run -v "$PWD:$PWD" -w "$PWD"`
+chown -R 1000:1000 "$work/study"
 inside() {
     echo "+ $*"
-    build run --isolation chroot --volume "$here:$here" --volume "$work/study:/study" --workingdir "$here" "$container" -- "$@"
+    build run --isolation chroot --user 1000:1000 --volume "$work/study:/study" "$container" -- "$@"
 }
 inside gyriflow --version
 inside python -c 'import dolfinx, pymeshlab, pytetwild, pyvista; print("dolfinx", dolfinx.__version__)'
-inside gyriflow run /study/shape.yaml --cores 2 --stage folding --directory /study
-test -s "$work/study/results/runs/reference/ball/folding/summary.json"
+inside gyriflow /study/data /study/out participant --settings /study/settings.yaml --cores 2
+test -s "$work/study/out/sub-01/anat/sub-01_hemi-L_desc-referencegw2200_pial.surf.gii"
 echo "the image works"
