@@ -7,7 +7,7 @@ from shapes import LPS, hemisphere, save_gifti
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_surface, write_vertex_labels
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps, write_surface, write_vertex_labels
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
 from gyriflow.phantom.brain import CORTEX, phantom_labels
@@ -27,6 +27,8 @@ STUDY = {
         "curvature_radius_mm": 6,
         "spangy_modes": 60,
         "export": "bids",
+        "template": "p22",
+        "white_surfaces": "all",
         "regions": {"p22": {"volume": "regions.nii.gz", "names": {1: "front", 2: "front", 3: "back", 4: "back"}}},
     },
 }
@@ -108,6 +110,18 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
     bids = results / "export" / "sub-one" / "ses-2200w" / "anat"
     assert (bids / "sub-one_ses-2200w_hemi-L_thickness.shape.gii").exists()
     assert not list((results / "export").rglob(".snakemake*"))
+
+    for where in ("brains/p21/metrics", "brains/p22/metrics", "runs/reference/p21/metrics/week-22.00"):
+        maps = read_vertex_maps(results / where / "left.template.shape.gii")
+        template = read_surface(results / "brains" / "p22" / "surface" / "left.pial.surf.gii")
+        assert len(maps["thickness_mm"]) == len(template.vertices)
+        assert np.median(maps["template_distance_mm"]) < 0.5
+        own = read_vertex_maps(results / where / "left.shape.gii")["sulcal_depth_mm"]
+        assert maps["sulcal_depth_mm"].mean() == pytest.approx(own.mean(), rel=0.2)
+    white = metrics[metrics["metric"] == "white_area"].set_index(["subject", "hemisphere"])["value"]
+    assert set(white.index) == {(brain, part) for brain in ("p21", "p22") for part in ("whole", *SIDES)}
+    measured = whole[:, "real"].droplevel("week").reindex(white.index)
+    assert (white / measured).between(0.6, 0.95).all()
 
 
 @pytest.mark.slow

@@ -64,6 +64,53 @@ use rule measure as measure_right with:
         where=one_of(PLAN.measuring.of_sides("right")),
 
 
+rule white:
+    input:
+        unpack(lambda wildcards: PLAN.measuring.of_brain(wildcards.brain).parts),
+        report=PIAL["report"],
+        source=lambda wildcards: list(
+            PLAN.measuring.white_source(wildcards.brain).values()
+        ),
+    output:
+        **white_of(*SIDES),
+    wildcard_constraints:
+        brain=one_of(PLAN.measuring.with_white(*SIDES)),
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        **of_brain("affine_from"),
+        labels=lambda wildcards: PLAN.measuring.of_brain(wildcards.brain).labels,
+        scheme=of(PLAN.brains.scheme),
+        # exchanged files are the same inputs to Snakemake
+        source=of(PLAN.measuring.white_source),
+        surface=CONFIG.surface.model_dump(
+            include={
+                "smoothing_voxels",
+                "edge_length_mm",
+                "smoothing_iterations",
+                "max_hole_mm",
+            }
+        ),
+        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+    script:
+        "../scripts/white.py"
+
+
+use rule white as white_left with:
+    output:
+        **white_of("left"),
+    wildcard_constraints:
+        brain=one_of(PLAN.measuring.with_white("left")),
+
+
+use rule white as white_right with:
+    output:
+        **white_of("right"),
+    wildcard_constraints:
+        brain=one_of(PLAN.measuring.with_white("right")),
+
+
 rule displacement:
     input:
         FOLDING["frames"],

@@ -1,4 +1,5 @@
 # Regions of the cortex: given on some brains, carried to others by registration, and to simulated ones with the tissue.
+# Maps of all brains at the vertices of one, the template.
 rule given_regions:
     input:
         unpack(lambda wildcards: CONFIG.metrics.regions[wildcards.brain].files),
@@ -64,3 +65,22 @@ rule region_metrics:
         labels=lambda wildcards: PLAN.measuring.at(wildcards.where).labels,
     script:
         "../scripts/region_metrics.py"
+
+
+rule template_maps:
+    input:
+        unpack(of(PLAN.measuring.template_files)),
+        correspondence=lambda wildcards: PLAN.chains.to_template(
+            PLAN.measuring.at(wildcards.where).subject
+        ),
+        maps="results/{where}/{side}.shape.gii",
+    output:
+        TEMPLATE_MAPS,
+    wildcard_constraints:
+        where=one_of(brain.where for brain in PLAN.measuring.every),
+    params:
+        posed=lambda wildcards: PLAN.chains.in_pose(
+            CONFIG.metrics.template, PLAN.measuring.at(wildcards.where).subject
+        ),
+    script:
+        "../scripts/template_maps.py"

@@ -75,7 +75,10 @@ rule export:
         [
             list(brain[kind].values())
             for brain in EXPORTED
-            for kind in ("surfaces", "maps", "regions", "white")
+            for kind in (
+                *("surfaces", "maps", "regions"),
+                *("white", "white_maps", "template_maps"),
+            )
         ],
         [brain["report"] for brain in EXPORTED],
         [

@@ -210,6 +210,7 @@ def metrics(config: "Config") -> Iterator[Problem]:
     given, known = config.metrics, [brain.id for brain in config.brains]
     yield from _unknown(given.norm_reference or (), known, ("metrics", "norm_reference"))
     yield from _unknown(given.regions, known, ("metrics", "regions"))
+    yield from _unknown([given.template] if given.template else (), known, ("metrics", "template"))
     # the carrying of regions and their asymmetry are of both sides
     if wrong := [brain.id for brain in config.brains if brain.id in given.regions and brain.hemisphere is not None]:
         yield Problem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))

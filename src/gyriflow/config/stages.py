@@ -146,6 +146,14 @@ class MetricsSettings(Settings):
         "Regions of the cortex, by the id of the brain on which they are given. Registration carries them to other "
         "brains, and the tissue to simulated ones.",
     )  # fmt: skip
+    white_surfaces: Literal["given", "all"] = setting(
+        "given",
+        "",
+        "White surfaces that are measured: those given, or `all`, also the inner border of cortex in labels.",
+    )
+    template: str | None = setting(
+        None, "", "Id of a measured brain. The target `export` then has all maps at its vertices, too, by registration."
+    )
     export: ExportNames = setting("plain", "", "How the target `export` names files; `bids` as in derivatives.")
 
 

@@ -4,14 +4,14 @@ Brains correspond by registration, which carries any point, or by surfaces with 
 and meshes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, carry_back, transform_points
-from ..geometry.matching import labels_at, match_points
+from ..geometry.matching import labels_at, match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
 from .matched_surfaces import follow_inside, follow_surfaces
@@ -74,6 +74,27 @@ def carry_regions(
         _require_on_grid(between, source.vertices, "the surface")
     shape = TriangleMesh(carry_surface(source, [between]), source.faces)
     return labels_at(match_points(target.vertices, vertex_normals(target), shape), labels)
+
+
+def maps_on_template(
+    maps: Mapping[str, NDArray], surface: TriangleMesh, template: TriangleMesh, between: Sequence[Correspondence]
+) -> dict[str, NDArray]:
+    """Returns maps at the vertices of a brain's surface at the (n,) places of the vertices of a template.
+
+    The template is carried into the brain's space; each of its vertices takes the value at the nearest point whose
+    normal agrees, linear in between, and the nearest one of a map of whole numbers. `template_distance_mm` is how far
+    away that point is. `between` leads from the template to the brain; nothing where these are one.
+    """
+    for pair in between:
+        if isinstance(pair, Deformation):
+            _require_on_grid(pair, template.vertices, "the template")
+    shape = TriangleMesh(carry_surface(template, between), template.faces)
+    match = match_points(shape.vertices, vertex_normals(shape), surface)
+    found: dict[str, NDArray] = {
+        name: labels_at(match, values) if (values == np.round(values)).all() else values_at(match, values)
+        for name, values in maps.items()
+    }
+    return {**found, "template_distance_mm": match.distance_mm}
 
 
 def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> None:

@@ -50,7 +50,8 @@ README = """\
 Pial surfaces of fetal brains, maps of folding on them, and simulated brains of later weeks, made by gyriflow {version}.
 
 - `*_pial.surf.gii`: surfaces, in the world coordinates (RAS+ mm) of the input's volumes; `*_curv.shape.gii` and others:
-  a map with a value at each of their vertices, described with its unit in the file `.json` of its name.
+  a map with a value at each of their vertices, described with its unit in the file `.json` of its name. Those of a
+  `space-` are at the vertices of the pial surfaces of that subject and session.
 - `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each. `*_dseg.nii.gz` are their labels
   in the grid of the start's: `dseg.tsv`.
 - `participants.tsv` and `sessions.tsv`: gestational ages in weeks. `metrics_wide.tsv` has a row for each brain,
@@ -69,9 +70,10 @@ class ExportedBrain:
     """A brain at a week, and its files by the sides that it has; regions may be empty.
 
     The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said. Of a
-    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface. White
-    surfaces are the user's files. The volume, which simulated brains of labels have, names the start's `labels` with
-    `affine_from`, in whose grid theirs are written, and the `surface` and `thickness` of the whole brain.
+    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface. There
+    may be white surfaces with their own maps, and maps at the vertices of another brain, the template. The volume,
+    which simulated brains of labels have, names the start's `labels` with `affine_from`, in whose grid theirs are
+    written, and the `surface` and `thickness` of the whole brain.
     """
 
     brain: str
@@ -84,6 +86,9 @@ class ExportedBrain:
     report: str
     covariates: Mapping[str, str]
     white: Mapping[Side, str] = field(default_factory=dict)
+    white_maps: Mapping[Side, str] = field(default_factory=dict)
+    template: str | None = None
+    template_maps: Mapping[Side, str] = field(default_factory=dict)
     volume: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -94,8 +99,10 @@ def export_plain(folder: AnyPath, brains: Sequence[ExportedBrain], tables: Mappi
         write_table(folder / f"{name}.csv", table)
     for brain in brains:
         place = folder / brain.brain / brain.run / f"week-{brain.week:.2f}"
-        for path in (*brain.surfaces.values(), *brain.maps.values(), *brain.regions.values()):
-            _copy(path, place / Path(path).name)
+        of_white = brain.white, brain.white_maps
+        for files in (brain.surfaces, brain.maps, brain.regions, *of_white, brain.template_maps):
+            for path in files.values():
+                _copy(path, place / Path(path).name)
 
 
 def export_bids(
@@ -114,17 +121,20 @@ def export_bids(
     """
     folder = Path(folder)
     names = _subjects_and_sessions([brain for brain in brains if brain.run == MEASURED])
-    described: dict[str, dict[str, str]] = {
-        kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"} for kind in ("pial", "white")
+    described: dict[str, dict[str, Any]] = {
+        kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"}
+        for kind, there in {"pial": True, "white": any(brain.white for brain in brains)}.items()
+        if there
     }
-    simulated: dict[str, str] = {}
+    space, reference = _template(brains, names)
+    descriptions: dict[str, str] = {}
     taken: dict[tuple[str, str], ExportedBrain] = {}
     for brain in brains:
         subject, session = names[brain.brain]
         stem, label = "_".join(filter(None, (subject, session))), ""
         if brain.run != MEASURED:
             label = f"{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
-            simulated[f"desc-{label}"] = f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
+            descriptions[f"desc-{label}"] = f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
         if (other := taken.setdefault((stem, label), brain)) is not brain:
             raise InputError(
                 f"two brains have the same BIDS name {stem}",
@@ -133,24 +143,30 @@ def export_bids(
             )
         pose = read_pose(brain.report)
         desc = f"_desc-{label}" if label else ""
+        place = folder / subject / (session or "") / "anat"
+        back = pose.inverse if pose.together else np.eye(4)
+        if brain.white:
+            descriptions["desc-white"] = "Map on the white surface; those without it are on the pial one"
         for side, surface in brain.surfaces.items():
-            named = f"{folder / subject / (session or '') / 'anat' / stem}_hemi-{side[0].upper()}"
-            back = pose.inverse if pose.together else np.eye(4)
+            named = f"{place / stem}_hemi-{side[0].upper()}"
             write_surface(f"{named}{desc}_pial.surf.gii", transformed(read_surface(surface), back), STRUCTURES[side])
             if side in brain.white:
-                # as given, in the place of the pial one
-                white = transformed(read_surface(brain.white[side]), back @ pose.of_file(side))
+                white = transformed(read_surface(brain.white[side]), back)
                 write_surface(f"{named}_white.surf.gii", white, STRUCTURES[side])
-            for quantity, values in read_vertex_maps(brain.maps[side]).items():
-                suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
-                described[suffix] = {"Description": text, "Units": unit}
-                write_vertex_maps(f"{named}{desc}_{suffix}.shape.gii", {quantity: values}, STRUCTURES[side])
             if side in brain.regions:
                 _copy(brain.regions[side], f"{named}{desc or '_desc-regions'}_dseg.label.gii")
+            for files, entities in ((brain.maps, ""), (brain.template_maps, space), (brain.white_maps, "")):
+                maps = read_vertex_maps(files[side]) if side in files else {}
+                for quantity, values in maps.items():
+                    suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
+                    known = {"Description": text, "Units": unit}
+                    described["_".join(filter(None, (entities, suffix)))] = known | (reference if entities else {})
+                    density = f"_{entities}_den-{len(values)}" if entities else ""
+                    of_white = "_desc-white" if files is brain.white_maps else desc
+                    path = f"{named}{density}{of_white}_{suffix}.shape.gii"
+                    write_vertex_maps(path, {quantity: values}, STRUCTURES[side])
         if brain.volume and pose.together:
-            write_label_volume(
-                folder / subject / (session or "") / "anat" / f"{stem}{desc}_dseg.nii.gz", _labels(brain, pose.inverse)
-            )
+            write_label_volume(place / f"{stem}{desc}_dseg.nii.gz", _labels(brain, pose.inverse))
             lookup = pd.DataFrame({"index": [1, 2], "name": ["cerebrum within the cortex", "cortex"]})
             _write_tsv(folder / "dseg.tsv", lookup)
     for suffix, sidecar in described.items():
@@ -158,8 +174,8 @@ def export_bids(
     ignored = "\n".join(f"/{suffix}.json" for suffix in sorted(described))
     write_text(folder / ".bidsignore", IGNORED.format(kinds=ignored))
     write_text(folder / "README.md", README.format(version=version))
-    if simulated:
-        _write_tsv(folder / "descriptions.tsv", pd.DataFrame(simulated.items(), columns=["desc_id", "description"]))
+    if descriptions:
+        _write_tsv(folder / "descriptions.tsv", pd.DataFrame(descriptions.items(), columns=["desc_id", "description"]))
     _write_people(folder, [brain for brain in brains if brain.run == MEASURED], names)
     for name, table in tables.items():
         ids = [names[brain] for brain in table["subject"]]
@@ -174,6 +190,19 @@ def export_bids(
     dataset = {"Name": "gyriflow", "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative", "GeneratedBy": made_by}
     # the last file: where it is there, all is
     write_json(folder / "dataset_description.json", dataset)
+
+
+def _template(
+    brains: Sequence[ExportedBrain], names: Mapping[str, tuple[str, str | None]]
+) -> tuple[str, dict[str, Any]]:
+    """Returns the entity of BIDS of a study's template, and what sidecars say of its surfaces."""
+    known = next((brain for brain in brains if brain.run == MEASURED and brain.brain == brain.template), None)
+    if known is None:
+        return "", {}
+    stem = "_".join(filter(None, names[known.brain]))
+    place = "/".join(filter(None, (*names[known.brain], "anat", stem)))
+    surfaces = {side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii" for side in known.surfaces}
+    return f"space-{_alphanumeric(stem)}", {"SpatialReference": surfaces}
 
 
 def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
@@ -231,7 +260,7 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Mapping[
     people = pd.DataFrame(
         dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True)) | dict(brain.covariates)
         for brain in brains
-    )
+    ).sort_values(first[:2])
     most = people.groupby("participant_id").nunique(dropna=False).max()
     tables = {"participants": people.drop(columns="session_id")}
     if people["session_id"].notna().any():

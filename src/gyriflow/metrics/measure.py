@@ -5,7 +5,7 @@ A metric is a row (name, value, unit) of `size_rows` (of any surface), `folding_
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -53,6 +53,12 @@ from .thickness import at_part
 
 type Row = tuple[str, float, str]
 
+OF_WHITE = (
+    *("gyrification_index", "gyrification_index_envelope", "mean_shape_index", "mean_curvedness", "sulcal_area_share"),
+    *("mean_sulcal_depth", "sulcal_depth_95"),
+)
+"""The rows of folding that are given for white surfaces, too."""
+
 LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
 """The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
 
@@ -72,20 +78,41 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False)
-class Hemisphere:
-    """A hemisphere of n vertices, "left" or "right", and what was measured on it.
+class Folds:
+    """The folds of a hemisphere's surface of n vertices, pial or white.
 
-    Hull and envelope are without what lies over cuts; depth, local gyrification and thickness (NaN where it is not
-    known) are (n,), in mm; `crossing` is the number of faces that cut others, `weyl` Weyl's number of modes.
+    Hull and envelope are without what lies over cuts; depth (in mm) and local gyrification are (n,).
     """
 
-    name: str
     mesh: TriangleMesh
     bend: Curvature
     hull: Pieces
     envelope: Pieces
     depth: Floats
     local_gyrification: Floats
+
+    def maps(self) -> dict[str, NDArray]:
+        """Returns the arrays per vertex by name, of those in `BrainMetrics.maps`."""
+        return {
+            "shape_index": self.bend.shape_index,
+            "curvedness": self.bend.curvedness,
+            "mean_curvature": self.bend.mean,
+            "gaussian_curvature": self.bend.gaussian,
+            "sulcal_depth_mm": self.depth,
+            "local_gyrification_index": self.local_gyrification,
+            "reliable": self.bend.reliable.astype(np.int32),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Hemisphere(Folds):
+    """A hemisphere of n vertices, "left" or "right", and what was measured on it beside its folds.
+
+    Thickness is (n,), in mm, NaN where it is not known; `crossing` is the number of faces that cut others, `weyl`
+    Weyl's number of modes.
+    """
+
+    name: str
     thickness: Floats
     crossing: int
     spectrum: Spectrum
@@ -94,23 +121,26 @@ class Hemisphere:
     def maps(self) -> dict[str, NDArray]:
         """Returns the arrays per vertex by name, as in `BrainMetrics.maps`."""
         known = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
-        return {
-            "shape_index": self.bend.shape_index,
-            "curvedness": self.bend.curvedness,
-            "mean_curvature": self.bend.mean,
-            "gaussian_curvature": self.bend.gaussian,
-            "sulcal_depth_mm": self.depth,
-            "local_gyrification_index": self.local_gyrification,
-            **known,
-            "spangy_dominant_band": self.spectrum.dominant_band,
-            "reliable": self.bend.reliable.astype(np.int32),
-        }
+        return {**super().maps(), **known, "spangy_dominant_band": self.spectrum.dominant_band}
+
+
+def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
+    """Returns the folds of a hemisphere's surface; see `curvature.curvature` for the radius."""
+    hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
+    return Folds(
+        mesh=mesh,
+        bend=curvature(mesh, radius_mm=curvature_radius_mm),
+        hull=pieces_over(hull, mesh),
+        envelope=around,
+        depth=sulcal_depth(mesh, hull),
+        local_gyrification=local_gyrification_index(mesh, around),
+    )
 
 
 def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, settings: Settings) -> Hemisphere:
     """Returns what is measured on a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
-    hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
-    bend = curvature(mesh, radius_mm=settings.curvature_radius_mm)
+    folds = measure_folds(mesh, settings.curvature_radius_mm)
+    bend = folds.bend
     formula = settings.spangy_wavelength
     stiffness, mass = laplacian(mesh)
     first = first_eigenvalue(stiffness, mass)
@@ -120,13 +150,8 @@ def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, 
     proxy = bend.shape_index if settings.spangy_proxy == "shape_index" else bend.mean
     values = continue_smoothly(proxy, bend.reliable, stiffness)
     return Hemisphere(
+        **vars(folds),
         name=name,
-        mesh=mesh,
-        bend=bend,
-        hull=pieces_over(hull, mesh),
-        envelope=around,
-        depth=sulcal_depth(mesh, hull),
-        local_gyrification=local_gyrification_index(mesh, around),
         thickness=np.full(len(mesh.vertices), np.nan) if thickness is None else np.asarray(thickness, dtype=float),
         crossing=crossing_faces(mesh),
         spectrum=spectrum(values, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach, weyl=weyl),
@@ -143,7 +168,7 @@ def size_rows(mesh: TriangleMesh, crossing: int) -> list[Row]:
     ]
 
 
-def folding_rows(sides: list[Hemisphere]) -> list[Row]:
+def folding_rows(sides: Sequence[Folds]) -> list[Row]:
     """Returns the rows of folding of one hemisphere, or of a brain's two together; what is near cuts is left out.
 
     Indices are of both hemispheres' areas, each in its own hull; means are over the vertices of both, by area.
@@ -176,7 +201,6 @@ def folding_rows(sides: list[Hemisphere]) -> list[Row]:
         ("sulcal_depth_95", float(deep), "mm"),
         *((name, value, "1") for name, value in curvature_integrals(bend, weights).items()),
         *((name, value, "1/mm") for name, value in mean_curvature_quantiles(bend, weights).items()),
-        *thickness_rows(np.concatenate([side.thickness for side in sides]), areas),
     ]
 
 
@@ -218,6 +242,13 @@ def spectrum_rows(side: Hemisphere, proxy: SpangyProxy) -> list[Row]:
         ("spangy_captured_share", side.spectrum.captured, "1"),
         ("weyl_number", float(side.weyl), "1"),
     ]
+
+
+def _rows_of(sides: Sequence[Hemisphere]) -> list[Row]:
+    areas = [vertex_areas(side.mesh) for side in sides]
+    return folding_rows(sides) + thickness_rows(
+        np.concatenate([side.thickness for side in sides]), np.concatenate(areas)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,11 +340,11 @@ def measure_brain(
             ) as pool,
         ):
             sides = list(pool.map(measure_hemisphere, *zip(*jobs, strict=True)))
-    rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + folding_rows(sides)]
+    rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + _rows_of(sides)]
     known = label_volumes_ml or {}
     rows += [("whole", metric, known[name], "mL") for metric, name in LABEL_VOLUMES.items() if name in known]
     for side in sides:
-        own = size_rows(side.mesh, side.crossing) + folding_rows([side]) + spectrum_rows(side, chosen.spangy_proxy)
+        own = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side, chosen.spangy_proxy)
         rows += [(side.name, *row) for row in own]
     spectra = pd.concat([side.spectrum.bands for side in sides], keys=list(meshes), names=["hemisphere", None])
     coefficients = {
@@ -333,3 +364,21 @@ def measure_brain(
         spectra=spectra.reset_index("hemisphere").reset_index(drop=True).assign(weyl_formula=chosen.spangy_wavelength),
         coefficients=pd.concat(coefficients, names=["hemisphere"]).reset_index("hemisphere").reset_index(drop=True),
     )
+
+
+def measure_white(
+    sides: Mapping[str, TriangleMesh], curvature_radius_mm: float = CURVATURE_RADIUS_MM
+) -> tuple[pd.DataFrame, dict[str, dict[str, NDArray]]]:
+    """Returns the metrics and the maps of the white surfaces of "left" and "right", or of the only hemisphere.
+
+    They are measured as pial ones are. The table has hemisphere, metric, value and unit of their area and of
+    `OF_WHITE`, the names with `white_` in front; the maps are those of `Folds` per hemisphere.
+    """
+    folds = {name: measure_folds(mesh, curvature_radius_mm) for name, mesh in sides.items()}
+    rows = []
+    for name, parts in {"whole": list(folds.values()), **{name: [part] for name, part in folds.items()}}.items():
+        size = sum(area(part.mesh) for part in parts) * CM2_PER_MM2
+        own = [row for row in folding_rows(parts) if row[0] in OF_WHITE]
+        rows += [(name, f"white_{metric}", value, unit) for metric, value, unit in [("area", size, "cm2"), *own]]
+    table = pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"])
+    return table, {name: part.maps() for name, part in folds.items()}

@@ -37,6 +37,11 @@ class Brains:
         return [brain.id for brain in self.config.brains if brain.white_files]
 
     @property
+    def with_white_measured(self) -> list[str]:
+        """Brains whose white surfaces are measured."""
+        return self.with_white if self.config.metrics.white_surfaces == "given" else self.with_thickness
+
+    @property
     def with_thickness(self) -> list[str]:
         """Brains whose cortical thickness is measured."""
         return [*self.with_cortex, *self.with_white]

@@ -172,6 +172,11 @@ class Chains:
         """
         return [not self.config.brain(name).has_labels and not self.matched(*pair) for name in pair]
 
+    def to_template(self, brain: str) -> list[str]:
+        """Returns the file that says where the template's points are in a brain; none for the template itself."""
+        template = self.config.metrics.template
+        return [] if template in (None, brain) else [self.correspondence(template, brain)]
+
     def posed(self, brain: str) -> list[bool]:
         """Returns the same for the brain of the regions and the brain that gets them."""
         return self.in_pose(self.config.regions_from(brain) or brain, brain)

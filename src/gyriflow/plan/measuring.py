@@ -8,7 +8,18 @@ from ..config.root import Config
 from ..parameters.terms import SIDES, Side
 from ..units import week_tag
 from .brains import Brains
-from .paths import DISPLACEMENT, PIAL, SIMILARITY, THICKNESS, VOLUMES, folded_of, region_files, surfaces_in
+from .paths import (
+    DISPLACEMENT,
+    PIAL,
+    SIMILARITY,
+    TEMPLATE_MAPS,
+    THICKNESS,
+    VOLUMES,
+    folded_of,
+    region_files,
+    surfaces_in,
+    white_of,
+)
 from .runs import Runs
 
 MEASURED = "real"
@@ -159,7 +170,10 @@ class Measuring:
     def tables(self) -> dict[str, list[str]]:
         """The tables of a study by name, and the files that each is joined from."""
         return {
-            "metrics": [f"{measured.folder}/metrics.csv" for measured in self.every],
+            "metrics": [
+                *(f"{measured.folder}/metrics.csv" for measured in self.every),
+                *(white_of()["metrics"].format(brain=brain) for brain in self.brains.with_white_measured),
+            ],
             "spectra": [f"{measured.folder}/spectra.csv" for measured in self.every],
             "regions": [f"{measured.folder}/regions.csv" for measured in self.with_regions],
             "volumes": [VOLUMES["volumes"].format(brain=brain) for brain in self.brains.with_volumes],
@@ -185,18 +199,32 @@ class Measuring:
                 "regions": dict(zip(SIDES, measured.regions.values(), strict=False)),
                 "report": PIAL["report"].format(brain=measured.subject),
                 "covariates": self.config.brain(measured.subject).covariates,
-                "white": self._white(measured),
+                "white": self._white(measured, "surface"),
+                "white_maps": self._white(measured, "maps"),
+                "template": self.config.metrics.template,
+                "template_maps": {
+                    side: TEMPLATE_MAPS.format(where=measured.where, side=side)
+                    for side in self.template_sides(measured)
+                },
                 "volume": self._volume(measured),
             }
             for measured in self.every
         ]
 
-    def _white(self, measured: Measured) -> dict[Side, str]:
-        """Returns the given white surfaces of a measured brain, by side."""
-        files = self.config.brain(measured.subject).white_files if measured.run == MEASURED else {}
-        if len(measured.sides) == 1:
-            return dict.fromkeys(measured.sides, files["whole"]) if files else {}
-        return {side: files[side] for side in measured.sides if side in files}
+    def _white(self, measured: Measured, kind: str) -> dict[Side, str]:
+        """Returns the white surfaces of a measured brain or the maps on them, by side."""
+        if measured.run != MEASURED or measured.subject not in self.brains.with_white_measured:
+            return {}
+        files = white_of(*measured.sides)
+        return {side: files[f"{side}_{kind}"].format(brain=measured.subject) for side in measured.sides}
+
+    def with_white(self, *sides: Side) -> list[str]:
+        """Returns the brains with these hemispheres whose white surfaces are measured."""
+        return [brain for brain in self.brains.with_sides(*sides) if brain in self.brains.with_white_measured]
+
+    def white_source(self, brain: str) -> dict[str, str]:
+        """Returns by what they are of the files that a brain's white surfaces are made from: `labels`, or surfaces."""
+        return self.config.brain(brain).white_files or {"labels": self.brains.label_volume(brain)}
 
     def _volume(self, measured: Measured) -> dict[str, Any]:
         """Returns what the labels of a simulated brain are made of; nothing where its start has none."""
@@ -205,6 +233,27 @@ class Measuring:
             return {}
         files = {"labels": self.brains.label_volume(start.id), "surface": measured.parts["whole"]}
         return files | {"thickness": measured.thickness, "affine_from": start.affine_from}
+
+    def template_sides(self, measured: Measured) -> list[Side]:
+        """Returns the hemispheres of a brain that have maps at the template's vertices."""
+        template = self.config.metrics.template
+        # it may have been refused
+        return [side for side in measured.sides if template in self.brains.ids and side in self.brains.sides(template)]
+
+    def template_files(self, where: str, side: Side) -> dict[str, str]:
+        """Returns the surfaces of the template's hemisphere and of one that has maps, with the reports of their poses.
+
+        A simulated brain's surface is that of its start, whose vertices it keeps.
+        """
+        measured, template = self.at(where), self.of_brain(self.config.metrics.template or "")
+        first = self.config.weeks(measured.run, measured.subject)[0] if measured.run != MEASURED else 0.0
+        at_start = measured if measured.run == MEASURED else self.simulated_at(measured.run, measured.subject, first)
+        return {
+            "template": template.parts[side],
+            "template_report": PIAL["report"].format(brain=template.subject),
+            "surface": at_start.parts[side],
+            "report": PIAL["report"].format(brain=measured.subject),
+        }
 
     def similarity(self, run: str, brain: str, week: str, measured: str) -> dict[str, list[str]]:
         """Returns the surfaces of a simulated brain and of a measured one, part by part."""

@@ -37,6 +37,17 @@ def maps_of(*sides: Side) -> dict[str, str]:
     return {side: f"results/{{where}}/{side}.shape.gii" for side in sides}
 
 
+TEMPLATE_MAPS = "results/{where}/{side}.template.shape.gii"
+"""Maps at the vertices of the study's template."""
+
+
+def white_of(*sides: Side) -> dict[str, str]:
+    """Returns what is made of the white surfaces of some hemispheres: themselves, maps on them, and their metrics."""
+    surfaces = {f"{side}_surface": f"{BRAIN}/surface/{side}.white.surf.gii" for side in sides}
+    maps = {f"{side}_maps": f"{BRAIN}/metrics/{side}.white.shape.gii" for side in sides}
+    return {**surfaces, **maps, "metrics": f"{BRAIN}/metrics/white.csv"}
+
+
 def region_files(folder: str) -> dict[str, str]:
     """Returns the files with the regions of both hemispheres in a folder."""
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}

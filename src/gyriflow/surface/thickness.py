@@ -116,15 +116,19 @@ def thickness_from_labels(
 
     `surface` is the whole one, posed by `pose`; the scheme has to separate cortex from the tissue inside.
     """
-    affine = pose.world @ affine
-    tissue = read_cerebrum(labels, affine, scheme).tissue
-    box, first = crop(np.isin(tissue, scheme.cerebrum))
-    tissue = np.pad(tissue[box], PAD_VOXELS)
-    cerebrum, cortex = np.isin(tissue, scheme.cerebrum), np.isin(tissue, scheme.cortex)
-    thickness = cortical_thickness(surface, cerebrum, cortex, shifted_affine(affine, first), smoothing_voxels)
+    cerebrum, cortex, affine = layers(labels, pose.world @ affine, scheme)
+    thickness = cortical_thickness(surface, cerebrum, cortex, affine, smoothing_voxels)
     suggested = thickness.report["suggested_thickness_mm"]
     log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
     return thickness
+
+
+def layers(labels: Labels, affine: Floats, scheme: LabelScheme) -> tuple[Mask, Mask, Floats]:
+    """Returns the (i, j, k) masks of the cerebrum and of its cortex, cut to their contents, and their (4, 4) affine."""
+    tissue = read_cerebrum(labels, affine, scheme).tissue
+    box, first = crop(np.isin(tissue, scheme.cerebrum))
+    tissue = np.pad(tissue[box], PAD_VOXELS)
+    return np.isin(tissue, scheme.cerebrum), np.isin(tissue, scheme.cortex), shifted_affine(affine, first)
 
 
 def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:

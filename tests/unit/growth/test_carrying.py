@@ -4,10 +4,10 @@ from shapes import ellipsoid_mesh, rigid, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import without_rigid_motion
-from gyriflow.geometry.deformations import Deformation
+from gyriflow.geometry.deformations import Deformation, carry
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import transformed
-from gyriflow.growth.carrying import carry_back_over_weeks, carry_over_weeks, carry_regions
+from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.growth.carrying import carry_back_over_weeks, carry_over_weeks, carry_regions, maps_on_template
 from gyriflow.growth.local import local_growth
 
 GRID = np.diag([4.0, 4.0, 4.0, 1.0])
@@ -48,6 +48,31 @@ def test_regions_come_to_the_same_places_of_another_brain():
     regions = carry_regions((source.vertices[:, 0] > 0).astype(int), source, target, deformation)
     clear = np.abs(target.vertices[:, 0] - 5.0) > 1.5
     assert (regions == (target.vertices[:, 0] > 5.0))[clear].all()
+
+
+def test_maps_come_to_the_vertices_of_a_template():
+    """A brain that is the template bent and turned, with other triangles; its maps are functions of the place."""
+    points = np.stack(np.meshgrid(*[np.arange(16) * 4.0 - 30.0] * 3, indexing="ij"), axis=-1)
+    bend = 1.5 * np.sin(points[..., [1, 2, 0]] / 8.0)
+    between = Deformation(rigid(0, 0, 25, shift=(5, 0, -3)), bend, GRID)
+    template, other = sphere(subdivisions=3), sphere(subdivisions=5)
+    brain = TriangleMesh(carry(between, other.vertices), other.faces)
+
+    def waves(places):
+        return np.sin(places[:, 0] / 4.0) + places[:, 2] / 10.0
+
+    maps = {"waves": waves(brain.vertices), "half": (brain.vertices[:, 1] > 0).astype(float)}
+    found = maps_on_template(maps, brain, template, [between])
+    places = carry(between, template.vertices)
+    assert found["waves"] == pytest.approx(waves(places), abs=0.01)
+    clear = np.abs(places[:, 1]) > 0.5
+    assert (found["half"] == (places[:, 1] > 0))[clear].all()
+    assert set(found["half"]) == {0, 1}
+    assert found["template_distance_mm"].max() < 0.05
+    # of the template itself, which needs no registration
+    assert maps_on_template({"x": brain.vertices[:, 0]}, brain, brain, [])["x"] == pytest.approx(brain.vertices[:, 0])
+    with pytest.raises(InputError, match="beyond the grid"):
+        maps_on_template(maps, brain, transformed(template, scaled(1, (60, 0, 0))), [between])
 
 
 @pytest.mark.parametrize("sigma", [0.0, 3.0, 25.0])

@@ -156,14 +156,32 @@ def labels_of(folder):
 
 
 def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
-    """Files in LPS, posed with the pial surface by a quarter turn and a shift."""
-    lps = np.diag([-1.0, -1, 1, 1])
+    """Both were posed by a quarter turn and a shift."""
     small = transformed(hemisphere(-1), np.diag([0.5, 0.5, 0.5, 1]))
-    write_surface(tmp_path / "white.surf.gii", transformed(small, lps))
-    write_json(tmp_path / "surface.json", {"pose": Pose(POSE, {"left": POSE @ lps}).plain()})
-    export_bids(tmp_path / "bids", [replace(brain, white={"left": str(tmp_path / "white.surf.gii")})], {}, "1", {})
-    found = read_surface(tmp_path / "bids" / "sub-case1" / "anat" / "sub-case1_hemi-L_white.surf.gii")
+    write_surface(tmp_path / "white.surf.gii", transformed(small, POSE))
+    files = {"white": {"left": str(tmp_path / "white.surf.gii")}, "white_maps": {"left": brain.maps["left"]}}
+    export_bids(tmp_path / "bids", [replace(brain, **files)], {}, "1", {})
+    place = tmp_path / "bids" / "sub-case1" / "anat"
+    found = read_surface(place / "sub-case1_hemi-L_white.surf.gii")
     np.testing.assert_allclose(found.vertices, small.vertices, atol=1e-5)
+    assert list(read_vertex_maps(place / "sub-case1_hemi-L_desc-white_sulc.shape.gii")) == ["sulcal_depth_mm"]
+    assert "desc-white" in (tmp_path / "bids" / "descriptions.tsv").read_text()
+
+
+def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, brain):
+    folder, path = tmp_path / "bids", str(tmp_path / "left.template.shape.gii")
+    write_vertex_maps(path, {"sulcal_depth_mm": np.arange(5.0)})
+    scans = [replace(one, template="sub-01_ses-1", template_maps={"left": path}) for one in scans_of_two(brain)]
+    export_bids(folder, [*scans, replace(scans[1], run="a", week=25.0)], {}, "1", {})
+    place = folder / "sub-01" / "ses-2" / "anat" / "sub-01_ses-2_hemi-L_space-sub01ses1_den-5_sulc.shape.gii"
+    assert read_vertex_maps(place)["sulcal_depth_mm"] == pytest.approx(np.arange(5))
+    assert place.with_name(place.name.replace("_sulc", "_desc-agw2500_sulc")).exists()
+    assert read_json(folder / "space-sub01ses1_sulc.json") == {
+        **{"Description": read_json(folder / "sulc.json")["Description"], "Units": "mm"},
+        "SpatialReference": {
+            side: f"bids::sub-01/ses-1/anat/sub-01_ses-1_hemi-{side}_pial.surf.gii" for side in ("L", "R")
+        },
+    }
 
 
 def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain):

@@ -316,6 +316,33 @@ def test_thickness_is_known_of_labels_of_the_cortex(tmp_path):
     assert (known, unknown) == (THICKNESS["measured"].format(brain="b21"), [])
 
 
+def test_maps_are_brought_to_a_template_that_is_there(tmp_path):
+    found = plan([labels(tmp_path, 21), labels(tmp_path, 22)], metrics={"template": "b22"})
+    files = found.measuring.template_files("runs/reference/b21/metrics/week-24.00", "left")
+    # a simulated brain keeps the vertices of its start
+    assert files["surface"] == "results/runs/reference/b21/surfaces/week-21.00/left.pial.surf.gii"
+    assert files["template"] == "results/brains/b22/surface/left.pial.surf.gii"
+    assert found.chains.to_template("b21") == ["results/study/registration/b22/b21.h5"]
+    assert found.chains.to_template("b22") == []
+    assert {len(one["template_maps"]) for one in found.measuring.exported} == {2}
+    # a template that was refused holds up nothing
+    without = Plan(found.config.without(["b22"]))
+    assert [one["template_maps"] for one in without.measuring.exported if one["run"] == "real"] == [{}]
+    with pytest.raises(InputError, match=r"metrics.template"):
+        plan([labels(tmp_path, 21)], metrics={"template": "b23"})
+
+
+def test_white_surfaces_of_labels_are_measured_where_they_are_asked_for(tmp_path):
+    brains = [labels(tmp_path, 21), labels(tmp_path, 22) | {"scheme": "binary"}]
+    given = [plan(brains, metrics={"white_surfaces": which}).measuring for which in ("given", "all")]
+    assert [[path for path in one.tables["metrics"] if "white" in path] for one in given] == [
+        [],
+        ["results/brains/b21/metrics/white.csv"],
+    ]
+    assert given[1].white_source("b21") == {"labels": str(tmp_path / "labels.nii.gz")}
+    assert [sorted(one["white"]) for one in given[1].exported[:2]] == [["left", "right"], []]
+
+
 @pytest.mark.parametrize(
     ("output", "log"),
     [

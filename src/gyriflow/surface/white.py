@@ -1,0 +1,70 @@
+"""White surfaces, the inner border of the cortex, from labels or files: even and in two sides as pial ones are."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..geometry.poses import Pose
+from ..geometry.triangles import TriangleMesh, area
+from ..parameters.schemes import LabelScheme
+from ..parameters.terms import Side
+from .extraction import COMPARABLE, Floats, isosurface, make_simple, smooth_mask
+from .fissure import cut_sides, nearer_left
+from .labels import SMALLEST_HEMISPHERE, Labels
+from .repair import after_repairs, make_sound, sound_pieces, with_volume
+from .thickness import layers, posed_whites
+
+
+def white_from_labels(
+    labels: Labels,
+    affine: Floats,
+    scheme: LabelScheme,
+    pial: Mapping[Side, TriangleMesh],
+    pose: Pose,
+    *,
+    smoothing_voxels: float = 1.0,
+    edge_length_mm: float = 1.0,
+    smoothing_iterations: int = 10,
+) -> dict[Side, TriangleMesh]:
+    """Returns by side the surface around what lies within the cortex of an (i, j, k) label volume.
+
+    It is made as `pial.from_labels` makes the pial one of these labels, and lies where that does. Where the cerebrum
+    has no cortex, as on the medial wall, both are one. MeshError where it stays tangled.
+    """
+    cerebrum, cortex, affine = layers(labels, pose.world @ affine, scheme)
+    core = cerebrum & ~cortex
+    smallest = SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE
+    field, topology = make_simple(smooth_mask(core, smoothing_voxels), smallest)
+    rough = isosurface(field, affine)
+    even = make_sound(rough, smoothing_iterations, edge_length_mm)
+    volume = float(core.sum() * abs(np.linalg.det(affine[:3, :3])))
+    mesh, _ = with_volume(even.mesh, after_repairs(volume, topology, affine), area(rough))
+    return _sides(mesh, pial)
+
+
+def white_from_surfaces(
+    whites: Mapping[str, TriangleMesh],
+    pial: Mapping[Side, TriangleMesh],
+    pose: Pose,
+    *,
+    max_hole_mm: float = 3.0,
+    edge_length_mm: float = 1.0,
+    smoothing_iterations: int = 10,
+) -> dict[Side, TriangleMesh]:
+    """Returns by side the given white surfaces of "left" and "right" or of the "whole", posed and made even.
+
+    MeshError where one can't be made a closed surface without handles and intersections.
+    """
+    even = {
+        name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, smoothing_iterations, edge_length_mm).mesh
+        for name, mesh in posed_whites(pose, whites).items()
+    }
+    return _sides(even["whole"], pial) if "whole" in even else {side: even[side] for side in pial}
+
+
+def _sides(mesh: TriangleMesh, pial: Mapping[Side, TriangleMesh]) -> dict[Side, TriangleMesh]:
+    """Returns a white surface cut where the pial one is; whole where there is one hemisphere."""
+    if len(pial) == 1:
+        return dict.fromkeys(pial, mesh)
+    left, right = cut_sides(mesh, nearer_left(mesh, pial["left"], pial["right"]))
+    return {"left": left, "right": right}

@@ -1,0 +1,32 @@
+"""The white surfaces of a brain, from its labels or from given files, the maps on them and their metrics."""
+
+from gyriflow.io.files import write_table
+from gyriflow.io.poses import read_pose
+from gyriflow.io.surfaces import STRUCTURES, read_one_hemisphere, read_surface, write_surface, write_vertex_maps
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.metrics.measure import measure_white
+from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.parameters.terms import SIDES
+from gyriflow.step import step
+from gyriflow.surface.white import white_from_labels, white_from_surfaces
+
+files, output, params = snakemake.input, snakemake.output, snakemake.params
+source, settings = params.source, dict(params.surface)
+with step(snakemake.log[0], *source.values()):
+    pial, pose = {side: read_surface(files[side]) for side in SIDES if files.get(side)}, read_pose(files.report)
+    max_hole_mm, smoothing_voxels = settings.pop("max_hole_mm"), settings.pop("smoothing_voxels")
+    if "labels" in source:
+        volume = read_label_volume(source["labels"], affine_from=params.affine_from, cropped=True)
+        of_labels = volume.labels, volume.affine, LabelScheme(**params.scheme)
+        sides = white_from_labels(*of_labels, pial, pose, smoothing_voxels=smoothing_voxels, **settings)
+    else:
+        whites = {
+            name: read_one_hemisphere(path, name) if name in SIDES else read_surface(path)
+            for name, path in source.items()
+        }
+        sides = white_from_surfaces(whites, pial, pose, max_hole_mm=max_hole_mm, **settings)
+    table, maps = measure_white(sides, params.curvature_radius_mm)
+    write_table(output.metrics, table.assign(**params.labels)[[*params.labels, *table.columns]])
+    for side, mesh in sides.items():
+        write_surface(output[f"{side}_surface"], mesh, STRUCTURES[side])
+        write_vertex_maps(output[f"{side}_maps"], maps[side], STRUCTURES[side])
