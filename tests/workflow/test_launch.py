@@ -47,6 +47,14 @@ def test_a_file_that_is_no_configuration_ends_in_2(workflow, content, said):
     assert said in message(outcome)
 
 
+def test_an_empty_configuration_of_a_folder_ends_in_2(workflow):
+    (workflow.directory / "config").mkdir()
+    (workflow.directory / "config" / "config.yaml").touch()
+    outcome = workflow.run("-n")
+    assert outcome.returncode == 2
+    assert "config.yaml: holds no keys; found nothing" in message(outcome)
+
+
 def test_the_results_of_another_study_are_not_mixed_with_this_ones(workflow):
     name = workflow.write("study.yaml", SMALL_STUDY)
     (workflow.directory / "results" / "brains" / "x").mkdir(parents=True)

@@ -62,8 +62,11 @@ REFUSED = {
     for brain, cause in refused_brains().items()
     if brain in [known.id for known in WHOLE_CONFIG.brains]
 }
-if REFUSED and not CONFIG.brains:
+if REFUSED and workflow.is_main_process:
     # each has told its cause
+    rest = "finishing the study without" if CONFIG.brains else "no brain is left"
+    print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
+if REFUSED and not CONFIG.brains:
     sys.exit(0)
 if workflow.is_main_process:
     for cause in UNLED.values():

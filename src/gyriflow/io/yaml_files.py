@@ -70,7 +70,7 @@ def read_keys(path: AnyPath) -> dict[str, Any]:
     """Returns the keys of a YAML (or JSON) file with their values; InputError where it has none."""
     content = read_yaml(path)
     if not isinstance(content, dict):
-        found = "nothing" if content is None else f"a {type(content).__name__}"
+        found = "nothing" if content is None else "a list" if isinstance(content, list) else repr(content)
         raise InputError("holds no keys", path=path, found=found, expected="keys with values, such as `week: 21`")
     return content
 

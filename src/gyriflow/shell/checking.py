@@ -33,7 +33,7 @@ from ..surface.plausible import require_plausible_size
 from .cost import LEAST_SURFACE_MIB, MEASURED, Job, Prediction, predict, surface_memory_mib
 from .launch import OF_PROFILES
 from .launch import main as launch
-from .terminal import DRAWN, ORDER, as_duration, where_of
+from .terminal import DRAWN, NO_RESULTS, ORDER, as_duration, where_of
 from .terminal import stages as stages_of_rules
 
 NAMED_RUNS = 6
@@ -102,7 +102,7 @@ def check_study(
     if missing:
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
     if not bad:
-        yield from _work(plan(path, directory, stages), settings, directory, cores, price)
+        yield from _work(plan(path, directory, ["--cores", str(cores), *stages]), settings, directory, cores, price)
 
 
 def work_of_study(
@@ -118,7 +118,7 @@ def work_of_study(
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
-    """Returns the jobs with outputs that Snakemake would run; ends the program as Snakemake does where it refuses.
+    """Returns the jobs that Snakemake would run, targets among them; ends the program as Snakemake does where it refuses.
 
     With `show` it lists them on the terminal.
     """
@@ -142,7 +142,7 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
             line for line in said.getvalue().splitlines(True) if not line.endswith(OF_PROFILES + "\n")
         )
         sys.exit(code)
-    return [PlannedJob(**job) for job in jobs if job["output"]]
+    return [PlannedJob(**job) for job in jobs]
 
 
 def _contents(config: Config) -> str:
@@ -221,18 +221,20 @@ def _work(
     jobs: Sequence[PlannedJob], config: Config, directory: Path, cores: int, price: float | None
 ) -> Iterator[tuple[str, bool]]:
     """Yields what will run, by stage, and what it will take of time, memory and disk."""
-    if not jobs:
-        yield "nothing to run: all results are up to date", False
+    making = [job for job in jobs if job.output]
+    if not making:
+        yield f"nothing to run: {NO_RESULTS if jobs else 'all results are up to date'}", False
         return
     of_rule = stages_of_rules(SHIPPED / "workflow" / "rules")
     by_stage = defaultdict(list)
-    for job in jobs:
+    for job in making:
         by_stage[of_rule.get(job.rule, DRAWN)].append(job)
-    yield f"to run: {len(jobs)} steps", False
+    yield f"to run: {len(making)} step{'s' if len(making) > 1 else ''}", False
     for stage, planned in sorted(by_stage.items(), key=lambda item: ORDER.index(item[0])):
-        reasons = ", ".join(f"{count} {why}" for why, count in Counter(job.why for job in planned).most_common())
+        several = Counter(job.why for job in planned).most_common()
+        reasons = ", ".join(f"{count} {why}" if len(several) > 1 else why for why, count in several)
         yield f"  {stage:<12} {len(planned):4d}  {reasons}", False
-    predicted = predict([job.job for job in jobs], config, read_json(MEASURED), cores, predicted_memory_mib)
+    predicted = predict([job.job for job in making], config, read_json(MEASURED), cores, predicted_memory_mib)
     yield from _needs(predicted, directory, cores, price)
 
 
@@ -241,7 +243,7 @@ def _needs(predicted: Prediction, directory: Path, cores: int, price: float | No
     factors = (1 / error["time"], 1, error["time"])
     least, usual, most = (as_duration(predicted.wall_seconds * factor) for factor in factors)
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
-    yield f"time    about {usual} on {on} ({least} to {most}, by the errors of studies left out)", False
+    yield f"time    about {usual} on {on} ({least} to {most} in trials on other studies)", False
     hours, folding = predicted.core_seconds / 3600, predicted.folding_core_seconds / predicted.core_seconds
     yield f"work    about {_range(hours, error['time'])} core hours, {folding:.0%} of them folding", False
     if price is not None:

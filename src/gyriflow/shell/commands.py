@@ -45,7 +45,7 @@ stages_option = click.option(
     "stages",
     multiple=True,
     type=click.Choice(STAGES),
-    help="Up to this stage only; of studies: theirs.",
+    help="Run up to this stage only. May be repeated.",
 )
 config_argument = click.argument("config", type=FILE, required=False)
 
@@ -199,7 +199,7 @@ def run(
 @main.command()
 @click.argument("labels", type=FILE)
 @click.option("--week", type=float, required=True, help="Gestational week of the brain.")
-@click.option("--until", type=float, required=True, help="Week in which it is to be foretold.")
+@click.option("--until", type=float, required=True, help="Week to predict it for.")
 @click.option("--atlas", help="Whose growth: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
 @click.option("--scheme", help="Label scheme. [default: found from the labels]")
 @click.option("--image", type=FILE, help="T2-weighted volume of the same brain.")
@@ -218,7 +218,7 @@ def predict(
     dry_run: bool,
     **given: Any,
 ) -> None:
-    """Foretell a brain of later weeks from its tissue LABELS, by the growth of an atlas.
+    """Predict a brain of later weeks from its tissue LABELS, by the growth of an atlas.
 
     It writes gyriflow.yaml into the working directory and runs it up to the report; the same command goes on after an
     interruption.

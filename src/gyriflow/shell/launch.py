@@ -133,9 +133,14 @@ def value_of(arguments: Sequence[str], *names: str) -> str | None:
     return found
 
 
-def refuse_bad_configfiles(arguments: Sequence[str]) -> None:
-    """Raises InputError where a configuration file of the command line is missing, no YAML, or names a key twice."""
-    given = False
+def refuse_bad_configfiles(arguments: Sequence[str], directory: Path) -> None:
+    """Raises InputError where a configuration file is missing, no YAML, or names a key twice.
+
+    It is one of the command line, or that which a working directory has for itself.
+    """
+    given, own = False, directory / "config" / "config.yaml"
+    if not any(argument.startswith("--configfile") for argument in arguments) and own.is_file():
+        read_keys(own)
     for argument in arguments:
         if argument.startswith("-"):
             option, _, argument = argument.partition("=")
@@ -237,7 +242,6 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
     """
     if any(argument.startswith(f"results/brains/{brain}/") for argument in arguments for brain in refused):
         return
-    print(f"gyriflow: refused: {', '.join(refused)}; finishing the study without", file=sys.stderr, flush=True)
     path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
     write_json(path, refused)
     # the locks of the Snakemake run that this process has ended
@@ -266,8 +270,8 @@ def main(arguments: Sequence[str]) -> int:
         os.environ.setdefault(name, value)
     # steps call `python`, which is to be this one
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
-    refuse_bad_configfiles(arguments)
     directory = Path(value_of(arguments, "--directory", "-d") or ".")
+    refuse_bad_configfiles(arguments, directory)
     if not looks_only(arguments):
         clear_stale_lock(directory)
     from snakemake import cli  # takes a second, which a refused run need not wait for

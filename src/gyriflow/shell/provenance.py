@@ -20,6 +20,8 @@ PACKAGES = (
     *("pandas", "picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
 )
 """Packages whose versions are recorded: those that results depend on."""
+STUDY = Path("results", "study", "study.json")
+"""Where, in a working directory, it is recorded whose results it has."""
 
 
 def software() -> dict[str, Any]:
@@ -44,7 +46,7 @@ def require_own_results(directory: Path, files: Sequence[Path], config: Config, 
     Another study is one of other configuration files without a brain in common; a configuration that was changed,
     copied or moved goes on. With `record` the study is written down as the one whose results these are.
     """
-    path = directory / "results" / "study" / "study.json"
+    path = directory / STUDY
     brains: list[list[Any]] = [[b.id, b.week, b.source, *(Path(file).name for file in b.files)] for b in config.brains]
     own: dict[str, Any] = {"configuration": [str(file.resolve()) for file in files], "brains": brains}
     known = read_json(path) if path.is_file() else own

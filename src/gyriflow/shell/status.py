@@ -16,6 +16,7 @@ from ..io.yaml_files import read_yaml
 from ..shipped import CONFIG
 from ..units import week_tag
 from .launch import hold_lock
+from .provenance import STUDY
 from .terminal import REPORT, STATE, as_duration, at_week
 
 BRAIN_FILES = {"surface": "surface/pial.surf.gii", "mesh": "mesh/brain.xdmf", "metrics": "metrics/metrics.csv"}
@@ -37,25 +38,29 @@ def status(directory: Path) -> Status:
     """Returns how far the study in a working directory is; InputError where there is none."""
     results = directory / "results"
     state = run_state(directory)
-    if not results.is_dir() and state is None:
-        expected = "a working directory with results/"
-        raise InputError("holds no study", path=directory, expected=expected, remedy="Give it as argument.")
+    configured = _configured(directory)
+    if not results.is_dir() and state is None and not configured:
+        expected = f"a working directory, with results/ or {CONFIG}"
+        remedy = "Name the folder: gyriflow status FOLDER"
+        raise InputError("holds no study", path=directory.resolve(), expected=expected, remedy=remedy)
     brains = [
         [folder.name, *(DONE if (folder / file).is_file() else NOT_YET for file in BRAIN_FILES.values())]
         for folder in _folders(results / "brains")
     ]
     begun = {(run.name, folder.name) for run in _folders(results / "runs") for folder in _folders(run)}
-    names = [*(configured := _configured(directory)), *sorted(begun - set(configured))]
+    names = [*configured, *sorted(begun - set(configured))]
     runs = [_row(run, results / "runs" / run / brain) for run, brain in names]
     report = directory / REPORT
     return Status(_lines(directory, state), brains, runs, report if report.is_file() else None)
 
 
 def _configured(directory: Path) -> list[tuple[str, str]]:
-    """Returns the runs, each with its start brain, of the configuration that lies in a working directory."""
+    """Returns the runs, each with its start brain, of the configuration whose results a working directory has."""
     path = directory / CONFIG
     # what is wrong with a configuration is for the command that runs it to say
     with suppress(InputError):
+        if (record := directory / STUDY).is_file():
+            path = Path(read_json(record)["configuration"][-1])
         if path.is_file():
             return load(read_yaml(path), path.resolve().parent).folded
     return []
@@ -85,7 +90,7 @@ def is_live(directory: Path) -> bool:
 def _lines(directory: Path, state: dict[str, Any] | None) -> list[str]:
     live = is_live(directory)
     if state is None:
-        return ["a run is live" if live else "no run is live"]
+        return ["a run is live" if live else "nothing is running"]
     steps = f"{state['done']} of {state['total']} steps done"
     left = f", about {as_duration(state['left_s'])} left" if live and state["left_s"] is not None else ""
     if live:
@@ -149,5 +154,5 @@ def report_of(directory: Path) -> Path:
         if report.is_file():
             return report.absolute()
     raise InputError(
-        "has no report yet", path=directory, expected=str(REPORT), remedy="Run the study first: gyriflow run"
+        "has no report yet", path=directory.resolve(), expected=str(REPORT), remedy="Run the study first: gyriflow run"
     )

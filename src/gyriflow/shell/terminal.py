@@ -13,9 +13,12 @@ from pathlib import Path
 from statistics import mean
 from typing import Any, TextIO
 
-from ..io.jobs import GrowingFile, cause, events_in, messages_in, read_log
+from ..io.jobs import KILLED, GrowingFile, cause, events_in, messages_in, read_log
+from ..step import KILLED as KILLED_CODE
+from ..step import record_exit_code
 
 MINUTE = 60.0
+NO_RESULTS = "the configuration asks for no results of this stage"
 QUIET = 5 * MINUTE
 """After so long without a word of it, a job that runs is named again, where no live line shows it."""
 LEAST_SHARE = 0.05
@@ -49,6 +52,8 @@ RULE = re.compile(r"^(?:checkpoint|(?:use )?rule) (?:\w+ as )?(\w+)(?::| with:)"
 """The line on which a rule or a checkpoint begins."""
 SLURM = re.compile(r"SLURM-job '(\d+)' failed.*SLURM status is: '(\w+)'", re.DOTALL)
 """How the executor for Slurm says in which state a job has ended."""
+SIGNAL = re.compile(r"died with <Signals\.(\w+)")
+"""How Snakemake says which signal has ended the program of a job."""
 STATES = {
     "CANCELLED": "it was cancelled",
     "TIMEOUT": "its time ran out: more is given by --set-resources {rule}:runtime=MINUTES",
@@ -94,6 +99,13 @@ def ended_by_slurm(message: str, rule: str) -> str:
     """Returns what Slurm has done to a job, from the executor's message on it; empty where it did nothing."""
     found = SLURM.search(message)
     return f"Slurm job {found[1]}: {STATES[found[2]].format(rule=rule)}" if found and found[2] in STATES else ""
+
+
+def ended_by_signal(message: str) -> str:
+    """Returns what a signal has done to a job, from Snakemake's message on it; empty where it did nothing."""
+    found = SIGNAL.search(message)
+    crashed = f"it crashed ({found[1]}): please report this with its log" if found else ""
+    return KILLED if found and found[1] == "SIGKILL" else crashed
 
 
 def as_duration(seconds: float) -> str:
@@ -251,7 +263,10 @@ class RunDisplay:
             self._follow(job)
         what = job.what if job else rule
         text = "".join(map(read_log, logs))
-        why = ended_by_slurm(otherwise, rule) or cause(text) or otherwise or "it left no message"
+        by_others = ended_by_slurm(otherwise, rule) or ended_by_signal(otherwise)
+        why = by_others or cause(text) or otherwise or "it left no message"
+        if why == KILLED:
+            record_exit_code(KILLED_CODE)
         self.failed.append({"what": what, "why": why, "logs": [str(Path(log).absolute()) for log in logs]})
         first, *rest = why.splitlines()
         self.line(f"failed  {what}: {first}")
@@ -289,6 +304,8 @@ class RunDisplay:
             )
         elif self.up_to_date:
             self.line("gyriflow: everything is up to date" + _place(REPORT))
+        elif self.total and self.done == self.total and not self.errors and not self.told:
+            self.line(f"gyriflow: nothing was to be done: {NO_RESULTS}")
         elif self.total and self.done == self.total and not self.errors:
             self.line(f"gyriflow: done in {took}" + (_place(Path(self.report)) if self.report else ""))
 

@@ -7,7 +7,7 @@ from shapes import hemisphere
 from gyriflow.config import load
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
-from gyriflow.shell.checking import coarse_cortices, input_problems, plan
+from gyriflow.shell.checking import coarse_cortices, input_problems, plan, work_of_study
 
 
 def problems(folder, **keys):
@@ -73,4 +73,6 @@ def test_a_look_leaves_nothing_behind(tmp_path):
     config = tmp_path / "a.yaml"
     config.write_text("brains: [{id: a, week: 23, phantom: {}}]\nstart: a\nfolding: {end_week: 24}\n")
     assert plan(config, tmp_path / "new" / "study", ["surface"])
+    (said,) = work_of_study(config, tmp_path / "new" / "study", 1, ["calibrate"])
+    assert said == "nothing to run: the configuration asks for no results of this stage"
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]

@@ -7,6 +7,7 @@ import pytest
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
 from gyriflow.shell.launch import hold_lock
+from gyriflow.shell.provenance import STUDY
 from gyriflow.shell.status import as_json, as_text, status
 from gyriflow.shell.terminal import STATE
 
@@ -71,7 +72,7 @@ def test_stages_of_brains_and_runs_are_told_from_their_files(study):
 
 
 def test_a_folder_without_a_study_is_named(tmp_path):
-    with pytest.raises(InputError, match="holds no study"):
+    with pytest.raises(InputError, match=f"{tmp_path}: holds no study"):
         status(tmp_path)
 
 
@@ -84,3 +85,9 @@ def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(stud
         ("r", "a", "-"),
         ("later", "a", "-"),
     ]
+    # the configuration may lie elsewhere
+    elsewhere = study / "elsewhere.yaml"
+    (study / "gyriflow.yaml").rename(elsewhere)
+    assert [row[0] for row in status(study).runs] == ["r"]
+    write_json(study / STUDY, {"configuration": [str(elsewhere)], "brains": []})
+    assert [row[0] for row in status(study).runs] == ["r", "later"]

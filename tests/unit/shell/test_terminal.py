@@ -6,6 +6,7 @@ import pytest
 
 from gyriflow.shell.terminal import ORDER, RunDisplay, ended_by_slurm, stages, subject
 from gyriflow.shipped import SHIPPED
+from gyriflow.step import EXIT_FILE, recorded_exit_code
 
 STAGES = {"pial_from_labels": "surface", "simulate": "folding", "html_report": "report"}
 STEP = '{{"event": "step", "week": {week}, "end_week": 23, "step": 1, "left_s": {left}}}\n'
@@ -148,6 +149,31 @@ def test_what_a_job_said_right_before_it_failed_is_told(display, tmp_path):
     assert "12 elements, 9 unknowns, 1 ranks, about 70 MiB" in lines[-4]
     assert lines[-3] == "warning folding, run r, brain a: too coarse"
     assert lines[-2] == "failed  folding, run r, brain a: memory ran out"
+
+
+@pytest.mark.fault(38)
+@pytest.mark.parametrize(
+    ("signal", "said", "code"),
+    [("SIGKILL: 9", "it was killed, most probably because memory ran out", 137), ("SIGSEGV: 11", "it crashed", None)],
+)
+def test_a_program_that_a_signal_has_ended_is_told_as_that(display, tmp_path, monkeypatch, signal, said, code):
+    monkeypatch.setenv(EXIT_FILE, str(tmp_path / "code"))
+    display.plan({"pial_from_labels": 1}, 1)
+    display.job_begins(1, "pial_from_labels", {"brain": "a"}, ["x"], None)
+    display.job_fails(
+        1, "pial_from_labels", [], f"CalledProcessError in file x:\n'python x.py' died with <Signals.{signal}>."
+    )
+    assert f"failed  surface, brain a: {said}" in shown(display)
+    assert recorded_exit_code(tmp_path / "code") == code
+
+
+def test_a_stage_without_results_is_not_called_done(display):
+    display.plan({"calibrate": 1}, 1)
+    display.job_begins(1, "calibrate", {}, [], None)
+    display.job_ends(1)
+    display.progress(1, 1)
+    display.end()
+    assert shown(display).splitlines()[-1].endswith("the configuration asks for no results of this stage")
 
 
 def test_a_terminal_has_a_last_line_that_is_written_over(clock, monkeypatch):
