@@ -79,10 +79,10 @@ def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -
 
 
 def doubts_of_proportions(extents_mm: Floats) -> list[str]:
-    """Returns what is doubtful about a posed brain's width, length and height (3,): a wrong edge of the voxels."""
+    """Returns what is doubtful about a posed brain's width, length and height (3,): a wrong scale of an axis."""
     width, length, height = map(float, extents_mm)
     return [
-        f"the {name} is {share:.2f} of the length, {least} to {most} in most brains: are the voxels' edges right?"
+        f"the {name} is {share:.2f} of the length, {least} to {most} in most brains: is its scale right along each axis?"
         for name, share, (least, most) in (("width", width / length, WIDTHS), ("height", height / length, HEIGHTS))
         if not least <= share <= most
     ]

@@ -10,7 +10,10 @@ from typing import Any
 import igl
 import numpy as np
 import pyvista as pv
-from scipy import ndimage
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+from scipy.sparse.csgraph import connected_components, laplacian
+from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
@@ -46,8 +49,10 @@ SAME_MM = 1e-5
 COMPARABLE = 0.3
 # lengths of brains and hemispheres
 SMALLEST_MM, LARGEST_MM = 15.0, 300.0
-# a vertex is off its surface at this distance from the middle of its neighbours, and so many times theirs from it
+# vertices are off their surface at this distance from the middle of those around them, and so many times theirs from it
 SPIKE_MM, SPIKE_SPREADS = 5.0, 3.0
+# more than this share of the vertices are a part of the brain
+SPIKE_SHARE = 0.02
 # voxels in which a surface is looked at for stalks
 STALK_VOXEL_MM = 0.8
 # cuts follow the triangles, so that they are wider than the stalks
@@ -87,9 +92,7 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
         )
     if spikes := repairs["vertices_moved_back"]:
         said = "1 vertex lay" if spikes == 1 else f"{spikes} vertices lay"
-        warnings.append(
-            f"{said} far off the surface and {'was' if spikes == 1 else 'were'} moved to the neighbours' middle"
-        )
+        warnings.append(f"{said} far off the surface and {'was' if spikes == 1 else 'were'} set between the neighbours")
     mesh, stalks = surface_without_stalks(mesh)
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ hung on a stalk of {stalk['stalk_mm2']:.0f} mm²: cut off"
@@ -99,19 +102,39 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
 
 
 def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Returns a surface whose vertices far off their neighbours are in the middle of these, and the number of them."""
-    one, other = np.concatenate([pairs := edges(mesh)[0], pairs[:, ::-1]]).T
-    count = np.bincount(one, minlength=len(mesh.vertices))
-    middle = np.zeros_like(mesh.vertices, dtype=np.float64)
-    np.add.at(middle, one, mesh.vertices[other])
-    middle /= np.maximum(count, 1)[:, None]
-    spread = np.zeros(len(count))
-    np.maximum.at(spread, one, np.linalg.norm(mesh.vertices[other] - middle[one], axis=1))
-    distance = np.linalg.norm(mesh.vertices - middle, axis=1)
-    far = (count > 2) & (distance > np.maximum(SPIKE_MM, SPIKE_SPREADS * spread))
+    """Returns a surface whose vertices far off it are set between those around them, and the number of them.
+
+    They are groups of few vertices that only long edges join to the rest, and that are far from those around them.
+    """
+    pairs, number = edges(mesh)[0], len(mesh.vertices)
+    length = np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1)
+    near = length <= max(SPIKE_MM, SPIKE_SPREADS * float(np.median(length)))
+    part = _parts(pairs[near], number)
+    few = np.bincount(part)[part] < SPIKE_SHARE * number
+    group = _parts(pairs[few[pairs].all(axis=1)], number)
+    rim = pairs[few[pairs].sum(axis=1) == 1]
+    inner, outer = np.where(few[rim[:, :1]], rim, rim[:, ::-1]).T
+    far = np.zeros(number, dtype=bool)
+    for one in np.unique(group[inner]):
+        members, around = few & (group == one), mesh.vertices[outer[group[inner] == one]]
+        middle = around.mean(axis=0)
+        spread = max(SPIKE_MM, SPIKE_SPREADS * float(np.linalg.norm(around - middle, axis=1).max()))
+        away = np.linalg.norm(mesh.vertices[members] - middle, axis=1).max()
+        far |= members & (away > spread and members.sum() < SPIKE_SHARE * number)
     if not far.any():
         return mesh, 0
-    return TriangleMesh(np.where(far[:, None], middle, mesh.vertices), mesh.faces), int(far.sum())
+    # each in the middle of its neighbours
+    joined = sparse.coo_array((np.ones(2 * len(pairs)), np.concatenate([pairs, pairs[:, ::-1]]).T), 2 * (number,))
+    stiffness = laplacian(joined.tocsr()).tocsr()
+    vertices = mesh.vertices.astype(np.float64)
+    vertices[far] = spsolve(stiffness[far][:, far].tocsc(), -stiffness[far][:, ~far] @ vertices[~far])
+    return TriangleMesh(vertices, mesh.faces), int(far.sum())
+
+
+def _parts(pairs: NDArray[np.integer], number: int) -> NDArray[np.int32]:
+    """Returns the (n,) number of the part that each vertex is in, as far as pairs of them are joined."""
+    joined = sparse.coo_array((np.ones(len(pairs)), pairs.T), (number, number))
+    return np.asarray(connected_components(joined, directed=False)[1])
 
 
 def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:
@@ -184,8 +207,8 @@ def make_even(
 def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Returns the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
-    Equal vertices are joined, degenerate and double faces removed, vertices far off their neighbours moved between
-    these, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small pieces and
+    Equal vertices are joined, degenerate and double faces removed, vertices far off the surface set between their
+    neighbours, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small pieces and
     pieces inside others dropped.
     MeshError for larger holes and for surfaces that stay open.
     """
@@ -402,8 +425,12 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
 
 def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> Floats:
     """Returns points on the surface, so dense that no place on it is further than about a voxel from one."""
-    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
-    longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=-1).max()
-    steps = max(int(np.ceil(longest / voxel_mm)), 1)
-    weights = np.array([(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)]) / steps
-    return np.unique(np.einsum("wk,kfd->wfd", weights, np.stack([a, b, c])).reshape(-1, 3).round(3), axis=0)
+    triangles = mesh.vertices[mesh.faces]
+    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
+    # of each face as many as its size asks for: one long face is not to fill the memory
+    every = np.maximum(np.ceil(longest / voxel_mm), 1).astype(int)
+    found = []
+    for steps in np.unique(every):
+        weights = np.array([(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)]) / steps
+        found.append(np.einsum("wk,fkd->wfd", weights, triangles[every == steps]).reshape(-1, 3).round(3))
+    return np.unique(np.concatenate(found), axis=0)

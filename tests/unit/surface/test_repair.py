@@ -1,5 +1,7 @@
 """Surfaces from files: what is broken is repaired and counted, or refused."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from shapes import sphere, torus
@@ -44,13 +46,15 @@ def test_large_hole_is_refused_with_its_size():
 
 
 @pytest.mark.parametrize("shift", [60.0, -25.0], ids=["spike", "dent"])
-def test_a_vertex_far_off_the_surface_is_moved_back_and_told(shift):
+@pytest.mark.parametrize("reach", [0.1, 2.0], ids=["one", "several"])
+def test_vertices_far_off_the_surface_are_moved_back_and_told(shift, reach):
     whole = ball()
     vertices = whole.vertices.copy()
-    vertices[7] *= 1.0 + shift / RADIUS
+    moved = np.linalg.norm(vertices - vertices[7], axis=1) < reach
+    vertices[moved] *= 1.0 + shift / RADIUS
     found = sound_pieces(TriangleMesh(vertices, whole.faces), 3.0)
-    assert found.report["repair"]["vertices_moved_back"] == 1
-    assert "1 vertex lay far off the surface" in found.warnings[0]
+    assert found.report["repair"]["vertices_moved_back"] == moved.sum()
+    assert f"{moved.sum()} vert" in found.warnings[0]
     assert signed_volume(found.mesh) == pytest.approx(VOLUME, rel=0.01)
     assert np.linalg.norm(found.mesh.vertices, axis=1).max() < RADIUS + 0.1
 
@@ -63,6 +67,18 @@ def test_large_triangles_and_fans_are_no_spikes():
     mesh, report = clean(submesh(whole, kept)[0], 30.0)
     assert report["holes_closed"] == 1
     assert clean(mesh, 3.0)[1]["vertices_moved_back"] == 0
+
+
+def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():
+    whole = ball()
+    vertices = whole.vertices.copy()
+    vertices[7] *= 1.0 + 200.0 / RADIUS
+    tracemalloc.start()
+    mesh, _ = rebuild(TriangleMesh(vertices, whole.faces), 1.0)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 500e6
+    assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.1)
 
 
 def test_faces_inside_out_are_turned():

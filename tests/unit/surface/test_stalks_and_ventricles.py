@@ -127,6 +127,16 @@ def test_ventricles_without_labels_are_filled_and_no_fissure_or_cistern(atlas_br
     assert (found & ~ventricles).sum() < 0.01 * ventricles.sum()
 
 
+def test_one_ventricle_without_a_label_is_filled_beside_the_other(atlas_brain):
+    labels, affine = atlas_brain
+    first_half = np.arange(len(labels))[:, None, None] < 67
+    missing = (labels == VENTRICLES) & first_half
+    assert 0.45 < missing.sum() / (labels == VENTRICLES).sum() < 0.55
+    found = unlabelled_ventricles(np.where(missing, 0, labels), SCHEMES["spina-bifida-atlas"], affine)
+    assert (found & missing).sum() > 0.95 * missing.sum()
+    assert (found & ~missing).sum() < 0.02 * missing.sum()
+
+
 @pytest.mark.parametrize("scheme", [SOLID, SCHEMES["spina-bifida-atlas"]])
 def test_nothing_is_filled_where_the_cerebrum_is_whole(atlas_brain, scheme):
     assert not unlabelled_ventricles(*(atlas_brain[0], scheme, atlas_brain[1])).any()
