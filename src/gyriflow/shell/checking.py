@@ -118,9 +118,9 @@ def work_of_study(
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
-    """Returns the jobs that Snakemake would run, targets among them; ends the program as Snakemake does where it refuses.
+    """Returns the jobs that Snakemake would run, with its targets, which have no outputs.
 
-    With `show` it lists them on the terminal.
+    With `show` it lists them on the terminal. Ends the program as Snakemake does where it refuses.
     """
     said = StringIO()
     with tempfile.TemporaryDirectory(prefix="gyriflow-") as folder, ExitStack() as stack:

@@ -82,7 +82,7 @@ def doubts_of_proportions(extents_mm: Floats) -> list[str]:
     """Returns what is doubtful about a posed brain's width, length and height (3,): a wrong scale of an axis."""
     width, length, height = map(float, extents_mm)
     return [
-        f"the {name} is {share:.2f} of the length, {least} to {most} in most brains: is its scale right along each axis?"
+        f"the {name} is {share:.2f} of the length, {least} to {most} in most brains: is the scale of each axis right?"
         for name, share, (least, most) in (("width", width / length, WIDTHS), ("height", height / length, HEIGHTS))
         if not least <= share <= most
     ]

@@ -208,9 +208,8 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
     """Returns the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
     Equal vertices are joined, degenerate and double faces removed, vertices far off the surface set between their
-    neighbours, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small pieces and
-    pieces inside others dropped.
-    MeshError for larger holes and for surfaces that stay open.
+    neighbours, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small
+    pieces and pieces inside others dropped. MeshError for larger holes and for surfaces that stay open.
     """
     mesh, doubles = _drop_doubles(mesh)
     # not before: faces that meet in several copies of a vertex would count

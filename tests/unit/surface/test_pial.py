@@ -159,7 +159,7 @@ def test_a_wrong_edge_of_the_voxels_is_told_by_the_brains_proportions(axis):
     extents = np.array([75.0, 92.0, 66.0])
     assert doubts_of_proportions(extents) == []
     extents[axis] *= 1.3
-    assert "is its scale right along each axis?" in doubts_of_proportions(extents)[0]
+    assert "is the scale of each axis right?" in doubts_of_proportions(extents)[0]
 
 
 @pytest.mark.fault(4)
