@@ -32,6 +32,7 @@ BYTES_IN_FILE, BYTES_IN_BRAIN = 16, 800
 """What the surface of a label volume takes for each voxel of the file, and each voxel of the brain in it."""
 FOLDINGS = ("simulate", "simulate_member")
 """Rules that solve a folding; those of studies and calibrations may diverge."""
+OF_LABELS = ("pial_from_labels", "cortical_thickness")
 OF_NODES = ("tetrahedralise", "carried_mesh", "parameter_maps", "regions")
 CHAIN = (
     *("pial_from_labels", "pial_from_hemispheres", "pial_from_surface", "tetrahedralise", "parameters", "regions"),
@@ -174,6 +175,11 @@ def predict(
         if job.rule in FOLDINGS and memory_of_run is not None and job.run is not None:
             run = run_of(job.run, config)
             memory = memory_of_run(round(size.tets), run.ranks, run.contact.kind, config.mesh.order)
+        if job.rule in OF_LABELS and job.brain is not None:
+            brain = config.brain(job.brain)
+            # of fine voxels, which the measured brains did not have
+            need = surface_memory_mib(brain.label_volume or "", brain.week)
+            memory = need if need > LEAST_SURFACE_MIB else memory
         seconds.append(time)
         folding += time if job.rule in FOLDINGS else 0.0
         # what each stage takes at least, one after the other

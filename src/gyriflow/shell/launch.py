@@ -134,10 +134,7 @@ def value_of(arguments: Sequence[str], *names: str) -> str | None:
 
 
 def refuse_bad_configfiles(arguments: Sequence[str], directory: Path) -> None:
-    """Raises InputError where a configuration file is missing, no YAML, or names a key twice.
-
-    It is one of the command line, or that which a working directory has for itself.
-    """
+    """Raises InputError where a configuration file, named or found here, is missing, no YAML, or has a key twice."""
     given, own = False, directory / "config" / "config.yaml"
     if not any(argument.startswith("--configfile") for argument in arguments) and own.is_file():
         read_keys(own)

@@ -243,6 +243,9 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     least = FURTHER_VENTRICLES if np.isin(labels, scheme.ventricles).any() else TOLD_LOSS
     size = np.linalg.norm(affine[:3, :3], axis=0)
     margin = int(np.ceil(CLOSING_MM / size.min())) + 2
+    if 2 * margin > max(labels.shape):
+        # in a far larger unit, which is reported elsewhere
+        return filled
     (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
     numbers, tissue = np.pad(labels[box], margin), np.pad(cerebrum[box], margin)
     near = ndimage.distance_transform_edt(~tissue, sampling=size) <= CLOSING_MM

@@ -91,8 +91,7 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
             f"{100 * dropped / (kept + dropped):.1f} % of the area"
         )
     if spikes := repairs["vertices_moved_back"]:
-        said = "1 vertex lay" if spikes == 1 else f"{spikes} vertices lay"
-        warnings.append(f"{said} far off the surface and {'was' if spikes == 1 else 'were'} set between the neighbours")
+        warnings.append(f"vertices far off the surface were set between their neighbours: {spikes}")
     mesh, stalks = surface_without_stalks(mesh)
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ hung on a stalk of {stalk['stalk_mm2']:.0f} mm²: cut off"

@@ -133,3 +133,6 @@ def test_the_memory_of_a_surface_follows_the_header(tmp_path):
     assert usual == surface_memory_mib(str(tmp_path / "none.nii"), 25.0) == LEAST_SURFACE_MIB
     assert fine > 1.2 * LEAST_SURFACE_MIB
     assert padded < fine
+    brain = {"id": "a", "week": 25, "labels": str(tmp_path / "fine.nii"), "scheme": "binary"}
+    config = load({"brains": [brain], "start": "a", "folding": {"end_week": 26}})
+    assert predict([Job("pial_from_labels", None, "a")], config, COEFFICIENTS, 1).memory_mib == fine
