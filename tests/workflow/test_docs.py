@@ -14,7 +14,7 @@ CHECKOUT = Path(__file__).parents[2]
 PAGES = [CHECKOUT / "README.md", CHECKOUT / "docs" / "tutorial.md", *sorted(CHECKOUT.glob("docs/how-to/*.md"))]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 BRAINS = [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 24, "phantom": {}}]
-FILE = re.compile(r"[\w./-]+\.(?:nii\.gz|gii|tsv|mgz)\b")
+FILE = re.compile(r"[\w./-]+\.(?:nii\.gz|gii|tsv|mgz|pial|white)\b")
 
 
 def blocks(page, kind):
@@ -70,13 +70,24 @@ def test_functions_that_the_api_lists_exist():
     assert missing == []
 
 
-# a command that several pages show is tried once, one with a page's own study on each page
+def options_of(line):
+    """Returns what a command that runs the workflow gives to Snakemake."""
+    command, *words = shlex.split(line, comments=True)[1:]
+    if command == "snakemake":
+        return " ".join(words)
+    _, configuration, *further = words
+    given = [] if configuration == "config/config.yaml" else ["--configfile", configuration]
+    return " ".join([*given, *("--directory" if word == "-d" else word for word in further if word != "--stage")])
+
+
+# a command that several pages show is tried once, one with a page's own study on each page; those for clusters are not
 COMMANDS = {
-    (page if "my.yaml" in line else None, " ".join(shlex.split(line, comments=True)[2:])): page
+    (page if "my.yaml" in line else None, options_of(line)): page
     for page in PAGES
     for block in blocks(page, "")
     for line in block.splitlines()
-    if line.strip().startswith("./run snakemake") and "{" not in line and "BRAIN" not in line
+    if line.strip().startswith(("./run snakemake", "./run gyriflow run"))
+    if not re.search(r"\{|BRAIN|--profile|retrieve", line)
 }
 
 

@@ -33,10 +33,10 @@ def changed_files(root, *names, content=OTHER):
 
 # what is made of the surface of a measured brain that starts no run: its own, and what compares others with it
 OF_THE_OTHER_BRAIN = SHAPE | {
-    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "growth_table": 1, "measure": 1, "study_table": 5,
+    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 5,
     "similarity": 2,
-    "weekly_figure": 1, "shape_maps": 2, "pial_from_labels": 1, "label_volumes": 1,
-    "quality_page": 1, "quality_table": 1, "inputs_figure": 1, "outlines_figure": 2,
+    "weekly_figure": 1, "shape_maps": 1, "pial_from_labels": 1, "label_volumes": 1,
+    "quality_page": 1, "quality_table": 1, "outlines_figure": 2,
 }  # fmt: skip
 # a table of the study is shown by the report
 NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "methods": 1}
@@ -52,7 +52,7 @@ OF_THE_SOLVER = {
     ("names", "expected"),
     [
         (["src/gyriflow/metrics/similarity.py"], NEW_TABLE | {"similarity": 2, "outlines_figure": 2}),
-        (["src/gyriflow/report/growth.py"], NEW_RESULTS | {"growth_figure": 1, "growth_table": 1}),
+        (["src/gyriflow/report/growth.py"], NEW_RESULTS | {"growth_figure": 1}),
         (["src/gyriflow/folding/contact.py"], OF_THE_SOLVER),
         (["workflow/scripts/quality_table.py"], RESOURCES | {"quality_table": 1, "study_warnings": 1}),
         # what the terminal says, the command line, comments in rules and the environment make no result
@@ -96,12 +96,10 @@ def with_later_end(study):
             | {
                 "growth_rates": 1,
                 "growth_figure": 1,
-                "growth_table": 1,
                 "label_volumes": 1,
                 "quality_page": 1,
                 "quality_table": 1,
-            }
-            | {"inputs_figure": 1},
+            },
         ),
         (with_run, ONE_RUN),
         (with_other_phantom, OF_THE_OTHER_BRAIN | {"phantom": 1}),

@@ -23,8 +23,7 @@ rule quality_table:
     input:
         expand(rules.quality_page.output.row, brain=PLAN.brains.ids),
     output:
-        csv=f"{STUDY}/quality.csv",
-        table=f"{STUDY}/quality.html",
+        f"{STUDY}/quality.csv",
     params:
         refused=REPORTING.refused(REFUSED),
         order=[*(brain.id for brain in WHOLE_CONFIG.brains), *WHOLE_CONFIG.left_out],

@@ -66,7 +66,7 @@ rule html_report:
         FIGURES.target("report", "quality"),
         surfaces=expand(PIAL["report"], brain=PLAN.brains.ids),
         runs=rules.study_runs.output.csv,
-        quality=rules.quality_table.output.csv,
+        quality=rules.quality_table.output[0],
         warnings=rules.study_warnings.output[0],
         validation=f"{STUDY}/validation.csv" if PLAN.validating.pairs else [],
         provenance=rules.report_provenance.output[0],
@@ -88,7 +88,6 @@ rule html_report:
         picture_bytes=PICTURE_BYTES,
         brains=REPORTING.described,
         surfaced=PLAN.brains.ids,
-        metrics=REPORTING.metrics,
         config=REPORTING.used,
         paths=CONFIG.report.paths,
     script:

@@ -64,13 +64,16 @@ def growth_chart(areas, rates, agreement, folding_rate_per_s, estimated_from, **
 
 
 def displacement_maps(frames, **shown):
-    """Returns the displacement between output weeks on the pial surface at the interval's end."""
-    weeks = read_weeks(frames)
-    surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames)))
-    at = {week: read_positions(frames, week)[pial] for week in weeks}
-    maps = {
-        (a, b): (TriangleMesh(at[b], surface.faces), np.linalg.norm(at[b] - at[a], axis=1)) for a, b in pairwise(weeks)
-    }
+    """Returns the displacement of runs between output weeks on the pial surface at the interval's end."""
+    maps = {}
+    for run, path in frames.items():
+        weeks = read_weeks(path)
+        surface, pial = boundary_surface(TetrahedralMesh(read_positions(path, weeks[0]), read_tets(path)))
+        at = {week: read_positions(path, week)[pial] for week in weeks}
+        maps[run] = {
+            (a, b): (TriangleMesh(at[b], surface.faces), np.linalg.norm(at[b] - at[a], axis=1))
+            for a, b in pairwise(weeks)
+        }
     return {"displacements": maps, **shown}
 
 

@@ -15,7 +15,7 @@ with step(snakemake.log[0]):
         Shown(
             entry["section"],
             entry["title"],
-            picture(addresses[path], entry["title"]) if path in addresses else read_body(path),
+            picture(*addresses[path], entry["title"]) if path in addresses else read_body(path),
             entry["caption"],
             first=path == params.first,
             technical=entry["technical"],
@@ -27,7 +27,6 @@ with step(snakemake.log[0]):
         surfaces={brain: read_json(path) for brain, path in zip(params.surfaced, files.surfaces, strict=True)},
         runs=read_table(files.runs),
         provenance=read_json(files.provenance),
-        metrics=params.metrics,
         methods=read_text(files.methods),
         configuration=yaml_text(params.config if params.paths else hide_paths(params.config)),
         **{name: read_table(files[name]) for name in ("validation", "quality", "warnings") if files.get(name)},

@@ -1,14 +1,10 @@
 """The verdict on every brain of the study, with what it rests on; refused brains with their cause."""
 
-from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, write_table
-from gyriflow.report.quality import quality_table, shown_table, thickness_note
-from gyriflow.report.tables import html_table
+from gyriflow.report.quality import quality_table
 from gyriflow.step import step
 
 params = snakemake.params
 with step(snakemake.log[0]):
     table = quality_table([read_json(file) for file in snakemake.input], params.refused, params.order)
-    write_table(snakemake.output.csv, table)
-    caption = f"Quality of the brains before the solve{thickness_note(table)}"
-    write_html(snakemake.output.table, html_table(shown_table(table), caption=caption))
+    write_table(snakemake.output[0], table)

@@ -7,23 +7,23 @@ from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.terms import run_names
 from gyriflow.report.solve import resolution_over_steps
-from gyriflow.report.tables import html_table, runs_table
+from gyriflow.report.tables import OF_EVERY_RUN, html_table, runs_table
 from gyriflow.step import step
 
 BEFORE_THE_SOLVE = ("clamped_share", "initial_penetration_mm", "elements_through_cortex")
 
 files, folded = snakemake.input, snakemake.params.folded
 with step(snakemake.log[0]):
-    rows = []
-    of_runs = zip(folded, files.params, files.summaries, files.zones, files.steps, strict=True)
-    for (run, brain), params, summary, zones, steps in of_runs:
+    rows, runs = [], {}
+    of_runs = zip(run_names(folded), folded, files.params, files.summaries, files.zones, files.steps, strict=True)
+    for name, (run, brain), params, summary, zones, steps in of_runs:
         report = read_json(zones)
         before = {name: report[name] for name in BEFORE_THE_SOLVE}
         resolved = resolution_over_steps(report["order"], read_table(steps))
-        rows.append({"run": run, "subject": brain, **read_yaml(params), **read_json(summary), **before, **resolved})
+        settings, found = read_yaml(params), {**read_json(summary), **before, **resolved}
+        rows.append({"run": run, "subject": brain, **settings, **found})
+        # the shapes of a closed loop are files
+        settings.pop("targets", None)
+        runs[name] = settings | {key: value for key, value in found.items() if key in OF_EVERY_RUN}
     write_table(snakemake.output.csv, pd.json_normalize(rows))
-    runs = {
-        name: {key: value for key, value in row.items() if key not in ("run", "subject")}
-        for name, row in zip(run_names(folded), rows, strict=True)
-    }
-    write_html(snakemake.output.table, html_table(runs_table(runs), caption="Parameters and summaries of the runs"))
+    write_html(snakemake.output.table, html_table(runs_table(runs)))

@@ -65,13 +65,21 @@ def write_html(path: AnyPath, body: str) -> None:
     write_text(path, f"{head}\n{body}\n</html>\n")
 
 
-def picture_addresses(paths: Sequence[AnyPath], budget_bytes: float) -> list[str]:
-    """Returns pictures as data addresses for a page, all as wide as fits into a number of bytes, WebP coded."""
+def picture_addresses(paths: Sequence[AnyPath], budget_bytes: float) -> list[tuple[str, float]]:
+    """Returns pictures as data addresses for a page, WebP coded, each with the width in inches that it has in print.
+
+    All have as many pixels as fit into a number of bytes.
+    """
     for width in WIDTHS:
         coded = [_coded(path, width) for path in paths]
         if sum(map(len, coded)) <= budget_bytes:
             break
-    return [f"data:image/webp;base64,{content}" for content in coded]
+    return [(f"data:image/webp;base64,{content}", _inches(path)) for content, path in zip(coded, paths, strict=True)]
+
+
+def _inches(path: AnyPath) -> float:
+    with Image.open(path) as picture:
+        return float(picture.width / picture.info["dpi"][0])
 
 
 def _coded(path: AnyPath, width: int) -> str:

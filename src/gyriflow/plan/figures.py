@@ -22,6 +22,10 @@ STUDY_FIGURES = f"{STUDY}/figures"
 INFLUENCE = f"{STUDY}/{{study}}/figures"
 WEEKLY = f"{STUDY_FIGURES}/weekly.{{brain}}.png"
 AROUND = ("left", "right", "top", "bottom")
+ZONES = ("contact", "no_growth", "support", "medial_wall")
+GROWTH_OF_START = (*ZONES, "thickness_mm", "growth_rate_per_s", "follow", "allow_negative_growth", "step_s")
+MODULI = ("shear_modulus_cortex_pa", "shear_modulus_core_pa")
+"""Settings of a run that decide what figures of the brain at its start show: runs alike in them have one figure."""
 
 
 def nothing(**_: str) -> dict[str, Any]:
@@ -169,7 +173,9 @@ class Figures:
     def _title(self, figure: Figure, wildcards: Wildcards) -> str:
         words = {key: value.removesuffix("_mm").replace("_", " ") for key, value in wildcards.items()}
         title = figure.title.format(**words)
-        named = [value for key, value in wildcards.items() if key in ("run", "brain", "study")]
+        # the page's title names a brain that all figures of a kind are of
+        one = len({of.get("brain") for of in figure.of}) == 1
+        named = [value for key, value in wildcards.items() if key in ("run", "study") or (key == "brain" and not one)]
         return " · ".join([title[0].upper() + title[1:], *named])
 
     def _caption(self, figure: Figure, wildcards: Wildcards) -> str:
@@ -180,12 +186,6 @@ class Figures:
             values["week"] = f"{self.studying.week(wildcards['study']):g}"
         # names in captions of the study may have braces
         return " ".join((figure.caption.format(**values) if values else figure.caption).split())
-
-    @cached_property
-    def last_week(self) -> str | None:
-        """The last week of which every run has a surface, as in file names, where there is one."""
-        weeks = [set(self.runs.week_tags(*pair)) for pair in self.runs.folded]
-        return max(set.intersection(*weeks), default=None) if weeks else None
 
     @property
     def first(self) -> str | None:
@@ -229,6 +229,11 @@ class Figures:
         beside = [self._real_beside(run, start) for run in self._runs_from(start)]
         return {week: row for rows in beside for week, row in rows.items()}
 
+    def _beside_runs(self, brain: str) -> dict[str, Any]:
+        """Returns the options of figures that show all runs from a brain beside measured brains."""
+        real = [row.subject for row in self._real_beside_runs(brain).values()]
+        return {**self._synthetic(brain), "measured": self.config.measured_name(real)}
+
     def _deviations(self, run: str, brain: str) -> dict[float, list[str]]:
         """Returns by week the surface that a run expects and the maps of how the real brain deviates."""
         surfaces, maps = self._surfaces(run, brain), DEVIATION["maps"].format(run=run, brain=brain, week="{week}")
@@ -247,11 +252,23 @@ class Figures:
         return tuple({"brain": brain} for brain in brains)
 
     @property
+    def _each_start(self) -> tuple[Wildcards, ...]:
+        return self._each_brain(list(dict.fromkeys(brain for _, brain in self.runs.folded)))
+
+    @property
     def _each_run(self) -> tuple[Wildcards, ...]:
         return tuple({"run": run, "brain": brain} for run, brain in self.runs.folded)
 
     def _each_run_with(self, chosen: Callable[[str], bool]) -> tuple[Wildcards, ...]:
         return tuple(wildcards for wildcards in self._each_run if chosen(wildcards["run"]))
+
+    def _each_start_with(self, *settings: str) -> tuple[Wildcards, ...]:
+        """Returns the first of the runs from a brain that are alike in some settings."""
+        first: dict[str, Wildcards] = {}
+        for wildcards in self._each_run:
+            own = self.config.run(wildcards["run"]).model_dump(include=set(settings))
+            first.setdefault(repr((wildcards["brain"], own)), wildcards)
+        return tuple(first.values())
 
     @property
     def gates(self) -> dict[str, float]:
@@ -284,7 +301,7 @@ class Figures:
                 "brains": {f"{b}\n{self.brains.week(b):g} GW": PIAL["whole"].format(brain=b) for b in ends}
             },
             lambda: {**self._synthetic(*ends), "views": ["left", "top", "bottom"]},
-            paper=True,
+            paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "quality_figure", "Inputs", "mesh quality", f"{BRAIN}/figures/mesh_quality.png", "solve.quality_histogram",
@@ -304,18 +321,12 @@ class Figures:
             of=(),
         )  # fmt: skip
         yield Figure(
-            "quality_page", "Quality of the brains", "quality of the brain", f"{BRAIN}/figures/quality.png",
+            "quality_page", "Inputs", "quality of the brain", f"{BRAIN}/figures/quality.png",
             caption="""Quality of *{brain}* before the solve: (a) the pial surface and the inner border of the cortex
             over the image or the labels, (b) the surface from several sides, (c) cortical thickness where it is known,
             else further sides, and what the steps have warned of.""",
             of=self._each_brain(self.brains.ids),
             target="quality", technical=True,
-        )  # fmt: skip
-        yield Figure(
-            "quality_table", "Quality of the brains", "verdicts", f"{STUDY}/quality.html",
-            caption="""The verdict on each brain before the solve: fine, to look at (with warnings), or refused (with
-            the cause). All columns are in ``results/study/quality.csv``.""",
-            target="quality",
         )  # fmt: skip
 
     @property
@@ -326,23 +337,13 @@ class Figures:
             "growth_figure", "Growth", "cortical growth rates", f"{STUDY}/growth/growth.png", "growth.growth_chart",
             f"""Pial area (a; both hemispheres, without the cut at the midline) and brain volume (b) of the brains that
             were given, and the tangential growth rate between successive weeks{" (c)" if len(series) == 1 else ""},
-            α = (θ^½ − 1)/Δt with θ the ratio of the areas. {self._series_note(series)} {self._rate_note(series)}""",
+            α = (√θ − 1)/Δt with θ the ratio of the areas. {self._series_note(series)} {self._rate_note(series)}""",
             lambda: dict(GROWTH),
             lambda: {
                 "measured": measured,
                 "folding_rate_per_s": self.chains.folding_rate_per_s,
                 "estimated_from": self.config.start_brains and self.config.estimated_from(self.config.start_brains[0]),
             },
-            ({},) if self.chains.grown else (),
-            "growth", paper=True,
-        )  # fmt: skip
-        yield Figure(
-            "growth_table", "Growth", "growth rates, table", f"{STUDY}/growth/rates.html", "growth.growth_tables",
-            """Areas and volumes; growth rates between successive weeks, of the cortex from the ratio of the areas
-            (square root), of what lies under it from that of the volumes (cube root); and, where there are several
-            series of brains, how far their rates differ.""",
-            lambda: dict(GROWTH),
-            lambda: {"measured": measured},
             ({},) if self.chains.grown else (),
             "growth", paper=True,
         )  # fmt: skip
@@ -367,7 +368,7 @@ class Figures:
             )
         if not rate:
             return ""
-        of = f", {rate:.3g} 1/s" if isinstance(rate, float) else ""
+        of = f", {1e7 * rate:.3g}·10⁻⁷ s⁻¹," if isinstance(rate, float) else ""
         return f"The dashed line is the growth rate of the simulation{of}."
 
     @property
@@ -391,13 +392,8 @@ class Figures:
                 },
                 "real": {week: row.parts["whole"] for week, row in self._real_beside_runs(brain).items()},
             },
-            lambda brain: {
-                **self._synthetic(brain),
-                "measured": self.config.measured_name(
-                    [row.subject for row in self._real_beside_runs(brain).values()]
-                ),
-            },
-            tuple({"brain": brain} for brain in dict.fromkeys(brain for _, brain in self.runs.folded)),
+            self._beside_runs,
+            self._each_start,
             paper=True,
         )  # fmt: skip
         yield Figure(
@@ -418,15 +414,18 @@ class Figures:
             "mesh_figure", "Folding", "the mesh, cut open", f"{at}/mesh.png", "pictures.mesh_picture",
             """Mesh at the start of run *{run}*: from the left (a), cut open across, from the front (b), and along,
             from above (c).""",
-            files(**start), self._of_start, self._each_run, paper=True, technical=True,
+            files(**start), self._of_start, self._each_start_with("thickness_mm"), paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
-            "displacement_maps", "Folding", "displacement maps", f"{at}/displacement_maps.png",
+            "displacement_maps", "Folding", "displacement maps", f"{STUDY_FIGURES}/displacement_maps.{{brain}}.png",
             "pictures.displacement_maps",
-            """Norm of the displacement between output weeks on the pial surface of run *{run}*, from the left (a),
-            from above (b) and from behind (c). One vertex in two hundred is above the scale. Ring: the largest one,
-            dotted where it lies on the side turned away, with its place in RAS+ mm. The mean is over the vertices.""",
-            files(frames=FOLDING["frames"]), self._of_start, self._each_run, paper=True,
+            """Norm of the displacement between output weeks on the pial surface, on one scale for all runs. One vertex
+            in two hundred is above the scale. Ring: the largest one, dotted where it lies on the side turned away, with
+            its place in RAS+ mm. The mean is over the vertices.""",
+            lambda brain: {
+                "frames": {run: FOLDING["frames"].format(run=run, brain=brain) for run in self._runs_from(brain)}
+            },
+            lambda brain: self._synthetic(brain), self._each_start, paper=True,
         )  # fmt: skip
         yield Figure(
             "contact_maps", "Folding", "contact pressure", f"{at}/contact_maps.png", "pictures.scalar_maps",
@@ -450,14 +449,14 @@ class Figures:
             """Zones of the boundary at the start of run *{run}*, from the left (a), from below (b) and on the medial
             sides (c, d): free, clamped (inside the ellipsoid of no growth), the facets of each hemisphere that may
             touch at the fissure, and those between the contact planes. Grey: the inside of the surface.""",
-            files(**start, **of_run), self._of_start, self._each_run, paper=True, technical=True,
+            files(**start, **of_run), self._of_start, self._each_start_with(*ZONES), paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "contact_scheme", "Folding", "scheme of contact", f"{at}/contact_scheme.png", "sections.contact_scheme",
             """Contact in run *{run}* at the start: an axial section with the walls that may touch (a), the fissure
             enlarged, with the pressure that acts (b), and the law of contact (c).""",
             files(**start, **of_run), self._of_start,
-            self._each_run_with(lambda run: self.config.run(run).contact.kind != "none"),
+            tuple(of for of in self._each_start_with(*ZONES) if self.config.run(of["run"]).contact.kind != "none"),
             paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
@@ -465,7 +464,8 @@ class Figures:
             """Tangential growth of the pial surface in the first time step of run *{run}*: from the left (a), from
             below (b), and the medial sides (c, d). Grey: nothing grows, as inside the ellipsoid of no growth and where
             tissue bridges the planes at the fissure. Below zero the surface shrinks.""",
-            files(**start, **of_run), self._of_start, self._each_run, paper=True, technical=True,
+            files(**start, **of_run), self._of_start, self._each_start_with(*GROWTH_OF_START),
+            paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "growth_found_figure", "Folding", "growth found", f"{at}/growth_found.png", "pictures.scalar_maps",
@@ -484,7 +484,8 @@ class Figures:
             """Start brain of run *{run}* in sections through its middle: hemispheres (neither between the contact
             planes), what grows, cortical weight, tangential growth in one time step, and shear modulus. Dashed: the
             ellipsoid of no growth.""",
-            files(**start, **of_run), self._of_start, self._each_run, paper=True, technical=True,
+            files(**start, **of_run), self._of_start, self._each_start_with(*GROWTH_OF_START, *MODULI),
+            paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "normals_figure", "Folding", "pial normals at two weeks", f"{at}/normals.png", "sections.normal_arrows",
@@ -510,27 +511,21 @@ class Figures:
             self._each_run, technical=True,
         )  # fmt: skip
         yield Figure(
-            "study_runs", "Folding", "parameters and summaries of the runs", f"{STUDY}/runs.html",
-            caption="""Parameters of the runs and summaries of their simulations; what differs between the runs comes
-            first. As numbers in ``results/study/runs.csv``.""",
+            "study_runs", "Folding", "parameters of the runs", f"{STUDY}/runs.html",
+            caption="""What differs between the runs comes first, then what is the same in all. All parameters are in
+            ``results/study/runs.csv``.""",
             target="metrics", technical=True,
         )  # fmt: skip
         displacement = {"displacement": f"{STUDY}/displacement.csv"}
         yield Figure(
             "displacement_figure", "Folding", "displacement per week", f"{STUDY_FIGURES}/displacement.png",
             "solve.displacement_chart",
-            """Largest (a) and mean (b) displacement between output weeks, over all nodes, beside what the FetalFoldSim
-            paper reports of its simulation and of real brains. Those are others: compare orders of magnitude only.""",
+            """Largest (a) and mean (b) displacement between output weeks, over all nodes, divided by the weeks between
+            them, beside what the FetalFoldSim paper reports of its simulation and of other real brains: compare orders
+            of magnitude only.""",
             lambda: displacement,
             lambda: {**self._runs, **self._synthetic(*self.config.start_brains)},
             paper=True,
-        )  # fmt: skip
-        yield Figure(
-            "displacement_table", "Folding", "displacement per week, table", f"{STUDY}/displacement_table.html",
-            "tables.displacement_page",
-            """Largest / mean norm of the displacement between output weeks in mm, over all nodes and over the pial
-            surface's nodes, with the published values.""",
-            lambda: displacement, lambda: self._synthetic(*self.config.start_brains), paper=True, technical=True,
         )  # fmt: skip
 
     @property
@@ -541,32 +536,37 @@ class Figures:
     @property
     def _of_metrics(self) -> Iterator[Figure]:
         yield Figure(
-            "shape_maps", "Metrics", "{measure} maps", f"{RUN}/figures/{{measure}}.png", "pictures.shape_maps",
-            "{shows} on the pial surfaces of run *{run}* and of the measured brains of the same weeks.",
-            lambda run, brain, measure: {
+            "shape_maps", "Metrics", "maps of the {measure}", f"{STUDY_FIGURES}/{{measure}}.{{brain}}.png",
+            "pictures.shape_maps",
+            "{shows} on the pial surfaces of the runs and of the measured brains of the same weeks.",
+            lambda brain, measure: {
                 "brains": {
-                    "simulated": {week: _halves(row) for week, row in self._surfaces(run, brain).items()},
-                    self._beside(run, brain)["measured"]: {
-                        week: _halves(row) for week, row in self._real_beside(run, brain).items()
+                    run: {week: _halves(row) for week, row in self._surfaces(run, brain).items()}
+                    for run in self._runs_from(brain)
+                } | {
+                    self._beside_runs(brain)["measured"]: {
+                        week: _halves(row) for week, row in self._real_beside_runs(brain).items()
                     },
                 }
             },
-            lambda run, brain, measure: {**self._beside(run, brain), "quantity": measure},
-            tuple({**pair, "measure": measure} for pair, measure in product(self._each_run, self._mapped)),
+            lambda brain, measure: {**self._beside_runs(brain), "quantity": measure},
+            tuple({**start, "measure": measure} for start, measure in product(self._each_start, self._mapped)),
         )  # fmt: skip
         metrics = {"metrics": f"{STUDY}/metrics.csv"}
         yield Figure(
             "metrics_figure", "Metrics", "metrics over the weeks", f"{STUDY_FIGURES}/metrics.png",
             "charts.metrics_chart",
             """Runs as lines, measured brains as stars. The gyrification index is the pial area over that of the convex
-            hull, or of a tighter envelope. Shape index: −1 is a cup, +1 a cap, so gyri are positive.""",
+            hulls of the hemispheres, or of tighter envelopes. The cut at the midline is left out of both, of the hull
+            by what lies nearest to it: a smooth brain may come out a few per cent below 1. Shape index: −1 is a cup,
+            +1 a cap.""",
             lambda: metrics, lambda: {**self._runs, **self._of_study()},
         )  # fmt: skip
         yield Figure(
             "metrics_table", "Metrics", "metrics, table", f"{STUDY}/metrics_table.html", "tables.metrics_page",
-            """Metrics of whole brains per week: the measured brain, each run, and the run's difference from the
-            measured brain. Curvature of folds shorter than ``curvature_wavelength`` is flattened, and with it
-            ``mean_curvature_norm``. All numbers, per hemisphere too, are in ``results/study/metrics.csv``.""",
+            """The measured brain, each run, and the run's difference from the measured brain. Curvature of folds
+            shorter than ``curvature_wavelength`` is flattened, and with it ``mean_curvature_norm``. All weeks, and the
+            hemispheres, are in ``results/study/metrics.csv``.""",
             lambda: metrics, self._of_study,
         )  # fmt: skip
         spectra = {"spectra": f"{STUDY}/spectra.csv"}
@@ -576,15 +576,6 @@ class Figures:
             """Relative power in the bands B4, B5 and B6 (primary, secondary and tertiary folds) per hemisphere (SpAnGy,
             Germanaud et al. 2012). Open marks: the band is cut off, or finer than the surface resolves.""",
             lambda: spectra, lambda: {**self._runs, **self._of_study()},
-        )  # fmt: skip
-        yield Figure(
-            "bands_figure", "Metrics", "all SpAnGy bands at the last week", f"{STUDY_FIGURES}/bands.png",
-            "charts.spectra_chart",
-            f"""Relative power in all bands at {float(self.last_week or 0):g} GW. Hatched bars and open stars: the band
-            is cut off or finer than the surface.""",
-            lambda: spectra,
-            lambda: {**self._runs, **self._of_study(), "week": float(self.last_week or 0), "bands": list(range(1, 7))},
-            ({},) if self.last_week else (), technical=True,
         )  # fmt: skip
         reference = self.config.norm_reference
         # of fewer brains there are no centiles
@@ -655,9 +646,10 @@ class Figures:
         yield Figure(
             "validation_figure", "Validation", "gain over no folding, by week", f"{STUDY_FIGURES}/validation.png",
             "scores.validation_chart",
-            """Correlation of curvature with that of the real brain, less that of the start brain scaled up: above 0
-            folding is worth more than none. Bars: 95 % intervals of a bootstrap over patches of the surface; full marks
-            explain a week whose own brains gave the growth, open ones predict it.""",
+            """Gain: the correlation r of the shape index (a) and of the mean curvature (b) with those of the real
+            brain, less the r of the start brain scaled up. Above 0, folding is worth more than none. Bars: 95 %
+            intervals of a bootstrap over patches of the surface. Full marks explain a week whose own brains gave the
+            growth, open ones predict it. Dotted: the start carried to the real brain by registration.""",
             beside(validation=f"{STUDY}/validation.csv"), lambda: runs, compared, target="validate",
         )  # fmt: skip
         yield Figure(
@@ -671,9 +663,10 @@ class Figures:
         yield Figure(
             "horizon_figure", "Validation", "gain by weeks after the start", f"{STUDY_FIGURES}/horizon.png",
             "scores.horizon_chart",
-            """Prediction horizon: the same gain by weeks after the start, whose week stands at the line's end, where
+            """Prediction horizon: the same gain by weeks after each start, whose week stands at the line's end, where
             growth was known and where it was not.""",
-            beside(horizon=f"{STUDY}/horizon.csv"), lambda: runs, compared, target="validate",
+            beside(horizon=f"{STUDY}/horizon.csv"), lambda: runs,
+            compared if len(self.config.start_brains) > 1 else (), target="validate",
         )  # fmt: skip
         foretold: tuple[Wildcards, ...] = ({},) if self.validating.foretold else ()
         prediction = {"prediction": f"{STUDY}/prediction.csv"}
@@ -697,8 +690,8 @@ class Figures:
         yield Figure(
             "expected_figure", "Validation", "start, expected and real brains", f"{RUN}/figures/expected.png",
             "pictures.runs_by_week",
-            """The start and what was to be expected of it (blue; a, c) beside the real brains (beige; b, d), from the
-            left and from above, at one scale. Below, on the expected surface, how far the real one lies outside (red)
+            """The start and what was to be expected of it (blue) beside the real brains (beige), from the left and from
+            above, at one scale. Below, on the expected surface, how far the real one lies outside (red)
             or inside (blue) of it, both laid onto each other rigidly.""",
             self._expected, self._beside, expected, target="validate",
         )  # fmt: skip
@@ -829,11 +822,6 @@ class Figures:
             caption="""What the jobs behind this report took, with an estimate of their energy and emissions, whose
             assumptions stand below. As numbers in ``results/study/resources.csv``.""",
             target="report", technical=True,
-        )  # fmt: skip
-        yield Figure(
-            "cost_figure", "Resources", "time and energy", f"{STUDY_FIGURES}/cost.png", "resources.cost_chart",
-            """Time (a), summed over jobs that may have run side by side, and estimated energy (b) of the stages.""",
-            lambda: {"resources": f"{STUDY}/resources.csv"}, target="report", technical=True,
         )  # fmt: skip
 
     def _start(self, study: str) -> str:

@@ -59,16 +59,6 @@ class Reporting:
         ]
 
     @property
-    def metrics(self) -> dict[str, dict[str, Any]]:
-        """The value, unit and description of each setting of the metrics."""
-        values = self.config.metrics.model_dump(mode="json")
-        fields = type(self.config.metrics).model_fields
-        return {
-            name: {"value": values[name], "unit": field.json_schema_extra["unit"], "description": field.description}  # type: ignore[index]
-            for name, field in fields.items()
-        }
-
-    @property
     def method(self) -> dict[str, Any]:
         """What the text of the methods says of the configuration: its brains, and settings by section."""
         named = {

@@ -1,4 +1,4 @@
-"""Areas, volumes and growth rates of series of brains, and how far these agree, as a chart and as tables."""
+"""Areas, volumes and growth rates of series of brains, and how far these agree, as a chart."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -21,7 +21,6 @@ from .style import (
     week_axis,
     wrap,
 )
-from .tables import html_table
 
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series; the one left out is the folding's."""
@@ -166,75 +165,3 @@ def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[f
     shown = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
     places = np.interp(shown, ends, np.arange(len(ends)) - 0.5)
     axes.plot(places, np.interp(shown, weeks, values), label="folding", **look)
-
-
-def growth_tables(areas: pd.DataFrame, rates: pd.DataFrame, agreement: pd.DataFrame, *, measured: str) -> str:
-    """Returns areas and volumes, growth rates and, where there are several series, their agreement as HTML."""
-    tables = {"Areas and volumes": sizes_table(areas), "Growth rates": growth_table(rates)}
-    if len(agreement):
-        tables["Agreement of the growth rates"] = agreement_table(agreement)
-    shown: dict[str, Any] = {"measured": measured, "synthetic": all_synthetic(measured)}
-    return "\n".join(html_table(table, caption=name, **shown) for name, table in tables.items())
-
-
-def growth_table(rates: pd.DataFrame) -> pd.DataFrame:
-    """Returns the growth rates with headings and units for print, one row per interval.
-
-    Parameters
-    ----------
-    rates : columns series, from_week, to_week, area_ratio, rate_per_s, volume_ratio, core_rate_per_s
-        The series is shown where there are several.
-    """
-    several = len(set(rates["series"])) > 1
-    return pd.DataFrame(
-        ({"series": rates["series"]} if several else {})
-        | {
-            "from (GW)": rates["from_week"],
-            "to (GW)": rates["to_week"],
-            "area ratio": rates["area_ratio"].round(4),
-            "tangential rate (10⁻⁷ s⁻¹)": (1e7 * rates["rate_per_s"]).round(3),
-            "volume ratio": rates["volume_ratio"].round(4),
-            "core rate (10⁻⁷ s⁻¹)": (1e7 * rates["core_rate_per_s"]).round(3),
-        }
-    )
-
-
-def sizes_table(areas: pd.DataFrame) -> pd.DataFrame:
-    """Returns areas and volumes per week of each series of brains, and how far each is from the first one in %.
-
-    Parameters
-    ----------
-    areas : columns series, week, area_cm2, volume_ml
-        Brains of one week and series count as their mean.
-    """
-    names = list(dict.fromkeys(areas["series"]))
-    columns: dict[str, pd.Series] = {}
-    for column, heading, unit in (("area_cm2", "pial area", "cm²"), ("volume_ml", "volume", "mL")):
-        wide = areas.pivot_table(index="week", columns="series", values=column, aggfunc="mean")
-        columns |= {f"{heading} ({unit})" + (f": {name}" if names[1:] else ""): wide[name] for name in names}
-        for name in names[1:]:
-            columns[f"{heading}: {name} − {names[0]} (%)"] = (100 * (wide[name] / wide[names[0]] - 1)).round(1)
-    return pd.DataFrame(columns).rename_axis("week (GW)")
-
-
-def agreement_table(agreement: pd.DataFrame) -> pd.DataFrame:
-    """Returns how far the growth rates of series agree, in 10⁻⁷ s⁻¹: a row per interval, their mean, the mean size.
-
-    Parameters
-    ----------
-    agreement : columns series, reference, from_week, to_week, difference_per_s, core_difference_per_s
-    """
-    differences = {"difference_per_s": "tangential rate", "core_difference_per_s": "core rate"}
-    parts = []
-    for series, rows in agreement.groupby("series", sort=False):
-        weeks = [f"{a:g}–{b:g}" for a, b in zip(rows["from_week"], rows["to_week"], strict=True)]
-        part = pd.DataFrame({"compared": f"{series} − {rows['reference'].iloc[0]}", "interval (GW)": weeks})
-        values = (1e7 * rows[list(differences)]).reset_index(drop=True)
-        part = part.join(values)
-        for label, summary in (("mean", values.mean()), ("mean size", values.abs().mean())):
-            part.loc[len(part)] = [part["compared"].iloc[0], label, *summary]
-        parts.append(part)
-    table = pd.concat(parts, ignore_index=True)
-    # a sum with 0 takes the sign from a rounded −0
-    table[list(differences)] = table[list(differences)].round(3) + 0.0
-    return table.rename(columns={name: f"{text}, difference (10⁻⁷ s⁻¹)" for name, text in differences.items()})

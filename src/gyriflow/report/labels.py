@@ -73,6 +73,16 @@ PARAMETERS = {
     "thickness": "cortical thickness",
     "shear_modulus_cortex": "shear modulus of the cortex",
     "shear_modulus_core": "shear modulus of the core",
+    "poisson_ratio": "Poisson's ratio",
+    "contact.kind": "contact",
+    "no_growth.kind": "zone without growth",
+    "step": "time step",
+    "tets": "elements",
+    "order": "order of the elements",
+    "elements_through_cortex": "elements through the cortex at the start",
+    "newton": "Newton iterations",
+    "seconds": "time of the solve (s)",
+    "peak_memory_MiB": "memory (MiB)",
 }
 """Parameters of the folding, without the endings of their names, which tell the unit; others are called as they are."""
 
@@ -82,6 +92,8 @@ _ENDINGS = {
     "_per_s": "s⁻¹",
     "_pa_per_m": "Pa/m",
     "_mm": "mm",
+    "_cm2": "cm²",
+    "_ml": "mL",
     "_pa": "Pa",
     "_gw": "GW",
     "_s": "s",
@@ -131,12 +143,12 @@ def column_label(key: Hashable) -> str:
 
 def parameter_label(key: str) -> str:
     """Returns what a key of the folding is called on an axis, with its unit, for example "cortical thickness (mm)"."""
-    name, unit = key.rpartition(".")[2], ""
+    name, unit = key, ""
     for ending, shown in _ENDINGS.items():
         if name.endswith(ending):
             name, unit = name.removesuffix(ending), shown
             break
-    return with_unit(PARAMETERS.get(name, plain(name)), unit)
+    return with_unit(PARAMETERS.get(name, plain(name.replace(".", " "))), unit)
 
 
 def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:

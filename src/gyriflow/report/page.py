@@ -14,12 +14,14 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..parameters.terms import run_names
-from .labels import plain, week_label
+from .labels import week_label
 from .solve import resolution_verdict
 from .tables import html_table
 
 FILE, COMMAND = "(file)", "(command)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
+DOTS_PER_INCH = 150
+"""Of the page, for an inch of print: a figure as wide as a journal's page has 1080."""
 DEEP_MM = 0.5
 """Walls of the fissure that begin so far beyond their planes are told of."""
 
@@ -54,7 +56,6 @@ class Results:
     brains, surfaces, quality : as for `brains_table`
     runs, validation : as for `scores_table`
     provenance : what `software` returns, and files (brain, what, sha256, and path where it may be shown)
-    metrics : {setting: {"value", "unit", "description"}}
     methods : reStructuredText
     warnings : columns subject, run, step, level, message
     configuration : text, without paths unless they may be shown
@@ -64,7 +65,6 @@ class Results:
     surfaces: Mapping[str, Mapping[str, Any]]
     runs: pd.DataFrame
     provenance: Mapping[str, Any]
-    metrics: Mapping[str, Mapping[str, Any]]
     methods: str
     configuration: str
     validation: pd.DataFrame | None = None
@@ -89,7 +89,6 @@ def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) 
         "sections": sections([item for item in shown if not item.first]),
         "made": made(provenance),
         "methods": caption_html(results.methods),
-        "metrics": html_table(metrics_settings(results.metrics)),
         "files": html_table(input_files(provenance["files"])),
         "versions": html_table(versions(provenance)),
         "configuration": results.configuration,
@@ -101,9 +100,10 @@ def methods_text(template: str, **used: Any) -> str:
     return Environment(undefined=StrictUndefined, keep_trailing_newline=True).from_string(template).render(**used)
 
 
-def picture(address: str, alt: str) -> str:
-    """Returns an image of the page from its data address."""
-    return Markup('<img src="{}" alt="{}" loading="lazy">').format(address, alt)
+def picture(address: str, inches: float, alt: str) -> str:
+    """Returns an image of the page from its data address and its width in print, so that all have letters of a size."""
+    width = round(inches * DOTS_PER_INCH)
+    return Markup('<img src="{}" alt="{}" width="{}" loading="lazy">').format(address, alt, width)
 
 
 def caption_html(caption: str) -> Markup:
@@ -208,7 +208,7 @@ def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> 
     names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
     for name, (_, run) in zip(names, runs.iterrows(), strict=True):
-        row = {"run": name, "start": str(run["subject"]), "verdict": run_verdict(run)}
+        row = {"run": name, "verdict": run_verdict(run)}
         rows.append(row | _scores(_last(validation, run["run"], run["start_week"])))
     return pd.DataFrame(rows)
 
@@ -242,18 +242,16 @@ def _scores(validation: Mapping[str, Any]) -> dict[str, str]:
         value = validation.get(name, np.nan)
         return "–" if pd.isna(value) else (pattern % (factor * value)).replace("-", "−")
 
-    gain = shown("gain_shape_index", "%+.2f")
-    if gain != "–":
-        gain += f" ({shown('gain_low_shape_index', '%+.2f')} to {shown('gain_high_shape_index', '%+.2f')})"
+    interval = f"{shown('gain_low_shape_index', '%+.2f')} to {shown('gain_high_shape_index', '%+.2f')}"
     return {
-        "compared at": week_label(validation["week"]) if validation else "–",
-        "kind": str(validation.get("kind", "–")),
+        "real brain": f"{week_label(validation['week'])}, {validation['kind']}" if validation else "none",
         "distance (mm)": shown("distance_mm", "%.2f"),
-        "shape index, r": shown("r_shape_index", "%.2f"),
-        "scaled start, r": shown("r_start_shape_index", "%.2f"),
-        "gain (95 %)": gain,
-        "area, difference (%)": shown("area_difference", "%+.1f", 100),
-        "volume, difference (%)": shown("volume_difference", "%+.1f", 100),
+        "r": shown("r_shape_index", "%.2f"),
+        "r of the scaled start": shown("r_start_shape_index", "%.2f"),
+        "gain": shown("gain_shape_index", "%+.2f"),
+        "95 % interval": "–" if interval == "– to –" else interval,
+        "area (%)": shown("area_difference", "%+.1f", 100),
+        "volume (%)": shown("volume_difference", "%+.1f", 100),
     }
 
 
@@ -262,7 +260,11 @@ def grouped(warnings: pd.DataFrame) -> pd.DataFrame:
     # of a brain's step there is no run
     named = warnings[["subject", "run"]].fillna("").astype(str)
     places = [", ".join(filter(None, place)) for place in named.itertuples(index=False)]
-    rows = warnings.assign(of=places).groupby(["step", "level", "message"], sort=False)["of"]
+    of_level = warnings["level"], warnings["message"]
+    said = [text if level == "warning" else f"{level}: {text}" for level, text in zip(*of_level, strict=True)]
+    rows = warnings.assign(**{"brain, run": places, "message": said}).groupby(["step", "message"], sort=False)[
+        "brain, run"
+    ]
     return rows.agg(lambda names: "; ".join(filter(None, dict.fromkeys(names)))).reset_index()
 
 
@@ -304,20 +306,6 @@ def versions(provenance: Mapping[str, Any]) -> pd.DataFrame:
     """Returns a row for each package that was there, gyriflow and Python first."""
     found = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"]} | provenance["packages"]
     return pd.DataFrame([(name, number) for name, number in found.items() if number], columns=["package", "version"])
-
-
-def metrics_settings(settings: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """Returns a row for each setting of the metrics, which are the same for simulated and measured brains."""
-    rows = [
-        {
-            "setting": plain(name),
-            "value": "default" if own["value"] is None else str(own["value"]),
-            "unit": own["unit"],
-            "what it is": own["description"].replace("`", ""),
-        }
-        for name, own in settings.items()
-    ]
-    return pd.DataFrame(rows)
 
 
 def input_files(files: Sequence[Mapping[str, str]]) -> pd.DataFrame:

@@ -17,8 +17,12 @@ from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note, wra
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
 _DOTS_PER_INCH = 300
-_MARGIN, _RINGED_MARGIN = 1.04, 1.12
-_MAX_COLUMNS = 8
+# room round the largest brain, so that it touches none in the next row or column
+_MARGIN = 1.12
+MOST_COLUMNS = 8
+_PANEL_IN = 1.75
+# no column is narrower than this part of the widest
+_NARROWEST = 0.7
 _EDGE_IN = 0.1
 _LABEL_LETTERS = 26
 # part of the width that the scale bar may take; colour bars follow
@@ -61,21 +65,13 @@ class Row:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Sizes in inches, and the half width in mm that every panel shows; `left` is where the first panel begins.
-
-    `margin` is how much larger than the surfaces pictures are.
-    """
+    """Sizes in inches; `left` is where the first panel begins, `panels` are the widths of all columns."""
 
     width: float
     left: float
-    panel: float
+    panels: Sequence[float]
     foot: float
-    half_width_mm: float
-    margin: float
-
-    @property
-    def inches_per_mm(self) -> float:
-        return self.panel / (2 * self.half_width_mm)
+    inches_per_mm: float
 
 
 def round_length(limit_mm: float) -> float:
@@ -84,14 +80,17 @@ def round_length(limit_mm: float) -> float:
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= limit_mm * (1 + 1e-9)))
 
 
-def _blocks(columns: Sequence[str], rows: Sequence[Row]) -> list[tuple[Sequence[str], list[Row]]]:
-    """Returns the grid cut into blocks of as equal numbers of columns as possible, to stand below each other."""
-    number = -(-len(columns) // _MAX_COLUMNS)
-    size = -(-len(columns) // number)
-    return [
-        (columns[start : start + size], [replace(row, panels=row.panels[start : start + size]) for row in rows])
-        for start in range(0, len(columns), size)
-    ]
+def _blocks(columns: int) -> list[slice]:
+    """Returns the columns cut into blocks of as equal numbers as possible, to stand below each other."""
+    size = -(-columns // -(-columns // MOST_COLUMNS))
+    return [slice(start, start + size) for start in range(0, columns, size)]
+
+
+def _half_widths_mm(rows: Sequence[Row]) -> Floats:
+    """Returns half of what each column shows in mm: its widest brain and a margin."""
+    columns = zip(*(row.panels for row in rows), strict=True)
+    halves = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in columns]
+    return _MARGIN * np.maximum(halves, _NARROWEST * max(halves))
 
 
 def panel_grid(
@@ -116,56 +115,58 @@ def panel_grid(
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     shown = [panel for row in rows for panel in row.panels if panel is not None]
-    margin = _MARGIN if all(panel.mark is None for panel in shown) else _RINGED_MARGIN
-    half_width = margin * max(half_extents(panel.mesh, panel.view)[0] for panel in shown)
-    blocks = _blocks(columns, rows)
-    most = max(len(heads) for heads, _ in blocks)
+    halves, blocks = _half_widths_mm(rows), _blocks(len(columns))
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
-    panel_in = _dots(min(1.75, (FULL_WIDTH_IN - label_in) / most))
-    width = _dots(max(SINGLE_COLUMN_IN, label_in + most * panel_in))
-    left_in = _dots(label_in + (width - label_in - most * panel_in) / 2)
+    most_mm = max(2 * halves[block].sum() for block in blocks)
+    inches_per_mm = min(_PANEL_IN / (2 * halves.max()), (FULL_WIDTH_IN - label_in) / most_mm)
+    panels = [_dots(2 * half * inches_per_mm) for half in halves]
+    most_in = max(sum(panels[block]) for block in blocks)
+    width = _dots(max(SINGLE_COLUMN_IN, label_in + most_in))
+    left_in = _dots(label_in + (width - label_in - most_in) / 2)
     foot_in = max(0.66 if colour_bars or legend else 0.46, 0.15 * -(-len(legend) // _legend_columns(width)) + 0.16)
-    layout = _Layout(width, left_in, panel_in, _dots(foot_in), half_width, margin)
+    layout = _Layout(width, left_in, panels, _dots(foot_in), inches_per_mm)
 
     # a letter of a column's heading is about 0.055 in wide
-    columns = [wrap(column, int(panel_in / 0.055)) for column in columns]
-    blocks = _blocks(columns, rows)
+    columns = [wrap(column, int(panel / 0.055)) for column, panel in zip(columns, panels, strict=True)]
     head_in, caption_line_in = 0.1 + 0.16 * synthetic, 0.13
     block_head_in = _dots(0.2 + 0.12 * max(column.count("\n") for column in columns))
-    heights = {id(row): _dots(_row_height_in(row, layout)) for _, part in blocks for row in part}
-    captions = {
-        id(row): _dots(caption_line_in * max((len(p.caption.splitlines()) for p in row.panels if p), default=0))
-        for _, part in blocks
-        for row in part
-    }
-    total = _dots(head_in) + layout.foot + len(blocks) * block_head_in + sum(heights.values()) + sum(captions.values())
+    heights = [[_dots(_row_height_in(row, block, layout)) for row in rows] for block in blocks]
+    captions = [[_dots(caption_line_in * _caption_lines(row, block)) for row in rows] for block in blocks]
+    total = _dots(head_in) + layout.foot + len(blocks) * block_head_in
+    total += sum(map(sum, heights)) + sum(map(sum, captions))
 
     figure = Figure(figsize=(width, total))
     if synthetic:
         figure.suptitle(synthetic_note(measured), y=1 - 0.05 / total, va="top")
     top = total - _dots(head_in)
     letters = iter(ascii_lowercase)
-    for heads, part in blocks:
-        for index, head in enumerate(heads):
-            x = (left_in + (index + 0.5) * panel_in) / width
-            figure.text(x, (top - block_head_in / 2) / total, head, ha="center", va="center", fontsize=7)
+    for number, block in enumerate(blocks):
+        left = left_in
+        for head, panel in zip(columns[block], panels[block], strict=True):
+            x, y = (left + panel / 2) / width, (top - block_head_in / 2) / total
+            figure.text(x, y, head, ha="center", va="center", fontsize=7)
+            left += panel
         top -= block_head_in
-        for row in part:
-            bottom = top - heights[id(row)]
-            marks = 1 if len(rows) > 1 else len(row.panels) if len(columns) > 1 else 0
-            _draw_row(figure, row, layout, list(islice(letters, marks)), bottom=bottom, height=heights[id(row)])
-            top = bottom - captions[id(row)]
+        for row, height, caption in zip(rows, heights[number], captions[number], strict=True):
+            marks = 1 if len(rows) > 1 else len(row.panels[block]) if len(columns) > 1 else 0
+            marked = list(islice(letters, marks))
+            _draw_row(figure, row, block, layout, marked, bottom=top - height, height=height)
+            top -= height + caption
     _draw_scale_bar(figure, layout, {end for panel in shown for end in panel.view.ends})
     _draw_keys(figure, layout, colour_bars, legend)
     return figure
 
 
-def _row_height_in(row: Row, layout: _Layout) -> float:
-    halves = [half_extents(panel.mesh, panel.view)[1] for panel in row.panels if panel is not None]
+def _row_height_in(row: Row, block: slice, layout: _Layout) -> float:
+    halves = [half_extents(panel.mesh, panel.view)[1] for panel in row.panels[block] if panel is not None]
     # the label is written along the height
     least = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
-    return max(2 * layout.margin * max(halves, default=0.0) * layout.inches_per_mm, least)
+    return max(2 * _MARGIN * max(halves, default=0.0) * layout.inches_per_mm, least)
+
+
+def _caption_lines(row: Row, block: slice) -> int:
+    return max((len(panel.caption.splitlines()) for panel in row.panels[block] if panel is not None), default=0)
 
 
 def _dots(inches: float) -> float:
@@ -174,7 +175,7 @@ def _dots(inches: float) -> float:
 
 
 def _draw_row(
-    figure: Figure, row: Row, layout: _Layout, letters: Sequence[str], *, bottom: float, height: float
+    figure: Figure, row: Row, block: slice, layout: _Layout, letters: Sequence[str], *, bottom: float, height: float
 ) -> None:
     total = figure.get_figheight()
     middle = (bottom + height / 2) / total
@@ -182,10 +183,11 @@ def _draw_row(
         (layout.left - 0.06) / layout.width, middle, row.label, rotation=90, ha="right", va="center", fontsize=7
     )
     half_height = height / layout.inches_per_mm / 2
-    previous = None
-    for index, panel in enumerate(row.panels):
-        x = (layout.left + index * layout.panel) / layout.width
-        axes = figure.add_axes((x, bottom / total, layout.panel / layout.width, height / total))
+    previous, left = None, layout.left
+    for index, (panel, wide) in enumerate(zip(row.panels[block], layout.panels[block], strict=True)):
+        axes = figure.add_axes((left / layout.width, bottom / total, wide / layout.width, height / total))
+        left += wide
+        half_width = wide / layout.inches_per_mm / 2
         axes.set_label(f"{row.label}, column {index}")
         axes.set_axis_off()
         if index < len(letters):
@@ -209,16 +211,14 @@ def _draw_row(
             panel.mesh,
             panel.colours,
             panel.view,
-            half_width_mm=layout.half_width_mm,
+            half_width_mm=half_width,
             half_height_mm=half_height,
             pixels_per_mm=PIXELS_PER_INCH * layout.inches_per_mm,
             material=panel.material,
             edges=panel.edges,
             lines=panel.lines,
         )
-        axes.imshow(
-            image, extent=(-layout.half_width_mm, layout.half_width_mm, -half_height, half_height), aspect="auto"
-        )
+        axes.imshow(image, extent=(-half_width, half_width, -half_height, half_height), aspect="auto")
         if panel.view != previous:
             for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):
                 axes.text(place, 1.0, end, transform=axes.transAxes, ha=align, va="top", fontsize=6)
@@ -243,7 +243,7 @@ def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
 def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
     total = figure.get_figheight()
     room_mm = (_SCALE_SHARE * layout.width - 2 * _EDGE_IN) / layout.inches_per_mm
-    length = round_length(min(1.2 * layout.half_width_mm, room_mm))
+    length = round_length(min(0.6 * max(layout.panels) / layout.inches_per_mm, room_mm))
     size = (length * layout.inches_per_mm / layout.width, 0.04 / total)
     axes = figure.add_axes((_EDGE_IN / layout.width, (layout.foot - 0.2) / total, *size))
     axes.set_label("scale bar")

@@ -18,7 +18,6 @@ from ..parameters.terms import (
     BASE,
     BETWEEN_PLANES,
     CLAMPED,
-    FLAT_CUTS,
     FREE,
     LEFT_CONTACT,
     MEDIAL_WALL,
@@ -29,7 +28,7 @@ from ..parameters.terms import (
 )
 from ..units import CM2_PER_MM2
 from .labels import AREA_GROWTH, DEVIATIONS, DISTANCE, GROWTH, MAPS, PRESSURES, column_label, plain, value_labels
-from .panels import Panel, Row, panel_grid
+from .panels import MOST_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
     UNKNOWN_COLOUR,
@@ -123,23 +122,31 @@ def runs_by_week(
     deviations : {week: (surface, maps)}
         Of which `labels.DISTANCE` is shown below.
     """
-    groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items()}
-    groups |= {measured: (real, REAL_SURFACE_COLOUR)}
-    keys = _ordered(*(meshes for meshes, _ in groups.values()))
-    rows = [
-        Row(f"{name}\n{view.name} view", _plain_panels(meshes, keys, colour, view))
-        for view in named_views(views)
+    groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
+    groups |= {measured: (real, REAL_SURFACE_COLOUR)} if real else {}
+    keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), named_views(views)
+    panels = {
+        name: {view: _plain_panels(meshes, keys, colour, view) for view in seen}
         for name, (meshes, colour) in groups.items()
-        if meshes
-    ]
+    }
     away = {week: (mesh, maps[DISTANCE]) for week, (mesh, maps) in (deviations or {}).items()}
     if away:
         scale = scale_of(DISTANCE, np.concatenate([values for _, values in away.values()]))
-        for view in named_views(views):
-            panels = [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys]
-            rows.append(Row(f"distance\n{view.name} view", panels))
+        panels["distance"] = {view: [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys] for view in seen}
         shown["colour_bars"] = [(scale, MAPS[DISTANCE])]
-    return panel_grid([column_label(key) for key in keys], rows, measured=measured, **shown)
+    return panel_grid(*_beside(keys, panels), measured=measured, **shown)
+
+
+def _beside(keys: Sequence, panels: Mapping[str, Mapping[View, Sequence[Panel | None]]]) -> tuple[list[str], list[Row]]:
+    """Returns the headings and rows of a grid: a row per group, its views beside each other where they fit.
+
+    Where they do not, the rows of all groups stand below each other, view by view.
+    """
+    views, heads = list(next(iter(panels.values()))), [column_label(key) for key in keys]
+    if len(views) * len(keys) > MOST_COLUMNS:
+        return heads, [Row(f"{name}\n{v.name} view".strip(), shown[v]) for v in views for name, shown in panels.items()]
+    rows = [Row(name, [panel for view in views for panel in shown[view]]) for name, shown in panels.items()]
+    return [f"{head}\n{view.name} view" for view in views for head in heads], rows
 
 
 @styled
@@ -150,21 +157,18 @@ def brains_picture(brains: Mapping[str, TriangleMesh], *, views: Sequence[str] =
     ----------
     brains : {heading: surface in RAS+ mm}
     """
-    rows = [
-        Row(f"{view.name} view", _plain_panels(brains, list(brains), REAL_SURFACE_COLOUR, view))
-        for view in named_views(views)
-    ]
-    return panel_grid(list(brains), rows, **shown)
+    panels = {view: _plain_panels(brains, list(brains), REAL_SURFACE_COLOUR, view) for view in named_views(views)}
+    return panel_grid(*_beside(list(brains), {"": panels}), **shown)
 
 
 @styled
 def displacement_maps(
-    displacements: Mapping[tuple[float, float], SurfaceMap],
+    displacements: Mapping[str, Mapping[tuple[float, float], SurfaceMap]],
     *,
-    views: Sequence[str] = ("left", "top", "back"),
+    views: Sequence[str] = SIDE_VIEWS,
     synthetic: bool = False,
 ) -> Figure:
-    """Returns the norm of the displacement on the pial surface, a column per interval, on one colour scale.
+    """Returns the norm of the displacement of runs on the pial surface, a column per interval, on one colour scale.
 
     The scale ends where one vertex in two hundred is above, so that a single maximum does not set it. The maximum is
     ringed, dotted where it lies on the side turned away; below each interval stand its size, its place in RAS+ mm, and
@@ -172,24 +176,27 @@ def displacement_maps(
 
     Parameters
     ----------
-    displacements : {(from_week, to_week): (surface, norms in mm)}
+    displacements : {run: {(from_week, to_week): (surface, norms in mm)}}
     """
-    keys = _ordered(displacements)
-    scale = magnitude_scale(np.concatenate([norms for _, norms in displacements.values()]), MAGNITUDES)
-    seen = named_views(views)
-    rows = []
-    for view in seen:
-        panels = []
-        for key in keys:
-            mesh, norms = displacements[key]
-            place = mesh.vertices[int(np.nanargmax(norms))]
-            where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
-            caption = f"max {np.nanmax(norms):.2f} mm at {where}\nmean {np.nanmean(norms):.2f} mm"
-            shown = caption if view == seen[-1] else ""
-            panels.append(Panel(mesh, paint(norms, scale), view, shown, MAP, place))
-        rows.append(Row(f"{view.name} view", panels))
+    keys, seen = _ordered(*displacements.values()), named_views(views)
+    norms = [norms for known in displacements.values() for _, norms in known.values()]
+    scale = magnitude_scale(np.concatenate(norms), MAGNITUDES)
+
+    def panel(known: SurfaceMap | None, view: View) -> Panel | None:
+        if known is None:
+            return None
+        mesh, norms = known
+        place = mesh.vertices[int(np.nanargmax(norms))]
+        where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
+        said = f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm" if view == seen[0] else ""
+        return Panel(mesh, paint(norms, scale), view, said, MAP, place)
+
+    panels = {
+        run: {view: [panel(known.get(key), view) for key in keys] for view in seen}
+        for run, known in displacements.items()
+    }
     bars = [(scale, "norm of the displacement (mm)")]
-    return panel_grid([column_label(key) for key in keys], rows, synthetic=synthetic, colour_bars=bars)
+    return panel_grid(*_beside(keys, panels), synthetic=synthetic, colour_bars=bars)
 
 
 def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
@@ -299,19 +306,18 @@ def scalar_maps(
     lengths = [np.linalg.norm(vectors, axis=1) for vectors in directions.values()] or [np.ones(1)]
     long = float(np.quantile(np.concatenate(lengths), LONG))
     shares = {key: np.asarray(vectors / long, dtype=float) for key, vectors in directions.items()}
-    rows = [
-        Row(
-            f"{group}\n{view.name} view",
-            [_map_panel(known.get(key), scale, view, quantity, shares.get(key)) for key in keys],
-        )
-        for view in named_views(views)
+    seen = named_views(views)
+    panels = {
+        group: {
+            view: [_map_panel(known.get(key), scale, view, quantity, shares.get(key)) for key in keys] for view in seen
+        }
         for group, known in maps.items()
-    ]
+    }
     legend = [Patch(color=NEUTRAL_COLOUR, label="no contact")] if quantity in PRESSURES else []
     if not all(np.isfinite(values).all() for group in maps.values() for _, values in group.values()):
         legend.append(Patch(color=UNKNOWN_COLOUR, label="not measured"))
     bars = [(scale, MAPS[quantity])]
-    return panel_grid([column_label(key) for key in keys], rows, colour_bars=bars, legend=legend, **shown)
+    return panel_grid(*_beside(keys, panels), colour_bars=bars, legend=legend, **shown)
 
 
 def _map_panel(
@@ -435,7 +441,8 @@ def regions_picture(
         for view in named_views(views)
     ]
     legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
-    legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
+    if any(not np.isin(numbers, list(table)).all() for halves in brains.values() for _, (numbers, table) in halves):
+        legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     return panel_grid(list(painted), rows, legend=legend, **shown)
 
 
@@ -473,7 +480,7 @@ def zones_picture(
     legend = [
         Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²")
         for code, colour in ZONE_COLOURS.items()
-        if areas[code] or code not in FLAT_CUTS
+        if areas[code]
     ]
     columns, rows = _one_row(mesh, palette[zones], views, fissure_x_mm)
     return panel_grid(columns, rows, synthetic=synthetic, legend=legend)
@@ -491,7 +498,7 @@ def field_picture(
     """Returns the (n,) growth of the pial vertices in a step from several sides; grey where it is zero."""
     scale = signed_scale(values) if goes_below_zero(values) else magnitude_scale(values, MAGNITUDES)
     columns, rows = _one_row(mesh, paint(values, scale, zero_is_nothing=True), views, fissure_x_mm)
-    legend = [Patch(color=NEUTRAL_COLOUR, label="zero")]
+    legend = [] if values.all() else [Patch(color=NEUTRAL_COLOUR, label="zero")]
     return panel_grid(columns, rows, synthetic=synthetic, colour_bars=[(scale, GROWTH)], legend=legend)
 
 

@@ -18,7 +18,6 @@ from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.schemes import LabelScheme
-from .labels import plain
 from .scene import VIEWS, View, colour_scale, half_extents, hemisphere_faces, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, draw_image, draw_outline, plane_grid, voxel_index
 from .style import FULL_WIDTH_IN, REAL_SURFACE_COLOUR, styled, synthetic_note, wrap
@@ -41,7 +40,7 @@ THICKNESS_VIEWS = ("left", "right", "left medial", "right medial")
 OTHER_VIEWS = ("front", "back", "left medial", "right medial")
 MOST_LINES, LINE_LETTERS = 8, 138
 # in inches, from the top of the page
-HEAD_IN, PLANES_IN, VIEWS_IN, FOOT_IN = 0.62, 2.4, 1.42, 1.45
+HEAD_IN, PLANES_IN, VIEWS_IN, FOOT_IN, LINE_IN = 0.62, 2.4, 1.42, 0.35, 0.13
 PIXELS_PER_INCH = 200
 
 
@@ -59,9 +58,6 @@ COLUMNS = (
     ),
 )
 """The columns; the first three, `source` and `sides` are of the configuration, the others of the surface stage."""
-SHOWN = ("subject", "week", "verdict", "cause", "warnings", "area_cm2", "volume_ml", "mean_thickness_mm", "page")
-RESOLVED_VOXELS = 1.5
-"""Labels of cortex below this many voxels are as thick as the voxels allow, not as the cortex is."""
 SEPARATOR = " | "
 """Between the warnings of a brain in its row."""
 
@@ -129,9 +125,11 @@ def quality_page(
 ) -> Figure:
     """Returns the page of a brain: three planes, the surface in four views, thickness in four views, and its warnings.
 
-    All pages have one size and one layout. The image lies behind the outlines where there is one, else the labels.
+    The image lies behind the outlines where there is one, else the labels. A page ends below its last warning.
     """
-    height = HEAD_IN + PLANES_IN + 2 * VIEWS_IN + FOOT_IN
+    lines = _warning_lines(warnings)
+    foot = FOOT_IN + LINE_IN * len(lines)
+    height = HEAD_IN + PLANES_IN + 2 * VIEWS_IN + foot
     figure = Figure(figsize=(FULL_WIDTH_IN, height))
     _draw_head(figure, title + (f" ({synthetic_note()})" if synthetic else ""), verdict, facts)
     _draw_planes(figure, brain, top=height - HEAD_IN)
@@ -143,15 +141,15 @@ def quality_page(
     else:
         scale = colour_scale(SHAPE_MEASURES["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True)
         _draw_views(figure, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS, top - VIEWS_IN)
-        bar = figure.add_axes((0.93, (FOOT_IN + 0.2) / height, 0.012, (VIEWS_IN - 0.4) / height))
+        bar = figure.add_axes((0.93, (foot + 0.2) / height, 0.012, (VIEWS_IN - 0.4) / height))
         figure.colorbar(scale, cax=bar).set_label("thickness (mm)", fontsize=6.5)
         if not np.isfinite(brain.thickness_mm).all():
-            figure.text(0.985, (FOOT_IN + 0.06) / height, "grey: not measured", fontsize=6, ha="right", va="top")
+            figure.text(0.985, (foot + 0.06) / height, "grey: not measured", fontsize=6, ha="right", va="top")
         bar.tick_params(labelsize=6)
     for letter, below in zip("abc", (HEAD_IN, HEAD_IN + PLANES_IN, HEAD_IN + PLANES_IN + VIEWS_IN), strict=True):
         place = 1 - (below + 0.02) / height
         figure.text(0.015, place, letter, ha="left", va="top", fontsize=9, fontweight="bold")
-    _draw_warnings(figure, verdict, warnings)
+    _draw_warnings(figure, verdict, lines)
     return figure
 
 
@@ -166,13 +164,17 @@ def _draw_head(figure: Figure, title: str, verdict: Verdict, facts: Mapping[str,
     figure.text(0.015, 1 - 0.33 / height, words, ha="left", va="top", fontsize=6.5, linespacing=1.35)
 
 
-def _draw_warnings(figure: Figure, verdict: Verdict, warnings: Sequence[str]) -> None:
-    height = figure.get_figheight()
+def _warning_lines(warnings: Sequence[str]) -> list[str]:
     lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], "• … more in quality.csv"]
+    return lines
+
+
+def _draw_warnings(figure: Figure, verdict: Verdict, lines: Sequence[str]) -> None:
+    height = figure.get_figheight()
     heading = {"fine": "No warnings.", "look": "Look at:", "refused": "Refused:"}[verdict]
-    place, colour = (FOOT_IN - 0.12) / height, VERDICT_COLOURS[verdict]
+    place, colour = (FOOT_IN + LINE_IN * len(lines) - 0.12) / height, VERDICT_COLOURS[verdict]
     figure.text(0.015, place, heading, fontsize=7.5, fontweight="bold", color=colour, ha="left", va="top")
     below = place - 0.16 / height
     figure.text(0.015, below, "\n".join(lines), fontsize=6.5, linespacing=1.35, ha="left", va="top")
@@ -345,29 +347,16 @@ def quality_table(
     return table.sort_values("subject", key=lambda names: names.map(rank)).reset_index(drop=True)
 
 
-def shown_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Returns the table as it is shown in pages: fewer columns, brains to look at first."""
-    rank = table["verdict"].map({"refused": 0, "look": 1, "fine": 2})
-    shown = table.loc[rank.sort_values(kind="stable").index, list(SHOWN)]
-    return shown.rename(columns={name: plain(name) for name in SHOWN})
-
-
-def thickness_note(table: pd.DataFrame) -> str:
-    """Returns what is to be said of brains whose labels do not resolve the cortex; nothing where there are none."""
-    coarse = table["subject"][table["voxels_through_cortex"] < RESOLVED_VOXELS]
-    said = f"; labels less than {RESOLVED_VOXELS:g} voxels thick say little of the cortex: {', '.join(coarse)}"
-    return said if len(coarse) else ""
-
-
 def facts(row: Mapping[str, Any]) -> dict[str, str]:
     """Returns what stands in the head of a brain's page, by name."""
+    turned = row["rotation_deg"]
     both = " + ".join(f"{row[f'area_{side}_cm2']:.1f}" for side in str(row["sides"]).split())
     found = {
         "source": str(row["source"]),
-        "hemispheres": str(row["sides"]),
+        "hemispheres": " and ".join(str(row["sides"]).split()),
         "area": f"{row['area_cm2']:.1f} cm² ({both})",
         "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of that expected)",
-        "pose": f"by {row['pose_by']}, turned by {row['rotation_deg']:.1f}°",
+        "pose": f"by {row['pose_by']}, turned by {turned:.1f}°" if turned >= 0.05 else "as in the file",
     }
     if _known(row["asymmetry_mm"]):
         found["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"

@@ -1,4 +1,4 @@
-"""Time, memory, energy and emissions of the workflow's jobs, as tables and as a chart.
+"""Time, memory, energy and emissions of the workflow's jobs, as a table.
 
 Energy by the formula of Green Algorithms: Lannelongue, Grealey & Inouye, Advanced Science 2021,
 doi:10.1002/advs.202100707.
@@ -11,10 +11,8 @@ from math import floor, log10
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from .labels import plain
-from .style import FULL_WIDTH_IN, RUN_COLOURS, add_letters, light_grid, new_figure, styled
 from .tables import html_table
 
 SIMULATE = "simulate"
@@ -23,8 +21,8 @@ SECONDS_PER_MINUTE = 60
 SECONDS_PER_HOUR = 3600
 GB_PER_MIB = 2**20 / 1e9
 KWH_PER_WH = 1e-3
-MOST_STAGES = 14
-"""Stages with bars of their own in the chart; the others are one bar."""
+MOST_STAGES = 10
+"""Stages with rows of their own in the page's table; the others are one row."""
 
 OFTEN_SAMPLED_S, SHORT_GAP_S, LONG_GAP_S = 15.0, 0.5, 30.0
 """Snakemake samples a job's CPU time twice a second for a quarter of a minute, and then twice a minute."""
@@ -131,10 +129,11 @@ def busy_seconds(wall_s: pd.Series, sampled_cpu_s: pd.Series) -> pd.Series:
 
 
 def resources_table(stages: pd.DataFrame) -> pd.DataFrame:
-    """Returns the table of `stage_resources` with headings and units for print, and a last row for all jobs."""
-    total = stages[["jobs", "wall_s", "cpu_s", "energy_kWh", "co2e_g"]].sum()
-    last = {"stage": "all", "run": "", **total, "peak_memory_MiB": stages["peak_memory_MiB"].max()}
-    rows = pd.concat([stages, pd.DataFrame([last])], ignore_index=True)
+    """Returns `stage_resources` with headings and units for print: what took longest, the rest, and all jobs."""
+    stages = stages.sort_values("cpu_s", ascending=False, kind="stable")
+    shown, rest = stages.iloc[:MOST_STAGES], stages.iloc[MOST_STAGES:]
+    last = [_summed(rest, f"{len(rest)} others")] if len(rest) else []
+    rows = pd.concat([shown, pd.DataFrame([*last, _summed(stages, "all")])], ignore_index=True)
     return pd.DataFrame(
         {
             "stage": rows["stage"].map(plain),
@@ -147,6 +146,11 @@ def resources_table(stages: pd.DataFrame) -> pd.DataFrame:
             "emissions (g CO₂e)": rows["co2e_g"].map(_three_digits),
         }
     )
+
+
+def _summed(stages: pd.DataFrame, name: str) -> dict[str, object]:
+    total = stages[["jobs", "wall_s", "cpu_s", "energy_kWh", "co2e_g"]].sum()
+    return {"stage": name, "run": "", **total, "peak_memory_MiB": stages["peak_memory_MiB"].max()}
 
 
 def _three_digits(value: float) -> float:
@@ -170,41 +174,3 @@ def resources_html(stages: pd.DataFrame, power: Power, *, caption: str) -> str:
         notes.append(f"Jobs without a time on record, which add nothing: {unmeasured} of {int(stages['jobs'].sum())}.")
     lines = "<br>\n".join(map(escape, notes))
     return f"{html_table(resources_table(stages), caption=caption, digits=6)}\n<p>{lines}</p>"
-
-
-@styled
-def cost_chart(resources: pd.DataFrame, *, synthetic: bool = False) -> Figure:
-    """Returns wall time, CPU time and energy of the stages as bars, the longest first.
-
-    Parameters
-    ----------
-    resources : what `stage_resources` returns
-    """
-    named = resources.assign(run=resources["run"].fillna(""))
-    names = named["stage"].map(plain) + named["run"].map(lambda run: f" · {run}" if run else "")
-    values = named.assign(name=names)[["name", "wall_s", "cpu_s", "energy_kWh"]]
-    values = values.sort_values("cpu_s", ascending=False, kind="stable")
-    rest = values.iloc[MOST_STAGES:]
-    shown = values.iloc[:MOST_STAGES]
-    if len(rest):
-        last = {"name": f"{len(rest)} other stages", **rest[["wall_s", "cpu_s", "energy_kWh"]].sum()}
-        shown = pd.concat([shown, pd.DataFrame([last])], ignore_index=True)
-    figure = new_figure(FULL_WIDTH_IN, 0.8 + 0.2 * len(shown), synthetic=synthetic)
-    times, energy = figure.subplots(1, 2, sharey=True, width_ratios=[1.4, 1.0])
-    places = range(len(shown))
-    for offset, column, colour, label in (
-        (-0.2, "wall_s", RUN_COLOURS[5], "wall time"),
-        (0.2, "cpu_s", RUN_COLOURS[0], "CPU time"),
-    ):
-        at = [place + offset for place in places]
-        times.barh(at, shown[column] / SECONDS_PER_MINUTE, height=0.4, color=colour, label=label)
-    energy.barh(list(places), shown["energy_kWh"] / KWH_PER_WH, height=0.6, color=RUN_COLOURS[2])
-    times.set_yticks(list(places), list(shown["name"]))
-    times.invert_yaxis()
-    times.set_xlabel("time, summed over jobs (min)")
-    energy.set_xlabel("energy, estimated (Wh)")
-    figure.legend(handles=times.get_legend_handles_labels()[0], loc="outside lower left", ncols=2)
-    for axes in (times, energy):
-        light_grid(axes, "x")
-    add_letters([times, energy])
-    return figure

@@ -76,14 +76,15 @@ class Material:
     specular: float
 
 
-TISSUE = Material(0.22, 0.78, 0.08)
+TISSUE = Material(0.16, 0.84, 0.1)
 """For surfaces of one colour, whose shape is read from their shade."""
 MAP = Material(0.58, 0.42, 0.0)
 """For maps, whose colours are read as values: shade may only hint at the shape."""
 _INSIDE = Material(0.6, 0.4, 0.0)
 
-# lamps fixed to the camera, as strong from the left as from the right: shade makes no difference between hemispheres
-_LAMPS = (((0.0, 1.0, 0.8), 0.24), ((-1.0, 0.2, 0.5), 0.26), ((1.0, 0.2, 0.5), 0.26), ((0.0, 0.0, 1.0), 0.50))
+# lamps fixed to the camera, as strong from the left as from the right: shade makes no difference between hemispheres.
+# The strongest stands above, so that shallow sulci of young brains are seen
+_LAMPS = (((0.0, 1.0, 0.8), 0.45), ((-1.0, 0.2, 0.5), 0.22), ((1.0, 0.2, 0.5), 0.22), ((0.0, 0.0, 1.0), 0.36))
 
 
 def picture_axes(view: View) -> tuple[Floats, Floats]:

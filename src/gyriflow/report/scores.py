@@ -40,6 +40,7 @@ from .style import (
 )
 
 CEILING = "registration alone"
+GAIN = "gain in r over the scaled start"
 KINDS = ("explained", "predicted")
 """Weeks whose growth was known, and those whose growth was not; panels show one of them."""
 ONE_WEEK = np.array([-0.25, 0.25])
@@ -102,8 +103,9 @@ def validation_chart(validation: pd.DataFrame, ceiling: pd.DataFrame | None = No
             if len(rows) == 1:  # a line through one point cannot be seen
                 begin, end = rows["week"].iloc[0] + ONE_WEEK
                 axes.hlines(gain, begin, end, colors=MUTED_COLOUR, linestyles=":")
-        _gain_axes(axes, f"{name}: r less that of the scaled start")
+        _gain_axes(axes, name)
         week_axis(axes, validation["week"])
+    panels[0].set_ylabel(GAIN)
     real = star("real brain of the week before", markersize=6)
     run_legend(figure, colours, extra=[real, *_ceiling_key(ceiling)])
     return figure
@@ -147,7 +149,7 @@ def smoothing_chart(
         axes.set_xticks(places, [f"{length:g}" for length in finite] + ["uniform"] * uniform)
         axes.minorticks_off()
         axes.set_xlabel("smoothing of measured growth, standard deviation (mm)")
-        _gain_axes(axes, f"{name}: r less that of the scaled start")
+        _gain_axes(axes, name)
     run_legend(figure, colours, extra=_ceiling_key(ceiling))
     return figure
 
@@ -184,9 +186,9 @@ def horizon_chart(horizon: pd.DataFrame, ceiling: pd.DataFrame | None = None, **
         axes.margins(x=0.1)
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
         if measure == next(iter(MEASURES)):
-            axes.set_ylabel("r less that of the scaled start")
+            axes.set_ylabel(GAIN)
         if kind == kinds[-1]:
-            axes.set_xlabel("weeks after the start (its week stands at the line's end)")
+            axes.set_xlabel("weeks after the start")
     run_legend(figure, colours, extra=_ceiling_key(ceiling))
     return figure
 
@@ -244,12 +246,16 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     table = table[~table["there_at_start"].astype(bool) | (table["run"] != MEASURED)]
     late = table[table["run"] == MEASURED].drop_duplicates("row").sort_values("onset_week", ascending=False)
     places = {name: place for place, name in enumerate(late["row"])}
+    drawn = table[table["row"].isin(places) & ~table["there_at_start"].astype(bool)]
+    weeks = drawn["onset_week"].dropna()
+    if not len(weeks):
+        figure = new_figure(FULL_WIDTH_IN, 0.4, synthetic=False)
+        figure.text(0.0, 0.5, "No sulcus begins after the start.", va="center")
+        return figure
     figure = new_figure(FULL_WIDTH_IN, 1.2 + ROW_IN * max(len(places), 2), synthetic=False)
     axes = figure.subplots()
     colours = chosen_colours(onset["run"], runs)
-    drawn = table[table["row"].isin(places) & ~table["there_at_start"].astype(bool)]
-    weeks = drawn["onset_week"].dropna()
-    beyond = np.ceil(weeks.max() + 0.5) if len(weeks) else 1.0
+    beyond = np.ceil(weeks.max() + 0.5)
     for number, (run, colour) in enumerate({MEASURED: REAL_COLOUR, **colours}.items()):
         rows = drawn[drawn["run"] == run].drop_duplicates("row")
         # runs beside each other, the real brains in the middle
@@ -261,14 +267,9 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
         axes.plot(np.full((~begins).sum(), beyond), heights[~begins], "x", color=colour, markersize=4)
     axes.set_yticks(list(places.values()), list(places))
     axes.set_ylim(-0.6, max(len(places), 1) - 0.4)
-    if len(weeks):
-        week_axis(axes, [weeks.min(), beyond])
-        whole = np.arange(np.ceil(weeks.min()), beyond)
-        axes.set_xticks([*whole, beyond], [*(f"{week:g}" for week in whole), "never"])
-    else:
-        said: dict[str, Any] = {"ha": "center", "transform": axes.transAxes, "color": MUTED_COLOUR}
-        axes.text(0.5, 0.5, "no sulcus begins after the start", **said)
-        axes.set_xticks([])
+    week_axis(axes, [weeks.min(), beyond])
+    whole = np.arange(np.ceil(weeks.min()), beyond)
+    axes.set_xticks([*whole, beyond], [*(f"{week:g}" for week in whole), "never"])
     light_grid(axes, "both")
     run_legend(figure, colours, measured="real brains")
     return figure

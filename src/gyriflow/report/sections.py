@@ -323,7 +323,9 @@ def cross_sections(
             bar.set_label(wrap(name, letters + 6), fontsize=7)
             bar.ax.xaxis.set_major_locator(MaxNLocator(nbins=3))
         else:
-            keys: list[Artist] = [Patch(color=colour, label=label) for label, colour in tags[name][1].values()]
+            codes, named = tags[name]
+            there = set(map(int, np.unique(codes)))
+            keys: list[Artist] = [Patch(color=named[code][1], label=named[code][0]) for code in named if code in there]
             if ellipsoid and name == list(tags)[-1]:
                 keys.append(Line2D([], [], color="black", linestyle="--", linewidth=0.9, label="ellipsoid"))
             foot[column].legend(handles=keys, loc="upper center", borderaxespad=0, labelspacing=0.3, handlelength=1.6)
@@ -605,9 +607,7 @@ def contact_scheme(
         zoom.set_title("a wall beyond its plane\nis pressed back", fontsize=7)
         handles.append(Line2D([], [], color="black", linestyle="--", linewidth=0.8, label="rigid planes"))
     else:
-        for side in (-1, 1):
-            _arrow(zoom, middle + side * 0.8, middle + side * 2.6, centre)
-        zoom.set_title(f"parts nearer than {distance}\nrepel each other", fontsize=7)
+        zoom.set_title(f"walls repel each other\nonce nearer than {distance}", fontsize=7)
     whole.set_title(f"axial, z = {at:.1f} mm", fontsize=7)
     curve.plot(law.at, law.pressure, color=RUN_COLOURS[0])
     curve.axhline(0, color=MUTED_COLOUR, linewidth=0.6)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..parameters.terms import ELEMENTS_NEEDED
-from .labels import QUALITY, STEPS, column_label, shown_number, week_label
+from .labels import QUALITY, STEPS, shown_number, week_label
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
@@ -34,6 +34,13 @@ GATES = {
     "max_dihedral_deg": "max_dihedral_deg",
     "volume_mm3": "min_volume_mm3",
 }
+FALLBACKS = {
+    "cg": "conjugate gradients",
+    "cg, preconditioner rebuilt": "preconditioner rebuilt",
+    "cg, tangent shifted": "tangent made definite",
+    "gmres": "GMRES in place of CG",
+}
+"""What is said of steps by the linear solver that they needed, from the usual one on."""
 _PAPER = "FetalFoldSim"
 _MEASURED = "Wang et al. 2021"
 _MARKERS = {_PAPER: "s", _MEASURED: "^"}
@@ -59,7 +66,7 @@ def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> 
     ----------
     steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, elements_through_cortex, radius_ratio_01, rung,
         seconds
-        One row per accepted step. Steps on another rung than the most frequent one are marked.
+        One row per accepted step. Steps that another linear solver was needed for than for most are marked.
     order
         Of the elements: it says how many through the cortex are enough.
     """
@@ -87,7 +94,9 @@ def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> 
     week_axis(panels["seconds"], week)
     unusual = steps[steps["rung"] != steps["rung"].mode().iloc[0]]
     for colour, (rung, rows) in zip(RUN_COLOURS[1:], unusual.groupby("rung", sort=False), strict=False):
-        panels["newton"].plot(rows["week"], rows["newton"], "D", color=colour, markersize=3.5, label=f"rung: {rung}")
+        panels["newton"].plot(
+            rows["week"], rows["newton"], "D", color=colour, markersize=3.5, label=FALLBACKS.get(rung, rung)
+        )
     if len(unusual):
         panels["newton"].legend(**above)
     return figure
@@ -140,47 +149,17 @@ def quality_histogram(
     return figure
 
 
-def displacement_table(displacement: pd.DataFrame) -> pd.DataFrame:
-    """Returns the weekly displacement norms of the runs with the published ones appended, one row per interval.
-
-    Parameters
-    ----------
-    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
-
-    Returns
-    -------
-    DataFrame with columns source, from_week, to_week, nodes, max_mm, mean_mm
-    """
-    runs = runs_by_name(displacement).rename(columns={"run": "source"})[list(PUBLISHED.columns)]
-    return pd.concat([runs, PUBLISHED], ignore_index=True)
-
-
-def displacement_summary(displacement: pd.DataFrame) -> pd.DataFrame:
-    """Returns the table as the paper prints it: a row per source and nodes, a column per interval, "max / mean" in mm.
-
-    Parameters
-    ----------
-    displacement : as for `displacement_table`
-    """
-    heading = "max / mean |u| (mm)"
-    table = displacement_table(displacement).sort_values(["from_week", "to_week"], kind="stable")
-    table["interval"] = [column_label(ends) for ends in zip(table["from_week"], table["to_week"], strict=True)]
-    table[heading] = [f"{most:.2f} / {mean:.2f}" for most, mean in zip(table["max_mm"], table["mean_mm"], strict=True)]
-    rows = table.sort_index()[["source", "nodes"]].drop_duplicates()
-    wide = table.pivot_table(index=["source", "nodes"], columns="interval", values=heading, aggfunc="first")
-    wide = wide.reindex(index=pd.MultiIndex.from_frame(rows), columns=list(table["interval"].drop_duplicates()))
-    return wide.fillna("–").rename_axis(columns=heading)
-
-
 @styled
 def displacement_chart(displacement: pd.DataFrame, **told: Unpack[Shown]) -> Figure:
-    """Returns the maximal and the mean displacement norm of all nodes, as in the paper, per interval.
+    """Returns the maximal and the mean displacement norm of all nodes, as in the paper, per week.
+
+    Norms between output weeks that lie further apart are divided by the weeks between them.
 
     Runs are lines, published values grey.
 
     Parameters
     ----------
-    displacement : as for `displacement_table`
+    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
     """
     named = runs_by_name(displacement)
     shown = named[named["nodes"] == "all"]
@@ -191,9 +170,10 @@ def displacement_chart(displacement: pd.DataFrame, **told: Unpack[Shown]) -> Fig
         lines |= {run: (shown[shown["run"] == run].sort_values("from_week"), colour) for run, colour in colours.items()}
         for name, (rows, colour) in lines.items():
             look: dict[str, Any] = {"marker": _MARKERS.get(name, "o"), "linestyle": "--" if name in _MARKERS else "-"}
-            axes.plot((rows["from_week"] + rows["to_week"]) / 2, rows[column], color=colour, label=name, **look)
-        axes.set_title(f"{label} |u| per interval, all nodes")
-        axes.set_ylabel("displacement (mm)")
+            per_week = rows[column] / (rows["to_week"] - rows["from_week"])
+            axes.plot((rows["from_week"] + rows["to_week"]) / 2, per_week, color=colour, label=name, **look)
+        axes.set_title(f"{label} displacement, all nodes")
+        axes.set_ylabel("displacement (mm per week)")
         from_zero(axes)
         week_axis(axes, [*ends["from_week"], *ends["to_week"]])
         axes.set_xlabel("gestational age (GW), middle of the interval")

@@ -1,5 +1,6 @@
 """Tables of a study, and any table as HTML."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,12 +10,12 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from .charts import WITH_NORMS
-from .labels import FORETOLD, METRICS, plain, with_unit
-from .solve import displacement_summary
+from .labels import FORETOLD, METRICS, parameter_label, plain, week_label, with_unit
 from .style import MEASURED, PHANTOM, REAL_BRAIN, runs_by_name, simulated_runs, synthetic_note
 
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60
+NUMBER = re.compile(r"[+−]?\d[\d.]*|–")
 _TABLE = Environment(autoescape=True).from_string(
     "<table>{% if caption %}<caption>{{ caption }}</caption>{% endif %}"
     "<thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr></thead>\n<tbody>"
@@ -24,14 +25,24 @@ _TABLE = Environment(autoescape=True).from_string(
 
 OF_THE_SURFACE = ("crossing_faces", "curvature_radius", "thickness_measured_share")
 """Metrics of how a brain was measured."""
-AROUND_ZERO = ("mean_shape_index", "mean_curvature")
-"""How metrics begin that may be zero, so that a difference in per cent says nothing."""
+OF_EVERY_RUN = (
+    *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "material", "poisson_ratio"),
+    *("growth_rate_per_s", "core_growth_rate_per_s", "stress_memory_gw", "support", "contact.kind", "no_growth.kind"),
+    *("step_s", "tets", "order", "elements_through_cortex", "steps", "newton", "seconds", "peak_memory_MiB"),
+)
+"""Parameters and summaries that are told of runs even where all have the same."""
+AROUND_ZERO = "mean_shape_index"
+"""A metric that may be zero, so that a difference in per cent says nothing."""
+QUANTILE = r"_q\d\d$"
+"""How the metrics end that are told in the CSV alone."""
 
 
 def _named(rows: pd.DataFrame) -> pd.Series:
-    """Returns the metric of each row as words, with its unit."""
+    """Returns the metric of each row as in figures, with its unit."""
     pairs = zip(rows["metric"], rows["unit"], strict=True)
-    return pd.Series([with_unit(plain(metric), unit) for metric, unit in pairs], index=rows.index, dtype=object)
+    return pd.Series(
+        [with_unit(METRICS.get(metric, plain(metric)), unit) for metric, unit in pairs], index=rows.index, dtype=object
+    )
 
 
 def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.DataFrame:
@@ -44,15 +55,16 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     measured
         Heading of the measured brains' column.
 
-    What says how a surface was measured, not what it is like, is left out.
+    What says how a surface was measured, not what it is like, is left out, and so are quantiles.
 
     Returns
     -------
-    DataFrame indexed by metric (with its unit) and week; cells without a value are NaN
+    DataFrame indexed by metric (with its unit) and week; cells without a value are NaN, without a difference "–"
     """
-    rows = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & ~metrics["metric"].isin(OF_THE_SURFACE)])
+    left_out = metrics["metric"].isin(OF_THE_SURFACE) | metrics["metric"].str.contains(QUANTILE)
+    rows = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & ~left_out])
     names = _named(rows)
-    below_zero = set(names[rows["metric"].str.startswith(AROUND_ZERO)])
+    below_zero = set(names[rows["metric"] == AROUND_ZERO])
     order = list(dict.fromkeys(names))
     wide = rows.assign(metric=names).pivot_table(
         index=["metric", "week"], columns="run", values="value", aggfunc="mean", sort=True
@@ -64,8 +76,15 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     columns = {measured: real}
     for run in runs:
         columns[run] = wide[run]
-        columns[f"{run}: difference (%)"] = (100 * (wide[run] / real - 1)).round(1).where(~signed)
+        columns[f"{run}, difference (%)"] = (
+            (100 * (wide[run] / real - 1)).map(_signed).where(~signed & real.notna(), "–")
+        )
     return pd.DataFrame(columns)
+
+
+def _signed(percent: float) -> str:
+    """Returns a difference in per cent with its sign, none where it is rounded to zero."""
+    return "–" if np.isnan(percent) else f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0")
 
 
 def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame:
@@ -85,7 +104,7 @@ def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame
     indices = of_regions.pivot_table("asymmetry_index", index, "metric", aggfunc="first")
     order = []
     for metric, name in dict(zip(regions["metric"], names, strict=True)).items():
-        heading = f"{plain(metric)}, asymmetry"
+        heading = f"{METRICS.get(metric, plain(metric))}, asymmetry"
         wide[heading] = indices.get(metric, np.nan)
         order += [f"{name}, left", f"{name}, right", heading]
     brains = pd.MultiIndex.from_frame(regions[index].drop_duplicates())
@@ -121,26 +140,30 @@ def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
-    """Returns the parameters of the runs: a row per parameter, a column per run, those that differ first.
+    """Returns the parameters of the runs with their units: a row per parameter, a column per run.
 
-    The column "differs" is "yes" for parameters that are not the same in all runs.
+    There are those that differ between the runs, then `OF_EVERY_RUN`.
 
     Parameters
     ----------
     parameters : {run: {name: value}}
-        Values may be mappings themselves; their names are joined by dots.
+        Values may be mappings themselves; their names are joined by dots. A curve over weeks is shown by its ends.
     """
     flat = pd.DataFrame({run: pd.Series(_flatten(values), dtype=object) for run, values in parameters.items()})
-    shown = flat.map(_shown)
+    shown = flat.map(lambda value: _shown(value, 4))
     differs = shown.ne(shown.iloc[:, 0], axis=0).any(axis=1)
-    shown.insert(0, "differs", differs.map({True: "yes", False: ""}))
-    return shown.loc[[*shown.index[differs], *shown.index[~differs]]].rename_axis("parameter")
+    chosen = [*shown.index[differs], *(name for name in OF_EVERY_RUN if name in shown.index and not differs[name])]
+    return shown.loc[chosen].rename(index=parameter_label).rename_axis("parameter")
 
 
 def metrics_page(metrics: pd.DataFrame, *, measured: str, **shown: bool) -> str:
-    """Returns `metrics_table` as HTML."""
+    """Returns `metrics_table` as HTML, at the last week that runs and measured brains share, else the last of all."""
     table = metrics_table(metrics, measured=measured)
-    return html_table(table, caption="Metrics of whole brains", measured=measured, **shown)
+    shared = table[table[measured].notna() & table.drop(columns=measured).notna().any(axis=1)]
+    week = (shared if len(shared) else table).index.get_level_values("week").max()
+    caption = f"Metrics of whole brains at {week_label(week)}"
+    at_week = table[table.index.get_level_values("week") == week].droplevel("week")
+    return html_table(at_week, caption=caption, measured=measured, **shown)
 
 
 def regions_page(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Any) -> str:
@@ -151,12 +174,6 @@ def regions_page(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Any) -
 def centiles_page(centiles: pd.DataFrame, **shown: Any) -> str:
     """Returns `centiles_table` as HTML."""
     return html_table(centiles_table(centiles), caption="Centiles (z) among the measured brains", **shown)
-
-
-def displacement_page(displacement: pd.DataFrame, **shown: Any) -> str:
-    """Returns `displacement_summary` as HTML."""
-    caption = "Largest / mean norm of the displacement (mm)"
-    return html_table(displacement_summary(displacement), caption=caption, **shown)
 
 
 def prediction_page(prediction: pd.DataFrame) -> str:
@@ -199,7 +216,7 @@ def html_table(
 
 def _kind(name: object, value: object, text: str) -> str:
     """Returns the class of a cell, by which the style sheet lays it out."""
-    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+    if (isinstance(value, int | float | np.number) and not isinstance(value, bool)) or NUMBER.fullmatch(text):
         return "number"
     if name == "verdict" and text in VERDICTS:
         return f"verdict {text}"
@@ -210,11 +227,18 @@ def _kind(name: object, value: object, text: str) -> str:
 def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
     flat: dict[str, object] = {}
     for name, value in values.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value and all(_is_number(week) for week in value):
+            ends = [(week, value[week]) for week in sorted(value, key=float)]
+            flat[f"{prefix}{name}"] = " to ".join(f"{_shown(at, 4)} at {week} GW" for week, at in (ends[0], ends[-1]))
+        elif isinstance(value, Mapping):
             flat.update(_flatten(value, f"{prefix}{name}."))
         else:
             flat[f"{prefix}{name}"] = value
     return flat
+
+
+def _is_number(name: object) -> bool:
+    return str(name).replace(".", "", 1).isdigit()
 
 
 def _shown(value: object, digits: int = 6) -> str:
@@ -222,7 +246,7 @@ def _shown(value: object, digits: int = 6) -> str:
         case bool() | np.bool_():
             return "yes" if value else "no"
         case float() | np.floating():
-            return "–" if np.isnan(value) else f"{value:.{digits}g}"
+            return "–" if np.isnan(value) else f"{value:.{digits}g}".replace("-", "−")
         case None:
             return "–"
         case list() | tuple():

@@ -244,7 +244,11 @@ def test_regions_chart_sums_areas_and_averages_depths():
 def test_table_of_regions_has_left_right_and_asymmetry():
     table = region_table(REGIONS, ASYMMETRY)
     row = table.loc[("a", "real", 21.0, "front")]
-    assert (row["area (cm²), left"], row["area (cm²), right"], row["area, asymmetry"]) == (11.0, 10.0, 0.1)
+    assert (row["pial area (cm²), left"], row["pial area (cm²), right"], row["pial area, asymmetry"]) == (
+        11.0,
+        10.0,
+        0.1,
+    )
     assert len(table) == 6
 
 

@@ -71,7 +71,6 @@ def page(shown: list[Shown], view: dict | None = None) -> str:
             "packages": {"numpy": "2.0", "absent": None},
             "files": [{"brain": "young", "what": "labels", "sha256": "12ab"}],
         },
-        metrics={"curvature_radius_mm": {"value": 2.4, "unit": "mm", "description": "Radius."}},
         methods="**Brains.** Two.",
         configuration="start: young\n",
         validation=VALIDATION,
@@ -86,7 +85,7 @@ def page(shown: list[Shown], view: dict | None = None) -> str:
 def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     shown = [
         Shown("Growth", "rates", "<table></table>", "of *all* brains"),
-        Shown("Folding", "weeks", picture("data:image/webp;base64,AA", "weeks"), "first <page>", first=True),
+        Shown("Folding", "weeks", picture("data:image/webp;base64,AA", 7.2, "weeks"), "first <page>", first=True),
     ]
     text = page(shown, {"groups": [{"name": "</script><b>"}], "maps": []})
     assert (
@@ -136,9 +135,9 @@ def test_technical_figures_are_folded_away_at_the_end_of_their_section():
 
 
 def test_a_warning_of_several_brains_is_told_once():
-    said = {"step": "surface", "level": "warning", "message": ["thin", "thin", "wide"]}
+    said = {"step": "surface", "level": ["warning", "warning", "error"], "message": ["thin", "thin", "wide"]}
     table = grouped(pd.DataFrame({"subject": ["a", "b", "a"], "run": [np.nan, np.nan, "r"]} | said))
-    assert list(zip(table["message"], table["of"], strict=True)) == [("thin", "a; b"), ("wide", "a, r")]
+    assert table[["message", "brain, run"]].to_numpy().tolist() == [["thin", "a; b"], ["error: wide", "a, r"]]
 
 
 @pytest.mark.parametrize(
@@ -181,11 +180,12 @@ def test_the_table_of_quality_control_judges_where_there_is_one():
 def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     (row,) = scores_table(RUNS, VALIDATION).to_dict("records")
     assert row["verdict"].startswith("ended at 22 GW of 23; cortex not resolved (1.2 elements")
-    assert row["compared at"] == "23 GW"
-    assert row["area, difference (%)"] == "−7.9"
-    assert row["gain (95 %)"] == "−0.00 (−0.04 to +0.04)"
+    assert row["real brain"] == "23 GW, predicted"
+    assert row["area (%)"] == "−7.9"
+    assert (row["gain"], row["95 % interval"]) == ("−0.00", "−0.04 to +0.04")
     assert row["distance (mm)"] == "0.42"
-    assert "–" in scores_table(RUNS).to_dict("records")[0]["gain (95 %)"]
+    (alone,) = scores_table(RUNS).to_dict("records")
+    assert [alone[name] for name in ("real brain", "gain", "95 % interval")] == ["none", "–", "–"]
 
 
 def test_a_sound_run_has_nothing_said_against_it():
@@ -224,10 +224,13 @@ def test_pictures_are_made_smaller_until_they_fit(tmp_path):
     figure = Figure(figsize=(8, 4))
     figure.subplots().imshow(np.random.default_rng(0).random((200, 400)))
     write_figure(tmp_path / "a.png", tmp_path / "a.pdf", figure, dpi=300)
-    (large,) = picture_addresses([tmp_path / "a.png"], 1e9)
-    (small,) = picture_addresses([tmp_path / "a.png"], 0.6 * len(large))
+    ((large, inches),) = picture_addresses([tmp_path / "a.png"], 1e9)
+    ((small, _),) = picture_addresses([tmp_path / "a.png"], 0.6 * len(large))
     assert large.startswith("data:image/webp;base64,")
     assert len(small) < 0.8 * len(large)
+    # a figure is as wide on the page as its letters need, whatever its pixels
+    assert inches == pytest.approx(8, rel=1e-4)
+    assert 'width="1200"' in picture(large, inches, "noise")
 
 
 def test_the_body_of_a_written_page_is_read_back(tmp_path):
@@ -261,7 +264,7 @@ def test_the_methods_say_what_was_run():
     )
     assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
     assert "1500 and the values given for each week or place Pa" in text
-    assert "tangentially at 2e-07 per second" in text
+    assert "tangentially at 2·10⁻⁷ per second" in text
     assert "itself [4]" in text
     assert "<li><p>Run <em>stiff</em>" in caption_html(text)
     assert "system-message" not in caption_html(text)

@@ -8,7 +8,6 @@ from gyriflow.report.resources import (
     MOST_STAGES,
     Power,
     busy_seconds,
-    cost_chart,
     energy_kwh,
     resources_html,
     resources_table,
@@ -137,20 +136,14 @@ def test_the_page_says_what_was_assumed_and_what_is_missing(stages):
     assert "without a time" not in resources_html(stages[stages["unmeasured"] == 0], POWER, caption="")
 
 
-def test_cost_has_the_longest_stages_first_and_the_others_together():
+def test_the_table_has_what_took_longest_and_the_others_together():
     count = MOST_STAGES + 3
+    numbers = dict.fromkeys(("wall_s", "peak_memory_MiB", "energy_kWh", "co2e_g"), 60.0)
     stages = pd.DataFrame(
-        {
-            "stage": [f"s{i}" for i in range(count)],
-            "run": "",
-            "wall_s": 60.0,
-            "cpu_s": 60.0 * np.arange(1, count + 1),
-            "energy_kWh": 1e-3,
-        }
+        {"stage": [f"s{i}" for i in range(count)], "run": "", "jobs": 1, "cpu_s": 60.0 * np.arange(1, count + 1)}
+        | numbers
     )
-    figure = cost_chart(stages)
-    times, energy = figure.axes
-    labels = [label.get_text() for label in times.get_yticklabels()]
-    assert labels[0] == f"s{count - 1}"
-    assert labels[-1] == "3 other stages"
-    assert energy.patches[-1].get_width() == pytest.approx(3.0)
+    table = resources_table(stages)
+    assert len(table) == MOST_STAGES + 2
+    assert table["stage"].iloc[[0, -2, -1]].tolist() == [f"s{count - 1}", "3 others", "all"]
+    assert table["CPU time (min)"].iloc[-2] == 1 + 2 + 3

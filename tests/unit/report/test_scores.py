@@ -153,7 +153,8 @@ def test_starts_are_told_apart_and_nothing_is_drawn_of_nothing():
     names = [label.get_text() for label in onset_chart(both).axes[0].get_yticklabels()]
     assert set(names) == {f"{sulcus} · {start}" for sulcus in ("left central", "left 2") for start in "ab"}
     nothing = onsets(real=(26.0, 28.0, np.nan)).assign(there_at_start=True)
-    assert "no sulcus begins" in onset_chart(nothing).axes[0].texts[0].get_text()
+    assert "No sulcus begins" in (empty := onset_chart(nothing)).texts[0].get_text()
+    assert not empty.axes
 
 
 def spectrum(run: str, power: float) -> pd.DataFrame:

@@ -136,6 +136,9 @@ def test_the_scheme_shows_the_planes_where_there_are_any():
     assert "left contact" in words(with_planes)
     without = contact_scheme(mesh, zones, law, planes_mm=None, distance="d̂ = 0.2 mm")
     assert "left contact" not in words(without)
+    # the walls are not that near: nothing acts between them
+    arrows = [text for axes in without.axes for text in axes.texts if getattr(text, "arrow_patch", None)]
+    assert arrows == []
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,8 @@ import re
 
 import numpy as np
 import pandas as pd
-import pytest
 
-from gyriflow.report.tables import html_table, metrics_table, prediction_page, runs_table
+from gyriflow.report.tables import html_table, metrics_page, metrics_table, prediction_page, runs_table
 
 
 def test_metrics_table_gives_the_difference_from_the_measured_brain():
@@ -17,20 +16,21 @@ def test_metrics_table_gives_the_difference_from_the_measured_brain():
             ("s", "real", 22.0, "whole", "area", 100.0, "cm2"),
             ("s", "thin", 22.0, "left", "area", 55.0, "cm2"),
             ("s", "thin", 22.0, "whole", "gyrification_index", 1.2, "1"),
+            ("s", "thin", 22.0, "whole", "mean_shape_index", -0.01, "1"),
+            ("s", "real", 22.0, "whole", "mean_shape_index", 0.02, "1"),
             ("s", "thin", 22.0, "whole", "mean_curvature_q05", -0.01, "1/mm"),
-            ("s", "real", 22.0, "whole", "mean_curvature_q05", 0.02, "1/mm"),
             ("s", "thin", 22.0, "whole", "crossing_faces", 0.0, "1"),
         ],
         columns=["subject", "run", "week", "hemisphere", "metric", "value", "unit"],
     )
     table = metrics_table(metrics)
-    assert table.loc[("area (cm²)", 22.0), "thin"] == 110.0
-    assert table.loc[("area (cm²)", 22.0), "thin: difference (%)"] == pytest.approx(10.0)
-    assert np.isnan(table.loc[("area (cm²)", 23.0), "real brain"])
-    assert table.loc[("gyrification index", 22.0), "thin"] == 1.2
+    assert table.loc[("pial area (cm²)", 22.0), "thin"] == 110.0
+    assert table.loc[("pial area (cm²)", 22.0), "thin, difference (%)"] == "+10.0"
+    assert np.isnan(table.loc[("pial area (cm²)", 23.0), "real brain"])
+    assert table.loc[("gyrification index, hulls", 22.0), "thin"] == 1.2
     # a share of what may be zero says nothing
-    (curvature,) = table.index[table.index.get_level_values("metric").str.contains("curvature")]
-    assert np.isnan(table.loc[curvature, "thin: difference (%)"])
+    assert table.loc[("mean shape index", 22.0), "thin, difference (%)"] == "–"
+    assert not table.index.get_level_values("metric").str.contains("curvature").any()
     assert not table.index.get_level_values("metric").str.contains("crossing").any()
     assert "phantom" in metrics_table(metrics, measured="phantom")
 
@@ -40,7 +40,16 @@ def test_metrics_table_without_measured_brains_has_no_differences():
         [("s", "thin", 22.0, "whole", "area", 110.0, "cm2")],
         columns=["subject", "run", "week", "hemisphere", "metric", "value", "unit"],
     )
-    assert metrics_table(metrics)["thin: difference (%)"].isna().all()
+    assert (metrics_table(metrics)["thin, difference (%)"] == "–").all()
+
+
+def test_the_page_has_the_last_week_that_runs_and_real_brains_share():
+    rows = [("s", run, week, "whole", "area", 100.0 + week, "cm2") for run, week in
+            (("thin", 22.0), ("real", 22.0), ("thin", 23.0), ("thin", 24.0), ("real", 23.0))]  # fmt: skip
+    columns = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
+    page = metrics_page(pd.DataFrame(rows, columns=columns), measured="real brain")
+    assert "at 23 GW" in page
+    assert re.findall("<td.*?>(.*?)</td>", page) == ["pial area (cm²)", "123", "123", "0.0"]
 
 
 def test_runs_table_puts_what_differs_first():
@@ -50,9 +59,14 @@ def test_runs_table_puts_what_differs_first():
             "thin": {"poisson_ratio": 0.45, "contact": {"gap_mm": 2.0}, "thickness_mm": 1.5},
         }
     )
-    assert table.index.tolist() == ["contact.gap_mm", "poisson_ratio", "thickness_mm"]
-    assert table["differs"].tolist() == ["yes", "", ""]
-    assert table.loc["contact.gap_mm", "thin"] == "2"
+    assert table.index.tolist() == ["contact gap (mm)", "cortical thickness (mm)", "Poisson's ratio"]
+    assert table.loc["contact gap (mm)", "thin"] == "2"
+
+
+def test_a_curve_is_told_by_its_ends():
+    curve = {"follow": {"area_cm2": {"21.0": 89.9166, "23.0": 100.0, "25.25": 143.2723}}}
+    table = runs_table({"reference": {"follow": None}, "measured": curve})
+    assert table.loc["follow area (cm²)", "measured"] == "89.92 at 21.0 GW to 143.3 at 25.25 GW"
 
 
 def test_html_is_escaped_named_and_the_same_each_time():
