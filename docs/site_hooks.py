@@ -8,10 +8,23 @@ from typing import Any
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
+from gyriflow.version import version
+
 CHECKOUT = Path(__file__).parents[1]
-PAGES = {"config/README.md": "configuration.md", "CONTRIBUTING.md": "how-to/extend.md", "README.md": "index.md"}
+PAGES = {
+    "config/README.md": "configuration.md",
+    "CONTRIBUTING.md": "how-to/extend.md",
+    "README.md": "index.md",
+    "CHANGELOG.md": "changes.md",
+}
 """Files of the checkout that are pages of the site."""
 LINK = re.compile(r"\[([^\]]*)\]\((?![a-z]+:|#)([^)\s#]+)(#[^)\s]*)?\)")
+
+
+def on_config(config: Any) -> Any:
+    """Names the version at the foot of each page."""
+    config.copyright = f"gyriflow {version()}"
+    return config
 
 
 def on_files(files: Files, config: Any) -> Files:
