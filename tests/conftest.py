@@ -9,7 +9,7 @@ import pytest
 from reliability import Collector
 from xdist.scheduler import LoadScopeScheduling
 
-LONGEST_FIRST = ("tests/mpi/", "tests/workflow/", "tests/")
+LONGEST_FIRST = ("tests/mpi/test_ranks.py", "tests/mpi/", "tests/workflow/", "tests/")
 MOST_WORKERS = 8
 """Some tests start three ranks, or a workflow of two cores, of their own."""
 
@@ -38,7 +38,13 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    items.sort(key=lambda item: next(n for n, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)))
+    """Puts what takes long first, so that no worker is left alone with it at the end."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+
+    def place(item):
+        return next(n for n, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)), item.path not in slow
+
+    items.sort(key=place)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -10,7 +10,7 @@ from gyriflow.folding.domain import Domain
 from gyriflow.folding.growth import Growth, layered_inverse
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
-from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import NeoHookean
 from gyriflow.parameters.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
 
@@ -26,6 +26,15 @@ def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
     vertices = mesh.vertices.copy()
     vertices[inner] += np.random.default_rng(3).uniform(-by, by, (len(inner), 3))
     return type(mesh)(vertices, mesh.tets)
+
+
+def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
+    """Returns a box in mm of quadratic elements, whose inner nodes are moved at random (seeded): sides are curved."""
+    mesh = quadratic(distorted_box(cells, size))
+    inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
+    vertices = mesh.vertices.copy()
+    vertices[inner] += np.random.default_rng(5).uniform(-by, by, (len(inner), 3))
+    return TetrahedralMesh(vertices, mesh.tets)
 
 
 def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=None, planes=(-0.5, 0.5)):

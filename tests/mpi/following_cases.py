@@ -44,7 +44,7 @@ def grown(folding, state, steps):
     return state
 
 
-@pytest.mark.parametrize("growth", [(0.10, 0.15), (0.02, 0.03)])
+@pytest.mark.parametrize("growth", [(0.10, 0.15), pytest.param((0.02, 0.03), marks=pytest.mark.one_rank)])
 def test_area_and_volume_meet_their_curves_after_a_week(growth):
     folding, state = following(growth)
     state = grown(folding, state, 10)
@@ -112,7 +112,7 @@ def test_growth_goes_in_measured_directions_and_still_meets_its_curves():
     assert after.rows[-1]["volume_ml"] == pytest.approx(after.rows[-1]["volume_aim_ml"], rel=1e-3)
 
 
-@pytest.mark.parametrize(("growth", "negative"), [(0.3, False), (0.05, True)])
+@pytest.mark.parametrize(("growth", "negative"), [(0.3, False), pytest.param(0.05, True, marks=pytest.mark.one_rank)])
 def test_ventricles_follow_a_curve_of_their_own_beside_the_brain(growth, negative):
     folding, state = following((0.10, 0.15), allow_negative_growth=negative)
     inputs, start, after = with_ventricles(folding, state, growth)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
+from boxes import COMM, curved_box, distorted_box, problem_on, smooth_displacement, zones_of
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
@@ -23,8 +23,8 @@ def test_isotropic_growth_of_a_free_body_is_free_of_stress():
     assert grown <= 1e-12 * problem.residual(problem.new_vector())
 
 
-def test_tangential_growth_stretches_across_the_normal_only():
-    mesh = distorted_box()
+@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
+def test_tangential_growth_stretches_across_the_normal_only(mesh):
     oblique = np.array([1.0, 2.0, 2.0]) / 3
     problem = problem_on(mesh, zones_of(mesh), dg=0.2, dr=-0.05, normals=lambda c: np.tile(oblique, (len(c), 1)))
     along = np.outer(oblique, oblique)
@@ -32,6 +32,9 @@ def test_tangential_growth_stretches_across_the_normal_only():
     x = problem.domain.local(problem.domain.positions)
     problem.set_displacement(x @ (growth - np.eye(3)).T)
     assert problem.energy() == pytest.approx(0.0, abs=1e-16)
+    problem.set_displacement(x * [0.2, 0.0, 0.0])
+    assert problem.volume_ratios() == pytest.approx(1.2)
+    assert 0 < problem.smallest_volume_ratio() <= 1.2 * (1 + 1e-12)
 
 
 def test_the_direction_of_the_normal_does_not_matter():

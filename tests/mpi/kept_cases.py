@@ -43,7 +43,7 @@ def counted(monkeypatch, problem):
     return calls
 
 
-@pytest.mark.parametrize("kind", ["global", "none"])
+@pytest.mark.parametrize("kind", ["global", pytest.param("none", marks=pytest.mark.one_rank)])
 def test_an_elastic_tangent_that_is_kept_spares_others_and_leads_to_the_same_place(kind, monkeypatch):
     folding, state = closing_sulcus(kind, **TIGHT)
     start = state.positions
@@ -80,6 +80,7 @@ def bounds_estimated(krylov):
     return bool(address.value)
 
 
+@pytest.mark.one_rank
 def test_the_smoother_keeps_its_bounds_and_takes_no_more_iterations(monkeypatch):
     folding, state = closing_sulcus("global", **TIGHT)
     kept = after_steps(folding, state, 8)
@@ -105,7 +106,7 @@ def test_a_smoother_that_elements_have_outgrown_estimates_its_bounds_anew(monkey
     assert not bounds_estimated(ladder_of_run._cg)
 
 
-@pytest.mark.parametrize("support", ["box", "free"])
+@pytest.mark.parametrize("support", ["box", pytest.param("free", marks=pytest.mark.one_rank)])
 def test_newtons_method_begins_at_the_first_good_guess(support):
     folding, state = closing_sulcus("global", support=support)
     state = after_steps(folding, state, 3)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import COMM, MATERIAL, EvenGrowth, distorted_box, everywhere_known, set_layers, zones_of
+from boxes import COMM, MATERIAL, EvenGrowth, curved_box, distorted_box, everywhere_known, set_layers, zones_of
 from shapes import box_mesh
 
 from gyriflow.folding.checkpoint import State
@@ -20,6 +20,7 @@ from gyriflow.units import M_PER_MM, SECONDS_PER_GW
 RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0]}
 EVEN = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0}
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
+ORDERS = ["linear", "quadratic"]
 STRETCH = np.array([[1.1, 0.03, 0.0], [0.03, 0.95, -0.02], [0.0, -0.02, 1.02]])
 
 
@@ -67,9 +68,9 @@ def test_the_energy_of_a_kept_stretch_is_counted_per_volume_without_stress():
 
 
 @pytest.mark.parametrize("memory_gw", [0.25, np.inf])
-def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(memory_gw):
+@pytest.mark.parametrize(("mesh", "points"), [(distorted_box(), 1), (curved_box((2, 2, 2)), 8)], ids=ORDERS)
+def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(mesh, points, memory_gw):
     # uniform isotropic growth of a body whose whole surface is fixed: nothing moves, and ln V adds up and decays
-    mesh = distorted_box()
     zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
     folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw, **EVEN)
     folding.model = EvenGrowth(folding.parameters, None, 0.01)
@@ -77,6 +78,7 @@ def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(memor
         state = folding.step(state, 43200.0)
     kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
     strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
+    assert strain.shape == (len(mesh.tets), points, 3)
     np.testing.assert_allclose(strain, -np.log(1.01) * sum(kept**n for n in range(5)), rtol=1e-9)
 
 
@@ -108,13 +110,13 @@ def test_a_kept_state_does_not_depend_on_how_the_mesh_is_spread():
         assert (COMM.bcast(values) == values).all()
 
 
-def test_a_free_body_grows_without_drifting():
-    mesh = distorted_box()
+@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=ORDERS)
+def test_a_free_body_grows_without_drifting(mesh):
     zones = replace(zones_of(mesh), free=True)
     folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"})
     # growth on one side only, which would turn a body that is only extrapolated
     folding._growing = (folding.domain.local(folding.domain.positions)[:, 0] > 0).astype(float)
-    for _ in range(6):
+    for _ in range(4):
         before, state = state.positions, folding.step(state, 43200.0)
         u, x = state.last, before - before.mean(axis=0)
         size = np.abs(u).max()

@@ -1,14 +1,10 @@
 """Quadratic elements with curved sides: what they must do as linear ones do, and what is theirs alone."""
 
-import sys
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 from boxes import (
     COMM,
-    EvenGrowth,
+    curved_box,
     distorted_box,
     everywhere_known,
     problem_on,
@@ -27,26 +23,13 @@ from gyriflow.folding.ladder import KEPT
 from gyriflow.folding.multigrid import linear_in_quadratic
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.stress import unpacked
 from gyriflow.geometry.jacobians import lower_bounds
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
+from gyriflow.geometry.tetrahedra import boundary_faces, quadratic, signed_volumes
 from gyriflow.parameters.folding import parameters_from
-from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from gyriflow.units import M_PER_MM, MM_PER_M
 
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
 RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0], "solver": TIGHT}
-EVEN = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0}
-
-
-def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
-    """Returns a box in mm of quadratic elements, whose inner nodes are moved at random (seeded): sides are curved."""
-    mesh = quadratic(distorted_box(cells, size))
-    inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
-    vertices = mesh.vertices.copy()
-    vertices[inner] += np.random.default_rng(5).uniform(-by, by, (len(inner), 3))
-    return TetrahedralMesh(vertices, mesh.tets)
 
 
 def at_the_bottom(centre):
@@ -69,32 +52,6 @@ def test_volumes_and_facets_are_those_of_the_curved_elements():
     counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
     np.testing.assert_array_equal(4 * counts, np.bincount(zones.facet_zone, minlength=5))
     np.testing.assert_allclose(domain.gathered(domain.local(domain.positions)[: domain.owned]), mesh.vertices * 1e-3)
-
-
-def test_growth_without_restraint_is_free_of_stress():
-    oblique = np.array([1.0, 2.0, 2.0]) / 3
-    mesh = curved_box()
-    problem = problem_on(mesh, zones_of(mesh), dg=0.2, dr=-0.05, normals=lambda c: np.tile(oblique, (len(c), 1)))
-    along = np.outer(oblique, oblique)
-    growth = 1.2 * (np.eye(3) - along) + 0.95 * along
-    problem.set_displacement(problem.domain.local(problem.domain.positions) @ (growth - np.eye(3)).T)
-    assert problem.energy() == pytest.approx(0.0, abs=1e-16)
-    problem.set_displacement(problem.domain.local(problem.domain.positions) * [0.2, 0.0, 0.0])
-    assert problem.volume_ratios() == pytest.approx(1.2)
-    assert 0 < problem.smallest_volume_ratio() <= 1.2 * (1 + 1e-12)
-
-
-def test_planes_push_back_with_the_penalty_pressure():
-    mesh = curved_box()
-    zones = zones_of(mesh, right=lambda c: c[:, 0] > 3.99, planes=(-5.0, 4.5))
-    total = []
-    for given in (zones, zones_of(mesh)):
-        problem = problem_on(mesh, given)
-        residual = problem.new_vector()
-        problem.set_displacement(np.zeros_like(problem.displacement))
-        problem.residual(residual)
-        total.append(COMM.allreduce(float(residual.array.reshape(-1, 3)[:, 0].sum())))
-    assert total[0] - total[1] == pytest.approx(-5e5 * 0.5e-3 * 36e-6, rel=1e-10)
 
 
 def test_newton_converges_quadratically_and_conjugate_gradients_as_on_linear_elements():
@@ -169,20 +126,6 @@ def test_what_is_moved_inside_out_is_not_accepted():
     assert lower_bounds(after, curved_box().tets).min() > 0
 
 
-@pytest.mark.parametrize("memory_gw", [0.25, np.inf])
-def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(memory_gw):
-    mesh = curved_box((2, 2, 2))
-    zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
-    folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw, **EVEN)
-    folding.model = EvenGrowth(folding.parameters, None, 0.01)
-    for _ in range(4):
-        state = folding.step(state, 43200.0)
-    kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
-    strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
-    assert strain.shape == (len(mesh.tets), 8, 3)
-    np.testing.assert_allclose(strain, -np.log(1.01) * sum(kept**n for n in range(4)), rtol=1e-9)
-
-
 def folding_of(mesh, zones, comm=COMM, **changes):
     parameters = parameters_from(RUN | {"contact": {"kind": "none"}} | changes)
     return Folding(comm, mesh, zones, parameters), State.at_start(mesh.vertices * M_PER_MM, parameters.step_s)
@@ -201,20 +144,6 @@ def test_a_kept_state_does_not_depend_on_the_number_of_ranks():
     assert np.abs(together.positions - alone.positions).max() <= 1e-8 * np.abs(alone.last).max()
     np.testing.assert_allclose(together.stretch, alone.stretch, atol=1e-9)
     assert (COMM.bcast(together.positions) == together.positions).all()
-
-
-def test_a_free_body_grows_without_drifting():
-    mesh = curved_box()
-    zones = replace(zones_of(mesh), free=True)
-    folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"})
-    folding._growing = (folding.domain.local(folding.domain.positions)[:, 0] > 0).astype(float)
-    for _ in range(3):
-        before, state = state.positions, folding.step(state, 43200.0)
-        u, x = state.last, before - before.mean(axis=0)
-        size = np.abs(u).max()
-        assert size > 1e-6
-        assert np.abs(u.mean(axis=0)).max() <= 1e-12 * size
-        assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(x).max() * size * len(x)
 
 
 def pressed_blocks(comm, growth, distance):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
+from boxes import COMM, curved_box, distorted_box, problem_on, smooth_displacement, zones_of
 from petsc4py import PETSc
 from shapes import box_mesh
 
@@ -102,8 +102,8 @@ def test_residual_is_the_derivative_of_the_energy_and_tangent_that_of_the_residu
         assert rates == pytest.approx(2.0, abs=0.15), (error, rates)
 
 
-def test_contact_pushes_back_with_the_penalty_pressure():
-    mesh = distorted_box()
+@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
+def test_contact_pushes_back_with_the_penalty_pressure(mesh):
     zones = zones_of(mesh, right=lambda c: c[:, 0] > 3.99, planes=(-5.0, 4.5))
     without = problem_on(mesh, zones_of(mesh))
     with_contact = problem_on(mesh, zones)
@@ -216,6 +216,7 @@ def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monke
     assert solver.solve(np.zeros_like(problem.displacement)).converged
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("gain", "newton"), [(1e-3, 50), (0.0, 5)])
 def test_iterations_that_lower_the_energy_do_not_count_towards_their_limit(gain, newton, monkeypatch):
     problem = growing_problem()

@@ -107,6 +107,7 @@ def test_a_step_across_a_target_goes_on_towards_the_next_one():
     assert away(grown(folding, across, 3), shapes[22.0]) < 0.05
 
 
+@pytest.mark.one_rank
 def test_a_run_that_was_stopped_within_a_week_ends_where_another_ends():
     folding, start = towards({22.0: bent(1), 23.0: bent(2)}, **TIGHT)
     middle = grown(folding, start, 3)

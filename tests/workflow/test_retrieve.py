@@ -186,18 +186,6 @@ def test_no_network_ends_in_5_with_one_message_a_file_and_nothing_torn(workflow)
     assert files_in(workflow.directory / "resources") == {}
 
 
-def test_a_narrow_licence_is_accepted_before_anything_is_planned(workflow, server):
-    raw = study(workflow.directory, server.url, licence={"name": "own", "terms": "Ask me.", "accept": True})
-    refused = workflow.run("retrieve", "--cores", "1", "--configfile", workflow.write("study.yaml", raw))
-    assert refused.returncode == 2
-    assert (
-        "the licence of far (own) is to be accepted: Ask me. Write `accept_licence: true` if you do" in refused.stderr
-    )
-    assert server.asked == []
-    raw["atlas"] = {"file": "atlas.yaml", "accept_licence": True}
-    assert workflow.run("-n", "--configfile", workflow.write("study.yaml", raw)).returncode == 0
-
-
 def test_without_an_atlas_there_is_nothing_to_retrieve(workflow):
     name = workflow.write(
         "study.yaml", {"brains": [{"id": "a", "week": 21, "phantom": {}}], "start": "a"} | {"folding": {"end_week": 22}}

@@ -2,6 +2,8 @@
 
 import pytest
 
+from .conftest import Workflow
+
 STUDY = {
     "brains": [
         {"id": "dome", "week": 21, "shape": {"kind": "half-ellipsoid"}},
@@ -13,9 +15,10 @@ STUDY = {
 TARGET = "results/brains/dome/surface/pial.surf.gii"
 
 
-@pytest.fixture
-def made(workflow):
+@pytest.fixture(scope="module")
+def made(checkout_copy, tmp_path_factory):
     """The surface of the shape, which counts as made."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("shape"))
     name = workflow.write("study.yaml", STUDY)
     folder = workflow.directory / "results" / "brains" / "dome" / "surface"
     folder.mkdir(parents=True)

@@ -76,7 +76,7 @@ def test_a_terminal_gets_a_line_that_is_written_over(workflow):
     name = workflow.write("study.yaml", ONE_BRAIN)
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
-        workflow.command("--cores", "1", "surface", "--configfile", name),
+        workflow.command("--cores", "1", "results/brains/a/surface/labels.nii.gz", "--configfile", name),
         cwd=workflow.directory, env=workflow.environment | {"TERM": "xterm"},
         stdin=theirs, stdout=theirs, stderr=theirs,
     )  # fmt: skip

@@ -9,17 +9,6 @@ FOLDER = "-a b; touch pwned; $(touch pwned) `touch pwned` 'it\"s é {brain}"
 FILE = "$(touch pwned) 'x' \"y\"; touch pwned & -é.nii.gz"
 
 
-def test_a_file_between_braces_is_refused_instead_of_another_one(workflow):
-    for folder in ("a", "{brain}"):
-        (workflow.directory / folder).mkdir()
-        (workflow.directory / folder / "l.nii.gz").touch()
-    brain = {"id": "a", "week": 21, "labels": "{brain}/l.nii.gz", "scheme": "binary"}
-    study = {"brains": [brain], "start": "a", "folding": {"end_week": 22}}
-    outcome = workflow.run("-n", "--configfile", workflow.write("study.yaml", study))
-    assert outcome.returncode == 2
-    assert f"brains[0].labels: found {workflow.directory}/{{brain}}/l.nii.gz; braces in a path" in outcome.stderr
-
-
 @pytest.mark.slow
 @pytest.mark.fault(57)
 def test_brains_in_a_folder_of_any_name_are_segmented_and_have_surfaces(checkout_copy, tmp_path):

@@ -51,13 +51,3 @@ def test_ventricles_of_a_phantom_come_to_the_next_weeks(workflow):
     assert steps["ventricles_aim_ml"].iloc[-1] == pytest.approx(curve[22.0], rel=1e-3)
     assert steps["ventricles_ml"].iloc[-1] == pytest.approx(curve[22.0], rel=0.005)
     assert "ventricles_ml" not in alike
-
-
-def test_labels_that_name_no_ventricles_are_refused_before_anything_is_made(workflow):
-    brains = [brain | {"phantom": None, "labels": "labels.nii.gz", "scheme": "mine"} for brain in STUDY["brains"]]
-    (workflow.directory / "labels.nii.gz").touch()
-    schemes = {"mine": {"cerebrum": [1, 5], "cortex": [5]}}
-    name = workflow.write("bare.yaml", STUDY | {"brains": brains, "schemes": schemes})
-    outcome = workflow.run("-n", "--configfile", name)
-    assert outcome.returncode == 2
-    assert "follow.ventricles_ml: needs a start brain whose labels know ventricles; mine" in outcome.stderr

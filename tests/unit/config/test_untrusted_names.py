@@ -45,6 +45,16 @@ def test_rows_of_a_table_have_such_names_neither(tmp_path, name):
     assert "id" in said
 
 
+@pytest.mark.fault(57)
+def test_a_file_between_braces_is_refused_instead_of_another_one(tmp_path):
+    for folder in ("a", "{brain}"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "l.nii.gz").touch()
+    brain = {"id": "a", "week": 21, "labels": "{brain}/l.nii.gz", "scheme": "binary"}
+    said = refusal(study(brains=[brain]), tmp_path)
+    assert f"brains[0].labels: found {tmp_path}/{{brain}}/l.nii.gz; braces in a path" in said
+
+
 ATLAS = {
     "name": "mine",
     "title": "Mine",

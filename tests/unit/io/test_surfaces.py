@@ -77,6 +77,7 @@ def in_spaces(path, ball, *systems):
     return path
 
 
+@pytest.mark.fault(11)
 @pytest.mark.parametrize("to", [SCANNER, ALIGNED])
 def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
     back = read_surface(in_spaces(tmp_path / "a.gii", ball, (U, to, TURN)))
@@ -84,6 +85,7 @@ def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
     assert declared(tmp_path / "a.gii")[0] == f"NIFTI_XFORM_{NAMES[to]}"
 
 
+@pytest.mark.fault(50)
 @pytest.mark.parametrize(
     ("systems", "said", "space"),
     [
@@ -185,6 +187,7 @@ def test_freesurfer_surface_without_its_volume_stays_and_that_is_said(tmp_path, 
     assert declared(tmp_path / "rh.white") == (None, "CortexRight")
 
 
+@pytest.mark.fault(9)
 def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
     write_surface(tmp_path / "a.surf.gii", ball, "CortexRight")
     write_geometry(tmp_path / "rh.pial", ball.vertices, ball.faces, volume_info=volume())
@@ -208,6 +211,7 @@ def test_triangles_stored_as_floats_are_read(tmp_path, ball):
     assert np.array_equal(back.faces, ball.faces)
 
 
+@pytest.mark.fault(13)
 def test_vertices_that_are_no_places_and_faces_beyond_the_vertices_are_refused(tmp_path, ball):
     vertices = ball.vertices.copy()
     vertices[3:5, 1] = np.nan

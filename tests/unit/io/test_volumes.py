@@ -33,6 +33,7 @@ def position(volume, label):
     return volume.affine[:3, :3] @ np.argwhere(volume.labels == label)[0] + volume.affine[:3, 3]
 
 
+@pytest.mark.fault(3)
 @pytest.mark.parametrize("order", ["LAS", "LPS", "PIR", "SRA", "RAS"])
 def test_storage_order_does_not_move_the_brain(tmp_path, labels, order):
     image = nib.Nifti1Image(labels, AFFINE)
@@ -43,12 +44,14 @@ def test_storage_order_does_not_move_the_brain(tmp_path, labels, order):
         assert position(volume, label) == pytest.approx(AFFINE[:3, :3] @ index + AFFINE[:3, 3], abs=1e-4)
 
 
+@pytest.mark.fault(1)
 def test_oblique_affine_is_kept_whole(tmp_path, labels):
     oblique = rigid(20, -30, 40) @ AFFINE
     volume = read_label_volume(saved(tmp_path / "a.nii", labels, oblique))
     assert volume.affine == pytest.approx(oblique, abs=1e-5)
 
 
+@pytest.mark.fault(4)
 @pytest.mark.parametrize(("unit", "per_mm"), [("mm", 1.0), ("meter", 1e-3), ("micron", 1e3)])
 def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
     stored = np.diag([per_mm] * 3 + [1.0]) @ AFFINE
@@ -56,6 +59,7 @@ def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
     assert volume.affine == pytest.approx(AFFINE, rel=1e-5)
 
 
+@pytest.mark.fault(43)
 def test_unit_that_nifti_does_not_know_is_refused(tmp_path, labels):
     image = nib.Nifti1Image(labels, AFFINE)
     image.header["xyzt_units"] = 5
@@ -64,6 +68,7 @@ def test_unit_that_nifti_does_not_know_is_refused(tmp_path, labels):
         read_label_volume(tmp_path / "a.nii")
 
 
+@pytest.mark.fault(53)
 def test_labels_of_freesurfer_volumes_are_read(tmp_path, labels):
     nib.save(nib.MGHImage(labels.astype(np.int32), AFFINE.astype(np.float32)), tmp_path / "aseg.mgz")
     volume = read_label_volume(tmp_path / "aseg.mgz")
@@ -71,6 +76,7 @@ def test_labels_of_freesurfer_volumes_are_read(tmp_path, labels):
     assert volume.affine == pytest.approx(AFFINE, abs=1e-4)
 
 
+@pytest.mark.fault(2)
 def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     other = AFFINE.copy()
     other[0, 3] = 33.0
@@ -82,6 +88,7 @@ def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     assert read_label_volume(path, "sform").affine[0, 3] == pytest.approx(-10.0)
 
 
+@pytest.mark.fault(2)
 @pytest.mark.parametrize(("sform", "qform"), [(1, 0), (0, 1)])
 def test_of_two_matrices_the_one_that_is_set_counts(tmp_path, labels, sform, qform):
     wrong = np.diag([3.0, 3.0, 3.0, 1.0])
@@ -133,12 +140,14 @@ def test_singleton_axis_and_whole_floats_are_accepted(tmp_path, labels):
     assert np.array_equal(read_label_volume(path).labels, labels)
 
 
+@pytest.mark.fault(6)
 @pytest.mark.parametrize("values", [np.zeros((3, 3, 3, 2), np.int16), np.zeros((3, 3), np.int16)])
 def test_other_numbers_of_axes_are_refused(tmp_path, values):
     with pytest.raises(InputError, match="three axes"):
         read_label_volume(saved(tmp_path / "a.nii", values))
 
 
+@pytest.mark.fault(6)
 def test_grey_values_are_no_labels(tmp_path, labels):
     values = labels.astype(np.float32)
     values[0, 0, :2] = 0.4
@@ -146,6 +155,7 @@ def test_grey_values_are_no_labels(tmp_path, labels):
         read_label_volume(saved(tmp_path / "a.nii", values))
 
 
+@pytest.mark.fault(13)
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_nan_and_infinity_are_counted(tmp_path, labels, value):
     values = labels.astype(np.float32)
@@ -154,6 +164,7 @@ def test_nan_and_infinity_are_counted(tmp_path, labels, value):
         read_label_volume(saved(tmp_path / "a.nii", values))
 
 
+@pytest.mark.fault(5)
 def test_flat_voxels_are_used_with_a_warning(tmp_path, labels, caplog):
     flat = np.diag([0.8, 0.8, 3.0, 1.0])
     with caplog.at_level(logging.WARNING):

@@ -22,6 +22,7 @@ def brain():
     return phantom(24.0, 1.6)
 
 
+@pytest.mark.fault(49)
 @pytest.mark.parametrize("degrees", TURNS)
 def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
     labels, affine = brain
@@ -103,6 +104,7 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
     assert "exchanged" not in turned.warnings[0]
 
 
+@pytest.mark.fault(10)
 @pytest.mark.parametrize("pathology", [None, "without_callosum", "holoprosencephaly", "wide_hemisphere"])
 def test_the_shape_tells_lps_from_ras(brain, pathology):
     labels, affine = brain

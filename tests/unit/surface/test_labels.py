@@ -36,12 +36,14 @@ def test_schemes_name_only_labels_that_they_have(scheme):
     assert len(scheme.left) == len(scheme.right)
 
 
+@pytest.mark.fault(7)
 def test_unknown_labels_are_named_beside_the_known():
     labels = np.arange(11).reshape(1, 1, 11)
     with pytest.raises(InputError, match=r"does not know; found 9, 10 among.*5 cortex"):
         cerebrum_mask(labels, ATLAS)
 
 
+@pytest.mark.fault(7)
 @pytest.mark.parametrize(("label", "tissue"), [(5, "cortex"), (1, "white matter")])
 def test_cortex_and_white_matter_are_required_by_name(label, tissue):
     labels = np.array([[[n for n in range(9) if n != label]]])
@@ -62,6 +64,7 @@ def test_transient_zones_stand_for_white_matter():
     assert cerebrum_mask(labels, SCHEMES["crl"]).all()
 
 
+@pytest.mark.fault(44)
 def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
     labels = np.full((9, 9, 9), 1)
     labels[2:7, 2:7, 2:7] = 5
@@ -89,12 +92,14 @@ def test_sides_of_parcellations_are_told_right():
     assert {2041, 12101, 43, 4012} & set(SCHEMES["freesurfer"].left) == set()
 
 
+@pytest.mark.fault(8)
 @pytest.mark.parametrize("labels", [[0, 0], [3, 4]])
 def test_volume_without_cerebrum_is_refused_by_tissue(labels):
     with pytest.raises(InputError, match=r"no voxel belongs to the cerebrum.*1 white matter"):
         cerebrum_mask(np.array([[labels]]), ATLAS)
 
 
+@pytest.mark.fault(42)
 def test_labels_of_the_left_on_the_right_are_refused():
     scheme = SCHEMES["dhcp-19"]
     labels = np.zeros((4, 1, 1), dtype=int)
