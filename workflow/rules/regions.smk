@@ -1,5 +1,8 @@
-# Regions of the cortex: given on some brains, carried to others by registration, and to simulated ones with the tissue.
-# Maps of all brains at the vertices of one, the template.
+# Regions of the cortex: given on some brains, carried to others by registration, and to simulated ones with the tissue;
+# where none are given, named sulci. Maps of all brains at the vertices of one, the template.
+from gyriflow.config.atlas import SULCI
+
+
 rule given_regions:
     input:
         unpack(lambda wildcards: CONFIG.metrics.regions[wildcards.brain].files),
@@ -29,12 +32,33 @@ rule carried_regions:
         brain=one_of(
             brain
             for brain in PLAN.measuring.regioned
-            if brain not in PLAN.measuring.given
+            if brain not in [*PLAN.measuring.given, *PLAN.measuring.named]
         ),
     params:
         posed=of(PLAN.chains.posed),
     script:
         "../scripts/carried_regions.py"
+
+
+rule named_sulci:
+    input:
+        volume=of(PLAN.brains.registered_volume),
+        left=PIAL["left"],
+        right=PIAL["right"],
+        report=PIAL["report"],
+        drawing=SULCI / "sulci.yaml",
+        drawn=SULCI / "sulci.nii.gz",
+    output:
+        **region_files(f"{BRAIN}/metrics"),
+    wildcard_constraints:
+        brain=one_of(PLAN.measuring.named),
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        own=of(PLAN.chains.named),
+    script:
+        "../scripts/named_sulci.py"
 
 
 rule simulated_regions:

@@ -10,6 +10,8 @@ from ..parameters.terms import ELEMENTS_NEEDED, FOLD_BANDS
 
 SIZES = ("area", "volume", "gyrification_index")
 """Metrics of whole brains whose relative difference from the real one is a measure."""
+MODES = "weyl_number"
+"""The metric that says at how many modes the spectrum of a hemisphere is cut."""
 SURFACE_DISTANCES = ("symmetric_mean", "hausdorff95")
 COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
@@ -29,7 +31,7 @@ def distances_to(
     Measures: `relative_power_B4` to `B6`, the share of the band in the power of the spectrum, and the same with
     `_weyl`, cut at Weyl's number as the paper's (distance: the absolute difference); `spectral_distance_…` of
     `metrics.spangy`; `surface_symmetric_mean` and `surface_hausdorff95` of `metrics.similarity`; `area`, `volume`,
-    `gyrification_index` (distance: the absolute relative difference).
+    `gyrification_index` (distance: the absolute relative difference); `weyl_number` (no distance).
 
     `real` is the id of the real brain. Metrics and spectra are rows of the simulated brain and of the real one, whose
     `run` is "real"; spectral and similarity those of the simulated brain, with the column `real`. The columns are
@@ -60,8 +62,9 @@ def _band_rows(real: str, spectra: pd.DataFrame) -> list[tuple]:
 
 
 def _size_rows(real: str, metrics: pd.DataFrame) -> list[tuple]:
-    pairs = _pairs(metrics[metrics["metric"].isin(SIZES)], real, ["hemisphere", "metric"])
-    distances = (pairs["value"] / pairs["value_real"] - 1).abs()
+    pairs = _pairs(metrics[metrics["metric"].isin([*SIZES, MODES])], real, ["hemisphere", "metric"])
+    # where spectra are cut is no likeness
+    distances = (pairs["value"] / pairs["value_real"] - 1).abs().where(pairs["metric"] != MODES)
     columns = (pairs[name] for name in ("hemisphere", "metric", "value", "value_real"))
     return [(*row, "ok") for row in zip(*columns, distances, pairs["unit"].astype(str), strict=True)]
 

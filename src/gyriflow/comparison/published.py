@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .members import MODES
+
 PAPER = "FetalFoldSim paper"
 
 
@@ -142,13 +144,14 @@ def replication(
     """Returns each result of the paper beside the same here: result, place, paper, here, verdict.
 
     Displacement has the rows of one run, in the columns of `displacement_table`. Where the paper's study is not among
-    `studies`, the verdict is `NOT_RUN`. Bands are cut at Weyl's number as the paper's, and stand in whole beside it.
+    `studies`, the verdict is `NOT_RUN`. Bands are cut at Weyl's number, here each surface's own and in the paper the
+    largest of all compared, and stand in whole beside it.
     """
-    rows = [*_displacements(published["displacement"], displacement)]
+    rows = [*_displacements(published["displacement"], displacement), *_modes(published["weyl_number"], studies)]
     for entry in [*published["nearest"], *published["findings"]]:
-        of_it = [one for one in studies if list(one.varied) == [entry["parameter"]] and one.week == entry["week"]]
+        of_it = _studies_of(entry, studies)
         if "finding" in entry:
-            result, paper = entry["finding"], "so it says"
+            result, paper = entry["finding"], "stated"
             here, verdict = _finding(entry["check"], of_it[0]) if of_it else ("–", NOT_RUN)
         else:
             result = f"nearest {entry['parameter']} by {entry['measure']}, {entry['week']} GW"
@@ -170,6 +173,28 @@ def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> 
                 away = [value / paper - 1 for value in found]
                 verdict = AGREES if min(map(abs, away)) <= CLOSE else "{:+.0%}, {:+.0%}".format(*away)
             yield f"{name} displacement, {week}-{week + 1} GW (mm)", published["place"], f"{paper:.2f}", text, verdict
+
+
+def _modes(published: Mapping[str, Any], studies: Sequence[StudyTables]) -> Iterator[tuple[str, ...]]:
+    """Yields for each hemisphere how many modes the paper takes, and Weyl's numbers of the surfaces compared here."""
+    tables = [one.comparison for one in _studies_of(published, studies)]
+    for side in ("right", "left"):
+        numbers = np.array([])
+        for table in tables:
+            rows = table[(table["measure"] == MODES) & (table["hemisphere"] == side)]
+            numbers = rows[["value", "real_value"]].to_numpy(dtype=float)
+        text, verdict = "–", NOT_RUN
+        if numbers.size:
+            away = numbers.max() / published[side] - 1
+            text = f"each its own, {numbers.min():.0f} to {numbers.max():.0f}"
+            verdict = AGREES if abs(away) <= CLOSE else f"{away:+.0%}"
+        paper = f"{published[side]}, the largest of all"
+        yield f"modes of the spectra, {side}", published["place"], paper, text, verdict
+
+
+def _studies_of(entry: Mapping[str, Any], studies: Sequence[StudyTables]) -> list[StudyTables]:
+    """Returns the studies that vary what an entry of the paper is of, at its week."""
+    return [one for one in studies if list(one.varied) == [entry["parameter"]] and one.week == entry["week"]]
 
 
 def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]:

@@ -16,6 +16,8 @@ from ..parameters.varying import Week
 from ..shipped import SHIPPED
 
 ATLASES = SHIPPED / "atlases"
+SULCI = ATLASES / "spina-bifida"
+"""The folder of the brain that named sulci are drawn on: how in `sulci.yaml`, by voxel in `sulci.nii.gz`."""
 """Folder of the atlases that come with gyriflow, each in a folder of its own."""
 
 FileKey = Literal["labels", "image", "left", "right", "pial"]

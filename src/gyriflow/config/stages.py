@@ -154,6 +154,10 @@ class MetricsSettings(Settings):
     template: str | None = setting(
         None, "", "Id of a measured brain. The target `export` then has all maps at its vertices, too, by registration."
     )
+    named_sulci: bool = setting(
+        False, "", "Without `regions`: whether named sulci are the regions, as drawn on a brain of the spina bifida "
+        "atlas and carried to others by registration. The weeks in which sulci begin have their names always.",
+    )  # fmt: skip
     export: ExportNames = setting("plain", "", "How the target `export` names files; `bids` as in derivatives.")
 
 

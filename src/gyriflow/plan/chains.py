@@ -177,6 +177,11 @@ class Chains:
         template = self.config.metrics.template
         return [] if template in (None, brain) else [self.correspondence(template, brain)]
 
+    def named(self, brain: str) -> dict[str, Any]:
+        """Returns how the volume is read that a brain is registered by, and whether its surfaces have its pose."""
+        affine_from, scheme = self.config.brain(brain).affine_from, self.brains.registered_scheme(brain)
+        return {"affine_from": affine_from, "scheme": scheme, "posed": not self.config.brain(brain).has_labels}
+
     def posed(self, brain: str) -> list[bool]:
         """Returns the same for the brain of the regions and the brain that gets them."""
         return self.in_pose(self.config.regions_from(brain) or brain, brain)

@@ -605,7 +605,8 @@ class Figures:
         }
         of_regions: tuple[Wildcards, ...] = ({},) if self.measuring.with_regions else ()
         tables = {"regions": f"{STUDY}/regions.csv", "asymmetry": f"{STUDY}/asymmetry.csv"}
-        said = f"""Regions of the cortex, given on {", ".join(self.measuring.given)}, carried to other measured brains
+        given = ", ".join(self.measuring.given) or "a brain of the spina bifida atlas (named sulci)"
+        said = f"""Regions of the cortex, given on {given}, carried to other measured brains
             by registration, and to simulated ones with the tissue. Metrics by region: areas are sums of both sides,
             other values means by area; the asymmetry index is 2 (left − right)/(\\|left\\| + \\|right\\|)."""
 

@@ -75,8 +75,16 @@ class Measuring:
     runs: Runs
 
     @cached_property
+    def named(self) -> list[str]:
+        """The brains whose sulci can be named: real ones of both sides, where no regions are given."""
+        found = [brain.id for brain in self.config.brains if not brain.synthetic and len(brain.sides) == len(SIDES)]
+        return [] if self.config.metrics.regions else found
+
+    @cached_property
     def regioned(self) -> list[str]:
-        """The brains that have regions: given, or carried from the brain of the nearest week."""
+        """The brains that have regions: named sulci, or given, or carried from the brain of the nearest week."""
+        if self.config.metrics.named_sulci:
+            return self.named
         return [
             brain.id
             for brain in self.config.brains

@@ -122,7 +122,8 @@ class Validating:
     def onset(self, run: str, brain: str) -> dict[str, str | list[str]]:
         """Returns the surfaces in which the beginning of sulci is looked for, and how they correspond."""
         later, sides = self.chains.later(brain), self.brains.sides(brain)
-        regions = region_files(f"results/brains/{later[-1]}/metrics") if later[-1] in self.measuring.regioned else {}
+        with_regions = [*self.measuring.regioned, *self.measuring.named]
+        regions = region_files(f"results/brains/{later[-1]}/metrics") if later[-1] in with_regions else {}
         folder = f"results/runs/{run}/{brain}/surfaces"
         return {
             **{

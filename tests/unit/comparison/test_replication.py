@@ -25,6 +25,7 @@ def study(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, .
         cut = zip((4, 5, 6), (*own, float("nan")), (*real, float("nan")), strict=True)
         rows += [(run, side, f"relative_power_B{band}_weyl", value, true) for band, value, true in cut]
         rows.append((run, side, "relative_power_B6", whole_b6, whole_b6))
+        rows.append((run, side, "weyl_number", 1800.0 if side == "left" else 700.0, 600.0))
     comparison = pd.DataFrame(rows, columns=["run", "hemisphere", "measure", "value", "real_value"]).assign(real="r28")
     members = pd.DataFrame({"run": ["thin", "thick"], "outcome": ["finished", "diverged"]})
     nearest = pd.DataFrame(
@@ -53,6 +54,13 @@ def test_displacements_agree_by_all_nodes_or_by_the_surface():
     # the paper's 0.42 for 0.50 and 1.25
     assert found["mean displacement, 21-22 GW (mm)"] == ("all nodes 0.50, surface 1.25", "+19%, +198%")
     assert found["largest displacement, 22-23 GW (mm)"] == ("–", "not run")
+
+
+def test_modes_of_cut_spectra_stand_beside_the_papers():
+    assert verdicts(moves())["modes of the spectra, left"] == ("–", "not run")
+    found = verdicts(moves(), study(SHARES, (0.4, 0.35), 0.2))
+    assert found["modes of the spectra, left"] == ("each its own, 600 to 1800", "as in the paper")
+    assert found["modes of the spectra, right"] == ("each its own, 600 to 700", "-64%")
 
 
 def test_findings_of_a_study_are_checked_one_by_one():

@@ -303,6 +303,7 @@ def test_regions_are_those_of_the_nearest_brain_that_has_any(tmp_path):
         "given_report": "results/brains/b21/surface/surface.json",
         "correspondence": "results/study/registration/b21/b22.h5",
     }
+    assert found.measuring.named == []
     # those of a run hold at all its weeks
     regions = found.measuring.at("runs/reference/b21/metrics/week-22.00").regions
     assert regions["left_regions"] == "results/runs/reference/b21/metrics/left.regions.label.gii"
@@ -580,3 +581,19 @@ def test_of_many_weeks_every_other_one_is_shown_with_the_start_and_the_last(tmp_
     brains = shown.inputs(run="a", brain="own22")
     assert list(brains["real"]) == list(brains["runs"]["expected"]) == [22, 24, 26, 28, 30]
     assert sorted(brains["deviations"]) == [24, 26, 28, 30]
+
+
+def test_named_sulci_are_those_of_real_whole_brains_and_name_what_begins(tmp_path, real):
+    shape = brain(22, shape={"kind": "sphere", "radius_mm": 20}) | {"id": "sphere"}
+    found = plan([*real, shape])
+    last = found.chains.later("b21")[-1]
+    assert last in found.measuring.named
+    assert "sphere" not in found.measuring.named
+    assert found.measuring.regioned == []
+    assert found.validating.onset("reference", "b21")["left_regions"] == (
+        f"results/brains/{last}/metrics/left.regions.label.gii"
+    )
+    assert found.chains.named("b21")["posed"] is False
+    everywhere = plan([*real, shape], metrics={"named_sulci": True}).measuring
+    assert everywhere.regioned == everywhere.named == found.measuring.named
+    assert everywhere.given == []

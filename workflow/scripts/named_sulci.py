@@ -1,0 +1,38 @@
+"""Named sulci at the vertices of a brain's hemispheres, carried by registration from the brain they are drawn on."""
+
+from pathlib import Path
+
+import numpy as np
+
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.growth.carried_regions import NO_REGION, PLACES_MM, find_places, regions_by_deformation
+from gyriflow.growth.channels import channels
+from gyriflow.io.poses import read_pose
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.surfaces import read_surface, write_vertex_labels
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.parameters.terms import SIDES, STRUCTURES
+from gyriflow.step import step
+
+files, own = snakemake.input, snakemake.params.own
+with step(snakemake.log[0], files.volume):
+    drawing, drawn = read_yaml(files.drawing), read_label_volume(files.drawn)
+    names = {number: sulcus["name"] for number, sulcus in enumerate(drawing["sulci"], start=1)}
+    brains = []
+    for path, affine_from, scheme in (
+        (files.volume, own["affine_from"], LabelScheme(**own["scheme"])),
+        (Path(files.drawing).parent / drawing["labels"], "auto", SCHEMES[drawing["scheme"]]),
+    ):
+        volume = read_label_volume(path, affine_from=affine_from)
+        parts = {"cerebrum": scheme.cerebrum, "cortex": scheme.cortex}
+        brains.append(channels(volume.labels, volume.affine, **parts, voxel_mm=PLACES_MM))
+    between = find_places(*brains, threads=snakemake.threads)
+    back = np.eye(4) if own["posed"] else read_pose(files.report).inverse
+    for side in SIDES:
+        points = transform_points(read_surface(files[side]).vertices, back)
+        labels = np.full(len(points), NO_REGION)
+        if between is not None:
+            labels = regions_by_deformation(points, between, drawn.labels, drawn.affine)
+        write_vertex_labels(snakemake.output[f"{side}_regions"], labels, names, STRUCTURES[side])
