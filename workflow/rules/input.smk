@@ -25,7 +25,6 @@ rule segmentation:
     params:
         **of_brain("affine_from"),
         command=lambda wildcards: CONFIG.brain(wildcards.brain).segmentation.command,
-        container=lambda wildcards: CONFIG.brain(wildcards.brain).segmentation.container,
         scheme=of(PLAN.brains.scheme),
     script:
         "../scripts/segmentation.py"

@@ -5,15 +5,13 @@ MESH_GATES = PLAN.figures.gates
 rule tetrahedralise:
     input:
         PIAL["whole"],
-        curves=CURVES["curves"] if CONFIG.mesh.sized_for == "end" else [],
     output:
         **MESH,
     resources:
         mem_mb=6000,
         runtime=60,
     params:
-        settings=CONFIG.mesh.model_dump(exclude={*MESH_GATES, "sized_for"}),
-        stretched=of(PLAN.chains.stretched),
+        settings=CONFIG.mesh.model_dump(exclude={*MESH_GATES}),
         gates=MESH_GATES,
         # not an output, so that it stays if the rule fails
         refused=f"{BRAIN}/mesh/refused",

@@ -1,30 +1,9 @@
 # Metrics of brains, measured and simulated: one rule, so that both go through the same code with the same settings.
-# Only a common number of modes makes brains depend on each other: measured ones then wait for all simulations.
-rule weyl_numbers:
-    input:
-        [file for brain in PLAN.measuring.every for file in brain.hemispheres],
-    output:
-        f"{STUDY}/weyl_numbers.csv",
-    resources:
-        runtime=20,
-    params:
-        labels=[brain.labels for brain in PLAN.measuring.every],
-        sides=[brain.sides for brain in PLAN.measuring.every],
-        formula=CONFIG.metrics.spangy_wavelength,
-    script:
-        "../scripts/weyl_numbers.py"
-
-
 rule measure:
     input:
         unpack(lambda wildcards: PLAN.measuring.at(wildcards.where).parts),
         thickness=lambda wildcards: PLAN.measuring.at(wildcards.where).thickness,
         report=lambda wildcards: PLAN.measuring.at(wildcards.where).report,
-        mode_numbers=(
-            rules.weyl_numbers.output[0]
-            if CONFIG.metrics.spangy_modes == "common"
-            else []
-        ),
     output:
         **MEASURES,
         **maps_of(*SIDES),

@@ -1,17 +1,14 @@
 """The metrics of one brain, measured or simulated, at one week."""
 
-from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.files import read_json, write_table
 from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.metrics.measure import measure_brain
-from gyriflow.metrics.spangy import common_modes
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 settings = dict(params.settings, threads=snakemake.threads)
 with step(snakemake.log[0]):
-    if files.mode_numbers:
-        settings["spangy_modes"] = common_modes(read_table(files.mode_numbers))
     if files.get("thickness"):
         (settings["thickness_mm"],) = read_vertex_maps(files.thickness).values()
     if files.report:

@@ -9,7 +9,7 @@ from gyriflow.surface.labels import cerebrum_mask
 
 image, params = snakemake.input[0], snakemake.params
 with step(snakemake.log[0]), replaced(snakemake.output[0]) as labels:
-    run_command(params.command, {"image": image, "labels": labels}, "labels", params.container)
+    run_command(params.command, {"image": image, "labels": labels}, "labels")
     volume = read_label_volume(labels, affine_from=params.affine_from)
     require_same_grid(volume, snakemake.output[0], image, params.affine_from)
     cerebrum_mask(volume.labels, LabelScheme(**params.scheme))

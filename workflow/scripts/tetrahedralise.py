@@ -2,20 +2,18 @@
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.growth.following import stretch_of_surface
-from gyriflow.io.files import emptied, read_table, write_json
+from gyriflow.io.files import emptied, write_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 from gyriflow.mesh.quality import quality_summary, radius_ratios, refuse_bad_mesh
-from gyriflow.mesh.tetrahedralisation import finer, tetrahedralise
+from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     refused = emptied(params.refused)
     surface = read_surface(snakemake.input[0])
-    stretch = stretch_of_surface(read_table(snakemake.input.curves), **params.stretched) if params.stretched else 1.0
-    mesh = tetrahedralise(surface, **finer(params.settings, stretch))
+    mesh = tetrahedralise(surface, **params.settings)
     summary, fields = quality_summary(mesh, surface), {"radius_ratio": radius_ratios(mesh)}
     try:
         refuse_bad_mesh(mesh, summary, refused / "brain.xdmf", **params.gates)

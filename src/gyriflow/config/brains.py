@@ -42,10 +42,6 @@ class SegmentationSettings(Settings):
         "Shell command that reads the file {image} and writes the labels of the brain's `scheme`, on the same grid, to "
         "the NIfTI file {labels}.",
     )  # fmt: skip
-    container: str | None = setting(
-        None, "", "Image in which the command runs: `docker://NAME` or a .sif file. Apptainer, Singularity, Docker or "
-        "Podman is used.",
-    )  # fmt: skip
 
     @check
     def _names_its_files(self) -> Iterator[Problem]:

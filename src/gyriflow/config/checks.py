@@ -191,20 +191,6 @@ def _too_few_weeks(brains: Sequence[Brain]) -> str:
     )
 
 
-def mesh_sizes(config: "Config") -> Iterator[Problem]:
-    """Yields what is wrong where meshes are made for the end of the runs, by what measured brains are stretched."""
-    # runs of studies are known where nothing is wrong with these
-    if config.mesh.sized_for == "start" or [*studies(config), *calibration(config)]:
-        return
-    without = sorted(brain for brain in config.start_brains if config.stretched_by(brain) is None)
-    if without:
-        text = (
-            f"`end` needs brains of other weeks that belong with {', '.join(without)}, which tell how far the surface "
-            "is stretched; list them, or give a smaller surface_edge_mm"
-        )
-        yield Problem(text, ("mesh", "sized_for"))
-
-
 def metrics(config: "Config") -> Iterator[Problem]:
     """Yields brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
     given, known = config.metrics, [brain.id for brain in config.brains]
@@ -336,4 +322,4 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
             yield from dict.fromkeys(text for _, text in messages(error, Run))
 
 
-CHECKS = (names, starts, runs, growth, mesh_sizes, studies, calibration, metrics)
+CHECKS = (names, starts, runs, growth, studies, calibration, metrics)

@@ -289,11 +289,6 @@ class Config(Settings):
         own = [name for name, ids in self.growth_series.items() if brain in ids]
         return min(own, key=lambda name: name != self.growth.estimated_from, default="")
 
-    def stretched_by(self, brain: str) -> str | None:
-        """Returns the series that tells how far a start's surface is stretched: another's where a run foretells it."""
-        expects = any(self.expects(run) for run, start, _ in self.ends if start == brain)
-        return next(iter(self.other_series(brain)), None) if expects else self.estimated_from(brain)
-
     def other_series(self, brain: str) -> list[str]:
         """Returns the growth series of other populations with a brain's hemispheres; of several, that of
         `growth.estimated_from` alone where it is one."""

@@ -12,8 +12,8 @@ from ..parameters.terms import (
     SPANGY_PROXY,
     SPANGY_WAVELENGTH,
     ExportNames,
+    LastBand,
     Mesher,
-    ModesWord,
     SpangyProxy,
     WeylFormula,
 )
@@ -62,18 +62,13 @@ class MeshSettings(Settings):
     )  # fmt: skip
     surface_edge_mm: float = setting(
         0.72, "mm",
-        "Distance between neighbouring nodes in the cortex: a little less than half its thickness. This is the edge "
-        "length of linear elements and half that of quadratic ones.",
+        "Distance between neighbouring nodes in the cortex of the start brain: a little less than half its thickness. "
+        "It grows with the tissue. This is the edge length of linear elements and half that of quadratic ones.",
         gt=0.1, le=10,
     )  # fmt: skip
     pial_faces: int | None = setting(
         None, "", "About how many triangles between nodes the surface has, instead of `surface_edge_mm`.",
         ge=100, le=2_000_000,
-    )  # fmt: skip
-    sized_for: Literal["start", "end"] = setting(
-        "start", "",
-        "When node distances hold: in the `start` brain, from which they grow with the tissue, or at the `end` of its "
-        "runs, for which the mesh is made finer by the stretch that the measured brains show.",
     )  # fmt: skip
     core_edge_mm: float = setting(2.5, "mm", "Distance between neighbouring nodes deep inside.", gt=0.1, le=20)
     fine_depth_edges: float = setting(
@@ -109,7 +104,7 @@ class MeshSettings(Settings):
 
 
 Modes = Annotated[
-    Annotated[int, Field(ge=2, le=20000), Tag("(number)")] | Annotated[ModesWord, Tag("(word)")],
+    Annotated[int, Field(ge=2, le=20000), Tag("(number)")] | Annotated[LastBand, Tag("(word)")],
     Discriminator(lambda value: "(word)" if isinstance(value, str) and not value.isdigit() else "(number)"),
 ]
 
@@ -125,8 +120,7 @@ class MetricsSettings(Settings):
     spangy_modes: Modes = setting(
         SPANGY_MODES, "",
         "Number of eigenmodes, 2 to 20000; or the last complete band, `B4`, `B5` or `B6`, each with four times as many "
-        "modes as the one before; or `common`, per hemisphere the largest Weyl number (modes needed for the shortest "
-        "wavelength) of all brains of the study; or `own`, that of each surface.",
+        "modes as the one before.",
     )  # fmt: skip
     spangy_wavelength: WeylFormula = setting(
         SPANGY_WAVELENGTH, "", "Eigenvalue of the shortest wavelength WL: `paper` 2π/WL², `textbook` (2π/WL)²."

@@ -51,7 +51,7 @@ def resolution_warning(rows: Sequence[dict], order: int) -> str:
     since = f"since it grows, from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
     return (
         f"{since} fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the cortex: folds may be mesh noise; "
-        "a smaller mesh.surface_edge_mm, or mesh.sized_for: end, resolves it to a later week"
+        "a smaller mesh.surface_edge_mm resolves it to a later week"
     )
 
 

@@ -89,12 +89,6 @@ def curves_of_run(follow: Mapping[str, Any] | None, curves: pd.DataFrame | None,
     return [] if curves is None else [_measured(curves, series, name) for name in QUANTITIES]
 
 
-def stretch_of_surface(curves: pd.DataFrame, series: str | None, week: float, end_week: float) -> float:
-    """Returns by how much lengths on the measured brains' surface grow between two weeks, on average; at least 1."""
-    first, last = value(_measured(curves, series, "area_cm2"), [week, end_week])
-    return max(1.0, float(np.sqrt(last / first)))
-
-
 def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str, until: float | None = None) -> Curve:
     """Returns the curve through the measured brains of a series up to a week; InputError where there is none."""
     columns = ["series", "known_until_gw", "quantity", "week", "value"]

@@ -1,10 +1,8 @@
-"""A command of the user's own, run on files, alone or in a container."""
+"""A command of the user's own, run on files."""
 
 import logging
-import os
 import re
 import shlex
-import shutil
 import subprocess
 from collections import deque
 from collections.abc import Mapping
@@ -19,28 +17,22 @@ LINES_SHOWN = 5
 QUOTES = ("'", '"', "`")
 SHELL_TOKEN = r"""'[^']*'|"(?:\\.|[^"\\])*"|`(?:\\.|[^`\\])*`|\\.|(?<!\S)\#[^\n]*|<<|."""
 """A quoted part of a shell command, an escaped character, a comment, or any other character."""
-DOCKER_PREFIX = "docker://"
-APPTAINER = ("apptainer", "singularity")
-DOCKER = ("docker", "podman")
 
 
-def run_command(command: str, files: Mapping[str, AnyPath], made: str, container: str | None = None) -> None:
+def run_command(command: str, files: Mapping[str, AnyPath], made: str) -> None:
     """Runs a shell command, in the working directory, with its output in the log.
 
-    The command has places such as {image} for the `files`; the one in the place `made` it has to make. It runs in the
-    image `container`, "docker://NAME" or a .sif file, where one is given: the files' folders are seen in it.
+    The command has places such as {image} for the `files`; the one in the place `made` it has to make.
 
     InputError, with the last lines of the output, where the command ends in another code than 0 or makes no file; where
     a place stands in quotes, in which a path could not be quoted.
     """
     paths = {name: Path(path).absolute() for name, path in files.items()}
     command = _with_paths(command, paths)
-    folders = sorted({str(path.parent) for path in paths.values()})
-    arguments = ["sh", "-c", command] if container is None else _command_in_container(command, container, folders)
-    log.info("running %s", shlex.join(arguments))
+    log.info("running %s", command)
     last: deque[str] = deque(maxlen=LINES_SHOWN)
     with subprocess.Popen(
-        arguments,
+        ["sh", "-c", command],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -74,31 +66,3 @@ def _with_paths(command: str, paths: Mapping[str, Path]) -> str:
                 remedy="Leave out the quotes around them, and here-documents (<<); put what is longer into a script.",
             )
     return "".join(places.get(token, token) for token in tokens)
-
-
-def _command_in_container(command: str, container: str, folders: list[str]) -> list[str]:
-    """Returns the arguments that run a shell command in a container with the first program found that can do so."""
-    is_file = container.endswith(".sif")
-    programs = APPTAINER if is_file else APPTAINER + DOCKER
-    program = next((name for name in programs if shutil.which(name)), None)
-    if program is None:
-        raise InputError(
-            "no program that runs containers is on PATH",
-            path=container,
-            expected=" or ".join(programs),
-            remedy="Install one of them, or give a command that needs no container.",
-        )
-    unclear = [folder for folder in folders if ":" in folder or "," in folder]
-    if unclear:
-        raise InputError(
-            "has a colon or a comma in its path, which containers take for the end of it",
-            path=unclear[0],
-            remedy="Move the file, or run the study, in another folder.",
-        )
-    if program in APPTAINER:
-        binds = [part for folder in folders for part in ("--bind", folder)]
-        return [program, "exec", *binds, container, "sh", "-c", command]
-    binds = [part for folder in folders for part in ("--volume", f"{folder}:{folder}")]
-    user = ["--user", f"{os.getuid()}:{os.getgid()}"] if program == "docker" else []
-    image = container.removeprefix(DOCKER_PREFIX)
-    return [program, "run", "--rm", *user, *binds, "--entrypoint", "sh", image, "-c", command]

@@ -1,7 +1,6 @@
 """Filling a closed surface with tetrahedra of wanted sizes, and refusing a mesh that is not the inside of it."""
 
 import logging
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -27,20 +26,6 @@ OTHER_VOLUME = 0.05
 """A mesh whose volume differs by more than this part is that of another shape; nearer ones are left to the gates."""
 REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 """Volume of the regular tetrahedron, in edges cubed."""
-
-
-def finer(settings: Mapping[str, Any], stretch: float) -> dict[str, Any]:
-    """Returns settings (surface_edge_mm, core_edge_mm, pial_faces) of nodes as far apart as wanted once stretched.
-
-    Lengths are stretched by `stretch`, 1 or more.
-    """
-    faces = settings["pial_faces"]
-    return {
-        **settings,
-        "surface_edge_mm": settings["surface_edge_mm"] / stretch,
-        "core_edge_mm": settings["core_edge_mm"] / stretch,
-        "pial_faces": None if faces is None else round(faces * stretch**2),
-    }
 
 
 def edge_length_at(

@@ -141,11 +141,10 @@ def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, 
     """Returns what is measured on a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
     folds = measure_folds(mesh, settings.curvature_radius_mm)
     bend = folds.bend
-    formula = settings.spangy_wavelength
     stiffness, mass = laplacian(mesh)
     first = first_eigenvalue(stiffness, mass)
-    modes, reach = modes_of(settings.spangy_modes, name, mesh, stiffness, mass, first, formula)
-    weyl = weyl_number(area(mesh), first, formula)
+    modes, reach = modes_of(settings.spangy_modes, stiffness, mass, first)
+    weyl = weyl_number(area(mesh), first, settings.spangy_wavelength)
     # near a cut the proxy is continued from beyond
     proxy = bend.shape_index if settings.spangy_proxy == "shape_index" else bend.mean
     values = continue_smoothly(proxy, bend.reliable, stiffness)

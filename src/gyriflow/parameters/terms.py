@@ -68,9 +68,7 @@ LONGEST_NAME = 100
 SpangyProxy = Literal["shape_index", "mean_curvature"]
 """The map whose spectrum is analysed."""
 LastBand = Literal["B4", "B5", "B6"]
-"""The last complete band."""
-ModesWord = Literal[LastBand, "common", "own"]
-"""What the number of eigenmodes may be called instead of being given."""
+"""The last complete band of eigenmodes."""
 WeylFormula = Literal["paper", "textbook"]
 """Relation between the shortest wavelength WL and λ: 2π/WL² or (2π/WL)²."""
 

@@ -139,13 +139,6 @@ class Chains:
         """Returns the weeks between which a run has regional growth."""
         return self.weeks(brain) if self._registered(run) else []
 
-    def stretched(self, brain: str) -> dict[str, Any] | None:
-        """Returns what tells how far a mesh will be stretched if it is made for the end of the runs, else nothing."""
-        if self.config.mesh.sized_for == "start":
-            return None
-        end = self.config.last_week(brain)
-        return {"series": self.config.stretched_by(brain), "week": self.brains.week(brain), "end_week": end}
-
     @property
     def folding_rate_per_s(self) -> Any:
         """The folding's growth rate: a number, {week: number}, `estimated`, or None where it has a map."""

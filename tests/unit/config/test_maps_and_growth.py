@@ -4,7 +4,6 @@ import pytest
 from configurations import problems
 
 from gyriflow.config import load
-from gyriflow.errors import InputError
 
 BRAINS = [
     {"id": "a", "week": 21, "phantom": {}},
@@ -142,14 +141,6 @@ def test_an_estimate_without_two_weeks_is_refused_where_it_stands():
     estimated = {"growth_rate_per_s": "estimated"}
     assert problems(alone | {"runs": {"x": estimated, "y": estimated}}) == [f"folding.growth_rate_per_s: {reason}"]
     assert problems(alone | {"runs": {"x": estimated, "y": {}}}) == [f"runs.x.growth_rate_per_s: {reason}"]
-
-
-def test_a_mesh_for_the_end_of_the_runs_needs_brains_that_tell_how_far_it_is_stretched(tmp_path):
-    config = load(study({}, mesh={"sized_for": "end"}, runs={"short": {}, "long": {"end_week": 27}}), tmp_path)
-    assert config.last_week("a") == 27
-    alone = {"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 24}, "mesh": {"sized_for": "end"}}
-    with pytest.raises(InputError, match=r"(?s)mesh.sized_for.*`end` needs brains of other weeks that belong with a"):
-        load(alone, tmp_path)
 
 
 @pytest.mark.parametrize(

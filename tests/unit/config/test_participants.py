@@ -55,7 +55,7 @@ def test_values_for_all_rows_stand_in_the_configuration(folder):
     assert brain.labels == str(folder / "bids" / "sub-9_dseg.nii.gz")
 
 
-@pytest.mark.parametrize("column", ["segmentation.command", "segmentation.container"])
+@pytest.mark.parametrize("column", ["segmentation.command", "segmentation.program"])
 def test_a_table_that_names_programs_is_refused(folder, column):
     head = ("id", "week", "image", "scheme", column)
     write(folder, head, ("sub-1", "24", "a.nii.gz", "feta-7", "n/a"))

@@ -6,7 +6,7 @@ import pytest
 
 from gyriflow.errors import InputError
 from gyriflow.growth.curves import curve_table
-from gyriflow.growth.following import fits_of_series, followed_sizes, stretch_of_surface
+from gyriflow.growth.following import fits_of_series, followed_sizes
 from gyriflow.growth.regional import regional_map, relative_growth
 
 WEEKS = np.arange(21.0, 26.0)
@@ -44,13 +44,6 @@ def test_a_given_table_shrinks_only_where_that_is_allowed():
     with pytest.raises(InputError, match="area_cm2 shrinks"):
         followed_sizes(follow, None, None, [21.0, 22.0], False)
     assert followed_sizes(follow, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
-
-
-def test_the_surface_is_stretched_as_measured_brains_grow():
-    assert stretch_of_surface(curves(), "volume", 21.0, 25.0) == pytest.approx(1.1**2, rel=5e-3)
-    assert stretch_of_surface(curves(), "volume", 25.0, 21.0) == 1.0
-    with pytest.raises(InputError, match="no measured curve"):
-        stretch_of_surface(curves(), None, 21.0, 25.0)
 
 
 def test_local_growth_is_a_multiple_of_the_whole():

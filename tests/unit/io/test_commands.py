@@ -1,7 +1,6 @@
-"""Commands of the user's own: their files, output, failures, container; a path in them is a name and nothing else."""
+"""Commands of the user's own: their files, output, failures; a path in them is a name and nothing else."""
 
 import logging
-import os
 
 import pytest
 from fuzzing import BOUNDED
@@ -37,38 +36,6 @@ def test_a_failed_command_is_named_with_its_last_words(files, command, code):
         run_command(command, files, "labels")
 
 
-@pytest.mark.parametrize(
-    ("program", "image", "words"),
-    [
-        ("apptainer", "my.sif", ["exec", "--bind", "FOLDER", "my.sif", "sh", "-c"]),
-        ("docker", "docker://lab/model:1", ["--volume", "FOLDER:FOLDER", "--entrypoint", "sh", "lab/model:1", "-c"]),
-    ],
-)
-def test_a_container_sees_the_files(files, tmp_path, monkeypatch, caplog, program, image, words):
-    caplog.set_level(logging.INFO)
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    # a stand-in that says how it was called and runs the command, its last argument, as it is
-    stand_in = folder / program
-    stand_in.write_text('#!/bin/sh\nprintf "%s\\n" "$@"\nfor last; do :; done\neval "$last"\n')
-    stand_in.chmod(0o755)
-    for name in ("sh", "cp"):
-        (folder / name).symlink_to(f"/bin/{name}")
-    monkeypatch.setenv("PATH", str(folder))
-    run_command("cp {image} {labels}", files, "labels", image)
-    assert files["labels"].read_text() == "grey"
-    said = [record.getMessage() for record in caplog.records]
-    place = said.index(words[0])
-    found = said[place : place + len(words)]
-    assert found == [word.replace("FOLDER", str(files["image"].parent)) for word in words]
-
-
-def test_without_a_program_for_containers_one_is_asked_for(files, tmp_path, monkeypatch):
-    monkeypatch.setenv("PATH", os.fspath(tmp_path))
-    with pytest.raises(InputError, match=r"my.sif: no program that runs containers.*expected apptainer or singularity"):
-        run_command("x {image} {labels}", files, "labels", "my.sif")
-
-
 NAMES = [
     "$(touch pwned)",
     "`touch pwned`",
@@ -88,11 +55,11 @@ NAMES = [
 ]
 
 
-def segmented(folder, name, command="cp -- {image} {labels}", container=None):
+def segmented(folder, name, command="cp -- {image} {labels}"):
     image, labels = folder / name / name, folder / name / f"{name} labels"
     image.parent.mkdir(exist_ok=True)
     image.write_text("grey")
-    run_command(command, {"image": image, "labels": labels}, "labels", container)
+    run_command(command, {"image": image, "labels": labels}, "labels")
     return labels.read_text()
 
 
@@ -132,13 +99,3 @@ def test_places_where_a_path_could_not_be_quoted_are_refused(folder, command):
 def test_quotes_comments_and_variables_elsewhere_are_left_alone(folder):
     command = 'text="it\'s {"; # don\'t mind\ncp {image} {labels}; echo "$text" >> {labels}; echo \\\' >> {labels}'
     assert segmented(folder, "a", command) == "greyit's {\n'\n"
-
-
-@pytest.mark.fault(57)
-def test_a_folder_that_containers_would_take_apart_is_refused(folder, monkeypatch):
-    (folder / "docker").write_text("#!/bin/sh\ntouch pwned\n")
-    (folder / "docker").chmod(0o755)
-    monkeypatch.setenv("PATH", str(folder), prepend=":")
-    with pytest.raises(InputError, match="a colon or a comma"):
-        segmented(folder, "a:b", container="docker://x")
-    assert not (folder / "pwned").exists()

@@ -1,4 +1,4 @@
-"""Files from a server: whole or not there, gone on with, checked; what is there is left as it is."""
+"""Files from a server: whole or not there, checked; what is there is left as it is."""
 
 import gzip
 import hashlib
@@ -15,12 +15,11 @@ LABELS = packed(300_000)
 SURFACE = gifti()
 LONG = "parcellations/labels.nii.gz"
 SHORT = "atlas/left.surf.gii"
-HALF = "parcellations/.part.labels.nii.gz"
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(downloads, "FIRST_WAIT_S", 0.0)
+    monkeypatch.setattr("pooch.core.time.sleep", lambda _: None)
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
 
 
@@ -79,76 +78,19 @@ def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     assert server.asked == []
 
 
-def test_a_broken_connection_is_gone_on_with(tmp_path, server):
-    server.broken_after[LONG] = [200_000]
+def test_a_broken_connection_is_tried_again(tmp_path, server):
+    server.broken_after[LONG] = [200_000] * (downloads.TRIES - 1)
     fetched(tmp_path, server, LONG, sha256=sha256(LABELS))
     assert files_in(tmp_path) == {LONG: LABELS}
-    (_, first), (_, second) = server.asked
-    assert first is None
-    # at most a chunk of an answer that broke off is lost
-    start = int(second.removeprefix("bytes=").removesuffix("-"))
-    assert 200_000 - downloads.CHUNK_BYTES <= start <= 200_000
+    assert server.asked == [LONG] * downloads.TRIES
 
 
-def test_a_server_that_sends_no_parts_sends_all_again(tmp_path, server):
-    server.ranges = False
-    server.broken_after[LONG] = [200_000]
-    fetched(tmp_path, server, LONG)
-    assert files_in(tmp_path) == {LONG: LABELS}
-
-
-def test_many_breaks_are_borne_as_long_as_something_comes(tmp_path, server):
-    server.broken_after[LONG] = [70_000] * 4
-    fetched(tmp_path, server, LONG)
-    assert files_in(tmp_path) == {LONG: LABELS}
-    assert len(server.asked) == 5 > downloads.TRIES
-
-
-def test_half_a_file_is_not_there_under_its_name_and_the_next_call_goes_on(tmp_path, server):
-    server.broken_after[LONG] = [150_000, *[0] * (downloads.TRIES - 1)]
+@pytest.mark.fault(40)
+def test_of_a_connection_that_stays_broken_nothing_is_kept(tmp_path, server):
+    server.broken_after[LONG] = [150_000] * downloads.TRIES
     with pytest.raises(StorageError, match="cannot be fetched"):
         fetched(tmp_path, server, LONG)
-    ((left, part),) = files_in(tmp_path).items()
-    assert left == HALF
-    assert 0 < len(part) < len(LABELS)
-    assert LABELS.startswith(part)
-    server.asked.clear()
-    fetched(tmp_path, server, LONG)
-    assert server.asked == [(LONG, f"bytes={len(part)}-")]
-    assert files_in(tmp_path) == {LONG: LABELS}
-
-
-def test_a_process_that_is_killed_leaves_its_half_file_alone(tmp_path, server, monkeypatch):
-    def killed(_url, part, file, _say):
-        file.write(LABELS[:1000])
-        file.flush()
-        seen.extend(path.name for path in tmp_path.rglob("*") if path.is_file())
-        raise KeyboardInterrupt
-
-    seen: list[str] = []
-    monkeypatch.setattr(downloads, "_go_on", killed)
-    with pytest.raises(KeyboardInterrupt):
-        fetched(tmp_path, server, LONG)
-    assert seen == [".part.labels.nii.gz"]
-
-
-@pytest.mark.parametrize("name", [LONG, SHORT])
-@pytest.mark.parametrize("known", [True, False], ids=["with its checksum", "without"])
-def test_half_a_file_of_another_version_is_not_kept(tmp_path, server, name, known):
-    before, after = {LONG: (LABELS, packed(300_000, seed=1)), SHORT: (SURFACE, gifti(seed=5))}[name]
-    server.broken_after[name] = [len(before) // 2, *[0] * (downloads.TRIES - 1)]
-    with pytest.raises(StorageError):
-        fetched(tmp_path, server, name)
-    server.files[name] = after
-    fetched(tmp_path, server, name, **({"sha256": sha256(after)} if known else {}))
-    assert files_in(tmp_path) == {name: after}
-
-
-def test_a_whole_file_that_was_not_renamed_is_kept_in_the_end(tmp_path, server):
-    (tmp_path / HALF).parent.mkdir()
-    (tmp_path / HALF).write_bytes(LABELS)
-    fetched(tmp_path, server, LONG, sha256=sha256(LABELS))
-    assert files_in(tmp_path) == {LONG: LABELS}
+    assert files_in(tmp_path) == {}
 
 
 @pytest.mark.fault(40)
@@ -186,15 +128,6 @@ def test_no_server_is_said_once_and_leaves_nothing(tmp_path):
     assert "the network" in str(caught.value)
     assert caught.value.exit_code == 5
     assert files_in(tmp_path) == {}
-
-
-def test_two_downloads_of_one_file_are_refused(tmp_path, server):
-    half = tmp_path / HALF
-    half.parent.mkdir()
-    with downloads._alone_with(half), pytest.raises(StorageError, match="another download of this file"):
-        fetched(tmp_path, server, LONG)
-    fetched(tmp_path, server, LONG)
-    assert files_in(tmp_path) == {LONG: LABELS}
 
 
 def test_a_folder_that_cannot_be_made_and_a_full_disk_are_refused(tmp_path, server):

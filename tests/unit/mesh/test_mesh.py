@@ -28,7 +28,6 @@ from gyriflow.mesh.tetrahedralisation import (
     background_mesh,
     edge_length_at,
     even_surface,
-    finer,
     tetrahedralise,
 )  # fmt: skip
 
@@ -200,12 +199,6 @@ def test_an_open_or_inverted_surface_is_refused():
         tetrahedralise(flipped(shape), **SIZES)
 
 
-def test_a_mesh_that_will_be_stretched_is_made_finer_by_as_much():
-    settings = {"surface_edge_mm": 0.9, "core_edge_mm": 3.0, "pial_faces": None, "order": 2}
-    assert finer(settings, 1.5) == pytest.approx(settings | {"surface_edge_mm": 0.6, "core_edge_mm": 2.0})
-    assert finer(settings | {"pial_faces": 1000}, 1.5)["pial_faces"] == 2250
-
-
 @pytest.fixture
 def stand_in(tmp_path, monkeypatch):
     """Puts code in the place of a mesher's function, in the mesher's process."""
@@ -278,7 +271,7 @@ def mesh_in(folder, mesher, gates=GATES):
     job = SimpleNamespace(
         input=[str(folder / "pial.surf.gii")],
         output=SimpleNamespace(**outputs),
-        params=SimpleNamespace(settings=settings, gates=gates, refused=str(folder / "refused"), stretched=None),
+        params=SimpleNamespace(settings=settings, gates=gates, refused=str(folder / "refused")),
         log=[str(folder / "log")],
     )
     code = 0

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from gyriflow.config import load
-from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.plan import Plan
 from gyriflow.plan.paths import CURVES, FOLDING, GROWTH, MEASURES, PARAMETERS, READY, THICKNESS, job_files, one_of
@@ -522,14 +521,6 @@ def test_another_growth_with_an_open_loop_is_measured_on_the_shapes_that_are_exp
     assert found.chains.regional_weeks("a", "own22") == []
     assert not found.chains.with_strain("own22")
     assert "own22" in unled(plan(of_two(tmp_path, 22, atlas=(21, 23)), runs={"a": {"follow": local}}))
-
-
-def test_a_mesh_for_the_end_of_a_prediction_is_sized_by_the_other_population(tmp_path):
-    for runs, series in (({"a": {"preset": "measured"}}, "own"), (EXPECTED["runs"], "atlas")):
-        found = plan(of_two(tmp_path, 22, 24), mesh={"sized_for": "end"}, runs=runs)
-        assert found.chains.stretched("own22") == {"series": series, "week": 22, "end_week": 24}
-    with pytest.raises(InputError, match="sized_for"):
-        plan(of_two(tmp_path, 22, 24, atlas=()), mesh={"sized_for": "end"}, **EXPECTED)
 
 
 def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read(tmp_path):
