@@ -5,12 +5,14 @@ import pandas as pd
 import pytest
 from shapes import cerebrum_surface, rigid, save_gifti, save_labels
 
-from gyriflow.geometry.alignment import angle_deg, fit_onto, mean_distance, rigid_fit, searched
+from gyriflow.geometry.alignment import angle_deg, rigid_fit
+from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
 from gyriflow.io.registrations import read_targets
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.metrics.similarity import surface_distance
 from gyriflow.phantom.brain import phantom_labels
 from gyriflow.report.labels import FORETOLD
 
@@ -102,13 +104,6 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
         assert value == pytest.approx(-np.log1p(errors[week]), abs=0.05)
 
 
-def fits_onto(mesh, other):
-    """Returns the mean distance in mm of a surface, laid onto another one, from it."""
-    return mean_distance(
-        searched(transformed(mesh, fit_onto(mesh, other))), searched(other), np.eye(3), np.zeros(3), 2000
-    )
-
-
 @pytest.mark.slow
 def test_a_surface_in_another_pose_is_carried_through_the_labels_of_an_atlas(workflow):
     brains = brains_of(workflow, "a", 1, 21, 22, 23)
@@ -129,8 +124,8 @@ def test_a_surface_in_another_pose_is_carried_through_the_labels_of_an_atlas(wor
     ends = targets.surfaces["atlas"][2], targets.positions[2][used]
     atlas, target = (TriangleMesh(places, boundary.faces) for places in ends)
     # the former in the pose of that brain, the latter in that of the start
-    assert mean_distance(searched(atlas), searched(real), np.eye(3), np.zeros(3), 2000) < 0.3
-    assert fits_onto(target, real) < 1.5
+    assert nearest_on(atlas.vertices, real)[0].mean() < 0.3
+    assert surface_distance(target, real)["symmetric_mean"] < 1.5
     assert signed_volume(target) == pytest.approx(signed_volume(real), rel=0.1)
     motion = rigid_fit(targets.positions[2], targets.positions[0], np.ones(len(targets.positions[0])))
     assert angle_deg(motion[:3, :3]) < 2.0

@@ -46,7 +46,6 @@ rule matched_surface:
     wildcard_constraints:
         brain=one_of(sorted(set().union(*PLAN.chains.matched_series.values()))),
     params:
-        # exchanged files are the same inputs to Snakemake
         **of_brain("files"),
     script:
         "../scripts/matched_surface.py"

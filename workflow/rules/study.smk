@@ -44,7 +44,6 @@ rule centiles:
         norms=f"{STUDY}/norms.csv",
         curves=f"{STUDY}/norm_curves.csv",
         centiles=f"{STUDY}/centiles.csv",
-        nearest=f"{STUDY}/nearest_weeks.csv",
     params:
         reference=CONFIG.norm_reference,
     script:

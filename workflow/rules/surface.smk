@@ -65,8 +65,6 @@ rule poses:
     resources:
         runtime=30,
     params:
-        # exchanged files are the same inputs to Snakemake
-        order=[path for brain in PLAN.brains.to_pose for path in brain.files],
         max_hole_mm=CONFIG.surface.max_hole_mm,
         limits=LIMITS,
     script:
@@ -88,8 +86,6 @@ rule pial_from_hemispheres:
     params:
         **of_brain("week", "coordinates"),
         known=of(PLAN.brains.known_files),
-        # exchanged files are the same inputs to Snakemake
-        order=lambda wildcards: CONFIG.brain(wildcards.brain).files,
         settings=surface_settings(
             "gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"
         ),
@@ -160,7 +156,6 @@ rule thickness_from_white:
         mem_mb=4000,
         runtime=30,
     params:
-        # exchanged files are the same inputs to Snakemake
         white=lambda wildcards: CONFIG.brain(wildcards.brain).white_files,
     script:
         "../scripts/thickness_from_white.py"

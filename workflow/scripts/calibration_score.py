@@ -30,7 +30,7 @@ with step(snakemake.log[0]):
         shapes = set(params.weights) - {"size", "surface_distance"}
         row = shape_scores(shape(mesh, real), shape(real, real), shapes) if shapes else {}
         row |= {"size": size_score(mesh, real)} if "size" in params.weights else {}
-        distance = {"surface_distance": surface_distance(mesh, real)["symmetric_mean_mm"]}
+        distance = {"surface_distance": surface_distance(mesh, real)["symmetric_mean"]}
         rows.append(row | (distance if "surface_distance" in params.weights else {}))
     found = pd.DataFrame(rows, columns=list(params.weights)).mean()
     score = sum(weight * found[name] for name, weight in params.weights.items())

@@ -1,7 +1,7 @@
-"""Norms of the measured brains over weeks, where each brain stands among them, and the week it is nearest to."""
+"""Norms of the measured brains over weeks, and where each brain stands among them."""
 
 from gyriflow.io.files import read_table, write_table
-from gyriflow.metrics.norms import measured_norms, measured_scores, nearest_weeks, norm_curves
+from gyriflow.metrics.norms import measured_norms, measured_scores, norm_curves
 from gyriflow.step import step
 
 output, reference = snakemake.output, snakemake.params.reference
@@ -10,4 +10,3 @@ with step(snakemake.log[0]):
     write_table(output.norms, measured_norms(metrics, reference))
     write_table(output.curves, norm_curves(metrics, reference))
     write_table(output.centiles, measured_scores(metrics, reference))
-    write_table(output.nearest, nearest_weeks(metrics, reference))

@@ -94,9 +94,9 @@ def scalar_maps(frames, quantity, params=None, **shown):
 
 def outlines_chart(pairs, **shown):
     """Returns the simulated brains in the pose in which each is nearest to the real one."""
-    from gyriflow.metrics.similarity import rigid_alignment
+    from gyriflow.geometry.alignment import fit_onto
 
-    laid = {week: (transformed(mesh, rigid_alignment(mesh, real).matrix), real) for week, (mesh, real) in pairs.items()}
+    laid = {week: (transformed(mesh, fit_onto(mesh, real)), real) for week, (mesh, real) in pairs.items()}
     return {"pairs": laid, **shown}
 
 

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
@@ -13,6 +12,7 @@ from ..parameters.synthetic import PhantomSettings
 from ..parameters.terms import AMPLITUDE, LONGEST_NAME, STIFFNESS_RATIO
 from ..parameters.varying import Varying
 from .brains import Brain
+from .root import Config
 from .runs import (
     ALL,
     CURVES,
@@ -26,9 +26,6 @@ from .runs import (
     variants,
 )
 
-if TYPE_CHECKING:
-    from .root import Config
-
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Names that stand for something else in results, tables and settings."""
 RESERVED_RUNS = ("real",)
@@ -37,7 +34,7 @@ RESERVED_STUDIES = ("benchmarks", "calibration", "figures", "growth", "logs", "r
 """Folders of the study's results that are no studies."""
 
 
-def _place(run: str, key: Key, config: "Config") -> Key:
+def _place(run: str, key: Key, config: Config) -> Key:
     """Returns the path of a run's key: that of `folding` where all runs share the value."""
     values = [getattr(settings, str(key[0])) for settings in config.runs.values()]
     return ("folding", *key) if all(value == values[0] for value in values) else ("runs", run, *key)
@@ -48,7 +45,7 @@ def _unknown(names: Iterable[str], known: Sequence[str], key: Key) -> Iterator[P
         yield Problem(f"found {', '.join(unknown)}; expected ids of brains: {', '.join(known)}", key)
 
 
-def names(config: "Config") -> Iterator[Problem]:
+def names(config: Config) -> Iterator[Problem]:
     """Yields what is wrong with the names of brains, runs and schemes, of which the first are folders of the results.
 
     A study without brains is told here, too.
@@ -95,7 +92,7 @@ def _equal_but_for_case(given: Iterable[str]) -> Iterator[tuple[str, str]]:
             yield other, name
 
 
-def starts(config: "Config") -> Iterator[Problem]:
+def starts(config: Config) -> Iterator[Problem]:
     """Yields what is wrong with the start brains of the study and of its runs."""
     known = [brain.id for brain in config.brains]
     yield from _id_problems(config.start, known, ("start",))
@@ -120,7 +117,7 @@ def _id_problems(start: Start | None, known: Sequence[str], key: Key) -> Iterato
             yield Problem(f"found {name!r}; expected the id of a brain: {', '.join(known)}{hint}", key)
 
 
-def runs(config: "Config") -> Iterator[Problem]:
+def runs(config: Config) -> Iterator[Problem]:
     """Yields what is wrong between the settings of each run and its start brains."""
     for name, run in config.runs.items():
         brains = [config.brain(brain) for brain in config.starts(name)]
@@ -141,7 +138,7 @@ def runs(config: "Config") -> Iterator[Problem]:
                 yield Problem(text, _place(name, ("follow", "ventricles_ml"), config))
 
 
-def _no_ventricles(brain: Brain, config: "Config") -> str:
+def _no_ventricles(brain: Brain, config: Config) -> str:
     """Returns why the labels of a brain know no ventricles; empty where they do, or their scheme is unknown."""
     if not brain.has_labels:
         return f"{brain.id} has no labels"
@@ -150,7 +147,7 @@ def _no_ventricles(brain: Brain, config: "Config") -> str:
     return "" if found is None or found.ventricles else f"{scheme}, the scheme of {brain.id}, names none"
 
 
-def growth(config: "Config") -> Iterator[Problem]:
+def growth(config: Config) -> Iterator[Problem]:
     """Yields what is wrong between the brains, the series that growth rates are estimated from, and the runs."""
     given, brains = config.growth.brains, {brain.id: brain for brain in config.brains}
     lists = dict(given) if isinstance(given, Mapping) else {"": given} if given is not None else {}
@@ -191,7 +188,7 @@ def _too_few_weeks(brains: Sequence[Brain]) -> str:
     )
 
 
-def metrics(config: "Config") -> Iterator[Problem]:
+def metrics(config: Config) -> Iterator[Problem]:
     """Yields brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
     given, known = config.metrics, [brain.id for brain in config.brains]
     yield from _unknown(given.norm_reference or (), known, ("metrics", "norm_reference"))
@@ -212,7 +209,7 @@ def metrics(config: "Config") -> Iterator[Problem]:
             yield Problem(f"{count} scans of the subject {subject} are of week {week:g}; expected one", ("brains",))
 
 
-def studies(config: "Config") -> Iterator[Problem]:
+def studies(config: Config) -> Iterator[Problem]:
     """Yields what is wrong between the studies, the runs and the brains."""
     weeks = {brain.id: brain.week for brain in config.brains}
     own: dict[str, str] = {}
@@ -279,7 +276,7 @@ def _comparison_problems(compared: Compared, weeks: Mapping[str, float], here: K
         yield Problem(text, (*here, "compare_week"))
 
 
-def calibration(config: "Config") -> Iterator[Problem]:
+def calibration(config: Config) -> Iterator[Problem]:
     """Yields what is wrong between the calibration, the runs and the brains."""
     found, here = config.calibrate, ("calibrate",)
     if found is None:
@@ -322,4 +319,7 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
             yield from dict.fromkeys(text for _, text in messages(error, Run))
 
 
-CHECKS = (names, starts, runs, growth, studies, calibration, metrics)
+def problems_between(config: Config) -> list[Problem]:
+    """Returns what is wrong between the sections of a configuration, each problem once."""
+    every = (names, starts, runs, growth, studies, calibration, metrics)
+    return list(dict.fromkeys(problem for check in every for problem in check(config)))

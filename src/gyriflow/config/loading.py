@@ -9,9 +9,10 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.yaml_files import read_keys
 from ..parameters.folding import VARYING
-from ..parameters.settings import PROBLEM, dotted, line, messages
+from ..parameters.settings import PROBLEM, Key, dotted, line, messages
 from .atlas import Atlas, AtlasSettings, UsedAtlas, atlas_brains, atlas_problems, atlas_sections
 from .brains import ParticipantsSettings, participants_brains
+from .checks import problems_between
 from .root import Config
 from .runs import PRESETS
 
@@ -55,7 +56,9 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
         config = Config.model_validate(plain, context={"folder": str(base_dir), "awaited": awaited})
     except ValidationError as error:
         waiting = any(details["type"] != PROBLEM for details in error.errors())
-        problems += _lines(error)
+        problems += _lines(messages(error, Config))
+    else:
+        problems += _lines([(problem.key, problem.text) for problem in problems_between(config)])
     if problems:
         raise InputError(
             f"the configuration has {len(problems)} problem{'s' if len(problems) > 1 else ''}:\n  "
@@ -151,8 +154,8 @@ def _atlases(raw: Any, base_dir: Path) -> tuple[list[UsedAtlas], list[str]]:
     return atlases, problems
 
 
-def _lines(error: ValidationError) -> list[str]:
+def _lines(told: list[tuple[Key, str]]) -> list[str]:
     """Returns the problems as lines but those of atlases; what a run has from `folding` is said there only."""
-    found = [(path, text) for path, text in dict.fromkeys(messages(error, Config)) if path[0] != "atlas"]
+    found = [(path, text) for path, text in dict.fromkeys(told) if path[0] != "atlas"]
     of_folding = {(path[1:], text) for path, text in found if path[0] == "folding"}
     return [line(path, text) for path, text in found if path[0] != "runs" or (path[2:], text) not in of_folding]

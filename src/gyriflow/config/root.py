@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import PrivateAttr, field_validator
 
@@ -18,7 +18,6 @@ from ..parameters.varying import Varying, files_of
 from ..units import week_tag
 from .atlas import Atlas, AtlasSettings, UsedAtlas
 from .brains import Brain, ParticipantsSettings
-from .checks import CHECKS
 from .runs import (
     ALL,
     FIRST,
@@ -41,8 +40,6 @@ REAL_BRAIN = "real brain"
 
 class Config(Settings):
     """All keys stand in these sections; `folding` is the base of every run."""
-
-    further_checks: ClassVar = CHECKS
 
     brains: tuple[Brain, ...] = setting(
         (), "", "The brains: those to fold, and others to compare with and to estimate growth from."

@@ -131,7 +131,7 @@ class MetricsSettings(Settings):
     )  # fmt: skip
     norm_reference: tuple[str, ...] | None = setting(
         None, "",
-        "Ids of the measured brains that others are compared with in tables of centiles and nearest weeks. `null`: all "
+        "Ids of the measured brains that others are compared with in tables of centiles. `null`: all "
         "real ones (of several populations, the start brain's), or all phantoms if none is real. Brains with other "
         "hemispheres than the first start brain are left out.",
     )  # fmt: skip

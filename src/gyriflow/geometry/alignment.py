@@ -31,16 +31,8 @@ class Fit:
         return motion(self.rotation, self.shift)
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How an alignment of surfaces is found: points per surface, most rounds, and the moves in mm that end it."""
-
-    points: int
-    rounds: int
-    converged_mm: float
-
-
-CLOSE = Effort(4000, 60, 0.005)
+POINTS, ROUNDS, ARRIVED_MM = 4000, 60, 0.005
+"""Of closest points: how many of either surface, most rounds, and the move that ends them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +43,14 @@ class Searched:
     tree: igl.AABB
     normals: Floats
 
-    def nearest(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Returns per point the distance in mm, and the nearest point of the surface with the normal there."""
-        squared, face, on = self.tree.squared_distance(self.mesh.vertices, self.mesh.faces, points)
-        return np.sqrt(squared), on, self.normals[face]
+    def nearest(self, points: Floats) -> tuple[Floats, Floats]:
+        """Returns per point the nearest point of the surface with the normal there."""
+        _, face, on = self.tree.squared_distance(self.mesh.vertices, self.mesh.faces, points)
+        return on, self.normals[face]
 
-    def spread(self, count: int) -> Floats:
-        """Returns about `count` points spread over the surface, the same in every call."""
-        return self.mesh.vertices[:: max(1, len(self.mesh.vertices) // count)]
+    def spread(self) -> Floats:
+        """Returns about `POINTS` points spread over the surface, the same in every call."""
+        return self.mesh.vertices[:: max(1, len(self.mesh.vertices) // POINTS)]
 
 
 def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) -> Floats:
@@ -145,46 +137,30 @@ def searched(mesh: TriangleMesh) -> Searched:
     return Searched(mesh, tree, face_normals(mesh))
 
 
-def closest_points(a: Searched, b: Searched, start: Fit, effort: Effort, *, as_matrices: bool = False) -> Fit:
-    """Returns the motion of `a` onto `b` that closest points lead to from a motion.
+def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
+    """Returns the (4, 4) rigid motion of a surface onto another in nearly the same pose, by iterative closest points.
 
-    Each round moves points of both surfaces towards the planes of their nearest faces on the other one. The residual
-    is the mean of the distances of the effort's points, over both directions. `as_matrices`: see `follow_planes`.
+    It begins with the surfaces as they are, centroids of the vertices together. Each round moves points of both
+    surfaces towards the planes of their nearest faces on the other one.
     """
-    of_a, of_b = a.spread(effort.points), b.spread(effort.points)
+    a, b = searched(mesh), searched(onto)
+    of_a, of_b = a.spread(), b.spread()
 
     def planes(rotation: Floats, shift: Floats) -> Planes:
         moved = of_a @ rotation.T + shift
-        _, on_b, normals_b = b.nearest(moved)
+        on_b, normals_b = b.nearest(moved)
         # points of b are taken back to where a is given
-        _, on_a, normals_a = a.nearest((of_b - shift) @ rotation)
+        on_a, normals_a = a.nearest((of_b - shift) @ rotation)
         points = np.concatenate([moved, on_a @ rotation.T + shift])
         normals = np.concatenate([normals_b, normals_a @ rotation.T])
         return points, normals, np.einsum("ij,ij->i", np.concatenate([on_b, of_b]) - points, normals), None
 
     def arrived(points: Floats, turn: Floats, move: Floats) -> bool:
         moved = points[: len(of_a)]
-        return bool(np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < effort.converged_mm)
+        return bool(np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < ARRIVED_MM)
 
-    rotation, shift = follow_planes(start.rotation, start.shift, planes, effort.rounds, arrived, as_matrices)
-    return Fit(rotation, shift, mean_distance(a, b, rotation, shift, effort.points))
-
-
-def mean_distance(a: Searched, b: Searched, rotation: Floats, shift: Floats, count: int) -> float:
-    """Returns the mean over both directions of the distance in mm of points of one surface, moved, to the other."""
-    there, _, _ = b.nearest(a.spread(count) @ rotation.T + shift)
-    back, _, _ = a.nearest((b.spread(count) - shift) @ rotation)
-    return float(0.5 * (there.mean() + back.mean()))
-
-
-def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
-    """Returns the (4, 4) rigid motion of a surface onto another in nearly the same pose, by iterative closest points.
-
-    It begins with the surfaces as they are, centroids of the vertices together.
-    """
-    a, b = searched(mesh), searched(onto)
-    apart = b.spread(CLOSE.points).mean(axis=0) - a.spread(CLOSE.points).mean(axis=0)
-    return closest_points(a, b, Fit(np.eye(3), apart, np.inf), CLOSE, as_matrices=True).matrix
+    apart = of_b.mean(axis=0) - of_a.mean(axis=0)
+    return motion(*follow_planes(np.eye(3), apart, planes, ROUNDS, arrived, as_matrices=True))
 
 
 def fits_from_all_sides(

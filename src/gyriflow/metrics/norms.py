@@ -195,24 +195,6 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
     return pd.DataFrame(rows, columns=columns)
 
 
-def nearest_weeks(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    """Returns for each metric of each brain the reference brain whose value is nearest to it, and that brain's week.
-
-    A brain of the reference is compared with the others, which tells how well the metric gives a week; brains with
-    other hemispheres than the reference's are left out. Columns subject, run, week, hemisphere, metric, value, unit,
-    nearest (the reference brain), nearest_week, nearest_value. With one reference brain a week nothing is known of how
-    fetuses of one age differ: no fetus can be dated so.
-    """
-    keys = [*BRAIN, "hemisphere", "metric", "value", "unit"]
-    known = _reference(metrics, reference)[["hemisphere", "metric", "subject", "week", "value"]]
-    named = {"subject": "nearest", "week": "nearest_week", "value": "nearest_value"}
-    pairs = metrics.loc[same_sides(metrics, reference), keys].merge(known.rename(columns=named))
-    pairs = pairs[(pairs["run"] != MEASURED) | (pairs["subject"] != pairs["nearest"])]
-    away = (pairs["value"] - pairs["nearest_value"]).abs().dropna()
-    closest = away.groupby([pairs[key] for key in (*BRAIN, "hemisphere", "metric")], sort=False).idxmin()
-    return pairs.loc[closest].reset_index(drop=True)
-
-
 def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     """Returns for each row of a table of metrics whether its brain has the hemispheres of a reference's brains.
 

@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from ..errors import InputError
 from ..geometry.triangles import Floats, Ints
 from ..parameters.terms import SIDES
 
@@ -127,15 +126,7 @@ def weekly_norms(weeks: Sequence[float], positions: Sequence[Floats], pial: Ints
 
     Positions in mm are (n, 3) of the same nodes in each of the ascending weeks, `pial` the (k,) indices of the nodes on
     the pial surface. Columns from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm; two rows per pair of weeks.
-    InputError where weeks and positions do not go together.
     """
-    if len(weeks) != len(positions):
-        raise InputError("each week needs its positions", found=f"{len(weeks)} weeks, {len(positions)} positions")
-    if (np.diff(weeks) <= 0).any():
-        raise InputError("weeks are not ascending", found=list(weeks))
-    shapes = {np.shape(nodes) for nodes in positions}
-    if len(shapes) > 1:
-        raise InputError("positions of different nodes", found=sorted(shapes), expected="the same nodes in every week")
     rows = []
     for weeks_of, (before, after) in zip(pairwise(weeks), pairwise(positions), strict=True):
         length = np.linalg.norm(np.asarray(after) - np.asarray(before), axis=1)

@@ -55,15 +55,13 @@ class Settings(BaseModel):
     """Settings that are validated as a whole and cannot change afterwards."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
-    further_checks: ClassVar[tuple[Callable[[Any], Iterator[Problem]], ...]] = ()
-    """Checks across keys that are no methods."""
     checks: ClassVar[tuple[Callable[[Any], Iterator[Problem]], ...]] = ()
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
         known = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
-        cls.checks = (*(value for value in known.values() if getattr(value, "is_check", False)), *cls.further_checks)
+        cls.checks = tuple(value for value in known.values() if getattr(value, "is_check", False))
 
     @field_validator("*", mode="before")
     @classmethod

@@ -76,22 +76,6 @@ def test_negative_rates_are_refused_with_their_intervals_unless_allowed() -> Non
     assert (rate_curve(table, "core_compound_rate_per_s")[1] > 0).all()
 
 
-@pytest.mark.parametrize(
-    ("weeks", "areas", "volumes", "match"),
-    [
-        ([21, 21, 22], [1.0, 1.1, 1.2], [1.0, 1.1, 1.2], "week 21 more than once"),
-        ([21], [1.0], [1.0], "at least two"),
-        ([], [], [], "at least two"),
-        ([21, 22], [1.0, 0.0], [1.0, 1.1], "areas_mm2"),
-        ([21, 22], [1.0, 1.1], [1.0, float("nan")], "volumes_mm3"),
-        ([21, 22], [1.0], [1.0, 1.1], "needs an area"),
-    ],
-)
-def test_refused(weeks: list[float], areas: list[float], volumes: list[float], match: str) -> None:
-    with pytest.raises(InputError, match=match):
-        growth_rates(weeks, areas, volumes)
-
-
 def brains(series: str, areas_cm2: dict[float, float], volumes_ml: dict[float, float]) -> pd.DataFrame:
     """Returns areas and volumes by week as the workflow's table has them."""
     columns = {"week": list(areas_cm2), "area_cm2": list(areas_cm2.values()), "volume_ml": list(volumes_ml.values())}

@@ -13,7 +13,6 @@ from gyriflow.io.schemes import SCHEMES
 from gyriflow.metrics.norms import (
     measured_norms,
     measured_scores,
-    nearest_weeks,
     published_norms,
     published_scores,
     structure_volumes,
@@ -156,17 +155,3 @@ def test_structures_of_the_norms_scheme_and_of_others() -> None:
     assert others == ["cortex", "white_matter"]
     scores = published_scores(found | {"cortex": 9.0}, 21.0, norms, others)
     assert scores["flag"].tolist() == ["other labels"] * 2
-
-
-def test_nearest_weeks_are_those_of_other_reference_brains() -> None:
-    metrics, reference = table(np.array([22.0, 24.0, 27.0]), np.array([5.0, 7.0, 8.0]), ("run", 23.0, 7.4))
-    found = nearest_weeks(metrics, reference).set_index("subject")
-    assert found["nearest_week"].to_dict() == {"s0": 24.0, "s1": 27.0, "s2": 24.0, "other": 24.0}
-    assert (found.loc["other", "nearest"], found.loc["other", "nearest_value"]) == ("s1", 7.0)
-    # numbers of the analysis, brains with other hemispheres and values that are not known say nothing of a week
-    alone = metrics.assign(hemisphere=metrics["hemisphere"].where(metrics["subject"] != "other", "left"))
-    missing = metrics.assign(value=metrics["value"].where(metrics["subject"] != "other"))
-    for changed in (alone, missing):
-        assert set(nearest_weeks(changed, reference)["subject"]) == set(reference)
-    assert nearest_weeks(metrics.assign(metric="weyl_number"), reference).empty
-    assert list(nearest_weeks(metrics, []).columns) == [*metrics.columns, "nearest", "nearest_week", "nearest_value"]

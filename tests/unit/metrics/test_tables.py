@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.errors import InputError
 from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, weekly_norms, wide_table
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
@@ -95,18 +94,3 @@ def test_single_week_has_no_rows_but_columns() -> None:
     table = weekly_norms([21.0], [np.zeros((3, 3))], np.array([0]))
     assert len(table) == 0
     assert "mean_mm" in table
-
-
-@pytest.mark.parametrize(
-    ("weeks", "positions", "match"),
-    [
-        ([21.0, 22.0], [np.zeros((3, 3))], "needs its positions"),
-        ([22.0, 21.0], [np.zeros((3, 3))] * 2, "ascending"),
-        ([21.0, 22.0], [np.zeros((3, 3)), np.zeros((4, 3))], "different nodes"),
-    ],
-)
-def test_weeks_and_positions_that_do_not_go_together_are_refused(
-    weeks: list[float], positions: list[np.ndarray], match: str
-) -> None:
-    with pytest.raises(InputError, match=match):
-        weekly_norms(weeks, positions, np.array([0]))
