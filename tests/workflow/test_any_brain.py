@@ -18,6 +18,7 @@ By what may be odd about a brain:
 
 import nibabel as nib
 import numpy as np
+import odd_brains
 import pandas as pd
 import pytest
 import pyvista as pv
@@ -137,7 +138,7 @@ def alone(side, change):
 LARGER = transformed(RIGHT, np.diag([1.09, 1.09, 1.09, 1.0]))
 GOOD = {
     "plain": labelled(),
-    "polyp": labelled(pathologies.with_fourth_ventricle),
+    "polyp": labelled(odd_brains.with_fourth_ventricle),
     "agenesis": labelled(pathologies.without_callosum),
     "holoprosencephaly": labelled(pathologies.holoprosencephaly),
     "wide": labelled(lambda labels, affine: pathologies.wide_hemisphere(labels, affine, ventricle=True)),
@@ -146,21 +147,21 @@ GOOD = {
     ),
     "shifted": labelled(pathologies.shifted_midline),
     "hemimegalencephaly": lambda folder, name: {"phantom": {"voxel_mm": 2.0, "pathology": name}},
-    "cropped": labelled(pathologies.crop),
+    "cropped": labelled(odd_brains.crop),
     "upside_down": labelled(turn=rigid(180, 0, 0)),
     "backwards": labelled(pathologies.add_sides, "dhcp-19", rigid(0, 0, 180)),
     "pial_backwards": whole(transformed(merged(LEFT, RIGHT), rigid(0, 0, 180))),
     "pial_vtk": whole(with_polyp(WHOLE), "vtk"),
     "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
     "unequal": both_sides(LEFT, LARGER),
-    "bent": whole(cerebrum_surface(pathologies.bent_midline(APART, AFFINE), AFFINE)),
+    "bent": whole(cerebrum_surface(odd_brains.bent_midline(APART, AFFINE), AFFINE)),
     "talairach": with_matrix(WHOLE, "UNKNOWN", "TALAIRACH", np.diag([1.16, 1.16, 1.16, 1.0])),
     "scanner_to_tkr": with_matrix(WHOLE, "SCANNER_ANAT", "UNKNOWN", rigid(shift=(5, -20, 13))),
     "sideways": labelled(turn=rigid(90, 0, 0)),
     "mgz": as_mgz,
 }
 BAD = {
-    "half": (labelled(pathologies.one_hemisphere), "the volume seems to hold one hemisphere only"),
+    "half": (labelled(odd_brains.one_hemisphere), "the volume seems to hold one hemisphere only"),
     "small_half": (labelled(pathologies.small_hemisphere), "the volume seems to hold one hemisphere only"),
     "whole_as_half": (alone("right", lambda labels, affine: labels), "this is no single hemisphere"),
     "pial_half": (whole(LEFT), "the surface seems to be one hemisphere only"),
@@ -179,7 +180,7 @@ NAMED = ("agenesis", "holoprosencephaly", "wide", "hypoplasia", "shifted", "hemi
 REFUSED = trying(
     dict.fromkeys(("half", "small_half", "whole_as_half", "pial_half"), 41) | {"mirrored": 42, "unit": 43, "scheme": 44}
 )
-HEMISPHERECTOMY = alone("left", pathologies.one_hemisphere)
+HEMISPHERECTOMY = alone("left", odd_brains.one_hemisphere)
 CROSSING = both_sides(LEFT, RIGHT, white_mm=-1.5)
 
 
@@ -284,7 +285,7 @@ def test_a_wide_ventricle_counts_as_brain_and_its_side_is_doubted(study):
 def test_a_field_of_view_that_cuts_the_brain_is_warned_of(study):
     assert warned(study, "cropped", "the cerebrum touches the border of the volume")
     cropped, plain = study.report("cropped"), study.report("plain")
-    assert cropped["volume_mL"] == pytest.approx(cerebrum_ml(pathologies.crop(LABELS, AFFINE)[0]), rel=0.01)
+    assert cropped["volume_mL"] == pytest.approx(cerebrum_ml(odd_brains.crop(LABELS, AFFINE)[0]), rel=0.01)
     assert cropped["volume_mL"] / plain["volume_mL"] == pytest.approx(0.81, abs=0.02)
     # a third of the height is lost
     assert cropped["extents_mm"][2] / plain["extents_mm"][2] == pytest.approx(0.68, abs=0.03)

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import odd_brains
 import pandas as pd
 import pytest
 from shapes import cerebrum_surface, phantom, save_labels
@@ -10,7 +11,6 @@ from gyriflow.geometry.triangles import area
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.phantom import pathologies
 
 from .conftest import Workflow
 
@@ -30,7 +30,7 @@ FIGURES = ("runs/reference/sub-01/figures/zones.png", "study/figures/shape_index
 
 def left_half(week):
     labels, affine = phantom(week, 2.0)
-    return pathologies.one_hemisphere(labels, affine, "left"), affine
+    return odd_brains.one_hemisphere(labels, affine, "left"), affine
 
 
 @pytest.fixture(scope="module")

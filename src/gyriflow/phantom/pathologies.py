@@ -36,23 +36,6 @@ def positions(labels: Labels, affine: Floats) -> Floats:
     return ((affine[:3, :3] @ index).T + affine[:3, 3] - CENTRE_MM).T.reshape(3, *labels.shape)
 
 
-def with_fourth_ventricle(labels: Labels, affine: Floats) -> Labels:
-    """Returns the brain with its ventricles joined, through a thin aqueduct, to a fourth ventricle below the cerebrum.
-
-    All of it has the label of the ventricles, as in the labels of atlases.
-    """
-    x, y, z = positions(labels, affine)
-    made = labels.copy()
-    below = z[np.isin(labels, CEREBRUM) & (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)].min()
-    brainstem = (np.hypot(x, y + 6.0) < 7.0) & (z < below) & (z > below - 24.0)
-    made[brainstem & ~np.isin(labels, CEREBRUM)] = BRAINSTEM
-    third = (np.abs(x) < 1.6) & (np.abs(y + 4.0) < 6.0) & (z > below + 4.0) & (z < 0.0)
-    aqueduct = (np.hypot(x, y + 6.0) < 1.3) & (z > below - 14.0) & (z < below + 6.0)
-    fourth = (x / 5.0) ** 2 + ((y + 6.0) / 4.0) ** 2 + ((z - below + 15.0) / 6.0) ** 2 < 1.0
-    made[third | aqueduct | fourth] = VENTRICLES
-    return made
-
-
 def without_callosum(labels: Labels, affine: Floats) -> Labels:
     """Returns a brain whose hemispheres are joined at the thalami alone: agenesis of the corpus callosum."""
     x, _, z = positions(labels, affine)
@@ -82,13 +65,6 @@ def holoprosencephaly(labels: Labels, affine: Floats) -> Labels:
     return np.where(single & np.isin(made, (WHITE, VENTRICLES, CORTEX)), VENTRICLES, made).astype(np.int32)
 
 
-def one_hemisphere(labels: Labels, affine: Floats, side: Side = "left", gap_mm: float = 1.0) -> Labels:
-    """Returns one hemisphere alone, as after hemispherectomy or as hemispheres are given one by one."""
-    x, _, _ = positions(labels, affine)
-    made = np.where(labels == CALLOSUM, WHITE, labels)
-    return np.where(SIGN[side] * x > 0.5 * gap_mm, made, 0).astype(np.int32)
-
-
 def warp(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) -> Labels:
     """Returns labels moved: `came_from` gives the (3, …) place, in mm from the centre, that each place's label has."""
     place = came_from(positions(labels, affine))
@@ -97,15 +73,6 @@ def warp(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) 
     inside = ((nearest >= 0) & (nearest < np.array(labels.shape)[:, None])).all(axis=0)
     clipped = np.clip(nearest, 0, np.array(labels.shape)[:, None] - 1)
     return np.where(inside, labels[tuple(clipped)], 0).reshape(labels.shape).astype(np.int32)
-
-
-def bent_midline(labels: Labels, affine: Floats, mm: float = 3.0) -> Labels:
-    """Returns a brain whose fissure bends to and fro by `mm`, together with what lies beside it."""
-
-    def came_from(place: Floats) -> Floats:
-        return np.stack([place[0] - mm * np.sin(place[1] / 12.0), place[1], place[2]])
-
-    return warp(labels, affine, came_from)
 
 
 def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
@@ -152,23 +119,6 @@ def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: 
 
     x, _, _ = positions(labels, affine)
     return np.where(SIGN[side] * x > 0, warp(whole, affine, came_from), whole).astype(np.int32)
-
-
-def crop(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels, Floats]:
-    """Returns the volume without a share of the brain on top, as where the field of view ends, and its affine."""
-    brain = np.isin(labels, CEREBRUM)
-    up = affine[2, :3]
-    axis = int(np.abs(up).argmax())
-    along = np.flatnonzero(brain.any(axis=tuple(n for n in range(3) if n != axis)))
-    count = round(share * len(along))
-    first = np.zeros(3)
-    if up[axis] > 0:
-        stop = along[-1] + 1 - count
-        return labels.take(range(stop), axis), affine
-    first[axis] = along[0] + count
-    moved = affine.copy()
-    moved[:3, 3] += affine[:3, :3] @ first
-    return labels.take(range(int(first[axis]), labels.shape[axis]), axis), moved
 
 
 def add_sides(labels: Labels, affine: Floats) -> Labels:

@@ -90,30 +90,12 @@ def outline(mesh: TriangleMesh) -> Outline:
 
 @cache
 def reference() -> Outline:
-    """Returns the outline of a right hemisphere in RAS+ that is no one's: half of the `reference_brain`."""
-    depth, x, affine = _reference_depth(-0.2)
-    return _outline_of(np.minimum(depth, x), affine)
+    """Returns the outline of a right hemisphere in RAS+ that is no one's.
 
-
-@cache
-def reference_brain() -> Outline:
-    """Returns the outline of a cerebrum in RAS+ that is no one's.
-
-    An ellipsoid with the proportions of a cerebrum, with temporal lobes, narrower frontal lobes, an underside that is
-    higher in front, and Sylvian dents. Its long axis is within a few degrees of y: that defines the pitch.
+    Half of an ellipsoid with the proportions of a cerebrum, with a temporal lobe, a narrower frontal lobe, an underside
+    that is higher in front, and a Sylvian dent. Its long axis is within a few degrees of y: that defines the pitch.
     """
-    depth, _, affine = _reference_depth(-1.2)
-    return _outline_of(depth, affine)
-
-
-def _outline_of(depth: Floats, affine: Floats) -> Outline:
-    field = np.clip(0.5 + depth / REFERENCE_VOXEL, 0.0, 1.0).astype(np.float32)
-    return outline(isosurface(field, affine))
-
-
-def _reference_depth(first_x: float) -> tuple[Floats, Floats, Floats]:
-    """Returns the depth below the reference's surface on a grid from `first_x` to the right, its x, and its affine."""
-    axes = [np.arange(start, 1.2, REFERENCE_VOXEL) for start in (first_x, -1.2, -1.2)]
+    axes = [np.arange(start, 1.2, REFERENCE_VOXEL) for start in (-0.2, -1.2, -1.2)]
     x, y, z = np.meshgrid(*axes, indexing="ij")
     p, q, r = (along / half for along, half in zip((np.abs(x), y, z), HALF_LENGTHS, strict=True))
     radius = np.sqrt(p**2 + q**2 + r**2) + 1e-6
@@ -129,7 +111,8 @@ def _reference_depth(first_x: float) -> tuple[Floats, Floats, Floats]:
     edge = -0.03 * np.logaddexp(-dome / 0.03, -underside / 0.03) - 0.15 * sylvian
     affine = np.diag([REFERENCE_VOXEL] * 3 + [1.0])
     affine[:3, 3] = [along[0] for along in axes]
-    return (edge - radius) * np.sqrt(x**2 + y**2 + z**2) / radius, x, affine
+    depth = np.minimum((edge - radius) * np.sqrt(x**2 + y**2 + z**2) / radius, x)
+    return outline(isosurface(np.clip(0.5 + depth / REFERENCE_VOXEL, 0.0, 1.0).astype(np.float32), affine))
 
 
 class Target:

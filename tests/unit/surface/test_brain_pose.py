@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import odd_brains
 import pytest
 from shapes import cerebrum_surface, ellipsoid, phantom, rigid
 
@@ -141,12 +142,12 @@ def test_a_shape_without_a_pose_is_refused():
 def test_hemispheres_are_narrow_and_brains_are_not(brain):
     labels, affine = brain
     assert narrowness(cerebrum_surface(labels, affine)) > 0.6
-    assert narrowness(cerebrum_surface(pathologies.one_hemisphere(labels, affine), affine)) < 0.45
+    assert narrowness(cerebrum_surface(odd_brains.one_hemisphere(labels, affine), affine)) < 0.45
 
 
 @pytest.mark.fault(9, 10)
 def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted(brain):
-    left, right = (cerebrum_surface(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right"))
+    left, right = (cerebrum_surface(odd_brains.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right"))
     assert doubts_of_hemispheres(left, right, "ras") == []
     # files that are swapped, and in the other one of RAS and LPS: back to front
     about = [transformed(side, rigid(*(0, 0, 180))) for side in (right, left)]

@@ -1,6 +1,7 @@
 """One hemisphere alone: posed by its file or its shape, of the side that it is said to be, or refused."""
 
 import numpy as np
+import odd_brains
 import pytest
 from shapes import LPS, cerebrum_surface, phantom, rigid
 
@@ -24,7 +25,7 @@ def brain():
 
 @pytest.fixture(scope="module")
 def sides(brain):
-    return {side: cerebrum_surface(pathologies.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right")}
+    return {side: cerebrum_surface(odd_brains.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right")}
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -52,7 +53,7 @@ def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
 @pytest.mark.fault(41)
 def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
     labels, affine = pathologies.add_sides(*brain), brain[1]
-    left = pathologies.one_hemisphere(labels, affine, "left")
+    left = odd_brains.one_hemisphere(labels, affine, "left")
     surface = from_labels(left, affine, DHCP, "left", **QUICK)
     assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5
     assert surface.report["volume_mL"] == pytest.approx(surface.report["mask_volume_mL"], rel=0.01)
@@ -62,7 +63,7 @@ def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain
         InputError, match=r"one hemisphere only; found labels of the left.*Give a volume with both hemispheres"
     ):
         from_labels(left, affine, DHCP, **QUICK)
-    unsided = pathologies.one_hemisphere(*brain, "left")
+    unsided = odd_brains.one_hemisphere(*brain, "left")
     with pytest.raises(InputError, match=r"seems to hold one hemisphere only"):
         from_labels(unsided, affine, SCHEMES["spina-bifida-atlas"], **QUICK)
 
@@ -77,7 +78,7 @@ def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_told_so(brain)
 
 
 def test_volumes_of_a_hemisphere_whose_affine_is_lps_are_turned_as_its_labels(brain):
-    left = pathologies.one_hemisphere(pathologies.add_sides(*brain), brain[1], "left")
+    left = odd_brains.one_hemisphere(pathologies.add_sides(*brain), brain[1], "left")
     affine = rigid(0, 0, 180) @ brain[1]
     surface = from_labels(left, affine, DHCP, "left", **QUICK)
     assert "the shape says that the coordinates are LPS" in surface.report["warnings"]

@@ -1,6 +1,7 @@
 """Left and right of closed surfaces: two pieces are the hemispheres, one piece is cut where the fissure is."""
 
 import numpy as np
+import odd_brains
 import pytest
 from shapes import cerebrum_surface, ellipsoid, phantom, sphere
 
@@ -43,7 +44,7 @@ def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
 @pytest.mark.parametrize("mm", [3.0, 6.0])
 def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
     labels, affine = brain
-    mesh = cerebrum_surface(pathologies.bent_midline(pathologies.apart(labels, affine), affine, mm), affine)
+    mesh = cerebrum_surface(odd_brains.bent_midline(pathologies.apart(labels, affine), affine, mm), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
     sides = cut_sides(mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1))))
     assert [len(pieces(side)) for side in sides] == [1, 1]

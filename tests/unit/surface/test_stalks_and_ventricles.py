@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from odd_brains import with_fourth_ventricle
 from scipy import ndimage
 from shapes import phantom
 
@@ -9,7 +10,7 @@ from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
 from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
+from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions
 from gyriflow.shipped import SHIPPED
 from gyriflow.surface.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.surface.labels import outside_ventricles, read_cerebrum, unlabelled_ventricles
