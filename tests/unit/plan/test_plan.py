@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gyriflow.config import load
+from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.plan import Plan
 from gyriflow.plan.paths import CURVES, FOLDING, GROWTH, MEASURES, PARAMETERS, READY, THICKNESS, job_files, one_of
