@@ -127,7 +127,8 @@ def test_known_growth_comes_back(workflow, hemispheres, kind):
 
 def test_matched_vertices_take_the_place_of_registration(workflow, hemispheres):
     jobs = workflow.jobs("all", "validate", "--configfile", write_study(workflow, hemispheres))
-    assert [jobs[rule] for rule in ("matched_surface", "match_surfaces", "carried_mesh", "onset")] == [3, 2, 1, 1]
+    assert [jobs[rule] for rule in ("matched_surface", "match_surfaces", "onset", "named_sulci")] == [3, 2, 1, 1]
+    assert jobs["carried_mesh"] == 1
     assert "register" not in jobs
 
 

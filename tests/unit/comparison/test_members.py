@@ -17,7 +17,12 @@ def spectra(run, subject, powers, *, complete=True):
 
 
 METRICS = pd.DataFrame(
-    [("sim", "a", "whole", "area", 90.0, "cm2"), ("real", "b", "whole", "area", 100.0, "cm2")],
+    [
+        ("sim", "a", "whole", "area", 90.0, "cm2"),
+        ("real", "b", "whole", "area", 100.0, "cm2"),
+        ("sim", "a", "left", "weyl_number", 600.0, "1"),
+        ("real", "b", "left", "weyl_number", 700.0, "1"),
+    ],
     columns=["run", "subject", "hemisphere", "metric", "value", "unit"],
 )
 SPECTRAL = pd.DataFrame([("b", "left", "spectral_distance_B4", 0.2, "ok")],
@@ -45,6 +50,10 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     }
     assert table.loc[("left", "relative_power_B6"), "flag"] == "not resolved"
     assert table.loc[("left", "relative_power_B4"), "real_value"] == 0.4
+    # where a spectrum is cut is told, and is no likeness
+    assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
+    printed = side_by_side(table.reset_index().assign(subject="a", real="b", thickness_mm=1.0), ["thickness_mm"])
+    assert "weyl_number" not in set(printed["measure"])
 
 
 def test_a_band_that_is_cut_off_has_no_distance():
