@@ -200,8 +200,9 @@ def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain
 @pytest.mark.skipif(not VALIDATOR, reason="no bids-validator-deno on PATH: pip install bids-validator-deno")
 def test_the_bids_validator_finds_no_error(tmp_path, brain):
     folder = tmp_path / "bids"
-    scans = scans_of_two(brain)
-    simulated = replace(scans[0], run="run-a", week=23.5, volume=labels_of(tmp_path))
+    more = {"white": brain.surfaces, "white_maps": brain.maps, "template": "sub-01_ses-1", "template_maps": brain.maps}
+    scans = [replace(one, **more) for one in scans_of_two(brain)]
+    simulated = replace(scans[0], white={}, white_maps={}, run="run-a", week=23.5, volume=labels_of(tmp_path))
     export_bids(folder, [*scans, simulated], TABLES_OF_TWO, "1", {"area": "cm2"})
     done = subprocess.run([VALIDATOR, folder, "--format", "json"], capture_output=True, text=True, check=False)
     found = json.loads(done.stdout)["issues"]["issues"]
