@@ -71,11 +71,10 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class Workflow:
-    """A copy of the checkout, a working directory for its results, and a folder of packages in place of others."""
+    """A copy of the checkout, and a working directory for its results."""
 
     checkout: Path
     directory: Path
-    packages: Path | None = None
 
     def command(self, *arguments: str) -> list[str]:
         """Returns the command that `./run snakemake` runs."""
@@ -83,8 +82,7 @@ class Workflow:
 
     @property
     def environment(self) -> dict[str, str]:
-        paths = [self.packages, self.checkout / "src"]
-        return os.environ | {"PYTHONPATH": os.pathsep.join(str(path) for path in paths if path)}
+        return os.environ | {"PYTHONPATH": str(self.checkout / "src")}
 
     def run(self, *arguments: str, timeout_s: float = 300) -> subprocess.CompletedProcess[str]:
         """Runs the launcher in the working directory."""

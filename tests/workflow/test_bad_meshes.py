@@ -1,6 +1,4 @@
-"""Meshes that are not good enough and meshers that fail, in the real program: refused, with what is to be looked at."""
-
-from dataclasses import replace
+"""Meshes that are not good enough, in the real program: refused, with what is to be looked at."""
 
 import numpy as np
 import pytest
@@ -108,29 +106,6 @@ def test_what_was_refused_can_be_looked_at(workflow):
     drawn = workflow.run(f"{REFUSED}/quality.png", "--cores", "1", "--configfile", "changed.yaml")
     assert drawn.returncode == 0, drawn.stderr
     assert (workflow.directory / REFUSED / "quality.png").stat().st_size > 10_000
-
-
-FAILURES = {
-    "hangs": ("time.sleep(60)", "the mesher pytetwild was stopped after 8 s; found its last words: "),
-    "dies": ("os.kill(os.getpid(), signal.SIGKILL)", "the mesher pytetwild failed with exit code -9; found "),
-}
-
-
-@pytest.mark.fault(24)
-@pytest.mark.usefixtures("gated")
-@pytest.mark.parametrize("failure", FAILURES)
-def test_a_mesher_that_fails_ends_in_3_with_its_last_words_and_all_of_them_in_the_log(workflow, tmp_path, failure):
-    end, message = FAILURES[failure]
-    (tmp_path / "pytetwild.py").write_text(
-        "import os, signal, time\n"
-        "def tetrahedralize(*arrays, **settings):\n"
-        "    os.write(1, b'first words\\n' + 100 * b'so much is done\\n' + b'half of it is done')\n"
-        f"    {end}\n"
-    )
-    outcome, log = remeshing(replace(workflow, packages=tmp_path), time_limit_s=8.0)
-    refused(workflow, outcome, log, message, "half of it is done")
-    assert "pytetwild: first words\n" in log
-    assert log.count("pytetwild: so much is done\n") == 100
 
 
 @pytest.mark.fault(20)

@@ -34,6 +34,7 @@ STUDY = {
             "contact": {"kind": "none"},
             "ranks": 1,
             "follow": {"loop": "open", "regional": 1, "directional": 1},
+            "end_week": 22.6,
         },
     },
 }

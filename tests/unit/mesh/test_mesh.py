@@ -243,6 +243,7 @@ def test_the_folder_of_a_mesher_is_its_users_only(stand_in, mesher):
         os.umask(before)
 
 
+@pytest.mark.fault(24)
 @pytest.mark.parametrize("mesher", MESHERS)
 def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesher):
     stand_in(mesher, *HANGING)
@@ -282,6 +283,7 @@ def mesh_in(folder, mesher, gates=GATES):
     return code, [name for name, path in outputs.items() if Path(path).exists()]
 
 
+@pytest.mark.fault(24)
 @pytest.mark.parametrize("mesher", MESHERS)
 def test_the_step_of_a_mesher_that_dies_ends_in_three_with_all_that_it_printed_in_the_log(
     stand_in, tmp_path, capsys, mesher
