@@ -28,6 +28,8 @@ LITTLE_CORTEX = 0.7
 TOLD_LOSS = 0.005
 # where ventricles are labelled, atlases leave up to 0.8 % of the cerebrum empty inside; one lateral ventricle is 1.7 %
 FURTHER_VENTRICLES = 0.012
+# the cerebrum is at 0.98 of the surface of a lateral ventricle, at 0.7 of that of a gap beside a small hemisphere
+AROUND_VENTRICLE = 0.9
 # the directions in which a voxel of fluid looks for tissue: to the faces, edges and corners of its cell
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1
 # fluid belongs to the cerebrum where it sees the cerebrum's tissue in more than this part of the directions
@@ -237,10 +239,11 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     Such voxels look on tissue inside the cortex, or on labelled ventricles, in more than half of 26 directions. Sulci,
     fissures and cisterns look on cortex, or they are open. Where no cortex is labelled, nearly all directions count.
     Less than `TOLD_LOSS` of the cerebrum is roughness of the labels, or `FURTHER_VENTRICLES` where some are labelled.
+    Then a gap that the cerebrum does not enclose is none.
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)
-    least = FURTHER_VENTRICLES if np.isin(labels, scheme.ventricles).any() else TOLD_LOSS
+    labelled = np.isin(labels, scheme.ventricles).any()
     size = np.linalg.norm(affine[:3, :3], axis=0)
     margin = int(np.ceil(CLOSING_MM / size.min())) + 2
     if 2 * margin > max(labels.shape):
@@ -257,7 +260,9 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     number, _ = ndimage.label(clear & (seen > (ENCLOSED if scheme.cortex else WHOLLY)), EVERY_NEIGHBOUR)
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
     found = np.isin(number, np.flatnonzero(sizes >= max(1, CRUMB * sizes.max())) + 1)
-    if found.sum() > least * cerebrum.sum():
+    around = ndimage.binary_dilation(found) & ~found
+    large = found.sum() > (FURTHER_VENTRICLES if labelled else TOLD_LOSS) * cerebrum.sum()
+    if large and (not labelled or tissue[around].mean() > AROUND_VENTRICLE):
         filled[box] = found[(slice(margin, -margin),) * 3]
     return filled
 

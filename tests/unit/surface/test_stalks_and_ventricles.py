@@ -10,7 +10,7 @@ from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
 from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions
+from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions, small_hemisphere
 from gyriflow.shipped import SHIPPED
 from gyriflow.surface.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.surface.labels import outside_ventricles, read_cerebrum, unlabelled_ventricles
@@ -136,6 +136,12 @@ def test_one_ventricle_without_a_label_is_filled_beside_the_other(atlas_brain):
     found = unlabelled_ventricles(np.where(missing, 0, labels), SCHEMES["spina-bifida-atlas"], affine)
     assert (found & missing).sum() > 0.95 * missing.sum()
     assert (found & ~missing).sum() < 0.02 * missing.sum()
+
+
+def test_the_gap_beside_a_small_hemisphere_is_no_ventricle(brain):
+    labels, affine = brain
+    small = small_hemisphere(labels, affine)
+    assert not unlabelled_ventricles(small, SCHEMES["spina-bifida-atlas"], affine).any()
 
 
 @pytest.mark.parametrize("scheme", [SOLID, SCHEMES["spina-bifida-atlas"]])
