@@ -15,19 +15,40 @@ from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, S
 from ..parameters.varying import Week
 from .scans import AGE, AGES, IDS, NOTHING, SESSION, SURE_AGES, Scan, read_scans
 
-SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "phantom", "shape")
+SOURCES = ("labels", "segmentation", "hemispheres", "hemisphere", "pial", "phantom", "shape")
 """The keys of which a brain has exactly one."""
 
 VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
 """How the names of volumes end."""
 
+VOLUMES = ("labels", "segmentation")
+"""Sources that give a label volume."""
 MEANINGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("scheme", "image", "affine_from"), ("labels", "hemisphere")),
+    **dict.fromkeys(("scheme", "image", "affine_from"), (*VOLUMES, "hemisphere")),
     "coordinates": ("hemispheres", "hemisphere", "pial"),
     "white": ("pial",),
     "population": tuple(source for source in SOURCES if source not in ("phantom", "shape")),
 }
 """Keys that make sense only with some sources."""
+PLACEHOLDERS = ("{image}", "{labels}")
+"""Placeholders for the two files in a segmentation command."""
+
+
+class SegmentationSettings(Settings):
+    """Your own program that makes a label volume from the brain's `image`; gyriflow itself does not segment."""
+
+    command: str = setting(
+        ..., "",
+        "Shell command that reads the file {image} and writes the labels of the brain's `scheme`, on the same grid, to "
+        "the NIfTI file {labels}.",
+    )  # fmt: skip
+
+    @check
+    def _names_its_files(self) -> Iterator[Problem]:
+        missing = [place for place in PLACEHOLDERS if place not in self.command]
+        if missing:
+            text = f"lacks {' and '.join(missing)}, the placeholders for the files it reads and writes"
+            yield Problem(text, ("command",))
 
 
 class WhiteFiles(Settings):
@@ -57,7 +78,9 @@ class OneHemisphere(Settings):
 
 
 class Brain(Settings):
-    """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial`, `phantom` and `shape`."""
+    """One brain, made from exactly one of `labels`, `segmentation`, `hemispheres`, `hemisphere`, `pial`, `phantom` and
+    `shape`.
+    """
 
     id: str = setting(
         ..., "", "Name in paths and tables: letters, digits, - _ .",
@@ -76,11 +99,14 @@ class Brain(Settings):
         {}, "", "What else is known of it, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."
     )
     labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI or MGZ).")
-    image: InputFile | None = setting(None, "", "T2-weighted volume (NIfTI), with `labels`: shown in a figure.")
+    image: InputFile | None = setting(
+        None, "", "T2-weighted volume (NIfTI): input of `segmentation`, or with `labels` shown in a figure."
+    )
+    segmentation: SegmentationSettings | None = setting(None, "", "Your program that makes labels from `image`.")
     scheme: str | None = setting(
         None, "",
         "What the labels mean: the name of a file in the folder `schemes`, such as `dhcp-19`, or of the key `schemes`. "
-        "Needed with `labels`.",
+        "Needed with `labels` and `segmentation`.",
     )  # fmt: skip
     affine_from: AffineSource = setting(
         "auto", "", "NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."
@@ -118,7 +144,7 @@ class Brain(Settings):
     @property
     def has_labels(self) -> bool:
         """Whether the surface is made from a label volume."""
-        return self.label_volume is not None or self.source == "phantom"
+        return self.label_volume is not None or self.source in ("segmentation", "phantom")
 
     @property
     def has_vertices(self) -> bool:
@@ -145,7 +171,11 @@ class Brain(Settings):
     def _keys_go_with_the_source(self) -> Iterator[Problem]:
         given = [key for key in SOURCES if self.gives(key)]
         if not given and self.image is not None:
-            yield Problem("gyriflow does not segment images; give a label volume under labels", ("image",))
+            yield Problem(
+                "gyriflow does not segment images; give a label volume under labels, or under segmentation your own "
+                "command that makes one from the image",
+                ("image",),
+            )
         elif len(given) != 1:
             found = " and ".join(given) or "none"
             yield Problem(f"found {found} as its source; expected exactly one of {', '.join(SOURCES)}")
@@ -153,8 +183,10 @@ class Brain(Settings):
             for key, sources in MEANINGS.items():
                 if key in self.model_fields_set and given[0] not in sources:
                     yield Problem(f"has no meaning with {given[0]}; only with {' or '.join(sources)}", (key,))
-        if "labels" in given and self.scheme is None:
+        if set(given) & set(VOLUMES) and self.scheme is None:
             yield Problem("is missing; it says what the labels mean", ("scheme",))
+        if self.segmentation is not None and self.image is None:
+            yield Problem("has no image to work on; give one under image", ("segmentation",))
         first, last = PHANTOM_WEEKS
         if self.phantom is not None and not first <= self.week <= last:
             yield Problem(f"found {self.week:g}; a phantom's should be {first:g} to {last:g}", ("week",))
@@ -184,7 +216,9 @@ NESTED: Mapping[str, tuple[str, ...]] = {
                     *(f"hemispheres.white.{key}" for key in WhiteFiles.model_fields)),
     "hemisphere": tuple(f"hemisphere.{key}" for key in OneHemisphere.model_fields),
 }  # fmt: skip
-NOT_OF_TABLES = ("id", "phantom", "shape", "covariates")
+COMMANDS = tuple(f"segmentation.{key}" for key in SegmentationSettings.model_fields)
+"""Keys of brains that are programs: a configuration's, never a table's, which is data."""
+NOT_OF_TABLES = ("id", "segmentation", "phantom", "shape", "covariates")
 COLUMNS = (
     *(key for key in Brain.model_fields if key not in (*NESTED, *NOT_OF_TABLES)),
     *(column for columns in NESTED.values() for column in columns),
@@ -252,7 +286,7 @@ def covariates(scan: Scan) -> dict[str, dict[str, str]]:
 
 
 def _require_known_columns(path: Path, columns: list[str]) -> None:
-    known = {*IDS, SESSION, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS}
+    known = {*IDS, SESSION, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS, *COMMANDS}
     for column in {name for name in columns if name.lower() not in AGES} - known:
         nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
         if nearest:
@@ -276,7 +310,7 @@ def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str
             return {}, f"files: found {len(parts)}, {'; '.join(parts)}; expected {expected}"
         values |= _of_files(parts, side)
     entry: dict[str, Any] = {}
-    for column in COLUMNS:
+    for column in (*COLUMNS, *COMMANDS):
         if column not in values or column == "week":
             continue
         value = values[column]

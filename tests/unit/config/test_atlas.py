@@ -135,7 +135,8 @@ def test_a_population_of_a_brain_of_ones_own(tmp_path):
     assert config.measured_name(["a", "b", "c"]) == "sheep (21 GW) or real brain (22 GW) or phantom"
     brains[2]["population"] = "sheep"
     assert problems(raw, tmp_path) == [
-        "brains[2].population: has no meaning with phantom; only with labels or hemispheres or hemisphere or pial"
+        "brains[2].population: has no meaning with phantom; only with labels or segmentation or hemispheres or "
+        "hemisphere or pial"
     ]
 
 

@@ -55,6 +55,23 @@ def test_values_for_all_rows_stand_in_the_configuration(folder):
     assert brain.labels == str(folder / "bids" / "sub-9_dseg.nii.gz")
 
 
+@pytest.mark.parametrize("column", ["segmentation.command", "segmentation.program"])
+def test_a_table_that_names_programs_is_refused(folder, column):
+    head = ("id", "week", "image", "scheme", column)
+    write(folder, head, ("sub-1", "24", "a.nii.gz", "feta-7", "n/a"))
+    with pytest.raises(
+        InputError, match=rf"participants\.tsv: names programs(.|\n)*found {column}(.|\n)*columns in the"
+    ):
+        config(folder, keep_going=True)
+
+
+def test_the_program_of_all_rows_stands_in_the_configuration(folder):
+    write(folder, ("id", "week", "image", "scheme"), ("sub-1", "24", "a.nii.gz", "feta-7"))
+    section = {"file": "bids/participants.tsv", "columns": {"segmentation.command": "model {image} {labels}"}}
+    (brain,) = config(folder, section).brains
+    assert brain.segmentation.command == "model {image} {labels}"
+
+
 def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(folder):
     head = ("participant_id", "gestational_age", "labels", "scheme")
     write(

@@ -1,4 +1,4 @@
-"""Label schemes of one's own and images in the configuration."""
+"""Label schemes of one's own, images and their segmentation in the configuration."""
 
 import configurations
 import pytest
@@ -87,11 +87,39 @@ def test_an_image_alone_is_refused_since_gyriflow_does_not_segment(folder):
     assert line.startswith("brains[0].image: gyriflow does not segment images; give a label volume under labels")
 
 
-def test_an_image_goes_with_labels_and_with_no_phantom(folder):
+def test_an_image_with_a_command_or_with_labels_is_a_brain(folder):
+    command = {"command": "segment {image} {labels}"}
+    made = load(study({"image": "t2w.nii.gz", "scheme": "feta-7", "segmentation": command}), folder).brains[0]
+    assert (made.source, made.files, made.image) == ("segmentation", [], str(folder / "t2w.nii.gz"))
     shown = load(study({"image": "t2w.nii.gz", "scheme": "feta-7", "labels": "labels.nii.gz"}), folder).brains[0]
     assert (shown.source, shown.files) == ("labels", [str(folder / "labels.nii.gz")])
-    (line,) = problems(study({"phantom": {}, "image": "t2w.nii.gz"}), folder)
-    assert line.startswith("brains[0].image: has no meaning with phantom")
+
+
+@pytest.mark.parametrize(
+    ("brain", "found"),
+    [
+        (
+            {"segmentation": {"command": "x {image} {labels}"}, "scheme": "binary"},
+            "brains[0].segmentation: has no image to work on",
+        ),
+        (
+            {"segmentation": {"command": "x {image}"}, "image": "t2w.nii.gz", "scheme": "binary"},
+            "brains[0].segmentation.command: lacks {labels}",
+        ),
+        (
+            {"segmentation": {"command": "x {image} {labels}"}, "image": "t2w.nii.gz"},
+            "brains[0].scheme: is missing; it says what the labels mean",
+        ),
+        ({"segmentation": {}, "image": "t2w.nii.gz", "scheme": "binary"}, "brains[0].segmentation.command: is missing"),
+        ({"phantom": {}, "image": "t2w.nii.gz"}, "brains[0].image: has no meaning with phantom"),
+        (
+            {"segmentation": {"command": "x {image} {labels}"}, "image": "t2w.nii.gz", "labels": "labels.nii.gz"},
+            "brains[0]: found labels and segmentation as its source",
+        ),
+    ],
+)
+def test_a_mistake_around_a_segmentation_is_named(folder, brain, found):
+    assert any(line.startswith(found) for line in problems(study(brain), folder))
 
 
 @pytest.mark.fault(15)

@@ -86,7 +86,7 @@ def test_a_shape_is_the_only_source_of_its_brain_and_takes_no_keys_of_others():
         {"id": "c", "week": 20, "shape": {"kind": "sphere"}, "coordinates": "lps"},
     ]
     assert problems(study(brains=brains)) == [
-        "brains[0]: found phantom and shape as its source; expected exactly one of labels, hemispheres, "
+        "brains[0]: found phantom and shape as its source; expected exactly one of labels, segmentation, hemispheres, "
         "hemisphere, pial, phantom, shape",
         "brains[1].week: found 50; it should be less than or equal to 45",
         "brains[2].coordinates: has no meaning with shape; only with hemispheres or hemisphere or pial",
