@@ -136,13 +136,14 @@ ONE_RUN = SHAPE | {
 }  # fmt: skip
 OF_THE_STUDY = {
     *SHAPE, "study_table", "study_runs", "displacement_figure", "weekly_figure", "displacement_maps", "shape_maps",
+    "outlines_figure",
 }  # fmt: skip
 BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count in ONE_RUN.items()}
 MESH = {"tetrahedralise": 1}
 FIGURES = {
     "metrics_figure": 1, "spectra_figure": 1, "displacement_figure": 1, "growth_figure": 1, "weekly_figure": 1,
     "displacement_maps": 1, "shape_maps": 1, "quality_page": 2, "quality_table": 1,
-    "outlines_figure": 2,
+    "outlines_figure": 1,
 }  # fmt: skip
 
 

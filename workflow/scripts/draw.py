@@ -92,12 +92,15 @@ def scalar_maps(frames, quantity, params=None, **shown):
     return {"maps": {"simulated": maps}, "quantity": quantity, **shown}
 
 
-def outlines_chart(pairs, **shown):
+def outlines_chart(runs, real, **shown):
     """Returns the simulated brains in the pose in which each is nearest to the real one."""
     from gyriflow.geometry.alignment import fit_onto
 
-    laid = {week: (transformed(mesh, fit_onto(mesh, real)), real) for week, (mesh, real) in pairs.items()}
-    return {"pairs": laid, **shown}
+    laid = {
+        run: {week: transformed(mesh, fit_onto(mesh, real[week])) for week, mesh in known.items()}
+        for run, known in runs.items()
+    }
+    return {"runs": laid, "real": real, **shown}
 
 
 def mesh_picture(mesh, **shown):
@@ -113,10 +116,15 @@ def zones_picture(mesh, params, synthetic, **_):
 
 
 def field_picture(mesh, params, synthetic, **_):
-    """Returns the growth of the pial surface in one step."""
+    """Returns the growth of the pial surface at the start."""
     surface, pial = boundary_surface(mesh.mesh)
     shown = {"fissure_x_mm": params.fissure_x_mm, "synthetic": synthetic}
-    return {"mesh": surface, "values": 1e3 * mesh.fields["tangential_growth_per_step"][pial], **shown}
+    return {"mesh": surface, "values": growth_per_week(mesh, params)[pial], **shown}
+
+
+def growth_per_week(mesh, params):
+    """Returns the tangential growth of the first step at the vertices in % per week."""
+    return 100 * SECONDS_PER_GW / params.step_s * mesh.fields["tangential_growth_per_step"]
 
 
 def region_sections(mesh, params, synthetic, **_):
@@ -124,7 +132,8 @@ def region_sections(mesh, params, synthetic, **_):
     from gyriflow.folding.zones import no_growth_ellipsoid
 
     ellipsoid = no_growth_ellipsoid(mesh.mesh.vertices, params)
-    return {"mesh": mesh.mesh, "fields": mesh.fields, "tags": mesh.cell_tags, "ellipsoid": ellipsoid,
+    fields = {**mesh.fields, "tangential_growth_percent_per_gw": growth_per_week(mesh, params)}
+    return {"mesh": mesh.mesh, "fields": fields, "tags": mesh.cell_tags, "ellipsoid": ellipsoid,
             "synthetic": synthetic}  # fmt: skip
 
 

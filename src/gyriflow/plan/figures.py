@@ -397,17 +397,21 @@ class Figures:
             paper=True,
         )  # fmt: skip
         yield Figure(
-            "outlines_figure", "Folding", "outlines over each other", f"{at}/outlines.png", "sections.outlines_chart",
-            """Simulated brain of run *{run}* (blue) over the measured one of the same week (black), rigidly aligned:
-            coronal (a) and axial planes (b) through the middle, sagittal ones through the right hemisphere (c).""",
-            lambda run, brain: {
-                "pairs": {
-                    week: [self._surfaces(run, brain)[week].parts["whole"], row.parts["whole"]]
-                    for week, row in self._real_beside(run, brain).items()
-                }
+            "outlines_figure", "Folding", "outlines over each other", f"{STUDY_FIGURES}/outlines.{{brain}}.png",
+            "sections.outlines_chart",
+            """Simulated brains over the measured one of the same week (black), rigidly aligned: coronal (a) and axial
+            planes (b) through the middle, sagittal ones through the right hemisphere (c).""",
+            lambda brain: {
+                "runs": {
+                    run: {
+                        week: self._surfaces(run, brain)[week].parts["whole"] for week in self._real_beside(run, brain)
+                    }
+                    for run in self._runs_from(brain)
+                },
+                "real": {week: row.parts["whole"] for week, row in self._real_beside_runs(brain).items()},
             },
-            self._beside,
-            self._each_run,
+            self._beside_runs,
+            tuple(start for start in self._each_start if self._real_beside_runs(start["brain"])),
             paper=True,
         )  # fmt: skip
         yield Figure(
@@ -461,7 +465,7 @@ class Figures:
         )  # fmt: skip
         yield Figure(
             "growth_zone_figure", "Folding", "growth on the surface", f"{at}/growth_zone.png", "pictures.field_picture",
-            """Tangential growth of the pial surface in the first time step of run *{run}*: from the left (a), from
+            """Tangential growth of the pial surface at the start of run *{run}*: from the left (a), from
             below (b), and the medial sides (c, d). Grey: nothing grows, as inside the ellipsoid of no growth and where
             tissue bridges the planes at the fissure. Below zero the surface shrinks.""",
             files(**start, **of_run), self._of_start, self._each_start_with(*GROWTH_OF_START),
@@ -482,7 +486,7 @@ class Figures:
             "layers_figure", "Folding", "regions and growth in sections", f"{at}/layers.png",
             "sections.region_sections",
             """Start brain of run *{run}* in sections through its middle: hemispheres (neither between the contact
-            planes), what grows, cortical weight, tangential growth in one time step, and shear modulus. Dashed: the
+            planes), what grows, cortical weight, tangential growth, and shear modulus. Dashed: the
             ellipsoid of no growth.""",
             files(**start, **of_run), self._of_start, self._each_start_with(*GROWTH_OF_START, *MODULI),
             paper=True, technical=True,
@@ -565,7 +569,7 @@ class Figures:
         yield Figure(
             "metrics_table", "Metrics", "metrics, table", f"{STUDY}/metrics_table.html", "tables.metrics_page",
             """The measured brain, each run, and the run's difference from the measured brain. Curvature of folds
-            shorter than ``curvature_wavelength`` is flattened, and with it ``mean_curvature_norm``. All weeks, and the
+            shorter than the curvature wavelength is flattened, and with it the mean curvature norm. All weeks, and the
             hemispheres, are in ``results/study/metrics.csv``.""",
             lambda: metrics, self._of_study,
         )  # fmt: skip

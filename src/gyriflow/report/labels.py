@@ -17,8 +17,14 @@ METRICS = {
     "mean_sulcal_depth": "mean depth below the hull",
     "folding_index": "folding index",
     "mean_thickness": "mean cortical thickness",
+    "thickness_sd": "cortical thickness, SD",
+    "sulcal_depth_95": "depth below the hull, 95 %",
+    "gaussian_curvature_norm": "Gaussian curvature norm",
+    "volume_tissue": "volume of tissue",
+    "volume_ventricles": "volume of ventricles",
+    "volume_cortex": "volume of cortex",
 }
-"""The metrics of the study's tables that are drawn, and their titles."""
+"""Metrics of the study's tables and their titles; others are called as they are."""
 MEASURES = {"shape_index": "shape index", "mean_curvature": "mean curvature"}
 """What a simulation is compared with a real brain by, as in the names of columns, and their titles."""
 FORETOLD = {
@@ -50,7 +56,7 @@ MAPS = {
     AREA_GROWTH: "growth of area (% per week)",
 }
 """The quantities that are drawn as maps, with the labels of their colour bars."""
-WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth per step (10⁻³)", "shear modulus (Pa)"
+WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth (% per week)", "shear modulus (Pa)"
 """The fields of the folding, with their units."""
 QUALITY = {
     "radius_ratio": "radius ratio (1 = regular)",

@@ -495,7 +495,7 @@ def field_picture(
     views: Sequence[str] = MEDIAL_VIEWS,
     synthetic: bool = False,
 ) -> Figure:
-    """Returns the (n,) growth of the pial vertices in a step from several sides; grey where it is zero."""
+    """Returns the (n,) growth of the pial vertices in % per week from several sides; grey where it is zero."""
     scale = signed_scale(values) if goes_below_zero(values) else magnitude_scale(values, MAGNITUDES)
     columns, rows = _one_row(mesh, paint(values, scale, zero_is_nothing=True), views, fissure_x_mm)
     legend = [] if values.all() else [Patch(color=NEUTRAL_COLOUR, label="zero")]

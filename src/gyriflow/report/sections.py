@@ -36,6 +36,7 @@ from .style import (
     add_letters,
     light_grid,
     new_figure,
+    run_colours,
     styled,
     wrap,
 )
@@ -193,24 +194,27 @@ def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh, *,
 
 @styled
 def outlines_chart(
-    pairs: Mapping[float, tuple[TriangleMesh, TriangleMesh]],
+    runs: Mapping[str, Mapping[float, TriangleMesh]],
+    real: Mapping[float, TriangleMesh],
     *,
     planes: Sequence[str] = tuple(PLANES),
     measured: str = REAL_BRAIN,
     synthetic: bool = False,
 ) -> Figure:
-    """Returns the outlines of the simulated over those of the measured brain, a row per plane, a column per week.
+    """Returns the outlines of runs over those of the measured brain, a row per plane, a column per week.
 
     The coronal and axial planes pass the middle of the measured brain, the sagittal one its right hemisphere. All
     panels have one scale. Of many weeks the last ones are shown.
 
     Parameters
     ----------
-    pairs : {week: (simulated, measured surface in RAS+ mm, laid onto each other)}
+    runs : {run: {week: surface in RAS+ mm, laid onto the measured one}}
+    real : {week: measured surface in RAS+ mm}
     """
-    weeks = sorted(pairs)[-MOST_WEEKS:]
-    low = np.min([np.minimum(*(mesh.vertices.min(axis=0) for mesh in pairs[week])) for week in weeks], axis=0) - 1
-    high = np.max([np.maximum(*(mesh.vertices.max(axis=0) for mesh in pairs[week])) for week in weeks], axis=0) + 1
+    weeks, colours = sorted(real)[-MOST_WEEKS:], run_colours(runs)
+    drawn = [known[week] for known in (real, *runs.values()) for week in weeks if week in known]
+    low = np.min([mesh.vertices.min(axis=0) for mesh in drawn], axis=0) - 1
+    high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1
     wide = max((high - low)[PLANES[plane][1]] for plane in known(planes))
     tall = [(high - low)[PLANES[plane][2]] for plane in planes]
     shown: dict[str, Any] = {"measured": measured, "synthetic": synthetic}
@@ -221,11 +225,13 @@ def outlines_chart(
         # a sagittal plane in the middle would show the fissure alone
         part = 0.75 if plane == "sagittal" else 0.5
         for axes, week in zip(line, weeks, strict=True):
-            simulated, real = pairs[week]
-            ends = real.vertices[:, across].min(), real.vertices[:, across].max()
+            ends = real[week].vertices[:, across].min(), real[week].vertices[:, across].max()
             at = float(ends[0] + part * (ends[1] - ends[0]))
-            for mesh, colour in ((real, REAL_COLOUR), (simulated, RUN_COLOURS[0])):
-                draw_outline(axes, mesh, plane, at, colour, 0.7)
+            # wide enough to be seen under a run that meets it
+            draw_outline(axes, real[week], plane, at, REAL_COLOUR, 1.7)
+            for run in runs:
+                if week in runs[run]:
+                    draw_outline(axes, runs[run][week], plane, at, colours[run], 0.8)
             axes.set(xlim=(centre - wide / 2, centre + wide / 2), ylim=(low[up], high[up]), aspect="equal")
             axes.set_axis_off()
             if axes is line[0]:
@@ -237,9 +243,9 @@ def outlines_chart(
     foot.plot([start, start + SCALE_BAR_MM], [bottom] * 2, color="black", linewidth=2, clip_on=False)
     foot.text(start, bottom - 1, f"{SCALE_BAR_MM:g} mm", va="top", fontsize=7)
     add_letters(panels[:, 0] if len(planes) > 1 and len(weeks) > 1 else panels.flat)
-    named = {"simulated": RUN_COLOURS[0], measured: REAL_COLOUR}
+    named = {**colours, measured: REAL_COLOUR}
     handles = [Line2D([], [], color=colour, label=label) for label, colour in named.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
 
@@ -251,7 +257,7 @@ def region_sections(
     *,
     synthetic: bool = False,
 ) -> Figure:
-    """Returns coronal and axial sections with the hemispheres, what grows, cortex, growth of a step, and stiffness.
+    """Returns coronal and axial sections with the hemispheres, what grows, cortex, growth, and stiffness.
 
     Fields at vertices, tags of elements, and the ellipsoid are those of the folding's regions.
     """
@@ -259,7 +265,7 @@ def region_sections(
         mesh,
         {
             WEIGHT: fields["cortex_weight"],
-            GROWTH: 1e3 * fields["tangential_growth_per_step"],
+            GROWTH: fields["tangential_growth_percent_per_gw"],
             STIFFNESS: fields["shear_modulus_pa"],
         },
         tags={"hemispheres": (tags["hemisphere"], HEMISPHERES), "growing": (tags["growing"], GROWING)},

@@ -15,7 +15,8 @@ from .style import MEASURED, PHANTOM, REAL_BRAIN, runs_by_name, simulated_runs, 
 
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60
-NUMBER = re.compile(r"[+−]?\d[\d.]*|–")
+NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?|–")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TABLE = Environment(autoescape=True).from_string(
     "<table>{% if caption %}<caption>{{ caption }}</caption>{% endif %}"
     "<thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr></thead>\n<tbody>"
@@ -150,8 +151,9 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
         Values may be mappings themselves; their names are joined by dots. A curve over weeks is shown by its ends.
     """
     flat = pd.DataFrame({run: pd.Series(_flatten(values), dtype=object) for run, values in parameters.items()})
-    shown = flat.map(lambda value: _shown(value, 4))
-    differs = shown.ne(shown.iloc[:, 0], axis=0).any(axis=1)
+    shown = flat.map(_shown)
+    # what one run has not and the other has not set is no difference
+    differs = shown.ne(shown.iloc[:, 0], axis=0).any(axis=1) & ~shown.isin(["–", "0", "no"]).all(axis=1)
     chosen = [*shown.index[differs], *(name for name in OF_EVERY_RUN if name in shown.index and not differs[name])]
     return shown.loc[chosen].rename(index=parameter_label).rename_axis("parameter")
 
@@ -246,7 +248,9 @@ def _shown(value: object, digits: int = 6) -> str:
         case bool() | np.bool_():
             return "yes" if value else "no"
         case float() | np.floating():
-            return "–" if np.isnan(value) else f"{value:.{digits}g}".replace("-", "−")
+            number, _, power = f"{value:.{digits}g}".partition("e")
+            raised = f"·10{str(int(power)).translate(_RAISED)}" if power else ""
+            return "–" if np.isnan(value) else number.replace("-", "−") + raised
         case None:
             return "–"
         case list() | tuple():

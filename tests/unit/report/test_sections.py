@@ -103,13 +103,13 @@ def test_a_section_of_wrong_values_or_in_an_unknown_plane_is_refused():
 
 def test_outlines_are_those_of_both_brains_at_one_scale():
     bigger = TriangleMesh(1.1 * SURFACE.vertices, SURFACE.faces)
-    figure = outlines_chart({21.0: (SURFACE, SURFACE), 22.0: (SURFACE, bigger)}, planes=("axial",))
+    figure = outlines_chart({"thin": {21.0: SURFACE, 22.0: SURFACE}}, {21.0: SURFACE, 22.0: bigger}, planes=("axial",))
     first, second = figure.axes
     assert np.ptp(first.get_xlim()) == np.ptp(second.get_xlim())
     real, simulated = (np.concatenate(lines.get_segments()) for lines in second.collections)
     assert np.ptp(real[:, 0]) == pytest.approx(44.0, rel=0.01)
     assert np.ptp(simulated[:, 0]) == pytest.approx(40.0, rel=0.01)
-    assert {"simulated", "real brain", "21 GW", "22 GW"} <= words(figure)
+    assert {"thin", "real brain", "21 GW", "22 GW"} <= words(figure)
 
 
 def test_a_penalty_presses_only_beyond_the_plane():
