@@ -115,7 +115,7 @@ def compared(name: str, mesh: TriangleMesh, last: str) -> dict[str, object]:
     areas = vertex_areas(mesh)
     stiffness, mass = laplacian(mesh)
     first = first_eigenvalue(stiffness, mass)
-    weyl = weyl_number(area(mesh), first, "paper")
+    weyl = weyl_number(area(mesh), first)
     modes, reach = modes_of(last, stiffness, mass, first)
     rms = [np.sqrt(np.average(mean**2, weights=areas)) for mean in (theirs["mean"], ours.mean)]
     found: dict[str, object] = {

@@ -19,7 +19,6 @@ rule measure:
                 "curvature_radius_mm",
                 "spangy_proxy",
                 "spangy_modes",
-                "spangy_wavelength",
             }
         ),
     script:

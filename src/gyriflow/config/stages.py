@@ -10,12 +10,10 @@ from ..parameters.terms import (
     MOST_HOLE_MM,
     SPANGY_MODES,
     SPANGY_PROXY,
-    SPANGY_WAVELENGTH,
     ExportNames,
     LastBand,
     Mesher,
     SpangyProxy,
-    WeylFormula,
 )
 from .brains import GivenRegions
 
@@ -122,9 +120,6 @@ class MetricsSettings(Settings):
         "Number of eigenmodes, 2 to 20000; or the last complete band, `B4`, `B5` or `B6`, each with four times as many "
         "modes as the one before.",
     )  # fmt: skip
-    spangy_wavelength: WeylFormula = setting(
-        SPANGY_WAVELENGTH, "", "Eigenvalue of the shortest wavelength WL: `paper` 2π/WL², `textbook` (2π/WL)²."
-    )
     mirrored_patches: bool = setting(
         False, "", "Intervals draw patches of the surface together with their mirror images even in brains that differ "
         "from their mirror image; where both are within half a voxel they always do.",

@@ -23,9 +23,7 @@ from ..parameters.terms import (
     CURVATURE_RADIUS_MM,
     SPANGY_MODES,
     SPANGY_PROXY,
-    SPANGY_WAVELENGTH,
     SpangyProxy,
-    WeylFormula,
 )
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import (
@@ -67,14 +65,13 @@ LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "
 class Settings:
     """How hemispheres are measured; the names and values of the configuration's `metrics`.
 
-    See `curvature.curvature`, `spangy.modes_of`, and `spangy.weyl_number` for the wavelength. The proxy is
-    "shape_index" as in the paper, or "mean_curvature" as in Germanaud et al. 2012.
+    See `curvature.curvature` and `spangy.modes_of`. The proxy is "shape_index" as in the paper, or "mean_curvature" as in
+    Germanaud et al. 2012.
     """
 
     curvature_radius_mm: float = CURVATURE_RADIUS_MM
     spangy_proxy: SpangyProxy = SPANGY_PROXY
     spangy_modes: SpangyModes = SPANGY_MODES
-    spangy_wavelength: WeylFormula = SPANGY_WAVELENGTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +141,7 @@ def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, 
     stiffness, mass = laplacian(mesh)
     first = first_eigenvalue(stiffness, mass)
     modes, reach = modes_of(settings.spangy_modes, stiffness, mass, first)
-    weyl = weyl_number(area(mesh), first, settings.spangy_wavelength)
+    weyl = weyl_number(area(mesh), first)
     # near a cut the proxy is continued from beyond
     proxy = bend.shape_index if settings.spangy_proxy == "shape_index" else bend.mean
     values = continue_smoothly(proxy, bend.reliable, stiffness)
@@ -264,7 +261,7 @@ class BrainMetrics:
         (where it is known; NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
     spectra : DataFrame
         Per hemisphere and band: hemisphere, band, wavelength_min_mm, wavelength_max_mm, modes, power, relative_power,
-        relative_power_weyl, complete, denominator_complete, resolved, weyl_formula.
+        relative_power_weyl, complete, denominator_complete, resolved.
     coefficients : DataFrame
         Per hemisphere and mode: hemisphere, mode, eigenvalue_per_mm2, band (−1 beyond B6), coefficient (cᵢ, in mm, or
         without a unit for mean curvature).
@@ -360,7 +357,7 @@ def measure_brain(
     return BrainMetrics(
         table=pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"]),
         maps={side.name: side.maps() for side in sides},
-        spectra=spectra.reset_index("hemisphere").reset_index(drop=True).assign(weyl_formula=chosen.spangy_wavelength),
+        spectra=spectra.reset_index("hemisphere").reset_index(drop=True),
         coefficients=pd.concat(coefficients, names=["hemisphere"]).reset_index("hemisphere").reset_index(drop=True),
     )
 

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints
-from ..parameters.terms import FOLD_BANDS, LastBand, WeylFormula
+from ..parameters.terms import FOLD_BANDS, LastBand
 from .laplace_beltrami import Modes, count_below, lowest_modes, modes_below
 
 type SpangyModes = int | LastBand
@@ -72,14 +72,14 @@ def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> f
     return float(values[1])
 
 
-def weyl_number(area_mm2: float, first: float, formula: WeylFormula) -> int:
+def weyl_number(area_mm2: float, first: float) -> int:
     """Returns the number of modes up to band B6 by Weyl's law, N = A·λmax/4π.
 
-    WL6 = WL0/2⁶ with WL0 = 2π/√λ1. λmax is (2π/WL6)² = 4⁶·λ1 by "textbook", the upper limit of B6, and 2π/WL6² by
-    "paper", the formula printed in the FetalFoldSim paper, 2π times smaller.
+    WL6 = WL0/2⁶ with WL0 = 2π/√λ1, and λmax = 2π/WL6², the formula printed in the FetalFoldSim paper; it is 2π times
+    smaller than (2π/WL6)² = 4⁶·λ1, the upper limit of B6.
     """
     shortest = 2.0 * np.pi / np.sqrt(first) / 2.0**BANDS
-    largest = 2.0 * np.pi / shortest**2 if formula == "paper" else (2.0 * np.pi / shortest) ** 2
+    largest = 2.0 * np.pi / shortest**2
     return round(area_mm2 * largest / (4.0 * np.pi))
 
 
