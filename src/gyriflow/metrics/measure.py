@@ -65,8 +65,8 @@ LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "
 class Settings:
     """How hemispheres are measured; the names and values of the configuration's `metrics`.
 
-    See `curvature.curvature` and `spangy.modes_of`. The proxy is "shape_index" as in the paper, or "mean_curvature" as in
-    Germanaud et al. 2012.
+    See `curvature.curvature` and `spangy.modes_of`. The proxy is "shape_index" as in the paper, or "mean_curvature" as
+    in Germanaud et al. 2012.
     """
 
     curvature_radius_mm: float = CURVATURE_RADIUS_MM
