@@ -20,6 +20,7 @@ from ..geometry.triangles import (
     corners,
     face_areas,
     face_components,
+    mean_edge_length,
     submesh,
     vertex_areas,
     vertex_normals,
@@ -32,8 +33,9 @@ DIRECTIONS = 400
 STARTS = 5
 # the left-right axis is looked for within this angle of the world's x axis
 SEARCH_DEG = 60.0
-# how much farther from its mirror image a surface may be in the plane of its coordinates than in the best one
-NEARLY, NEARLY_MM = 1.1, 0.05
+# how much farther from its mirror image a surface may be in the plane of its coordinates than in the best one: by a
+# factor, and by edges, since distances are those to vertices
+NEARLY, NEARLY_EDGES = 1.1, 0.1
 # smaller tilts are left as they are: the plane is not known better than this
 LEAST_TILT_DEG = 0.5
 # of the distances to the mirror image, those above this quantile count as asymmetry
@@ -95,9 +97,9 @@ def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG, *, named: bool
     sample, tree = mesh.vertices[chosen], cKDTree(mesh.vertices)
     planes = _symmetry_planes(sample, tree, search_deg)
     if named:
-        x, middle = np.array([1.0, 0.0, 0.0]), float(sample[:, 0].mean())
+        x, middle = np.array([1.0, 0.0, 0.0]), float(weights @ mesh.vertices[:, 0] / weights.sum())
         distance = _mirror_distance(x, middle, sample, tree)
-        if distance < NEARLY * min(asymmetry for _, _, asymmetry in planes) + NEARLY_MM:
+        if distance < NEARLY * min(asymmetry for _, _, asymmetry in planes) + NEARLY_EDGES * mean_edge_length(mesh):
             return _fit_to_fissure(mesh, x, middle, distance)
     candidates = [_fit_to_fissure(mesh, *plane) for plane in planes]
     return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))

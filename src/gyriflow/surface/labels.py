@@ -161,7 +161,7 @@ def require_cortex_outside(
 
     InputError where it is less than `least`: the scheme is another volume's, whose labels happen to be known.
     """
-    cerebrum = np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1)
+    cerebrum = ndimage.binary_fill_holes(np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1))
     outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
     cortex = ndimage.binary_dilation(np.pad(np.isin(labels, scheme.cortex), 1))
     share = float((outside & cortex).sum() / outside.sum())

@@ -74,6 +74,7 @@ TO_RIGHT = np.array([1.0, 0.0, 0.0])
 LEAST_TURN_DEG = 60.0
 # brains turned by more, up to that, are kept and told: atlases and scans rarely differ as much
 DOUBTFUL_TURN_DEG = 15.0
+PITCH_KEPT = "its mid-plane is set upright, its pitch is kept; check the file's axes"
 # told of volumes without labelled sides, which tell a turned brain from a mirrored one
 OR_MIRRORED = "if its array has an axis reversed or two exchanged instead, left and right are exchanged now: check them"
 # two directions nearer to each other than this (in radians) say nothing of the turn about them
@@ -517,7 +518,7 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     if angle >= LEAST_TURN_DEG:
         said = f"the brain was turned by {angle:.0f}°, as {by} say: its affine has other axes"
         return turned(rotation, by, "ras", said if sides is not None else f"{said}; {OR_MIRRORED}")
-    doubt = f"{by} say that the brain is turned by about {angle:.0f}°, which was kept: check the file's axes"
+    doubt = f"{by} say that the brain is turned by about {angle:.0f}°: {PITCH_KEPT}"
     return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
 
 
@@ -606,7 +607,7 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
     if angle >= LEAST_TURN_DEG:
         said = f"the brain was turned by {angle:.0f}°, as its shape says: its affine has other axes"
         return turned(rotation, "shape", "ras", said if sided else f"{said}; {OR_MIRRORED}")
-    doubt = f"the shape says that the brain is turned by about {angle:.0f}°, which was kept: check the file's axes"
+    doubt = f"the shape says that the brain is turned by about {angle:.0f}°: {PITCH_KEPT}"
     return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
 
 

@@ -71,6 +71,11 @@ def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
     with pytest.raises(InputError, match="does not lie around what it calls the cerebrum; found cortex at 0 %"):
         require_cortex_outside(labels, ATLAS)
     assert require_cortex_outside(6 - labels, ATLAS) == 1.0
+    # single voxels that are missing inside are no surface
+    brain = np.full((21, 21, 21), 5)
+    brain[2:-2, 2:-2, 2:-2] = 1
+    brain[4:-4:3, 4:-4:3, 4:-4:3] = 0
+    assert require_cortex_outside(brain, ATLAS) == 1.0
 
 
 def test_labels_of_bounti_have_its_own_names():
