@@ -16,9 +16,10 @@ import sys
 import time
 from pathlib import Path
 
+import pandas as pd
+
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, read_table
-from gyriflow.io.jobs import read_stages
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -53,6 +54,24 @@ def nearest_of(folder: Path) -> dict[str, list[dict]]:
     return found
 
 
+def stages_of(folder: Path) -> pd.DataFrame:
+    """Returns what the jobs of each stage took, the longest first: jobs, wall_s and cpu_s (sums), peak_memory_MiB."""
+    found = sorted(folder.glob("results/**/benchmarks/*.tsv"))
+    measured = ["s", "cpu_time", "max_rss"]
+    table = pd.concat(
+        [
+            pd.DataFrame(columns=[*measured, "stage"], dtype=str),
+            *(pd.read_csv(path, sep="\t", dtype=str).assign(stage=path.name.split(".")[0]) for path in found),
+        ]
+    )
+    for name in measured:
+        table[name] = pd.to_numeric(table[name], errors="coerce")
+    stages = table.groupby("stage").agg(
+        jobs=("s", "size"), wall_s=("s", "sum"), cpu_s=("cpu_time", "sum"), peak_memory_MiB=("max_rss", "max")
+    )
+    return stages.sort_values("cpu_s", ascending=False).reset_index()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=Path("paper-hour"))
@@ -67,7 +86,7 @@ def main() -> None:
     began = time.monotonic()
     outcome = subprocess.run(command(arguments), env=os.environ | {"PYTHONPATH": path}, check=False)
     total = time.monotonic() - began
-    stages = read_stages(arguments.folder)
+    stages = stages_of(arguments.folder)
     print(stages.to_string(index=False))
     result = {
         "total": round(total, 1),

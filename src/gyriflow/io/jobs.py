@@ -166,21 +166,6 @@ def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFram
     return pd.DataFrame(rows, columns=["rule", "run", "brain", *MEASURED.values()])
 
 
-def read_stages(folder: AnyPath) -> pd.DataFrame:
-    """Returns what the jobs of each stage took, by what their benchmark files are called, in the order of their time.
-
-    Columns are stage, jobs, wall_s and cpu_s (sums over the jobs), peak_memory_MiB.
-    """
-    found = sorted(Path(folder).glob("results/**/benchmarks/*.tsv"))
-    table = pd.DataFrame([_measured(path) for path in found], columns=[*MEASURED.values()])
-    table["stage"] = [path.name.split(".")[0] for path in found]
-    groups = table.groupby("stage")
-    stages = groups[["wall_s", "cpu_s"]].sum()
-    stages.insert(0, "jobs", groups.size())
-    stages["peak_memory_MiB"] = groups["memory_MiB"].max()
-    return stages.sort_values("cpu_s", ascending=False).reset_index()
-
-
 def _measured(path: Path) -> dict[str, float]:
     try:
         table = pd.read_csv(path, sep="\t", dtype=str)

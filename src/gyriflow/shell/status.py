@@ -40,9 +40,7 @@ def status(directory: Path) -> Status:
     state = run_state(directory)
     configured = _configured(directory)
     if not results.is_dir() and state is None and not configured:
-        expected = f"a working directory, with results/ or {CONFIG}"
-        remedy = "Name the folder: gyriflow status FOLDER"
-        raise InputError("holds no study", path=directory.resolve(), expected=expected, remedy=remedy)
+        raise InputError("holds no study", path=directory.resolve(), expected=f"results/ or {CONFIG} in it")
     brains = [
         [folder.name, *(DONE if (folder / file).is_file() else NOT_YET for file in BRAIN_FILES.values())]
         for folder in _folders(results / "brains")

@@ -116,10 +116,9 @@ def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     far = np.zeros(number, dtype=bool)
     for one in np.unique(group[inner]):
         members, around = few & (group == one), mesh.vertices[outer[group[inner] == one]]
-        middle = around.mean(axis=0)
-        spread = max(SPIKE_MM, SPIKE_SPREADS * float(np.linalg.norm(around - middle, axis=1).max()))
-        away = np.linalg.norm(mesh.vertices[members] - middle, axis=1).max()
-        far |= members & (away > spread and members.sum() < SPIKE_SHARE * number)
+        places = mesh.vertices[members], around
+        away, wide = (np.linalg.norm(points - around.mean(axis=0), axis=1).max() for points in places)
+        far |= members & (away > max(SPIKE_MM, SPIKE_SPREADS * wide) and members.sum() < SPIKE_SHARE * number)
     if not far.any():
         return mesh, 0
     # each in the middle of its neighbours
