@@ -178,4 +178,4 @@ def _store_by_blocks(multigrid: PETSc.PC, levels: Iterable[int]) -> None:
         smoother = multigrid.getMGSmoother(level)
         operator, matrix = smoother.getOperators()
         if operator.handle == matrix.handle:  # not yet done
-            smoother.setOperators(matrix.convert("baij", out=PETSc.Mat()), matrix)
+            smoother.setOperators(matrix.convert("sbaij", out=PETSc.Mat()), matrix)
