@@ -373,8 +373,8 @@ def solver_errors(arguments: argparse.Namespace) -> dict[str, pd.DataFrame]:
     tolerances = {value: given | {"solver": solver | {"newton_tolerance": value}} for value in arguments.run_tolerances}
     steps = {days: given | {"step_s": days * DAY_S} for days in arguments.run_steps_days}
     return {
-        "tolerances": errors("newton_tolerance", tolerances, arguments.folder / "tolerances", mesh, *maps),
         "run_steps": errors("step_days", steps, arguments.folder / "run_steps", mesh, *maps),
+        "tolerances": errors("newton_tolerance", tolerances, arguments.folder / "tolerances", mesh, *maps),
     }
 
 
