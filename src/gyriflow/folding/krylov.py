@@ -178,4 +178,5 @@ def _store_by_blocks(multigrid: PETSc.PC, levels: Iterable[int]) -> None:
         smoother = multigrid.getMGSmoother(level)
         operator, matrix = smoother.getOperators()
         if operator.handle == matrix.handle:  # not yet done
+            matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # as the finest one is; PETSc may not know it
             smoother.setOperators(matrix.convert("sbaij", out=PETSc.Mat()), matrix)
