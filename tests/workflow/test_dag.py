@@ -82,12 +82,11 @@ def test_examples_of_narrow_licences_are_planned_once_these_are_accepted(workflo
     assert {rule: jobs.get(rule) for rule in expected} == expected
 
 
-def test_the_example_of_labels_and_hemispheres_is_planned_once_these_are_made(workflow):
+def test_the_example_of_labels_and_surfaces_is_planned_once_these_are_made(workflow):
     example = CHECKOUT / "config" / "examples" / "labels-and-hemispheres.yaml"
     for brain in yaml.safe_load(example.read_text())["brains"]:
-        for file in brain["hemispheres"].values():
-            (workflow.directory / file).parent.mkdir(parents=True, exist_ok=True)
-            (workflow.directory / file).touch()
+        (workflow.directory / brain["pial"]).parent.mkdir(parents=True, exist_ok=True)
+        (workflow.directory / brain["pial"]).touch()
     jobs = workflow.jobs("growth", "--configfile", str(example))
     assert jobs["growth_figure"] == 1
     # nothing is fetched
