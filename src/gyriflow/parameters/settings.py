@@ -150,7 +150,7 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
         case "model_type":
             return path, f"found {details['input']!r}; it should hold keys and values"
     # pydantic begins with what the value is: "String should", "Tuple should"
-    expected = re.sub(r"^(Value error, )?(\w+ should )?", "", details["msg"])
+    expected = re.sub(r"^(Value error, )?(\w+ should )?", "", details["msg"].partition(", unable to")[0])
     return path, f"found {details['input']!r}; it should {expected}"
 
 

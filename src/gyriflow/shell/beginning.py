@@ -169,13 +169,12 @@ def write_bids(
         ):
             found.append(brain)
             problems += [f"{brain.entry['id']}: {note}" for note in brain.notes]
-    if problems or not found:
-        raise InputError(
-            "cannot be run as it is" if problems else "has no such participants and sessions",
-            path=folder,
-            found="\n  ".join(["", *problems]) if problems else " ".join(sorted(wanted[0] | wanted[1])) or "no sub-…",
-            remedy="Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'.",
-        )
+    if not found:
+        asked = " ".join(sorted(wanted[0] | wanted[1])) or "files named sub-…"
+        raise InputError("has no such participants and sessions", path=folder, expected=asked)
+    if problems:
+        remedy = "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'."
+        raise InputError("cannot be run as it is", path=folder, found="\n  ".join(["", *problems]), remedy=remedy)
     first: dict[str, dict[str, Any]] = {}
     for brain in found:
         first.setdefault(str(brain.entry.get("subject")), brain.entry)
@@ -214,7 +213,7 @@ def _growing(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[s
     raise InputError(
         f"no series of the atlas {atlas.name} leads from {weeks[0]:g} to {weeks[1]:g} GW",
         found=has,
-        remedy="Choose another --atlas, or an earlier --until.",
+        remedy="Choose another --atlas, or another --until, after --week.",
     )
 
 
