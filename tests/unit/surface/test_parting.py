@@ -51,16 +51,18 @@ def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
     assert area(sides[0]) == pytest.approx(area(sides[1]), rel=0.05)
 
 
-@pytest.mark.parametrize("pathology", ["bent_midline", "without_callosum", "shifted_midline"])
+@pytest.mark.parametrize(
+    "pathology", [odd_brains.bent_midline, pathologies.without_callosum, pathologies.shifted_midline]
+)
 def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
     labels, affine = brain
-    mesh = cerebrum_surface(getattr(pathologies, pathology)(labels, affine), affine)
+    mesh = cerebrum_surface(pathology(labels, affine), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
     sides = cut_sides(mesh, left)
     assert [len(pieces(side)) for side in sides] == [1, 1]
     place = corners(mesh).mean(axis=1) - CENTRE_MM
-    middle = {"bent_midline": 3.0 * np.sin(place[:, 1] / 12.0), "shifted_midline": 8.0}.get(pathology, 0.0)
+    middle = {"bent_midline": 3.0 * np.sin(place[:, 1] / 12.0), "shifted_midline": 8.0}.get(pathology.__name__, 0.0)
     wrong = np.where(left, place[:, 0] - middle, middle - place[:, 0]) > 1.5
     assert face_areas(mesh)[wrong].sum() < 0.005 * area(mesh)
 
