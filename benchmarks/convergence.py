@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 
 from gyriflow.comparison.placement import correlation
 from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
+from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.matching import match_points, values_at
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, finer_surface
@@ -50,7 +51,6 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.metrics.measure import Settings, folding_rows, measure_hemisphere, size_rows, spectrum_rows
-from gyriflow.metrics.similarity import distances
 from gyriflow.surface.pial import from_labels
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -307,7 +307,8 @@ def difference(one: Carried, other: Carried, start: Carried) -> dict[str, float]
     apart = without_rigid_motion(other.surface.vertices, one.surface.vertices, areas)
     moved = without_rigid_motion(start.surface.vertices, other.surface.vertices, areas)
     laid = transformed(one.surface, rigid_fit(one.surface.vertices, other.surface.vertices, areas))
-    ways = np.concatenate([distances(laid, other.surface), distances(other.surface, laid)])
+    pairs = ((laid, other.surface), (other.surface, laid))
+    ways = np.concatenate([nearest_on(surface.vertices, there)[0] for surface, there in pairs])
     both = np.concatenate([vertex_areas(laid), areas])
 
     def rms(vectors: np.ndarray) -> float:
