@@ -38,8 +38,7 @@ from numpy.typing import NDArray
 
 from gyriflow.comparison.placement import correlation
 from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
-from gyriflow.geometry.matching import nearest_on
-from gyriflow.geometry.matching import match_points, values_at
+from gyriflow.geometry.matching import match_points, nearest_on, values_at
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, finer_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
