@@ -108,9 +108,8 @@ class LogHandler(LogHandlerBase):
             case LogEvent.JOB_FINISHED:
                 self.display.job_ends(said["job_id"])
             case LogEvent.JOB_ERROR:
-                said_before = "\n".join(self.of_failed_jobs)
+                otherwise = str(said["rule_msg"] or "\n".join(self.of_failed_jobs))
                 self.of_failed_jobs.clear()
-                otherwise = str(said["rule_msg"] or said_before)
                 self.display.job_fails(said["jobid"], said["rule_name"], said["log"], otherwise)
             case LogEvent.PROGRESS:
                 self.display.progress(said["done"], said["total"])

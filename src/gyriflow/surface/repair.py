@@ -108,9 +108,9 @@ def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     pairs, number = edges(mesh)[0], len(mesh.vertices)
     length = np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1)
     near = length <= max(SPIKE_MM, SPIKE_SPREADS * float(np.median(length)))
-    part = _parts(pairs[near], number)
+    _, part = connected_components(_graph(pairs[near], number), directed=False)
     few = np.bincount(part)[part] < SPIKE_SHARE * number
-    group = _parts(pairs[few[pairs].all(axis=1)], number)
+    _, group = connected_components(_graph(pairs[few[pairs].all(axis=1)], number), directed=False)
     rim = pairs[few[pairs].sum(axis=1) == 1]
     inner, outer = np.where(few[rim[:, :1]], rim, rim[:, ::-1]).T
     far = np.zeros(number, dtype=bool)
@@ -122,17 +122,16 @@ def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     if not far.any():
         return mesh, 0
     # each in the middle of its neighbours
-    joined = sparse.coo_array((np.ones(2 * len(pairs)), np.concatenate([pairs, pairs[:, ::-1]]).T), 2 * (number,))
-    stiffness = laplacian(joined.tocsr()).tocsr()
+    stiffness = laplacian(_graph(pairs, number).tocsr()).tocsr()
     vertices = mesh.vertices.astype(np.float64)
     vertices[far] = spsolve(stiffness[far][:, far].tocsc(), -stiffness[far][:, ~far] @ vertices[~far])
     return TriangleMesh(vertices, mesh.faces), int(far.sum())
 
 
-def _parts(pairs: NDArray[np.integer], number: int) -> NDArray[np.int32]:
-    """Returns the (n,) number of the part that each vertex is in, as far as pairs of them are joined."""
-    joined = sparse.coo_array((np.ones(len(pairs)), pairs.T), (number, number))
-    return np.asarray(connected_components(joined, directed=False)[1])
+def _graph(pairs: NDArray[np.integer], number: int) -> sparse.coo_array:
+    """Returns the (n, n) matrix with ones for pairs of vertices that are joined."""
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    return sparse.coo_array((np.ones(len(both)), both.T), (number, number))
 
 
 def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:

@@ -41,6 +41,7 @@ THINNEST_VOXELS = 1 / 3
 QUANTILES = (0.05, 0.95)
 # on the medial wall, where there is no cortex, white and pial surfaces meet
 LEAST_MM = 0.3
+USUAL_MM = 0.4, 3.5  # means in label atlases of 21 to 36 GW are 0.8 to 2.7 mm
 # the white surface crosses the pial one where so much of its area is so far outside
 OUTSIDE_MM, MOST_OUTSIDE = 0.5, 0.01
 
@@ -120,6 +121,8 @@ def thickness_from_labels(
     thickness = cortical_thickness(surface, cerebrum, cortex, affine, smoothing_voxels)
     suggested = thickness.report["suggested_thickness_mm"]
     log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
+    if not USUAL_MM[0] <= suggested <= USUAL_MM[1]:
+        log.warning("the cortex is %.1f mm thick on average: is it cortex that the scheme calls so?", suggested)
     return thickness
 
 

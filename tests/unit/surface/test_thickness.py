@@ -7,10 +7,12 @@ from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import transformed
+from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.surface.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.surface.repair import make_even
-from gyriflow.surface.thickness import cortical_thickness
+from gyriflow.surface.thickness import cortical_thickness, thickness_from_labels
 
 FOLDS_MM = 2.0
 
@@ -98,6 +100,14 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
     assert (found.values_mm > 0.8 / 3).all()
     edge = found.measured & (pial.vertices[:, 0] > 7)
     assert set(np.round(found.values_mm[bare], 6)) <= set(np.round(found.values_mm[edge], 6))
+
+
+@pytest.mark.parametrize(("thickness_mm", "told"), [(1.7, False), (8.0, True)])
+def test_a_cortex_of_no_usual_thickness_is_told(ball, caplog, thickness_mm, told):
+    pial, depth, inside, affine = ball
+    labels = np.where(inside, np.where(depth < thickness_mm, 5, 1), 0)
+    thickness_from_labels(labels, affine, LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)), pial, Pose())
+    assert ("is it cortex that the scheme calls so?" in caplog.text) == told
 
 
 def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
