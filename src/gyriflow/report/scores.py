@@ -339,7 +339,7 @@ def nearest_chart(
     measures = list(dict.fromkeys(rows["measure"]))
     if not measures:
         raise InputError("no distance to a measured brain is known", found=f"{len(own)} rows")
-    published = nearest.dropna(subset=["paper"]).set_index("measure")["paper"]
+    published = nearest.dropna(subset=["paper"]).drop_duplicates("measure").set_index("measure")["paper"]
     figure, panels = panel_figure(len(measures), panel_in=2.1, synthetic=synthetic)
     colours = {"whole": RUN_COLOURS[0], "left": RUN_COLOURS[0], "right": RUN_COLOURS[1]}
     drawn: set[str] = set()

@@ -206,7 +206,7 @@ def test_hemispheres_are_drawn_apart_and_the_published_value_is_a_line():
             for side, value in (("left", 1.0), ("right", 3.0))
         ]
     )
-    figure = nearest_chart(table, pd.DataFrame({"measure": ["B4"], "paper": [2.25]}), **OF_THE_STUDY)
+    figure = nearest_chart(table, pd.DataFrame({"measure": ["B4", "B4"], "paper": [2.25, 2.25]}), **OF_THE_STUDY)
     (axes,) = figure.axes
     assert sorted(text.get_text() for text in axes.texts) == ["1", "2"]
     assert [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == "--"] == [2.25]
