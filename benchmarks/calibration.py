@@ -51,7 +51,7 @@ def study(edge_mm: float) -> dict[str, Any]:
 def call(folder: Path, config: dict[str, Any], target: str, cores: int) -> None:
     """Runs a target in a folder; GyriflowError where it fails."""
     write_yaml(folder / "study.yaml", config)
-    command = [sys.executable, "-m", "gyriflow.shell.launch", "--cores", str(cores), target, "--snakefile"]
+    command = [sys.executable, "-m", "gyriflow.cli.launch", "--cores", str(cores), target, "--snakefile"]
     command += [str(ROOT / "Snakefile"), "--configfile", str(folder / "study.yaml"), "--directory", str(folder)]
     path = os.pathsep.join(filter(None, [str(ROOT / "src"), os.environ.get("PYTHONPATH", "")]))
     outcome = subprocess.run(

@@ -36,7 +36,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from gyriflow.comparison.placement import correlation
+from gyriflow.anatomy.pial import from_labels
+from gyriflow.compare.placement import correlation
 from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
 from gyriflow.geometry.matching import match_points, nearest_on, values_at
 from gyriflow.geometry.remeshing import remesh
@@ -50,7 +51,6 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.metrics.measure import Settings, folding_rows, measure_hemisphere, size_rows, spectrum_rows
-from gyriflow.surface.pial import from_labels
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]

@@ -3,7 +3,7 @@
 Times are of one core: what a job kept busy. Each rule has a constant and a part that grows with its brain: faces of the
 surface, nodes of the mesh, nodes times steps of a folding. The error is that of studies left out: a fit to the others,
 with sizes predicted from the configuration alone, against what was measured. It writes
-`src/gyriflow/shell/measured.json`, which the terminal and `gyriflow check` read.
+`src/gyriflow/cli/measured.json`, which the terminal and `gyriflow check` read.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import nnls
 
+from gyriflow.cli.cost import MEASURED, Job, Size, cubes, predict, rule_key, work_of
 from gyriflow.config import load
 from gyriflow.config.root import Config
 from gyriflow.folding.predicted_memory import predicted_memory_mib
@@ -23,7 +24,6 @@ from gyriflow.io.files import read_json, write_json
 from gyriflow.io.jobs import read_benchmarks
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.resources import busy_seconds
-from gyriflow.shell.cost import MEASURED, Job, Size, cubes, predict, rule_key, work_of
 
 MIB = 2**20
 PLACES = re.compile(r"results/(?:runs/(?P<run>[^/]+)/(?P<brain>[^/]+)|brains/(?P<measured>[^/]+)|[^/]+)/.*")

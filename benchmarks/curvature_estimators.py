@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyriflow.comparison.placement import correlation
+from gyriflow.compare.placement import correlation
 from gyriflow.geometry.triangles import (
     Floats,
     TriangleMesh,

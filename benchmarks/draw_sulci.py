@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from gyriflow.anatomy.pial import from_labels
 from gyriflow.config.atlas import ATLASES
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import Floats, Ints, TriangleMesh, edges, vertex_areas
@@ -23,7 +24,6 @@ from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volu
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.gyrification import convex_hull, sulcal_depth
-from gyriflow.surface.pial import from_labels
 
 FOLDER = ATLASES / "spina-bifida"
 SEEN_MM = 1.5

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gyriflow.anatomy.pial import from_hemispheres
+from gyriflow.anatomy.plausible import expected_volume_ml
+from gyriflow.anatomy.pose import Pair, pairs_by_shape, poses
+from gyriflow.anatomy.repair import pieces, sound_pieces
 from gyriflow.errors import GyriflowError, InputError
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, signed_volume
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_hemispheres, read_surface
-from gyriflow.surface.pial import from_hemispheres
-from gyriflow.surface.plausible import expected_volume_ml
-from gyriflow.surface.pose import Pair, pairs_by_shape, poses
-from gyriflow.surface.repair import pieces, sound_pieces
 
 Floats = NDArray[np.float64]
 Files = tuple[Path, Path]

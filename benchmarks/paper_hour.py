@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[1]
 def command(arguments: argparse.Namespace) -> list[str]:
     """Returns the command that is measured, as `./run snakemake` runs it."""
     return [
-        *(sys.executable, "-m", "gyriflow.shell.launch", "--cores", str(arguments.cores), arguments.target),
+        *(sys.executable, "-m", "gyriflow.cli.launch", "--cores", str(arguments.cores), arguments.target),
         *("--snakefile", str(ROOT / "Snakefile"), "--configfile", str(arguments.configfile.resolve())),
         *("--directory", str(arguments.folder)),
     ]

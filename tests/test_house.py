@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from gyriflow.cli.launch import SETTINGS
 from gyriflow.io.sources import imported_modules, room_of
-from gyriflow.shell.launch import SETTINGS
 from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
@@ -28,17 +28,17 @@ ARROWS = {
     # a configuration names atlases, which are described in files
     "config": PLAIN | {"io", "shipped"},
     # what a study consists of is told from its configuration
-    "plan": PLAIN | {"config", "io"},
+    "study": PLAIN | {"config", "io"},
     "mechanics": set(),
     # the solve is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io"},
-    **dict.fromkeys(("io", "phantom", "surface", "mesh", "growth", "metrics"), PLAIN),
-    **dict.fromkeys(("comparison", "report"), PLAIN),
+    **dict.fromkeys(("io", "phantom", "anatomy", "mesh", "growth", "metrics"), PLAIN),
+    **dict.fromkeys(("compare", "report"), PLAIN),
     "shipped": set(),
     "version": {"shipped"},
     "step": {"errors"},
     # the shell around the rooms: how a workflow starts, what it will take, what the terminal says
-    "shell": PLAIN | {"config", "folding", "io", "plan", "shipped", "step", "surface", "version"},
+    "cli": PLAIN | {"config", "folding", "io", "study", "shipped", "step", "anatomy", "version"},
 }
 """The rooms, and what each may import besides itself. Siblings do not know each other; they meet in plain geometry, in
 the vocabulary and in files."""
@@ -49,7 +49,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
-OPENING_ROOMS = {"io", "folding", "shell", "step"}
+OPENING_ROOMS = {"io", "folding", "cli", "step"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
     *("open", "read_text", "read_bytes", "write_text", "write_bytes", "tofile", "to_filename", "savefig"),

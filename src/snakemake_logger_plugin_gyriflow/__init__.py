@@ -43,8 +43,8 @@ class LogHandler(LogHandlerBase):
         # every job's process imports this module, and few need more of it
         from snakemake.logging import DefaultFormatter
 
-        from gyriflow.shell.cost import typical_seconds
-        from gyriflow.shell.terminal import STATE, RunDisplay, stages
+        from gyriflow.cli.cost import typical_seconds
+        from gyriflow.cli.terminal import STATE, RunDisplay, stages
         from gyriflow.shipped import SHIPPED
 
         settings = self.settings if isinstance(self.settings, LogHandlerSettings) else LogHandlerSettings()

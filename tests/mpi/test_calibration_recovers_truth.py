@@ -6,9 +6,9 @@ import pytest
 from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
-from gyriflow.comparison.design import calibrated_parameters, sobol_design
-from gyriflow.comparison.scores import size_score
-from gyriflow.comparison.surrogate import fit, optimum, propose
+from gyriflow.compare.design import calibrated_parameters, sobol_design
+from gyriflow.compare.scores import size_score
+from gyriflow.compare.surrogate import fit, optimum, propose
 from gyriflow.folding.run import run
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface

@@ -78,7 +78,7 @@ class Workflow:
 
     def command(self, *arguments: str) -> list[str]:
         """Returns the command that `./run snakemake` runs."""
-        return [sys.executable, "-m", "gyriflow.shell.launch", *arguments]
+        return [sys.executable, "-m", "gyriflow.cli.launch", *arguments]
 
     @property
     def environment(self) -> dict[str, str]:

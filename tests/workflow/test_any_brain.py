@@ -5,9 +5,9 @@ By what may be odd about a brain:
 1. Closed hemispheres beside a midline that bends: `bent`, `freesurfer`, `shifted`.
 2. Matrices of GIFTI files: `talairach`; test_bad_hemispheres.py, `placed`; tests/unit/io/test_surfaces.py.
 3. Missing tissues: `agenesis`, `holoprosencephaly`.
-4. Front and back, up and down: `upside_down`, `backwards`; tests/unit/surface/test_brain_pose.py.
+4. Front and back, up and down: `upside_down`, `backwards`; tests/unit/anatomy/test_brain_pose.py.
 5. One hemisphere: `small_half`, `pial_half`, `hypoplasia`, `whole_as_half`; test_cohort.py to the end.
-6. Poses: test_bad_hemispheres.py; tests/unit/surface/test_posing.py; benchmarks/orientation.py.
+6. Poses: test_bad_hemispheres.py; tests/unit/anatomy/test_posing.py; benchmarks/orientation.py.
 7. Losses: `cropped`, `polyp`, `pial_vtk`.
 8. Asymmetry: `wide`, `unequal`, `hypoplasia`, `shifted`.
 9. Formats: `freesurfer`, `pial_vtk`; tests/unit/io/test_volumes.py.
@@ -25,14 +25,14 @@ from nibabel.freesurfer.io import write_geometry
 from reliability import trying
 from shapes import cerebrum_surface, phantom, rigid, save_gifti, save_labels
 
+from gyriflow.anatomy.extraction import isosurface, smooth_mask
+from gyriflow.anatomy.repair import pieces
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface
 from gyriflow.phantom import pathologies
 from gyriflow.phantom.brain import CENTRE_MM
-from gyriflow.surface.extraction import isosurface, smooth_mask
-from gyriflow.surface.repair import pieces
 
 from .conftest import Workflow
 

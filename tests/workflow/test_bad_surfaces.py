@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from shapes import HALF_AXES, hemisphere, save_gifti
 
+from gyriflow.anatomy.extraction import isosurface, smooth_mask
+from gyriflow.anatomy.repair import pieces
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, signed_volume
 from gyriflow.io.surfaces import read_surface
-from gyriflow.surface.extraction import isosurface, smooth_mask
-from gyriflow.surface.repair import pieces
 
 from .conftest import Workflow
 

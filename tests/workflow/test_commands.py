@@ -11,7 +11,7 @@ from .conftest import SMALL_STUDY
 
 def gyriflow(workflow, *arguments):
     return subprocess.run(
-        [sys.executable, "-m", "gyriflow.shell", *arguments],
+        [sys.executable, "-m", "gyriflow.cli", *arguments],
         cwd=workflow.directory, env=workflow.environment, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
 

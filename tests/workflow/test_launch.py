@@ -4,9 +4,9 @@ import subprocess
 
 import pytest
 
+from gyriflow.cli.launch import add_snakefile, clear_stale_lock, hold_lock, value_of
 from gyriflow.errors import StorageError
 from gyriflow.io.files import write_json
-from gyriflow.shell.launch import add_snakefile, clear_stale_lock, hold_lock, value_of
 
 from .conftest import SMALL_STUDY
 
@@ -120,7 +120,7 @@ def test_a_live_lock_is_not_cleared_but_refused(tmp_path):
 @pytest.mark.promise(10)
 def test_a_run_beside_a_live_one_is_refused_with_5_but_may_look(workflow):
     holder = subprocess.Popen(
-        [*workflow.command()[:1], "-c", "from gyriflow.shell.launch import hold_lock; from pathlib import Path;"
+        [*workflow.command()[:1], "-c", "from gyriflow.cli.launch import hold_lock; from pathlib import Path;"
          "lock = hold_lock(Path('.')); print('held', flush=True); input()"],
         cwd=workflow.directory, env=workflow.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip

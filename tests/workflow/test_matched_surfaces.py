@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from shapes import LPS, cerebrum_surface, phantom, rigid
 
+from gyriflow.anatomy.repair import pieces
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
@@ -17,7 +18,6 @@ from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.parameters.terms import SIDES
 from gyriflow.phantom import pathologies
-from gyriflow.surface.repair import pieces
 
 from .conftest import COARSE
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from gyriflow.cli.terminal import STATE
 from gyriflow.io.files import read_json
-from gyriflow.shell.terminal import STATE
 
 from .conftest import SMALL_STUDY
 

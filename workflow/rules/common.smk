@@ -4,10 +4,10 @@ from inspect import signature
 from gyriflow.errors import GyriflowError
 from gyriflow.parameters.measures import SHAPE_MEASURES
 from gyriflow.parameters.terms import SIDES
-from gyriflow.plan import Plan
-from gyriflow.plan.paths import *
-from gyriflow.shell.launch import hold_lock, keeps_going, refused_brains, runs_nothing
-from gyriflow.shell.provenance import input_contents, require_own_results
+from gyriflow.study import Plan
+from gyriflow.study.paths import *
+from gyriflow.cli.launch import hold_lock, keeps_going, refused_brains, runs_nothing
+from gyriflow.cli.provenance import input_contents, require_own_results
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
 
@@ -74,7 +74,7 @@ if workflow.is_main_process:
     for row in WHOLE_CONFIG.left_out.values():
         print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 
-# held as long as this process lives: how `gyriflow.shell.launch` tells a live run from one that was interrupted
+# held as long as this process lives: how `gyriflow.cli.launch` tells a live run from one that was interrupted
 if workflow.is_main_process and not runs_nothing():
     LOCK = hold_lock(Path.cwd())
 

@@ -1,4 +1,4 @@
-# Figures and tables of the registry, `gyriflow.plan.figures`: each row that is drawn has a rule.
+# Figures and tables of the registry, `gyriflow.study.figures`: each row that is drawn has a rule.
 from dataclasses import replace
 
 FIGURES = replace(PLAN.figures, reaches=reaches)

@@ -3,8 +3,8 @@ from functools import cache
 
 from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.io.files import read_json
-from gyriflow.shell.cost import MEASURED as MEASURED_COSTS
-from gyriflow.shell.cost import folding_needs
+from gyriflow.cli.cost import MEASURED as MEASURED_COSTS
+from gyriflow.cli.cost import folding_needs
 
 
 rule parameters:

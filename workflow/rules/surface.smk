@@ -1,5 +1,5 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
-from gyriflow.shell.cost import surface_memory_mib
+from gyriflow.cli.cost import surface_memory_mib
 
 # how unequal and how asymmetric hemispheres may be
 LIMITS = CONFIG.surface.model_dump(include={"max_hemisphere_ratio", "max_asymmetry"})

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from gyriflow.comparison.design import sobol_design
-from gyriflow.comparison.surrogate import fit, propose
+from gyriflow.compare.design import sobol_design
+from gyriflow.compare.surrogate import fit, propose
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from gyriflow.comparison.scores import shape_scores, size_score
-from gyriflow.comparison.shapes import Shape, ready
+from gyriflow.compare.scores import shape_scores, size_score
+from gyriflow.compare.shapes import Shape, ready
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import curvature

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.comparison.surrogate import fit, optimum, profiles, sensitivities
+from gyriflow.compare.surrogate import fit, optimum, profiles, sensitivities
 from gyriflow.io.figures import write_printed
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.comparison.members import COLUMNS, distances_to
+from gyriflow.compare.members import COLUMNS, distances_to
 from gyriflow.io.files import read_table, write_table
 from gyriflow.metrics.spangy import spectral_distances
 from gyriflow.step import step

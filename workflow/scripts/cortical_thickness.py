@@ -1,12 +1,12 @@
 """Cortical thickness at the vertices of a brain's pial surface, from the labels of its cortex."""
 
+from gyriflow.anatomy.thickness import thickness_from_labels
 from gyriflow.io.files import write_json
 from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import read_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.thickness import thickness_from_labels
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], files.labels):

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import KDTree
 
-from gyriflow.comparison.deviation import deviation_maps
+from gyriflow.compare.deviation import deviation_maps
 from gyriflow.geometry.alignment import fit_onto
 from gyriflow.geometry.matching import match_points, values_at
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals

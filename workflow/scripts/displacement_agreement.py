@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gyriflow.comparison.validation import displacement_table
+from gyriflow.compare.validation import displacement_table
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.files import write_table
 from gyriflow.io.frames import read_positions, read_tets, read_weeks

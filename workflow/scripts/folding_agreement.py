@@ -1,6 +1,6 @@
 """How much the simulated brains of a study are folded beside the real ones of their week."""
 
-from gyriflow.comparison.validation import folding_agreement
+from gyriflow.compare.validation import folding_agreement
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 

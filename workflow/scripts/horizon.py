@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.comparison.validation import horizon_table
+from gyriflow.compare.validation import horizon_table
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.comparison.onset import named, onset, regions_on, relief, sulcal_regions
+from gyriflow.compare.onset import named, onset, regions_on, relief, sulcal_regions
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carrying import carry_surface

@@ -1,11 +1,11 @@
 """The clean pial surface in RAS+ mm of the only hemisphere of a brain, from its surface or from a label volume."""
 
+from gyriflow.anatomy.pial import from_labels, from_surface
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_one_hemisphere, write_brain
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.pial import from_labels, from_surface
 
 file, output, params = snakemake.input[0], snakemake.output, snakemake.params
 with step(snakemake.log[0], file):

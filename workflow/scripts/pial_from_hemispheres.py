@@ -1,12 +1,12 @@
 """The clean pial surface of a brain in RAS+ mm, from the surfaces of its hemispheres."""
 
+from gyriflow.anatomy.pial import from_hemispheres
+from gyriflow.anatomy.plausible import Limits
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import read_one_hemisphere, write_brain
 from gyriflow.step import step
-from gyriflow.surface.pial import from_hemispheres
-from gyriflow.surface.plausible import Limits
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0], files.left, files.right):

@@ -1,12 +1,12 @@
 """The clean pial surface of a brain and of its hemispheres in RAS+ mm, from a label volume."""
 
+from gyriflow.anatomy.pial import from_labels
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_brain
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.pial import from_labels
 
 labels, output, params = snakemake.input.labels, snakemake.output, snakemake.params
 with step(snakemake.log[0], labels):

@@ -1,9 +1,9 @@
 """A simple geometry as the pial surface of a brain, its halves as hemispheres."""
 
+from gyriflow.anatomy.pial import from_shape
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_surface, write_brain
 from gyriflow.step import step
-from gyriflow.surface.pial import from_shape
 
 output = snakemake.output
 with step(snakemake.log[0], snakemake.input[0]):

@@ -1,10 +1,10 @@
 """The clean pial surface of a brain and of its hemispheres in RAS+ mm, from one closed surface."""
 
+from gyriflow.anatomy.pial import from_surface
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_surface, write_brain
 from gyriflow.step import step
-from gyriflow.surface.pial import from_surface
 
 file, output, params = snakemake.input[0], snakemake.output, snakemake.params
 with step(snakemake.log[0], file):

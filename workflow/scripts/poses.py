@@ -5,13 +5,13 @@ A refused brain does not stop the others: its file holds the reason, and the ste
 
 import logging
 
+from gyriflow.anatomy.plausible import Limits
+from gyriflow.anatomy.pose import pairs_by_shape, poses
+from gyriflow.anatomy.repair import sound_pieces
 from gyriflow.errors import InputError, MeshError
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres
 from gyriflow.step import step
-from gyriflow.surface.plausible import Limits
-from gyriflow.surface.pose import pairs_by_shape, poses
-from gyriflow.surface.repair import sound_pieces
 
 files, params = list(snakemake.input), snakemake.params
 with step(snakemake.log[0]):

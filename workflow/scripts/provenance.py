@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from gyriflow.cli.provenance import software, texts_in
 from gyriflow.io.files import files_in, fingerprints, write_json
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.shell.provenance import software, texts_in
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params

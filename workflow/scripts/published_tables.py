@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.comparison.published import cost_table, displacement_table, growth_table, parameters_table
+from gyriflow.compare.published import cost_table, displacement_table, growth_table, parameters_table
 from gyriflow.io.figures import write_printed
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.yaml_files import read_yaml

@@ -1,5 +1,7 @@
 """The page of a brain for quality control before the solve, and what its row of the study's table says."""
 
+from gyriflow.anatomy.plausible import expected_volume_ml
+from gyriflow.anatomy.thickness import posed_whites
 from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
@@ -11,8 +13,6 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.report.quality import Brain, Volume, facts, quality_page, quality_row, tissue_groups
 from gyriflow.step import step
-from gyriflow.surface.plausible import expected_volume_ml
-from gyriflow.surface.thickness import posed_whites
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):

@@ -1,6 +1,6 @@
 """The surfaces that all runs from a start brain are compared with in a week, ready and with their curvature."""
 
-from gyriflow.comparison.shapes import ready
+from gyriflow.compare.shapes import ready
 from gyriflow.io.surfaces import read_surface, write_surface, write_vertex_maps
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step

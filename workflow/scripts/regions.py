@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.folding.checks import refuse_impossible
 from gyriflow.folding.growth import GrowthInputs
 from gyriflow.folding.growth_models import growth_at_start
@@ -15,7 +16,6 @@ from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import parameters_from, require_maps
 from gyriflow.parameters.terms import REGION_FIELDS
 from gyriflow.step import step
-from gyriflow.surface.fissure import nearer_left
 
 files = snakemake.input
 with step(snakemake.log[0]):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from gyriflow.comparison.shapes import Shape, ready
-from gyriflow.comparison.validation import Comparison, ordered, validation_row
+from gyriflow.compare.shapes import Shape, ready
+from gyriflow.compare.validation import Comparison, ordered, validation_row
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh

@@ -2,7 +2,7 @@
 
 from markupsafe import Markup
 
-from gyriflow.comparison.published import StudyTables, comparison_caption, replication
+from gyriflow.compare.published import StudyTables, comparison_caption, replication
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_table, write_table
 from gyriflow.io.yaml_files import read_yaml

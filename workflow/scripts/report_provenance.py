@@ -1,8 +1,8 @@
 """Where the results come from: versions, commit, and the hashes of the input files."""
 
+from gyriflow.cli.provenance import software
 from gyriflow.io.downloads import sha256_of
 from gyriflow.io.files import write_json
-from gyriflow.shell.provenance import software
 from gyriflow.step import step
 
 params = snakemake.params

@@ -1,11 +1,11 @@
 """A label volume made from a brain's image by the user's own command, checked before it is used."""
 
+from gyriflow.anatomy.labels import cerebrum_mask
 from gyriflow.io.commands import run_command
 from gyriflow.io.files import replaced
 from gyriflow.io.volumes import read_label_volume, require_same_grid
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
-from gyriflow.surface.labels import cerebrum_mask
 
 image, params = snakemake.input[0], snakemake.params
 with step(snakemake.log[0]), replaced(snakemake.output[0]) as labels:

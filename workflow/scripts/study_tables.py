@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from gyriflow.comparison.members import member_row, nearest, side_by_side
-from gyriflow.comparison.published import comparison_caption, with_published_nearest
+from gyriflow.compare.members import member_row, nearest, side_by_side
+from gyriflow.compare.published import comparison_caption, with_published_nearest
 from gyriflow.io.figures import write_printed
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.yaml_files import read_yaml

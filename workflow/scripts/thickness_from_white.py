@@ -1,11 +1,11 @@
 """Cortical thickness at the vertices of a brain's pial surface: its distance from the white surfaces."""
 
+from gyriflow.anatomy.thickness import thickness_from_white
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import read_one_hemisphere, read_surface, write_vertex_maps
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
-from gyriflow.surface.thickness import thickness_from_white
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], *params.white.values()):

@@ -1,7 +1,7 @@
 """Each simulated brain of a run beside the real one of its week, and beside the start brain merely scaled up."""
 
-from gyriflow.comparison.shapes import Shape, ready
-from gyriflow.comparison.validation import Comparison, ordered, validation_row
+from gyriflow.compare.shapes import Shape, ready
+from gyriflow.compare.validation import Comparison, ordered, validation_row
 from gyriflow.growth.curves import value
 from gyriflow.growth.following import curves_of_run
 from gyriflow.io.files import read_table, write_table

@@ -1,5 +1,6 @@
 """The white surfaces of a brain, from its labels or from given files, the maps on them and their metrics."""
 
+from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
 from gyriflow.io.files import write_table
 from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import STRUCTURES, read_one_hemisphere, read_surface, write_surface, write_vertex_maps
@@ -8,7 +9,6 @@ from gyriflow.metrics.measure import measure_white
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
-from gyriflow.surface.white import white_from_labels, white_from_surfaces
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 source, settings = params.source, dict(params.surface)

@@ -11,12 +11,12 @@ import yaml
 from ellipsoid import RUN, SEMI_AXES
 from shapes import ellipsoid_mesh
 
+from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.geometry.triangles import TriangleMesh, corners, merged, submesh
 from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import read_regions, write_tetrahedral_mesh
 from gyriflow.parameters.terms import LEFT, RIGHT
-from gyriflow.surface.fissure import nearer_left
 
 SCRIPTS = Path(__file__).parents[3] / "workflow" / "scripts"
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gyriflow.anatomy.pial import from_labels
 from gyriflow.config.atlas import SULCI
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.deformations import Deformation, transform_points
@@ -16,7 +17,6 @@ from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import LabelVolume, read_label_volume
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
-from gyriflow.surface.pial import from_labels
 
 DRAWING = read_yaml(SULCI / "sulci.yaml")
 SCHEME = SCHEMES[DRAWING["scheme"]]

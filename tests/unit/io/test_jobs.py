@@ -24,9 +24,9 @@ def test_messages_of_steps_and_of_the_folding_are_told_apart(tmp_path):
     log = tmp_path / "a.log"
     write_log(
         log,
-        "2026-11-22 00:53:59,004 INFO gyriflow.surface: fine",
-        "2026-11-22 00:53:59,004 WARNING gyriflow.surface: it is crooked",
-        "2026-11-22 00:53:59,004 WARNING gyriflow.surface: it is crooked",
+        "2026-11-22 00:53:59,004 INFO gyriflow.anatomy: fine",
+        "2026-11-22 00:53:59,004 WARNING gyriflow.anatomy: it is crooked",
+        "2026-11-22 00:53:59,004 WARNING gyriflow.anatomy: it is crooked",
         "2026-11-22 00:53:59,004 WARNING py.warnings: deprecated",
         "warning: few elements",
         "2026-11-22 00:54:00,004 ERROR root: a.nii: no brain",

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gyriflow.config import load
-from gyriflow.plan import Plan
+from gyriflow.study import Plan
 
 DRAW = Path(__file__).parents[3] / "workflow" / "scripts" / "draw.py"
 BRAINS = [{"id": name, "week": week, "phantom": {}} for name, week in (("a", 21), ("b", 22), ("c", 23))]

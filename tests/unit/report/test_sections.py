@@ -6,6 +6,7 @@ from matplotlib.collections import LineCollection
 from pictures import words
 from shapes import ellipsoid_mesh, rigid
 
+from gyriflow.anatomy.extraction import isosurface
 from gyriflow.errors import InputError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
@@ -20,7 +21,6 @@ from gyriflow.report.sections import (
     penalty_law,
     surface_overlay,
 )
-from gyriflow.surface.extraction import isosurface
 
 BALL = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
 SURFACE, _ = boundary_surface(BALL)

@@ -1,6 +1,0 @@
-"""`python -m gyriflow.shell`, which is what `./run gyriflow` calls."""
-
-from .commands import main
-
-if __name__ == "__main__":
-    main(prog_name="gyriflow")

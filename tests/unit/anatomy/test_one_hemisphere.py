@@ -1,0 +1,108 @@
+"""One hemisphere alone: posed by its file or its shape, of the side that it is said to be, or refused."""
+
+import numpy as np
+import odd_brains
+import pytest
+from shapes import LPS, cerebrum_surface, phantom, rigid
+
+from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
+from gyriflow.anatomy.thickness import thickness_from_white
+from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import angle_deg
+from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import CENTRE_MM
+
+QUICK = {"week": 24.0, "edge_length_mm": 2.0}
+DHCP = SCHEMES["dhcp-19"]
+
+
+@pytest.fixture(scope="module")
+def brain():
+    return phantom(24.0, 1.6)
+
+
+@pytest.fixture(scope="module")
+def sides(brain):
+    return {side: cerebrum_surface(odd_brains.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right")}
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize(("degrees", "by"), [((0, 0, 0), "file"), ((0, 0, 180), "file"), ((100, 40, -70), "shape")])
+def test_a_hemisphere_in_any_pose_is_posed(sides, side, degrees, by):
+    turn = rigid(*degrees)
+    surface = from_surface(transformed(sides[side], turn), side, coordinates="auto", **QUICK)
+    assert surface.pose.by == by
+    rest = surface.pose.of_file()[:3, :3] @ turn[:3, :3]
+    assert angle_deg(rest) < 5.0
+    there = getattr(surface, side)
+    assert there is surface.whole
+    assert getattr(surface, "left" if side == "right" else "right") is None
+    away = (there.vertices[:, 0] - surface.fissure_x_mm) * (1 if side == "right" else -1)
+    assert away.min() == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
+    with pytest.raises(InputError, match="seems to be the right one"):
+        from_surface(sides["right"], "left", coordinates="auto", **QUICK)
+    with pytest.raises(InputError, match="this is no single hemisphere"):
+        from_surface(cerebrum_surface(*brain), "left", coordinates="auto", **QUICK)
+
+
+@pytest.mark.fault(41)
+def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
+    labels, affine = pathologies.add_sides(*brain), brain[1]
+    left = odd_brains.one_hemisphere(labels, affine, "left")
+    surface = from_labels(left, affine, DHCP, "left", **QUICK)
+    assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5
+    assert surface.report["volume_mL"] == pytest.approx(surface.report["mask_volume_mL"], rel=0.01)
+    with pytest.raises(InputError, match="holds labels of another hemisphere than the right one"):
+        from_labels(left, affine, DHCP, "right", **QUICK)
+    with pytest.raises(
+        InputError, match=r"one hemisphere only; found labels of the left.*Give a volume with both hemispheres"
+    ):
+        from_labels(left, affine, DHCP, **QUICK)
+    unsided = odd_brains.one_hemisphere(*brain, "left")
+    with pytest.raises(InputError, match=r"seems to hold one hemisphere only"):
+        from_labels(unsided, affine, SCHEMES["spina-bifida-atlas"], **QUICK)
+
+
+def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_told_so(brain):
+    labels, affine = pathologies.add_sides(*brain), brain[1]
+    left, right = DHCP.cortex
+    for kept, lost, side in ((left, right, "left"), (right, left, "right")):
+        merged = np.where(labels == lost, kept, labels)
+        with pytest.raises(InputError, match=f"a whole brain has labels of the {side} hemisphere only.*scheme without"):
+            from_labels(merged, affine, DHCP, **QUICK)
+
+
+def test_volumes_of_a_hemisphere_whose_affine_is_lps_are_turned_as_its_labels(brain):
+    left = odd_brains.one_hemisphere(pathologies.add_sides(*brain), brain[1], "left")
+    affine = rigid(0, 0, 180) @ brain[1]
+    surface = from_labels(left, affine, DHCP, "left", **QUICK)
+    assert "the shape says that the coordinates are LPS" in surface.report["warnings"]
+    world = surface.pose.world @ affine
+    voxels = np.argwhere(np.isin(left, DHCP.cerebrum)) @ world[:3, :3].T + world[:3, 3]
+    for end in (np.min, np.max):
+        assert end(surface.whole.vertices, axis=0) == pytest.approx(end(voxels, axis=0), abs=2.0)
+
+
+def inner(mesh, depth_mm):
+    return TriangleMesh(mesh.vertices - depth_mm * vertex_normals(mesh), mesh.faces)
+
+
+def test_white_surfaces_give_the_thickness_in_any_pose_and_may_not_cross(sides):
+    moved = [transformed(sides[side], LPS) for side in ("left", "right")]
+    surface = from_hemispheres(*moved, coordinates="lps", **QUICK)
+    posed = surface.whole, surface.pose, surface.fissure_x_mm
+    whites = {side: inner(mesh, 1.5) for side, mesh in zip(("left", "right"), moved, strict=True)}
+    thickness = thickness_from_white(*posed, whites)
+    assert thickness.report["mean_mm"] == pytest.approx(1.5, abs=0.15)
+    assert thickness.measured.mean() > 0.98
+    with pytest.raises(InputError, match=r"the white surface \(left\) crosses the pial one"):
+        thickness_from_white(*posed, whites | {"left": inner(moved[0], -1.5)})
+    with pytest.raises(
+        InputError, match=r"the white surface \(right\) lies in the other hemisphere.*both are of one side"
+    ):
+        thickness_from_white(*posed, whites | {"right": whites["left"]})

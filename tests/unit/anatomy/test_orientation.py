@@ -1,0 +1,123 @@
+"""The mid-sagittal plane and the fissure: found on shifted, turned, sheared and asymmetric brains."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from shapes import cerebrum_surface, ellipsoid, phantom
+
+from gyriflow.anatomy.extraction import isosurface, smooth_mask
+from gyriflow.anatomy.fissure import fissure_between, mid_plane, open_fissure, upright
+from gyriflow.geometry.remeshing import remesh
+from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.phantom.brain import CENTRE_MM
+
+
+@pytest.fixture(scope="module")
+def brain():
+    mesh = cerebrum_surface(*phantom())
+    # the phantom's own centre to the origin: its fissure is x = 0 there
+    return TriangleMesh(mesh.vertices - CENTRE_MM, mesh.faces)
+
+
+def moved(brain, linear, shift=(0.0, 0.0, 0.0)):
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = linear, shift
+    return transformed(brain, matrix), matrix
+
+
+def angle_to(plane, normal):
+    return np.degrees(np.arccos(np.clip(plane.normal @ normal / np.linalg.norm(normal), -1, 1)))
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 45), (0, -45, 0), (30, 20, -30), (90, 0, 0)])
+def test_turned_and_shifted_brain(brain, turn):
+    rotation = Rotation.from_euler("xyz", turn, degrees=True).as_matrix()
+    mesh, matrix = moved(brain, rotation, (31.0, -4.0, 9.0))
+    plane = mid_plane(mesh)
+    assert angle_to(plane, rotation[:, 0]) < 1.0
+    # the origin of the unmoved brain lies in its fissure
+    assert plane.offset - plane.normal @ matrix[:3, 3] == pytest.approx(0.0, abs=0.4)
+    assert plane.fissure_points > 500
+
+
+@pytest.mark.parametrize("shear", [(0.0, 0.15), (0.1, 0.0), (-0.1, 0.1)])
+def test_sheared_brain_where_symmetry_and_fissure_differ(brain, shear):
+    linear = np.eye(3)
+    linear[0, 1:] = shear
+    mesh, _ = moved(brain, linear)
+    plane = mid_plane(mesh)
+    assert angle_to(plane, np.array([1.0, *(-s for s in shear)])) < 1.5
+    assert plane.offset == pytest.approx(0.0, abs=0.4)
+
+
+@pytest.mark.parametrize("stretch", [1.1, 1.25])
+def test_brain_with_a_larger_right_hemisphere(brain, stretch):
+    vertices = brain.vertices.copy()
+    vertices[vertices[:, 0] > 0, 0] *= stretch
+    mesh = TriangleMesh(vertices, brain.faces)
+    middle_of_box = 0.5 * (vertices[:, 0].min() + vertices[:, 0].max())
+    plane = mid_plane(mesh)
+    assert abs(middle_of_box) > 1.0
+    assert angle_to(plane, np.array([1.0, 0, 0])) < 1.0
+    assert plane.offset == pytest.approx(0.0, abs=0.5)
+
+
+def test_upright_turns_the_plane_to_constant_x_and_little_else(brain):
+    rotation = Rotation.from_euler("xyz", [0, 15, -25], degrees=True).as_matrix()
+    mesh, _ = moved(brain, rotation)
+    centre = mesh.vertices.mean(axis=0)
+    plane = mid_plane(mesh)
+    matrix, angle = upright(plane, centre)
+    assert matrix[:3, :3] @ plane.normal == pytest.approx([1, 0, 0], abs=1e-9)
+    assert angle == pytest.approx(np.degrees(np.arccos(rotation[0, 0])), abs=1.0)
+    assert matrix[:3, :3] @ centre + matrix[:3, 3] == pytest.approx(centre, abs=1e-9)
+    # anterior and superior keep their sense
+    assert (matrix @ [*rotation[:, 1], 0])[1] > 0.9
+    assert (matrix @ [*rotation[:, 2], 0])[2] > 0.9
+
+
+def test_tiny_tilt_is_left_alone(brain):
+    mesh, _ = moved(brain, Rotation.from_euler("z", 0.2, degrees=True).as_matrix())
+    matrix, angle = upright(mid_plane(mesh), np.zeros(3))
+    assert angle == 0.0
+    assert np.array_equal(matrix, np.eye(4))
+
+
+def test_mid_surface_follows_a_bent_fissure(brain):
+    bend = 2.0 * np.cos(np.pi * brain.vertices[:, 1] / 30.0)
+    bent = TriangleMesh(brain.vertices + bend[:, None] * [1.0, 0, 0], brain.faces)
+    fissure = fissure_between(bent, mid_plane(bent))
+    y = np.array([-20.0, -10.0, 0.0, 10.0, 20.0])
+    in_fissure = np.stack([2.0 * np.cos(np.pi * y / 30.0), y, np.full(5, 14.0)], axis=1)
+    assert np.abs(fissure.height_above(in_fissure)).max() < 0.7
+    assert (fissure.height_above(in_fissure - [6.0, 0, 0]) < -5.0).all()
+
+
+def test_shut_fissure_is_opened_down_to_the_joint():
+    # two blocks of core in one block of cortex, joined by a bar: the fissure is hidden
+    brain, core = np.zeros((40, 40, 30), dtype=bool), np.zeros((40, 40, 30), dtype=bool)
+    brain[4:36, 4:36, 4:26] = True
+    core[6:18, 6:34, 6:24], core[22:34, 6:34, 6:24] = True, True
+    core[18:22, 12:28, 6:12] = True
+    affine = np.diag([0.8, 0.8, 0.8, 1.0])
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    plane = mid_plane(walls)
+    shut = smooth_mask(brain, 1.0)
+    field = open_fissure(shut, affine, core, fissure_between(walls, plane), 1.6)
+    assert plane.offset == pytest.approx(19.5 * 0.8, abs=0.2)
+    # open at the top above the joint and beside it, closed in the joint
+    assert not (field[19:21, 20, 16:26] > 0.5).any()
+    assert not (field[19:21, 5, 5:25] > 0.5).any()
+    assert (field[18:22, 20, 7:12] > 0.5).all()
+    # the walls are 1.6 mm, two voxels, apart: nothing further away is lost
+    assert ((shut > 0.5) & (field <= 0.5))[[17, 22]].sum() == 0
+    assert ((shut > 0.5) & (field <= 0.5))[:17].sum() == 0
+
+
+def test_named_coordinates_are_kept_by_a_body_with_many_mirror_planes(brain):
+    # bodies of revolution about z and, of coarse and uneven triangles, about y
+    for body in (ellipsoid((24.0, 24.0, 33.0)), remesh(ellipsoid((30.0, 36.0, 30.0)), 2.5)):
+        assert angle_to(mid_plane(body, named=True), np.array([1.0, 0, 0])) == pytest.approx(0.0, abs=1e-6)
+    # a brain has one plane, in whatever coordinates
+    rotation = Rotation.from_euler("xyz", [0, 15, -25], degrees=True).as_matrix()
+    assert angle_to(mid_plane(moved(brain, rotation)[0], named=True), rotation[:, 0]) < 1.0

@@ -1,0 +1,133 @@
+"""Left and right of closed surfaces: two pieces are the hemispheres, one piece is cut where the fissure is."""
+
+import numpy as np
+import odd_brains
+import pytest
+from shapes import cerebrum_surface, ellipsoid, phantom, sphere
+
+from gyriflow.anatomy.extraction import isosurface, smooth_mask
+from gyriflow.anatomy.fissure import MidPlane, cut_sides, fissure_between, left_faces, mid_plane, open_fissure
+from gyriflow.anatomy.pial import from_labels
+from gyriflow.anatomy.repair import pieces
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import CENTRE_MM
+
+
+@pytest.fixture(scope="module")
+def brain():
+    return phantom()
+
+
+def ball_at(*centre):
+    return sphere(10.0, 3, centre)
+
+
+def test_two_closed_pieces_are_the_hemispheres_though_they_reach_over_the_plane():
+    mesh = merged(ball_at(-8.0, 0.0, 0.0), ball_at(12.5, 0.0, 0.0))
+    left = left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
+    assert left.tolist() == [True] * 1280 + [False] * 1280
+
+
+def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
+    # whose middle is a little off the plane, on the other side than the lump
+    brain = ellipsoid((24, 33, 22), centre=(0.5, 0, 0))
+    lump = sphere(8.7, 3, (-38.0, 0.0, 0.0))
+    assert 0.1 < area(lump) / area(brain) < 0.12
+    mesh = merged(brain, lump)
+    with pytest.raises(InputError, match=r"cannot be parted at the fissure.* 10 % of the area beside"):
+        left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
+
+
+@pytest.mark.parametrize("mm", [3.0, 6.0])
+def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
+    labels, affine = brain
+    mesh = cerebrum_surface(odd_brains.bent_midline(pathologies.apart(labels, affine), affine, mm), affine)
+    fissure = fissure_between(mesh, mid_plane(mesh))
+    sides = cut_sides(mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1))))
+    assert [len(pieces(side)) for side in sides] == [1, 1]
+    assert area(sides[0]) == pytest.approx(area(sides[1]), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "pathology", [odd_brains.bent_midline, pathologies.without_callosum, pathologies.shifted_midline]
+)
+def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
+    labels, affine = brain
+    mesh = cerebrum_surface(pathology(labels, affine), affine)
+    fissure = fissure_between(mesh, mid_plane(mesh))
+    left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
+    sides = cut_sides(mesh, left)
+    assert [len(pieces(side)) for side in sides] == [1, 1]
+    place = corners(mesh).mean(axis=1) - CENTRE_MM
+    middle = {"bent_midline": 3.0 * np.sin(place[:, 1] / 12.0), "shifted_midline": 8.0}.get(pathology.__name__, 0.0)
+    wrong = np.where(left, place[:, 0] - middle, middle - place[:, 0]) > 1.5
+    assert face_areas(mesh)[wrong].sum() < 0.005 * area(mesh)
+
+
+def test_a_cut_that_does_not_part_the_surface_is_refused():
+    mesh = ball_at(0.0, 0.0, 0.0)
+    stripes = np.sin(corners(mesh)[:, :, 0].mean(axis=1) * 1.2)
+    with pytest.raises(InputError, match="cannot be parted at the fissure"):
+        left_faces(mesh, stripes)
+
+
+def test_a_bend_of_more_than_5_mm_is_followed():
+    # two walls 2 mm apart whose middle bends away from the plane by 9 mm
+    y, z = np.meshgrid(np.arange(-40.0, 40.0, 1.0), np.arange(-20.0, 20.0, 1.0), indexing="ij")
+    middle = 9.0 * np.exp(-((y / 15.0) ** 2))
+    grid = np.arange(y.size).reshape(y.shape)
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    walls = [np.stack([middle + x, y, z], axis=-1).reshape(-1, 3) for x in (-1.0, 1.0)]
+    outer = [np.stack([np.full(y.shape, x), y, z], axis=-1).reshape(-1, 3) for x in (-35.0, 35.0)]
+    sheets = [(walls[0], faces), (walls[1], faces[:, ::-1]), (outer[0], faces[:, ::-1]), (outer[1], faces)]
+    mesh = merged(*(TriangleMesh(points, corner) for points, corner in sheets))
+    plane = MidPlane(np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0, 0.0)
+    fissure = fissure_between(mesh, plane)
+    for at in (-30.0, -12.0, 0.0, 12.0):
+        place = np.array([[9.0 * np.exp(-((at / 15.0) ** 2)), at, 0.0]])
+        assert abs(fissure.height_above(place)[0]) < 1.0
+
+
+def block(gap_voxels):
+    """Returns two blocks of core in cortex, joined by a bar, with a gap of CSF between their cortex, and the affine."""
+    brain, core = np.zeros((41, 40, 30), dtype=bool), np.zeros((41, 40, 30), dtype=bool)
+    brain[4:37, 4:36, 4:26] = True
+    core[6:18, 6:34, 6:24], core[23:35, 6:34, 6:24] = True, True
+    core[18:23, 12:28, 6:12] = True
+    if gap_voxels:
+        first = 20 - gap_voxels // 2
+        brain[first : first + gap_voxels, :, 14:] = False
+        brain[first : first + gap_voxels, :10] = brain[first : first + gap_voxels, 30:] = False
+    return brain, core, np.diag([0.9, 0.9, 0.9, 1.0])
+
+
+@pytest.mark.parametrize(("gap_voxels", "open_voxels"), [(0, 1), (1, 0)])
+def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
+    brain, core, affine = block(gap_voxels)
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    fissure = fissure_between(walls, mid_plane(walls))
+    field = smooth_mask(brain, 0.5)
+    hidden = fissure.hidden(brain, affine, 1.5)
+    wide = open_fissure(field, affine, core, fissure, 1.5, hidden)
+    # cortex beside a fissure that CSF shows stays; a hidden one is opened
+    taken = (field > 0.5) & (wide <= 0.5)
+    assert bool(taken[18:23, 15:25, 17:24].any()) == bool(open_voxels)
+    assert not (wide[20, 20, 17:24] > 0.5).any()
+
+
+def test_a_narrow_fissure_shown_by_csf_keeps_its_width(brain):
+    labels, affine = phantom(24.0, 0.9)
+    x, _, _ = pathologies.positions(labels, affine)
+    cerebrum = np.isin(labels, pathologies.CEREBRUM)
+    # one voxel of CSF in the middle, cortex beside it
+    middle = np.abs(x) < 0.46
+    filled = np.where((labels == 4) & (np.abs(x) < 3.0), 5, labels)
+    shown = np.where((labels == 4) & middle & (filled == 5), 4, filled)
+    surface = from_labels(shown, affine, SCHEMES["spina-bifida-atlas"], week=24.0, edge_length_mm=1.2)
+    assert cerebrum.sum() < np.isin(shown, pathologies.CEREBRUM).sum()
+    assert surface.report["fissure_opened_mL"] < 0.002 * surface.report["volume_mL"]
+    assert surface.report["area_cm2"]["whole"] > 110.0

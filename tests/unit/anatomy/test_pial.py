@@ -1,0 +1,356 @@
+"""Whole pial surfaces from each kind of input: closed spheres, posed, honest in size, split at the fissure."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+from scipy.spatial.transform import Rotation
+from shapes import LPS, rigid, sphere
+
+from gyriflow.anatomy.fissure import least_gap, left_faces, set_apart, split
+from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
+from gyriflow.anatomy.plausible import doubts_of_proportions, expected_volume_ml, require_plausible_size
+from gyriflow.anatomy.repair import pieces
+from gyriflow.errors import InputError
+from gyriflow.geometry.remeshing import self_intersecting_faces
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    euler_number,
+    flipped,
+    is_closed,
+    merged,
+    signed_volume,
+    submesh,
+    transformed,
+)
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.surfaces import read_surface
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.mesh.maps import move_to_mesh
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
+
+DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
+ATLAS = SCHEMES["spina-bifida-atlas"]
+QUICK = {"edge_length_mm": 1.5}
+
+
+def atlas_volume(week):
+    path = DATA / "spina_bifida_atlas" / f"week{week}_labels.nii.gz"
+    if not path.exists():
+        pytest.skip(f"no example data: {path} is missing (GYRIFLOW_DATA names its folder)")
+    return read_label_volume(path)
+
+
+@pytest.fixture(scope="module")
+def volume():
+    return shapes.phantom()
+
+
+@pytest.fixture(scope="module")
+def phantom(volume):
+    return from_labels(*volume, ATLAS, week=24.0, **QUICK)
+
+
+@pytest.fixture(scope="module")
+def halves():
+    """The phantom's left and right hemispheres as closed surfaces a millimetre apart, where its volume has them."""
+    return [transformed(half, rigid(shift=CENTRE_MM)) for half in shapes.phantom_halves()]
+
+
+def require_sound(surface, surfaces=1):
+    whole = surface.whole
+    assert is_closed(whole)
+    assert [euler_number(piece) for piece in pieces(whole)] == [2] * surfaces
+    assert all(signed_volume(piece) > 0 for piece in pieces(whole))
+    assert not self_intersecting_faces(whole).any()
+    assert len(surface.left.faces) + len(surface.right.faces) == len(whole.faces)
+    assert surface.left.vertices[:, 0].mean() < surface.fissure_x_mm < surface.right.vertices[:, 0].mean()
+    assert area(surface.left) + area(surface.right) == pytest.approx(area(whole))
+    json.dumps(surface.report, allow_nan=False)
+
+
+def test_phantom_surface_is_sound_and_of_the_masks_volume(phantom):
+    require_sound(phantom)
+    report = phantom.report
+    expected = report["mask_volume_mL"] - report["fissure_opened_mL"]
+    assert report["volume_mL"] == pytest.approx(expected, rel=0.015)
+    assert report["volume_mL"] == pytest.approx(signed_volume(phantom.whole) / 1e3)
+    assert phantom.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
+    assert report["rotation_deg"] < 1.0
+
+
+@pytest.mark.slow
+def test_phantoms_of_all_ages_are_sound_and_fold():
+    surfaces = [
+        from_labels(*phantom_labels(week, voxel_mm=voxel_mm), ATLAS, week=week, edge_length_mm=edge_mm)
+        for week, voxel_mm, edge_mm in ((21.0, 1.2, 1.5), (29.5, 1.2, 1.8), (36.0, 1.2, 1.8))
+    ]
+    for surface in surfaces:
+        require_sound(surface)
+        assert surface.report["warnings"] == []
+    young, _, old = (surface.whole for surface in surfaces)
+    assert area(old) / area(young) > 1.1 * (signed_volume(old) / signed_volume(young)) ** (2 / 3)
+
+
+@pytest.mark.fault(1)
+@pytest.mark.parametrize("turn", [(0, 0, 45), (20, -30, 10)])
+def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom, turn):
+    labels, affine = volume
+    oblique = rigid(*turn)
+    turned = from_labels(labels, oblique @ affine, ATLAS, week=24.0, **QUICK)
+    require_sound(turned)
+    for part in ("whole", "left", "right"):
+        assert turned.report["area_cm2"][part] == pytest.approx(phantom.report["area_cm2"][part], rel=0.005)
+    normal = turned.pose.world[:3, :3] @ oblique[:3, 0]
+    assert np.degrees(np.arccos(normal[0])) < 1.0
+
+
+@pytest.mark.fault(3)
+def test_storage_order_makes_no_difference(volume, phantom):
+    labels, affine = volume
+    reversed_ = affine @ np.diag([1.0, -1.0, 1.0, 1.0])
+    reversed_[:3, 3] += affine[:3, 1] * (labels.shape[1] - 1)
+    same = from_labels(labels[:, ::-1], reversed_, ATLAS, week=24.0, **QUICK)
+    assert same.report["area_cm2"]["whole"] == pytest.approx(phantom.report["area_cm2"]["whole"], rel=0.003)
+    assert same.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.1)
+
+
+@pytest.mark.fault(4)
+@pytest.mark.parametrize(("factor", "unit"), [(1e-3, "metres"), (1e3, "micrometres"), (0.1, "centimetres")])
+def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, unit):
+    labels, affine = volume
+    scale = np.diag([factor] * 3 + [1.0])
+    with pytest.raises(InputError, match=f"seems to be in {unit}"):
+        from_labels(labels, scale @ affine, ATLAS, week=24.0)
+    with pytest.raises(InputError, match=f"seems to be in {unit}"):
+        from_surface(transformed(phantom.whole, scale), week=24.0, max_hole_mm=3.0)
+    with pytest.raises(InputError, match=f"seems to be in {unit}"):
+        from_hemispheres(*(transformed(half, scale) for half in halves), week=24.0)
+
+
+@pytest.mark.parametrize(("week", "volume_ml"), [(21, 25.0), (21, 90.0), (29, 110.0), (36, 500.0), (36, 1300.0)])
+def test_small_large_and_adult_brains_pass(week, volume_ml):
+    require_plausible_size(volume_ml * 1e3, np.ones(3), week)
+
+
+@pytest.mark.parametrize(
+    ("share", "doubted"), [(0.57, False), (1.27, False), (0.8**-3, True), (0.3, True), (0.5, True), (1.5, True)]
+)
+def test_a_volume_far_from_that_of_the_week_is_doubted(share, doubted):
+    said = require_plausible_size(share * expected_volume_ml(24.0) * 1e3, np.ones(3), 24.0)
+    assert [f"has {100 * share:.0f} % of the volume expected at week 24" in doubt for doubt in said] == [True] * doubted
+
+
+def test_a_brain_of_another_week_is_doubted():
+    size = expected_volume_ml(25.0) * 1e3
+    assert require_plausible_size(size, np.ones(3), 25.0) == []
+    assert "is the week right" in require_plausible_size(size, np.ones(3), 34.0)[0]
+    assert "is the week right" in require_plausible_size(1.3**3 * size, np.ones(3), 25.0)[0]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_wrong_edge_of_the_voxels_is_told_by_the_brains_proportions(axis):
+    # the spina bifida atlas at 31 GW
+    extents = np.array([75.0, 92.0, 66.0])
+    assert doubts_of_proportions(extents) == []
+    extents[axis] *= 1.3
+    assert "is the scale of each axis right?" in doubts_of_proportions(extents)[0]
+
+
+@pytest.mark.fault(4)
+def test_a_surface_in_voxel_indices_is_told(phantom):
+    assert not any("voxel indices" in warning for warning in phantom.report["warnings"])
+    # voxels of 0.7 mm
+    indices = transformed(phantom.whole, np.diag([1 / 0.7] * 3 + [1.0]))
+    surface = from_surface(indices, week=24.0, edge_length_mm=3.0)
+    assert any("not in voxel indices?" in warning for warning in surface.report["warnings"])
+
+
+def test_hemispheres_are_merged_apart_and_whole(halves):
+    surface = from_hemispheres(*halves, week=24.0, **QUICK)
+    require_sound(surface, surfaces=2)
+    assert not any("behind the middle" in warning for warning in surface.report["warnings"])
+    assert surface.report["moved_apart_mm"] == 0.0
+    assert is_closed(surface.left)
+    assert signed_volume(surface.whole) == pytest.approx(sum(map(signed_volume, halves)), rel=0.01)
+    assert surface.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
+    assert least_gap(*pieces(surface.whole)) > 0.5
+
+
+def test_hemispheres_in_lps_and_inside_out_are_the_same_brain(halves):
+    left, right = (flipped(transformed(half, LPS)) for half in halves)
+    surface = from_hemispheres(left, right, week=24.0, coordinates="lps", **QUICK)
+    require_sound(surface, surfaces=2)
+    assert surface.report["repair_left"]["pieces_turned_outward"] == 1
+    assert surface.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
+
+
+def test_overlapping_hemispheres_are_moved_apart(halves):
+    left = TriangleMesh(halves[0].vertices - [-2.5, 0, 0], halves[0].faces)
+    surface = from_hemispheres(left, halves[1], week=24.0, gap_mm=0.8, **QUICK)
+    require_sound(surface, surfaces=2)
+    assert surface.report["gap_before_mm"] < 0
+    assert 0.5 < surface.report["moved_apart_mm"] < 2.0
+    assert least_gap(*pieces(surface.whole)) == pytest.approx(0.8, abs=0.15)
+    assert any("moved apart" in warning for warning in surface.report["warnings"])
+
+
+@pytest.mark.slow
+def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain(halves):
+    world = merged(*halves)
+    sides, whole = [transformed(half, LPS) for half in halves], transformed(world, LPS)
+    surfaces = {
+        "pial, found": from_surface(whole, week=24.0, coordinates="auto", edge_length_mm=2.5),
+        "hemisphere, found": from_surface(sides[1], "right", week=24.0, coordinates="auto", edge_length_mm=2.5),
+        "hemispheres": from_hemispheres(*sides, week=24.0, coordinates="lps", edge_length_mm=2.5),
+    }
+    for source, surface in surfaces.items():
+        points, one = surface.whole.vertices, source.startswith("hemisphere,")
+        given, there = (sides[1], halves[1]) if one else (whole, world)
+        moved = move_to_mesh(points, given, surface.pose.of_file())
+        # a volume knows the brain in the world, which is RAS+
+        voxels = transformed(there, surface.pose.of_volume("a.nii"))
+        for found in (moved, voxels):
+            for end in (np.min, np.max):
+                assert np.abs(end(found.vertices, axis=0) - end(points, axis=0)).max() < 1.5, source
+
+
+@pytest.mark.fault(9)
+def test_swapped_hemispheres_are_refused(halves):
+    with pytest.raises(InputError, match=r"are LPS \(set coordinates: lps\) or the files are swapped.*Both changes"):
+        from_hemispheres(*reversed(halves), week=24.0)
+    with pytest.raises(InputError, match=r"are RAS \(set coordinates: ras\) or the files are swapped.*Both changes"):
+        from_hemispheres(*halves, week=24.0, coordinates="lps")
+
+
+@pytest.mark.fault(9)
+def test_hemispheres_that_are_swapped_and_in_other_coordinates_are_doubted(halves):
+    surface = from_hemispheres(*halves[::-1], week=24.0, coordinates="lps", edge_length_mm=2.5)
+    assert any("behind the middle" in warning for warning in surface.report["warnings"])
+
+
+@pytest.mark.fault(14)
+def test_hemispheres_of_different_weeks_are_refused(halves):
+    centre = halves[1].vertices.mean(axis=0)
+    larger = TriangleMesh((halves[1].vertices - centre) * 1.06 + centre, halves[1].faces)
+    with pytest.raises(InputError, match="too different in size"):
+        from_hemispheres(halves[0], larger, week=24.0)
+
+
+def test_hemispheres_in_different_poses_are_refused(halves):
+    centre = halves[1].vertices.mean(axis=0)
+    turn = Rotation.from_euler("x", 60, degrees=True).as_matrix()
+    tilted = TriangleMesh((halves[1].vertices - centre) @ turn.T + centre, halves[1].faces)
+    with pytest.raises(InputError, match="not posed as one brain"):
+        from_hemispheres(halves[0], tilted, week=24.0, **QUICK)
+
+
+def test_pial_surface_with_a_small_hole_is_closed(phantom):
+    near = np.linalg.norm(phantom.whole.vertices[phantom.whole.faces].mean(axis=1) - phantom.whole.vertices[0], axis=1)
+    holed, _ = submesh(phantom.whole, near > 1.5)
+    surface = from_surface(transformed(holed, LPS), week=24.0, coordinates="lps", max_hole_mm=6.0, **QUICK)
+    require_sound(surface)
+    assert surface.report["repair"]["holes_closed"] == 1
+    assert area(surface.whole) == pytest.approx(area(phantom.whole), rel=0.02)
+    assert surface.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.2)
+
+
+@pytest.mark.slow
+def test_pial_surface_that_cuts_itself_is_made_anew(phantom):
+    vertices = phantom.whole.vertices.copy()
+    # the left hemisphere's medial wall pushed through the right one's
+    wall = (np.abs(vertices[:, 0] - phantom.fissure_x_mm) < 3.0) & (vertices[:, 0] < phantom.fissure_x_mm)
+    wall &= vertices[:, 2] > CENTRE_MM[2] + 10.0
+    vertices[wall, 0] += 4.0
+    tangled = TriangleMesh(vertices, phantom.whole.faces)
+    assert self_intersecting_faces(tangled).sum() > 20
+    surface = from_surface(tangled, week=24.0, **QUICK)
+    require_sound(surface)
+    assert signed_volume(surface.whole) == pytest.approx(signed_volume(tangled), rel=0.03)
+
+
+def test_split_gives_bulges_back_to_their_hemisphere(phantom):
+    vertices = phantom.whole.vertices.copy()
+    fissure = phantom.fissure_x_mm
+    # a patch of the left medial wall that bulges over the fissure
+    patch = np.linalg.norm(vertices - [fissure - 1.5, CENTRE_MM[1] + 20, CENTRE_MM[2] + 10], axis=1) < 4.0
+    patch &= vertices[:, 0] < fissure
+    assert patch.sum() > 5
+    vertices[patch, 0] += 2.0
+    mesh = TriangleMesh(vertices, phantom.whole.faces)
+    left, right = split(mesh, fissure)
+    assert len(pieces(left)) == len(pieces(right)) == 1
+    assert len(left.faces) + len(right.faces) == len(mesh.faces)
+    assert left.vertices[:, 0].max() > fissure + 0.3
+
+
+def test_face_on_each_side_belongs_to_that_side():
+    square = TriangleMesh([[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]], [[0, 2, 3], [1, 3, 2]])
+    assert left_faces(square, np.array([-0.3, 0.3])).tolist() == [True, False]
+
+
+def test_gap_between_balls_is_known():
+    one, other, closer = (sphere(5.0, 3, (x, 0.0, 0.0)) for x in (-6.0, 6.0, 2.0))
+    assert least_gap(one, other) == pytest.approx(2.0, abs=0.05)
+    assert least_gap(one, closer) == pytest.approx(-2.0, abs=0.1)
+    apart_one, apart_other, moved = set_apart(one, closer, 1.0, np.array([1.0, 0, 0]))
+    assert moved == pytest.approx(1.5, abs=0.1)
+    assert least_gap(apart_one, apart_other) == pytest.approx(1.0, abs=0.1)
+
+
+def test_sides_of_a_scheme_that_contradict_the_affine_are_refused(volume):
+    labels, affine = pathologies.add_sides(*volume), volume[1]
+    scheme = SCHEMES["dhcp-19"]
+    assert from_labels(labels, affine, scheme, week=24.0, **QUICK).fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.5)
+    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0]) @ affine
+    with pytest.raises(InputError, match="left hemisphere lie on the right"):
+        from_labels(labels, mirrored, scheme, week=24.0, **QUICK)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("week", [21, 29])
+def test_real_atlas_labels_give_sound_surfaces(week):
+    volume = atlas_volume(week)
+    surface = from_labels(volume.labels, volume.affine, ATLAS, week=float(week), edge_length_mm=1.2)
+    require_sound(surface)
+    report = surface.report
+    expected = report["mask_volume_mL"] - report["fissure_opened_mL"]
+    assert report["volume_mL"] == pytest.approx(expected, rel=0.01)
+    # tissue across the open fissure would be a filled tunnel
+    assert report["topology"]["voxels_filled_in_tunnels"] < 10
+    # this atlas is mirror-symmetric about x = 0
+    assert surface.fissure_x_mm == pytest.approx(0.0, abs=0.1)
+    assert report["area_cm2"]["left"] == pytest.approx(report["area_cm2"]["right"], rel=0.02)
+
+
+def test_real_labels_and_hemispheres_of_a_week_agree():
+    folder = DATA / "hemispheres"
+    if not folder.exists():
+        pytest.skip(f"no example data: {folder} is missing (GYRIFLOW_DATA names its folder)")
+    left, right = (read_surface(folder / f"fetal.week21.{side}.pial.surf.gii") for side in ("left", "right"))
+    surface = from_hemispheres(left, right, week=21.0, coordinates="lps")
+    require_sound(surface, surfaces=2)
+    # truth.json of the example data: 49.40 and 49.44 cm², 23.01 and 23.04 mL
+    assert surface.report["area_cm2"]["left"] == pytest.approx(49.40, rel=0.01)
+    assert surface.report["area_cm2"]["right"] == pytest.approx(49.44, rel=0.01)
+    assert surface.report["volume_mL"] == pytest.approx(46.05, rel=0.005)
+    assert surface.fissure_x_mm == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_real_fissure_hidden_by_cortex_is_opened_or_left_shut_as_asked():
+    volume = atlas_volume(21)
+    opened, shut = (
+        from_labels(volume.labels, volume.affine, ATLAS, week=21.0, edge_length_mm=1.2, fissure_mm=width)
+        for width in (1.5, 0.0)
+    )
+    # the example hemispheres of this week, cut apart and closed, have 98.8 cm²; the shut brain lacks its medial walls
+    assert shut.report["area_cm2"]["whole"] < 75
+    assert 85 < opened.report["area_cm2"]["whole"] < 98
+    wall = opened.left.vertices[np.abs(opened.left.vertices[:, 0] - opened.fissure_x_mm) < 1.5]
+    assert np.median(wall[:, 0]) == pytest.approx(-0.75, abs=0.1)

@@ -1,0 +1,186 @@
+"""Surfaces from files: what is broken is repaired and counted, or refused."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from shapes import sphere, torus
+
+from gyriflow.anatomy.repair import clean, make_even, pieces, rebuild, smooth_taubin, sound_pieces
+from gyriflow.errors import MeshError
+from gyriflow.geometry.remeshing import remesh, self_intersecting_faces, untangle
+from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume, submesh
+
+RADIUS = 10.0
+VOLUME = 4 / 3 * np.pi * RADIUS**3
+
+
+def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
+    return sphere(radius, centre=centre)
+
+
+def test_sound_surface_stays_as_it_is():
+    mesh, report = clean(ball(), 3.0)
+    assert signed_volume(mesh) == pytest.approx(signed_volume(ball()))
+    assert {key: value for key, value in report.items() if value} == {"pieces": 1}
+
+
+def test_small_hole_is_closed_and_reported():
+    whole = ball()
+    near = np.linalg.norm(whole.vertices[whole.faces].mean(axis=1) - [0, 0, RADIUS], axis=1) < 1.2
+    mesh, report = clean(submesh(whole, ~near)[0], 3.0)
+    assert is_closed(mesh)
+    assert report["holes_closed"] == 1
+    assert 1.5 < report["largest_hole_mm"] < 3.0
+    assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.01)
+
+
+def test_large_hole_is_refused_with_its_size():
+    whole = ball()
+    mesh, _ = submesh(whole, whole.vertices[whole.faces][:, :, 2].max(axis=1) < 8.0)
+    with pytest.raises(MeshError, match=r"1 of 1 holes, up to 1[12]\.\d mm.*at most 3 mm.*raise surface\.max_hole_mm"):
+        clean(mesh, 3.0)
+    wide = TriangleMesh(3.0 * mesh.vertices, mesh.faces)
+    with pytest.raises(MeshError, match=r"up to 3\d\.\d mm.*Give a closed surface: holes of this size"):
+        clean(wide, 20.0)
+
+
+@pytest.mark.parametrize("shift", [60.0, -25.0], ids=["spike", "dent"])
+@pytest.mark.parametrize("reach", [0.1, 2.0], ids=["one", "several"])
+def test_vertices_far_off_the_surface_are_moved_back_and_told(shift, reach):
+    whole = ball()
+    vertices = whole.vertices.copy()
+    moved = np.linalg.norm(vertices - vertices[7], axis=1) < reach
+    vertices[moved] *= 1.0 + shift / RADIUS
+    found = sound_pieces(TriangleMesh(vertices, whole.faces), 3.0)
+    assert found.report["repair"]["vertices_moved_back"] == moved.sum()
+    assert f"far off the surface were set between their neighbours: {moved.sum()}" in found.warnings[0]
+    assert signed_volume(found.mesh) == pytest.approx(VOLUME, rel=0.01)
+    assert np.linalg.norm(found.mesh.vertices, axis=1).max() < RADIUS + 0.1
+
+
+def test_large_triangles_and_fans_are_no_spikes():
+    assert clean(sphere(40.0, 0), 3.0)[1]["vertices_moved_back"] == 0
+    # a flat end of 24 mm across, closed by a fan of long triangles
+    whole = sphere(20.0, 4)
+    kept = whole.vertices[whole.faces][:, :, 2].max(axis=1) < 16.0
+    mesh, report = clean(submesh(whole, kept)[0], 30.0)
+    assert report["holes_closed"] == 1
+    assert clean(mesh, 3.0)[1]["vertices_moved_back"] == 0
+
+
+def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():
+    whole = ball()
+    vertices = whole.vertices.copy()
+    vertices[7] *= 1.0 + 200.0 / RADIUS
+    tracemalloc.start()
+    mesh, _ = rebuild(TriangleMesh(vertices, whole.faces), 1.0)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 500e6
+    assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.1)
+
+
+@pytest.mark.fault(19)
+def test_faces_inside_out_are_turned():
+    mesh, report = clean(flipped(ball()), 3.0)
+    assert signed_volume(mesh) > 0
+    assert report["pieces_turned_outward"] == 1
+
+
+def test_faces_partly_inside_out_are_turned():
+    faces = ball().faces.copy()
+    faces[100:300] = faces[100:300, ::-1]
+    mesh, report = clean(TriangleMesh(ball().vertices, faces), 3.0)
+    assert is_closed(mesh)
+    assert signed_volume(mesh) == pytest.approx(signed_volume(ball()))
+    assert report["faces_turned_to_agree"] == 200
+
+
+@pytest.mark.fault(22)
+def test_soup_of_separate_triangles_is_joined():
+    whole = ball()
+    soup = TriangleMesh(whole.vertices[whole.faces].reshape(-1, 3), np.arange(3 * len(whole.faces)).reshape(-1, 3))
+    mesh, report = clean(soup, 3.0)
+    assert len(mesh.vertices) == len(whole.vertices)
+    assert report["duplicate_vertices_joined"] == 3 * len(whole.faces) - len(whole.vertices)
+    assert report["faces_that_cut_others"] == 0
+
+
+@pytest.mark.fault(22)
+def test_degenerate_and_double_faces_are_removed():
+    whole = ball()
+    faces = np.vstack([whole.faces, whole.faces[:5], [[7, 7, 8]]])
+    mesh, report = clean(TriangleMesh(whole.vertices, faces), 3.0)
+    assert len(mesh.faces) == len(whole.faces)
+    assert (report["double_faces_removed"], report["degenerate_faces_removed"]) == (5, 1)
+
+
+def test_non_manifold_fin_is_removed():
+    whole = ball()
+    vertices = np.vstack([whole.vertices, whole.vertices[whole.faces[0, 0]] * 1.02])
+    fin = [[whole.faces[0, 0], whole.faces[0, 1], len(whole.vertices)]]
+    mesh, report = clean(TriangleMesh(vertices, np.vstack([whole.faces, fin])), 3.0)
+    assert is_closed(mesh)
+    assert report["non_manifold_edges_opened"] == 1
+    assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.01)
+
+
+@pytest.mark.fault(21)
+def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
+    mesh, report = clean(
+        merged(ball((-11, 0, 0)), ball((11, 0, 0), 9.5), ball((0, 30, 0), 1.0), flipped(ball((-11, 0, 0), 7.0))), 3.0
+    )
+    assert (report["pieces"], report["pieces_dropped"]) == (2, 2)
+    assert signed_volume(mesh) == pytest.approx(VOLUME * (1 + 0.95**3), rel=0.01)
+    assert all(signed_volume(piece) > 0 for piece in pieces(mesh))
+
+
+def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
+    even, report = make_even(ball(), 10, 1.0)
+    assert is_closed(even)
+    lengths = np.linalg.norm(np.diff(even.vertices[even.faces[:, :2]], axis=1), axis=-1)
+    assert lengths.mean() == pytest.approx(1.0, rel=0.1)
+    assert signed_volume(even) == pytest.approx(VOLUME, rel=0.01)
+    assert report["self_intersections_before"] == report["self_intersections_after"] == 0
+
+
+def test_smoothing_removes_noise_but_not_volume():
+    noise = np.random.default_rng(0).normal(scale=0.1, size=ball().vertices.shape)
+    rough = TriangleMesh(ball().vertices + noise, ball().faces)
+    smooth = smooth_taubin(rough, 10)
+    assert signed_volume(smooth) == pytest.approx(VOLUME, rel=0.01)
+    assert np.linalg.norm(smooth.vertices, axis=1).std() < 0.5 * np.linalg.norm(rough.vertices, axis=1).std()
+
+
+def test_tangle_is_counted_and_relaxed():
+    vertices = ball().vertices.copy()
+    # one vertex pushed through the opposite side of a dent
+    vertices[np.argmax(vertices[:, 2])] *= 0.7
+    vertices[np.argsort(-vertices[:, 2])[1]] += [0.0, 2.5, -1.5]
+    tangled = TriangleMesh(vertices, ball().faces)
+    assert self_intersecting_faces(tangled).sum() > 0
+    free = untangle(tangled)
+    assert self_intersecting_faces(free).sum() == 0
+    assert euler_number(free) == 2
+    assert signed_volume(free) == pytest.approx(VOLUME, rel=0.01)
+
+
+def test_overlapping_balls_are_made_one_surface():
+    both = merged(ball((-6, 0, 0)), ball((6, 0, 0)))
+    assert self_intersecting_faces(both).any()
+    one, report = rebuild(both, 0.7)
+    assert is_closed(one)
+    assert euler_number(one) == 2
+    # two balls less the lens that they share: two caps of height 4
+    cap = np.pi * 4.0**2 * (3 * RADIUS - 4.0) / 3
+    assert signed_volume(one) == pytest.approx(2 * VOLUME - 2 * cap, rel=0.02)
+    assert report["handles_left"] == 0
+
+
+def test_handle_of_a_torus_is_closed_when_remade():
+    mesh, report = clean(torus(10.0, 7.5, 60, 40), 3.0)
+    assert euler_number(mesh) == 0
+    simple, report = rebuild(remesh(mesh, 1.0), 0.8)
+    assert euler_number(simple) == 2
+    assert report["tunnels_filled"] + report["bridges_cut"] == 1

@@ -1,0 +1,121 @@
+"""Left and right from labels that have sides, and the volume that smoothing gives back."""
+
+import numpy as np
+import pytest
+from shapes import phantom, rigid, sphere
+
+from gyriflow.anatomy.pial import from_labels
+from gyriflow.anatomy.repair import after_repairs, with_volume
+from gyriflow.errors import InputError
+from gyriflow.geometry.remeshing import self_intersecting_faces
+from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
+from gyriflow.io.schemes import SCHEMES
+from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.phantom import pathologies
+from gyriflow.phantom.brain import CENTRE_MM
+
+SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A phantom whose sides meet at a surface bent by 4 mm, cortex on both sides of it and no gap between."""
+    labels, affine = phantom()
+    index = np.stack(np.indices(labels.shape), axis=-1)
+    x, y, _ = np.moveaxis(index @ affine[:3, :3].T + affine[:3, 3] - CENTRE_MM, -1, 0)
+    cerebrum = np.isin(labels, (1, 2, 5, 6, 8))
+    middle = 4.0 * np.sin(y / 12.0)
+    # the phantom's own fissure is filled
+    gap = (np.abs(x) < 3.0) & (labels == 4)
+    right = x > middle
+    cortex = (labels == 5) | gap
+    sided = np.where(cerebrum | gap, np.where(cortex, 3, 1) + right, 0)
+    sided[labels == 2] = 5
+    return sided, affine, middle
+
+
+def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet(bent):
+    sided, affine, _ = bent
+    surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=1.5)
+    inverse = surface.pose.world
+    expected = {"left": -1, "right": 1}
+    for name, sign in expected.items():
+        part = getattr(surface, name)
+        centres = corners(part).mean(axis=1) - inverse[:3, 3]
+        places = centres @ np.linalg.inv(inverse[:3, :3]).T - CENTRE_MM
+        wrong = sign * (places[:, 0] - 4.0 * np.sin(places[:, 1] / 12.0)) < -1.2
+        assert face_areas(part)[wrong].sum() < 0.005 * area(part)
+
+
+def test_a_scheme_of_ones_own_names_its_tissues():
+    scheme = LabelScheme(name="mine", cerebrum=(2, 1), cortex=(2,), known={9: "outer CSF", 1: "inside"})
+    assert scheme.labels == {1: "inside", 2: "cortex", 9: "outer CSF"}
+
+
+def test_a_side_of_a_few_voxels_is_no_hemisphere():
+    labels, affine = phantom(21.0, 2.0)
+    scheme, sided = SCHEMES["dhcp-19"], pathologies.add_sides(labels, affine)
+    left = np.argwhere(np.isin(sided, scheme.left))
+    # all but the 40 voxels farthest to the left become the right hemisphere's
+    outermost = left[np.argsort(left @ affine[0, :3])][40:]
+    sided[tuple(outermost.T)] = dict(zip(scheme.left, scheme.right, strict=True))[3]
+    with pytest.raises(InputError, match=r"too small to be one; found areas of \d\.\d\d and \d\d\.\d\d cm²"):
+        from_labels(sided, affine, scheme, week=21.0, edge_length_mm=3.0)
+
+
+@pytest.mark.parametrize("degrees", [(90, 0, 0), (0, 0, 180)])
+def test_a_volume_without_a_hindbrain_has_the_surface_of_the_brain_that_stands_right(degrees):
+    labels, affine = phantom(24.0, 1.6)
+    mask = np.isin(labels, (1, 2, 5, 6, 8)).astype(int)
+    surfaces = [
+        from_labels(mask, rigid(*turn) @ affine, SCHEMES["binary"], week=24.0, edge_length_mm=2.0)
+        for turn in ((0, 0, 0), degrees)
+    ]
+    assert [surface.pose.by for surface in surfaces] == ["file", "shape"]
+    right, turned = (np.array(surface.report["extents_mm"]) for surface in surfaces)
+    np.testing.assert_allclose(turned, right, rtol=0.02)
+
+
+def test_smoothing_keeps_volume_and_area(bent):
+    labels, affine = phantom(22.0)
+    surface = from_labels(labels, affine, SCHEMES["spina-bifida-atlas"], week=22.0, edge_length_mm=1.5)
+    smoothing = surface.report["smoothing"]
+    assert abs(smoothing["volume_change"]) < 1e-4 < abs(smoothing["volume_change_before_correction"])
+    assert abs(smoothing["area_change"]) < 0.02
+    assert signed_volume(surface.whole) / 1e3 == pytest.approx(smoothing["volume_expected_mL"], rel=1e-4)
+    mask = np.isin(labels, (1, 2, 5, 6, 8)).sum() * 1.2**3 / 1e3
+    assert smoothing["volume_expected_mL"] == pytest.approx(mask - surface.report["fissure_opened_mL"], rel=2e-3)
+
+
+def test_a_volume_that_is_far_off_is_told_and_not_hidden():
+    ball = sphere(20.0, 3)
+    volume = signed_volume(ball)
+    near, report = with_volume(ball, 1.02 * volume, area(ball))
+    assert signed_volume(near) == pytest.approx(1.02 * volume, rel=1e-5)
+    assert report["area_change"] == pytest.approx(1.02 ** (2 / 3) - 1, rel=0.01)
+    far, report = with_volume(ball, 1.2 * volume, area(ball))
+    assert far is ball
+    assert report["volume_change"] == pytest.approx(1 / 1.2 - 1)
+
+
+def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
+    one = sphere(20.0, 3)
+    shift = np.array([2 * one.vertices[:, 0].max() + 0.1, 0.0, 0.0])
+    balls = merged(*(sphere(20.0, 3, k * shift) for k in (0, 1)))
+    wider, report = with_volume(balls, 1.02 * signed_volume(balls), area(balls))
+    assert report["volume_change"] == pytest.approx(0.0, abs=1e-4)
+    assert not self_intersecting_faces(wider).any()
+    still = np.all(wider.vertices == balls.vertices, axis=1)
+    assert 0 < still.mean() < 0.2
+    # at the place where the balls nearly touch
+    assert np.abs(balls.vertices[still, 0] - shift[0] / 2).max() < 5.0
+
+
+def test_repairs_count_for_the_volume():
+    topology = {
+        "voxels_filled": 4,
+        "voxels_filled_in_tunnels": 3,
+        "voxels_dropped": 5,
+        "voxels_cut_from_bridges": 1,
+    }
+    assert after_repairs(100.0, topology, np.diag([2.0, 1.0, 1.0, 1.0])) == 102.0

@@ -1,0 +1,76 @@
+"""Handles: counted, cut or filled with the least change, the rest left alone."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+from skimage.measure import euler_number as euler_number_of_mask
+
+from gyriflow.anatomy.extraction import handles, isosurface, unambiguous, without_handles
+from gyriflow.geometry.triangles import euler_number
+
+
+def two_blocks():
+    mask = np.zeros((24, 20, 20), dtype=bool)
+    mask[4:20, 4:16, 4:8] = True
+    mask[4:20, 4:16, 12:16] = True
+    mask[4:6, 4:16, 4:16] = True
+    return mask
+
+
+def field(mask):
+    # what a smoothed mask has at its edge: 0.3 and 0.7
+    return np.where(mask, 0.7, 0.3).astype(np.float32)
+
+
+def test_ball_torus_and_hollow_ball_have_known_handles():
+    x, y, z = np.indices((24, 24, 24)) - 11.5
+    ball = x**2 + y**2 + z**2 < 81
+    torus = (np.hypot(x, y) - 6) ** 2 + z**2 < 9
+    assert handles(ball) == 0
+    assert handles(torus) == 1
+    assert handles(ball & ~(x**2 + y**2 + z**2 < 9)) == 0
+    assert handles(np.concatenate([torus, torus])) == 2
+
+
+def test_thin_bridge_across_a_sulcus_is_cut():
+    mask = two_blocks()
+    mask[16, 9, 8:12] = True
+    assert handles(mask) == 1
+    repaired, counts = without_handles(field(mask))
+    assert (counts["handles_left"], counts["bridges_cut"], counts["tunnels_filled"]) == (0, 1, 0)
+    assert counts["voxels_cut_from_bridges"] == 1
+    assert (repaired > 0.5)[16, 9, 8:12].sum() == 3
+
+
+def test_narrow_tunnel_is_filled():
+    mask = np.zeros((20, 20, 20), dtype=bool)
+    mask[4:16, 4:16, 8:12] = True
+    mask[9:11, 9:11, 8:12] = False
+    assert handles(mask) == 1
+    _, counts = without_handles(field(mask))
+    assert (counts["handles_left"], counts["bridges_cut"], counts["tunnels_filled"]) == (0, 0, 1)
+    # one layer of the tunnel's four voxels closes it
+    assert counts["voxels_filled_in_tunnels"] == 4
+
+
+def test_mask_without_handles_is_not_touched():
+    smooth = ndimage.gaussian_filter(two_blocks().astype(np.float32), 1.0)
+    assert np.array_equal(without_handles(smooth)[0], smooth)
+
+
+def test_several_handles_are_all_removed():
+    mask = two_blocks()
+    mask[12, 6, 8:12] = mask[16, 9:11, 8:12] = mask[18, 13, 8:12] = True
+    assert handles(mask) == 3
+    repaired, counts = without_handles(field(mask))
+    assert counts["handles_left"] == 0
+    assert euler_number(isosurface(unambiguous(repaired), np.eye(4))) == 2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_isosurface_has_the_topology_of_voxels_joined_by_faces(seed):
+    noise = np.random.default_rng(seed).normal(size=(14, 14, 14))
+    mask = np.pad(ndimage.gaussian_filter(noise, 0.8) > 0.15, 2)
+    surface = isosurface(unambiguous(field(mask)), np.eye(4))
+    # the boundary of a body has twice the body's Euler number
+    assert euler_number(surface) == 2 * euler_number_of_mask(mask, connectivity=1)

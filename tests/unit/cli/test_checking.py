@@ -1,0 +1,78 @@
+"""What `gyriflow check` says of the input files of brains and of the mesh, and what it leaves behind."""
+
+import numpy as np
+import pytest
+from shapes import hemisphere
+
+from gyriflow.cli.checking import coarse_cortices, input_problems, plan, work_of_study
+from gyriflow.config import load
+from gyriflow.io.surfaces import write_surface
+from gyriflow.io.volumes import LabelVolume, write_label_volume
+
+
+def problems(folder, **keys):
+    brain = {"id": "a", "week": 23} | keys
+    config = load({"brains": [brain], "start": "a", "folding": {"end_week": 26}}, folder)
+    return [line for line, bad in input_problems(config) if bad]
+
+
+@pytest.fixture
+def volume(tmp_path):
+    """Labels of the spina bifida atlas in a block of white matter with cortex on one side only."""
+    labels = np.zeros((20, 20, 20), np.int32)
+    labels[4:16, 4:16, 4:16] = 1
+    labels[4:6, 4:16, 4:16] = 5
+    write_label_volume(tmp_path / "l.nii.gz", LabelVolume(labels, np.eye(4)))
+    labels[0, 0, 0] = 99
+    write_label_volume(tmp_path / "unknown.nii.gz", LabelVolume(labels, np.eye(4)))
+    return tmp_path
+
+
+def test_the_labels_of_one_hemisphere_are_read_as_labels(volume):
+    scheme = "spina-bifida-atlas"
+    # its wall towards the side that is not there may have no cortex
+    assert problems(volume, hemisphere={"file": "l.nii.gz", "side": "left"}, scheme=scheme) == []
+    assert "does not lie around" in problems(volume, labels="l.nii.gz", scheme=scheme)[0]
+    (said,) = problems(volume, hemisphere={"file": "unknown.nii.gz", "side": "left"}, scheme=scheme)
+    assert f"labels that the scheme '{scheme}' does not know" in said
+
+
+def test_the_surface_of_one_hemisphere_is_of_its_side(tmp_path):
+    write_surface(tmp_path / "r.surf.gii", hemisphere(1), "CortexRight")
+    assert problems(tmp_path, hemisphere={"file": "r.surf.gii", "side": "right"}) == []
+    (said,) = problems(tmp_path, hemisphere={"file": "r.surf.gii", "side": "left"})
+    assert "is of the other hemisphere; found CortexRight; expected CortexLeft" in said
+
+
+@pytest.mark.parametrize(("mm", "doubted"), [(1.0, "% of the volume expected at week 38"), (1.7, None)])
+def test_a_size_that_is_not_that_of_the_week_is_told(tmp_path, mm, doubted):
+    write_label_volume(tmp_path / "l.nii.gz", LabelVolume(np.ones((45, 45, 40), np.int32), mm * np.eye(4)))
+    brain = {"id": "a", "week": 38, "labels": "l.nii.gz", "scheme": "binary"}
+    said = list(input_problems(load({"brains": [brain], "start": "a", "folding": {"end_week": 39}}, tmp_path)))
+    assert [bad for _, bad in said] == [False] * len(said)
+    assert bool(said) == bool(doubted)
+    assert all(doubted in line for line, _ in said)
+
+
+def coarse(mesh, **folding):
+    brain = {"id": "a", "week": 23, "phantom": {}}
+    return list(
+        coarse_cortices(load({"brains": [brain], "start": "a", "mesh": mesh, "folding": {"end_week": 24} | folding}))
+    )
+
+
+def test_a_mesh_too_coarse_for_the_cortex_is_told_before_it_is_made():
+    fine = {"surface_edge_mm": 0.7}
+    (said,) = coarse(fine | {"order": 1}, thickness_mm=1.0)
+    assert "about 1.4 elements through the cortex, 2 are needed: mesh.surface_edge_mm: 0.47 would do" in said
+    assert coarse(fine, thickness_mm=1.5) == coarse({"surface_edge_mm": 0.47, "order": 1}, thickness_mm=1.0) == []
+    assert "mesh.surface_edge_mm: 0.48" in coarse(fine, thickness_mm={"weeks": {22: 0.5, 24: 1.5}})[0]
+
+
+def test_a_look_leaves_nothing_behind(tmp_path):
+    config = tmp_path / "a.yaml"
+    config.write_text("brains: [{id: a, week: 23, phantom: {}}]\nstart: a\nfolding: {end_week: 24}\n")
+    assert plan(config, tmp_path / "new" / "study", ["surface"])
+    (said,) = work_of_study(config, tmp_path / "new" / "study", 1, ["calibrate"])
+    assert said == "nothing to run: the configuration asks for no results of this stage"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]

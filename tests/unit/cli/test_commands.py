@@ -1,0 +1,111 @@
+"""What the commands hand on to Snakemake, and what they tell to type next."""
+
+import shutil
+
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from gyriflow.cli import beginning, launch
+from gyriflow.cli.commands import main
+from gyriflow.config import load
+from gyriflow.shipped import SHIPPED
+from gyriflow.study import Plan
+
+
+@pytest.fixture
+def handed_on(monkeypatch, tmp_path):
+    """Returns the arguments that Snakemake gets for those of `gyriflow run`, beside a configuration."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gyriflow.yaml").touch()
+
+    def arguments(*given):
+        got = []
+        monkeypatch.setattr(launch, "main", lambda asked: got.extend(asked) or 0)
+        assert CliRunner().invoke(main, ["run", *given]).exit_code == 0
+        assert got[:2] == ["--configfile", str(tmp_path / "gyriflow.yaml")]
+        return got[2:]
+
+    return arguments
+
+
+def test_a_run_on_this_machine_gets_its_cores(handed_on):
+    assert "--cores" in handed_on()
+    assert handed_on("--cores", "3")[:2] == ["--cores", "3"]
+
+
+def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
+    assert "--cores" not in handed_on("--profile", "profiles/slurm")
+    assert "--cores" not in handed_on("--executor=slurm")
+    # but a limit that is asked for is one
+    assert handed_on("--cores", "200", "--profile", "profiles/slurm")[:2] == ["--cores", "200"]
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_missing_configuration_is_an_error(monkeypatch, tmp_path, command):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, [command])
+    assert (done.exit_code, "there is no configuration" in done.output) == (2, True)
+
+
+@pytest.mark.parametrize(("installed", "typed"), [(None, "./run gyriflow"), ("/usr/bin/gyriflow", "gyriflow")])
+def test_what_to_type_next_can_be_typed(monkeypatch, tmp_path, installed, typed):
+    monkeypatch.setattr(shutil, "which", lambda name: installed)
+    monkeypatch.setattr(beginning, "write_configuration", lambda folder, path, force, quick: ["1 brain"])
+    folder = tmp_path / "brains of our lab"
+    folder.mkdir()
+    said = CliRunner().invoke(main, ["init", str(folder)]).output
+    assert said.endswith(f"; next: {typed} check '{folder}/gyriflow.yaml'\n")
+
+
+@pytest.fixture
+def predicted(monkeypatch, tmp_path):
+    """Returns what `gyriflow predict` says of the shipped brain of 22 GW, and hands the run's arguments on."""
+    monkeypatch.setattr(launch, "main", lambda asked: (tmp_path / "asked.txt").write_text(" ".join(asked)) and 0)
+    labels = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA22_notoperated" / "parcellation.nii.gz"
+
+    def said(*given):
+        arguments = ["predict", str(labels), "--directory", str(tmp_path), "--cores", "3", *given]
+        return CliRunner().invoke(main, arguments)
+
+    return said
+
+
+def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted, tmp_path):
+    done = predicted("--week", "22.4", "--until", "24.5")
+    assert done.exit_code == 0
+    assert "brains are of spina bifida aperta, not normal ones" in done.output
+    config = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
+    assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
+    assert config.starts("reference") == ["subject"]
+    assert config.run("reference").follow.growth_of == "another"
+    assert Plan(config).expecting.chain("subject", "another")[1:] == [brain.id for brain in config.brains[1:]]
+    asked = (tmp_path / "asked.txt").read_text()
+    assert asked == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path}"
+    # the same call goes on, another one replaces nothing
+    assert predicted("--week", "22.4", "--until", "24.5").exit_code == 0
+    other = predicted("--week", "22.4", "--until", "24")
+    assert (other.exit_code, "is there already and says something else" in other.output) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("until", "more", "told"),
+    [
+        ("30", [], "no series of the atlas spina-bifida leads from 22.4 to 30 GW; found unoperated: 21 to 25 GW"),
+        ("22", [], "or another --until, after --week"),
+        ("30", ["--atlas", "crl"], "For non-commercial education and research only"),
+        ("30", ["--atlas", "crk"], "did you mean crl?"),
+    ],
+)
+def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until, more, told):
+    done = predicted("--week", "22.4", "--until", until, *more)
+    assert done.exit_code == 2
+    assert told in done.output
+    assert not (tmp_path / "gyriflow.yaml").exists()
+
+
+def test_a_prediction_by_an_atlas_whose_licence_is_accepted_says_so(predicted, tmp_path):
+    assert predicted("--week", "22.4", "--until", "30", "--atlas", "crl", "--accept-licence").exit_code == 0
+    weeks = [float(week) for week in range(22, 31)]
+    atlas = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())["atlas"]
+    assert atlas == {"name": "crl", "series": "normative", "weeks": weeks, "accept_licence": True}

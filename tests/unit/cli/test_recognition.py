@@ -1,0 +1,210 @@
+"""Which files are recognised as brains: names of atlases, sides, ages, label schemes, participants."""
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from gyriflow.cli import launch
+from gyriflow.cli.beginning import UNSET, fitting_scheme, participants, recognise, week_in, write_configuration
+from gyriflow.cli.commands import main
+from gyriflow.config import load
+from gyriflow.errors import InputError
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.shipped import SHIPPED
+
+ATLAS = SHIPPED / "atlases" / "spina-bifida"
+LABELS = ATLAS / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
+
+
+@pytest.mark.parametrize(
+    ("name", "week"),
+    [
+        ("week21_labels.nii.gz", 21),
+        ("fetal.week36.left.pial.surf.gii", 36),
+        ("tissue-t21.00_dhcp-19.nii.gz", 21),
+        ("STA30_tissue.nii.gz", 30),
+        ("HarvardSTA25_Study1", 25),
+        ("fetal_SB_atlas_GA27_operated", 27),
+        ("sub-01_ga-26.4_dseg.nii.gz", 26.4),
+        ("brain_24w.nii.gz", 24),
+        ("case_33GW_seg.nii.gz", 33),
+        ("sub-21_dseg.nii.gz", None),
+        ("week99.nii.gz", None),
+        ("T2w.nii.gz", None),
+        ("GestationalAge24_seg", 24),
+        ("sub-01_EGA25_seg", 25),
+        # numbers of subjects after words that end as a name of an age does
+        ("patient23_seg.nii.gz", None),
+        ("subject-24", None),
+        ("fet_30_labels.nii.gz", None),
+        ("infant-31_seg.nii.gz", None),
+        ("image24_seg.nii.gz", None),
+        ("dataset_21", None),
+        ("PATIENT23", None),
+    ],
+)
+def test_ages_are_read_from_names(name, week):
+    assert week_in(name) == week
+
+
+def test_the_scheme_is_found_from_the_labels():
+    labels = read_label_volume(LABELS).labels
+    assert fitting_scheme(labels)[0] == "spina-bifida-atlas"
+    # the same brain with the numbers of FeTA
+    feta = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])[labels]
+    assert fitting_scheme(feta)[0] == "feta-7"
+    assert fitting_scheme((labels > 0).astype(np.int32))[0] == "binary"
+    assert fitting_scheme(labels + 200 * (labels > 0)) == (None, [])
+
+
+def touched(folder, *names):
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+
+
+def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
+    for side in ("left", "right"):
+        touched(
+            tmp_path, *(f"fetal.week22.{side}.{kind}.surf.gii" for kind in ("pial", "wm", "sphere", "midthickness"))
+        )
+    touched(tmp_path, "fetal.week23.left.pial.surf.gii")
+    touched(tmp_path, *(f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white")))
+    (tmp_path / "participants.tsv").write_text("participant_id\tsex\tga\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
+    assert {scan.id: scan.week for scan in participants(tmp_path)[0]} == {"sub-07": 27.3, "sub-08": None}
+    first, alone, second = (brain.entry for brain in recognise(tmp_path))
+    assert first == {
+        "id": "fetal.week22",
+        "week": 22.0,
+        "hemispheres": {
+            "left": "fetal.week22.left.pial.surf.gii",
+            "right": "fetal.week22.right.pial.surf.gii",
+            "white": {"left": "fetal.week22.left.wm.surf.gii", "right": "fetal.week22.right.wm.surf.gii"},
+        },
+    }
+    assert alone["hemisphere"] == {"file": "fetal.week23.left.pial.surf.gii", "side": "left"}
+    assert (second["id"], second["week"], second["covariates"]) == ("sub-07", 27.3, {"sex": "F"})
+    assert second["hemispheres"]["white"] == {"left": "sub-07/surf/lh.white", "right": "sub-07/surf/rh.white"}
+
+
+def test_a_configuration_is_written_that_is_valid(tmp_path):
+    for name in ("GA21", "GA22"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "parcellation.nii.gz").write_bytes(LABELS.read_bytes())
+    path = tmp_path / "gyriflow.yaml"
+    said = list(write_configuration(tmp_path, path, force=False))
+    assert said == ["2 brains: 2 from label volumes (spina-bifida-atlas)"]
+    config = load(yaml.safe_load(path.read_text()), tmp_path)
+    assert [(brain.id, brain.week) for brain in config.brains] == [("GA21", 21.0), ("GA22", 22.0)]
+    assert config.start == "GA21"
+    assert list(config.runs) == ["reference", "measured"]
+    assert config.mesh.order == 2
+    with pytest.raises(InputError, match="is there already"):
+        list(write_configuration(tmp_path, path, force=False))
+    list(write_configuration(tmp_path, path, force=True, quick=True))
+    assert load(yaml.safe_load(path.read_text()), tmp_path).mesh.surface_edge_mm == 1.5
+
+
+def test_what_files_do_not_tell_is_left_to_be_filled_in(tmp_path):
+    (tmp_path / "mine_seg.nii.gz").write_bytes(LABELS.read_bytes())
+    path = tmp_path / "gyriflow.yaml"
+    said = list(write_configuration(tmp_path, path, force=False))
+    assert said[1] == "to be filled in for mine: week: not told by its name"
+    written = yaml.safe_load(path.read_text())
+    assert written["brains"][0]["week"] == UNSET
+    with pytest.raises(InputError, match=r"brains\[0\].week"):
+        load(written, tmp_path)
+
+
+def test_a_folder_without_brains_says_what_is_expected(tmp_path):
+    touched(tmp_path, "notes.txt")
+    with pytest.raises(InputError, match="no brain was recognised; found 1 files; expected tissue label volumes"):
+        recognise(tmp_path)
+
+
+def bids_folder(folder):
+    for session in ("ses-1", "ses-2"):
+        place = folder / "derivatives" / "seg" / "sub-01" / session / "anat"
+        place.mkdir(parents=True)
+        (place / f"sub-01_{session}_desc-brain_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    (folder / "participants.tsv").write_text("participant_id\tsex\nsub-01\tF\nsub-02\tM\n")
+    (folder / "sub-01").mkdir()
+    (folder / "sub-02").mkdir()
+    for name, ages in (("sub-01", ("21w2d", "24+3")), ("sub-02", ("22.1", "25"))):
+        rows = "".join(f"ses-{number}\t{age}\t3.0\n" for number, age in enumerate(ages, 1))
+        (folder / name / f"{name}_sessions.tsv").write_text("session_id\tga\ttesla\n" + rows)
+
+
+def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
+    bids_folder(tmp_path)
+    own = tmp_path / "derivatives" / "gyriflow"
+    (own / "sub-01").mkdir(parents=True)
+    (own / "sub-01" / "sub-01_desc-x_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    (own / "dataset_description.json").write_text('{"GeneratedBy": [{"Name": "gyriflow"}]}')
+    first, second = (brain.entry for brain in recognise(tmp_path))
+    assert (first["id"], first["week"], first["subject"]) == ("sub-01_ses-1", 21.29, "sub-01")
+    assert (second["id"], second["week"], second["subject"]) == ("sub-01_ses-2", 24.43, "sub-01")
+    assert first["covariates"] == {"sex": "F", "tesla": "3.0"}
+    path = tmp_path / "gyriflow.yaml"
+    list(write_configuration(tmp_path, path, force=False))
+    config = load(yaml.safe_load(path.read_text()), tmp_path)
+    assert config.scans == {"sub-01": ["sub-01_ses-1", "sub-01_ses-2"]}
+
+
+def test_an_ambiguous_age_is_asked_for_by_file_and_column(tmp_path):
+    (tmp_path / "sub-01_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    (tmp_path / "sub-01_dseg_copy.nii.gz").write_bytes(LABELS.read_bytes())
+    (tmp_path / "participants.tsv").write_text("participant_id\tage\nsub-01\t31\n")
+    first, second = recognise(tmp_path)
+    assert first.entry["week"] == UNSET
+    assert f"week: {tmp_path}/participants.tsv: has a column age that may be" in first.notes[0]
+    assert second.entry["id"] == "sub-01-2"
+    assert "2 files are of sub-01: keep one" in second.notes
+
+
+@pytest.fixture
+def app(monkeypatch, tmp_path):
+    """Calls gyriflow as a BIDS app with some arguments, and returns what Snakemake gets and the configuration."""
+    data, out, got = tmp_path / "data", tmp_path / "out", []
+    data.mkdir()
+    bids_folder(data)
+    monkeypatch.setattr(launch, "main", lambda asked: got.extend(asked) or 0)
+
+    def call(level, *more, code=0):
+        got.clear()
+        done = CliRunner().invoke(main, [str(data), str(out), level, *more])
+        assert done.exit_code == code, done.output
+        path = out / "work" / "gyriflow.yaml"
+        return done.output if code else (got, yaml.safe_load(path.read_text()))
+
+    return call
+
+
+def test_a_bids_app_folds_the_first_of_several_scans(app, tmp_path):
+    arguments, written = app("participant")
+    assert arguments[-2:] == ["quality", "export"]
+    assert "--keep-going" in arguments
+    assert (written["start"], written["folding"]["end_week"]) == (["sub-01_ses-1"], 24.43)
+    assert (list(written["runs"]), written["metrics"]["export"]) == (["reference", "measured"], "bids")
+    assert [brain.id for brain in load(written, tmp_path).brains] == ["sub-01_ses-1", "sub-01_ses-2"]
+    arguments, _ = app("group")
+    assert arguments[-2:] == ["all", "export"]
+
+
+def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
+    (tmp_path / "own.yaml").write_text("{mesh: {order: 1}, runs: {mine: {}}, folding: {poisson_ratio: 0.4}}")
+    options = ("--participant-label", "02", "01", "--session-label", "ses-2", "--settings", str(tmp_path / "own.yaml"))
+    _, written = app("participant", *options)
+    assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-2"]
+    assert (written["start"], written["runs"], written["mesh"]) == ("sub-01_ses-2", {"mine": {}}, {"order": 1})
+    assert written["folding"] == {"end_week": 25.43, "poisson_ratio": 0.4}
+    assert "no such participants and sessions" in app("participant", "--participant-label", "07", code=2)
+
+
+def test_a_bids_app_asks_which_of_several_files_is_meant(app, tmp_path):
+    place = tmp_path / "data" / "derivatives" / "seg" / "sub-01" / "ses-1" / "anat"
+    (place / "sub-01_ses-1_desc-other_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+    assert "2 files are of sub-01_ses-1: keep one" in app("participant", code=2)
+    _, written = app("participant", "--files", "*_desc-brain_dseg.nii.gz")
+    assert len(written["brains"]) == 2

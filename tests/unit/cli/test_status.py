@@ -1,0 +1,93 @@
+"""How far a study is, from what lies in its folder."""
+
+import json
+
+import pytest
+
+from gyriflow.cli.launch import hold_lock
+from gyriflow.cli.provenance import STUDY
+from gyriflow.cli.status import as_json, as_text, status
+from gyriflow.cli.terminal import STATE
+from gyriflow.errors import InputError
+from gyriflow.io.files import write_json
+
+RUNNING = {
+    "began": "2026-01-01 10:00:00",
+    "ended": None,
+    "done": 3,
+    "total": 10,
+    "left_s": 240.0,
+    "running": ["folding, run r, brain a: GW 21.50 of 23"],
+    "failed": [],
+    "details": "run.log",
+    "interrupted": False,
+}
+FAILED = [{"what": "surface, brain b", "why": "b.nii: is no image", "logs": ["b.log"]}]
+
+
+@pytest.fixture
+def study(tmp_path):
+    for name in ("brains/a/surface/pial.surf.gii", "brains/b/logs/x", "runs/r/a/logs/simulate.log"):
+        (tmp_path / "results" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "results" / name).touch()
+    write_json(tmp_path / STATE, RUNNING)
+    return tmp_path
+
+
+def text(folder):
+    return "\n".join(as_text(status(folder)))
+
+
+def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
+    with hold_lock(study):
+        said = text(study)
+    assert "running since 2026-01-01 10:00:00: 3 of 10 steps done, about 4 min left" in said
+    assert "now: folding, run r, brain a: GW 21.50 of 23" in said
+
+
+def test_a_run_that_was_killed_is_called_interrupted(study):
+    assert "interrupted: the run of 2026-01-01 10:00:00 ended without notice, 3 of 10 steps done" in text(study)
+    assert "now:" not in text(study)
+    write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True})
+    assert "interrupted at 2026-01-01 10:05:00, 3 of 10 steps done" in text(study)
+
+
+def test_failures_are_told_with_their_cause_and_log(study):
+    write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "failed": FAILED})
+    said = text(study)
+    assert "last run: 2026-01-01 10:00:00 to 2026-01-01 10:05:00" in said
+    assert "failed: surface, brain b: b.nii: is no image\n          log: b.log" in said
+
+
+def test_stages_of_brains_and_runs_are_told_from_their_files(study):
+    found = status(study)
+    assert found.brains == [["a", "done", "-", "-"], ["b", "-", "-", "-"]]
+    assert found.runs == [["r", "a", "-", "-", "-", "-"]]
+    progress = study / "results/runs/r/a/logs/simulate.jsonl"
+    progress.write_text('{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s": 142.0}\n')
+    assert status(study).runs[0][2] == "GW 21.50 of 23"
+    write_json(study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]})
+    assert status(study).runs[0][2] == "done, GW 23.00"
+    assert found.report is None
+
+
+def test_a_folder_without_a_study_is_named(tmp_path):
+    with pytest.raises(InputError, match=f"{tmp_path}: holds no study"):
+        status(tmp_path)
+
+
+def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(study):
+    brain = "brains: [{id: a, week: 23, phantom: {}}]\nstart: a\nfolding: {end_week: 24}\nruns: {r: {}, later: {}}\n"
+    (study / "gyriflow.yaml").write_text(brain)
+    found = json.loads(as_json(status(study)))
+    assert found["brains"][0] == {"brain": "a", "surface": "done", "mesh": "-", "metrics": "-"}
+    assert [(row["run"], row["brain"], row["folding"]) for row in found["runs"]] == [
+        ("r", "a", "-"),
+        ("later", "a", "-"),
+    ]
+    # the configuration may lie elsewhere
+    elsewhere = study / "elsewhere.yaml"
+    (study / "gyriflow.yaml").rename(elsewhere)
+    assert [row[0] for row in status(study).runs] == ["r"]
+    write_json(study / STUDY, {"configuration": [str(elsewhere)], "brains": []})
+    assert [row[0] for row in status(study).runs] == ["r", "later"]

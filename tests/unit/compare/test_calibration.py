@@ -1,0 +1,108 @@
+"""Designs fill their bounds, and the surrogate finds a known least with an interval that holds it."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gyriflow.compare.design import calibrated_parameters, in_unit_box, sobol_design
+from gyriflow.compare.surrogate import fit, optimum, profiles, propose, sensitivities
+
+BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
+TRUTH = {"thickness_mm": 1.7, "growth_rate_per_s": 3.2e-7}
+
+
+def scored(design):
+    """Returns a design with the score of a bowl around the truth, steeper along the rate."""
+    away = in_unit_box(design, BOUNDS) - in_unit_box(pd.DataFrame([TRUTH]), BOUNDS)
+    return design.assign(score=0.1 + 0.3 * away[:, 0] ** 2 + 2.0 * away[:, 1] ** 2)
+
+
+def test_a_design_fills_every_part_of_the_bounds_and_is_the_same_again():
+    design = sobol_design(BOUNDS, 16, seed=3)
+    pd.testing.assert_frame_equal(design, sobol_design(BOUNDS, 16, seed=3))
+    assert not design.equals(sobol_design(BOUNDS, 16, seed=4))
+    points = in_unit_box(design, BOUNDS)
+    assert ((points >= 0) & (points <= 1)).all()
+    # a Sobol sequence has one point in each of 16 slices of each axis
+    for axis in points.T:
+        assert sorted(np.minimum((16 * axis).astype(int), 15)) == list(range(16))
+
+
+def test_the_optimum_is_found_and_its_interval_holds_the_truth():
+    runs = scored(sobol_design(BOUNDS, 10, seed=0))
+    for _ in range(2):
+        runs = pd.concat([runs, scored(propose(fit(runs, BOUNDS, seed=0), 3))], ignore_index=True)
+    best = optimum(fit(runs, BOUNDS, seed=0)).set_index("parameter")
+    for name, truth in TRUTH.items():
+        width = BOUNDS[name][1] - BOUNDS[name][0]
+        assert best.loc[name, "value"] == pytest.approx(truth, abs=0.03 * width)
+        assert best.loc[name, "low"] <= truth <= best.loc[name, "high"]
+        assert best.loc[name, "high"] - best.loc[name, "low"] < 0.5 * width
+    assert not best["at_bound"].any()
+    assert best["score"].iloc[0] == pytest.approx(0.1, abs=0.02)
+
+
+def test_rounds_look_where_the_least_is_and_apart_from_each_other():
+    runs = scored(sobol_design(BOUNDS, 12, seed=0))
+    chosen = propose(fit(runs, BOUNDS, seed=0), 3)
+    assert scored(chosen)["score"].min() < runs["score"].min()
+    points = in_unit_box(chosen, BOUNDS)
+    gaps = [np.linalg.norm(points[i] - points[j]) for i in range(3) for j in range(i)]
+    assert min(gaps) >= 0.02
+
+
+def test_an_optimum_at_a_bound_says_so():
+    runs = sobol_design(BOUNDS, 12, seed=0)
+    runs["score"] = in_unit_box(runs, BOUNDS)[:, 0]
+    best = optimum(fit(runs, BOUNDS, seed=0)).set_index("parameter")
+    assert best.loc["thickness_mm", "at_bound"]
+
+
+def test_a_diverged_run_keeps_others_away():
+    runs = scored(sobol_design(BOUNDS, 12, seed=0))
+    thick = runs["thickness_mm"] > 2.4
+    runs.loc[thick, "score"] = np.nan
+    chosen = propose(fit(runs, BOUNDS, seed=0), 3)
+    assert (chosen["thickness_mm"] < 2.4).all()
+    with pytest.raises(ValueError, match="0 runs with a score"):
+        fit(runs.assign(score=np.nan), BOUNDS, seed=0)
+
+
+def test_sensitivities_are_those_of_the_bowl():
+    runs = scored(sobol_design(BOUNDS, 32, seed=0))
+    found = sensitivities(fit(runs, BOUNDS, seed=0)).set_index("parameter")
+    # a sum of two functions has no interactions
+    np.testing.assert_allclose(found["first_order"].sum(), 1, atol=0.05)
+    np.testing.assert_allclose(found["first_order"], found["total"], atol=0.05)
+    points = np.random.default_rng(0).random((20000, 2)) - in_unit_box(pd.DataFrame([TRUTH]), BOUNDS)
+    parts = np.var(0.3 * points[:, 0] ** 2), np.var(2.0 * points[:, 1] ** 2)
+    assert found.loc["growth_rate_per_s", "first_order"] == pytest.approx(parts[1] / sum(parts), abs=0.05)
+
+
+def test_profiles_pass_through_the_optimum():
+    surrogate = fit(scored(sobol_design(BOUNDS, 16, seed=0)), BOUNDS, seed=0)
+    lines = profiles(surrogate, list(TRUTH.values()))
+    for name, truth in TRUTH.items():
+        line = lines[lines["parameter"] == name]
+        assert line["value"].iloc[[0, -1]].tolist() == pytest.approx(BOUNDS[name])
+        assert line["value"][line["mean"].idxmin()] == pytest.approx(truth, abs=0.1 * np.ptp(BOUNDS[name]))
+
+
+def test_values_take_their_places_in_the_parameters():
+    base = {
+        "start_week": 21.0,
+        "thickness_mm": 1.5,
+        "shear_modulus_cortex_pa": 1500.0,
+        "shear_modulus_core_pa": 300.0,
+        "growth_rate_per_s": {"weeks": {21.0: 1e-7, 25.0: 2e-7}},
+        "follow": {"area_cm2": {21.0: 90.0, 25.0: 150.0}},
+        "contact": {"gap_mm": 2.5},
+    }
+    values = {"thickness_mm": 2.0, "stiffness_ratio": 4.0, "contact.gap_mm": 3.0}
+    found = calibrated_parameters(base, values | {"growth_rate_per_s.amplitude": 2.0}, 25.0)
+    assert (found["thickness_mm"], found["shear_modulus_cortex_pa"], found["contact"]["gap_mm"]) == (2.0, 1200.0, 3.0)
+    assert found["growth_rate_per_s"] == {"weeks": {21.0: 2e-7, 25.0: 4e-7}}
+    assert (found["end_week"], found["output_weeks"]) == (25.0, [21.0, 25.0])
+    led = calibrated_parameters(base, {"follow.area_cm2.amplitude": 1.1}, 25.0)
+    assert led["follow"]["area_cm2"] == pytest.approx({21.0: 99.0, 25.0: 165.0})
+    assert base["contact"]["gap_mm"] == 2.5

@@ -1,0 +1,167 @@
+import numpy as np
+import pytest
+import trimesh
+
+from gyriflow.compare.onset import named, onset, regions_on, relief, sulcal_regions
+from gyriflow.compare.validation import displacement_table, vector_agreement
+from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import TriangleMesh
+
+BALL = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
+POINTS, FACES = np.asarray(BALL.vertices), np.asarray(BALL.faces)
+TURN = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
+
+
+def stretched(week: float, factor: float = 1.0) -> np.ndarray:
+    """Returns a sphere that grows along x by a tenth a week, and along y by a part of it."""
+    grown = 1 + factor * (week - 21) * np.array([0.10, 0.05, 0.0])
+    return POINTS * grown
+
+
+def test_equal_vectors_agree_and_parts_have_their_slope():
+    generator = np.random.default_rng(1)
+    u, v, weights = generator.normal(size=(50, 3)), generator.normal(size=(50, 3)), generator.uniform(1, 2, 50)
+    assert vector_agreement(u, u, weights) == pytest.approx((1.0, 1.0))
+    assert vector_agreement(0.4 * u, u, weights) == pytest.approx((1.0, 0.4))
+    assert vector_agreement(-u, u, weights) == pytest.approx((-1.0, -1.0))
+    assert abs(vector_agreement(u, v, weights)[0]) < 0.3
+    assert np.isnan(vector_agreement(0 * u, u, weights)).all()
+
+
+def test_displacement_agrees_whatever_pose_the_run_is_in():
+    weeks = [21, 22, 24]
+    measured = np.stack([stretched(week) for week in weeks])
+    simulated = np.stack([stretched(week) @ TURN.T + [5, week, 0] for week in weeks])
+    table = displacement_table(weeks, simulated, measured, FACES, known_until=22)
+    assert table["from_week"].tolist() == [21, 22]
+    assert table["test"].tolist() == ["consistency", "comparison"]
+    assert table["displacement_r"].tolist() == pytest.approx([1.0, 1.0])
+    assert table["displacement_slope"].tolist() == pytest.approx([1.0, 1.0], abs=1e-6)
+    assert table["rms_mm"].tolist() == pytest.approx(table["measured_rms_mm"].tolist())
+    half = displacement_table(weeks, np.stack([stretched(week, 0.5) for week in weeks]), measured, FACES)
+    assert half["displacement_slope"].iloc[0] == pytest.approx(0.5)
+
+
+def test_uniform_scaling_stands_beside_it():
+    measured = np.stack([POINTS, POINTS * [1.1, 1.05, 1.0]])
+    table = displacement_table([21, 22], measured, measured, FACES)
+    # on a sphere, Σ x² = Σ y² = Σ z²: (0.1 + 0.05)/√(3 (0.1² + 0.05²))
+    assert table["displacement_r_scaling"].iloc[0] == pytest.approx(0.15 / np.sqrt(3 * 0.0125), abs=0.01)
+    scale = np.cbrt(1.1 * 1.05) - 1
+    assert table["displacement_slope_scaling"].iloc[0] == pytest.approx(scale * 0.15 / 0.0125, rel=0.02)
+    uniform = np.stack([POINTS, 1.2 * POINTS])
+    alike = displacement_table([21, 22], uniform, uniform, FACES)
+    assert alike["displacement_r_scaling"].iloc[0] == pytest.approx(1.0)
+    assert alike["displacement_slope_scaling"].iloc[0] == pytest.approx(1.0)
+
+
+def test_bodies_that_nothing_joins_may_move_apart():
+    faces = np.concatenate([FACES, FACES + len(POINTS)])
+    measured = np.stack(
+        [np.concatenate([stretched(week) - [22, 0, 0], stretched(week) + [22, 0, 0]]) for week in (21, 22)]
+    )
+    apart = np.stack([measured[0], measured[1] + np.repeat([[-3.0, 0, 1], [2, 0, 0]], len(POINTS), axis=0)])
+    table = displacement_table([21, 22], apart, measured, faces)
+    assert table["displacement_r"].iloc[0] == pytest.approx(1.0)
+    assert table["rms_mm"].iloc[0] == pytest.approx(table["measured_rms_mm"].iloc[0])
+    one = displacement_table([21, 22], measured[:, : len(POINTS)], measured[:, : len(POINTS)], FACES)
+    for name in ("displacement_r_scaling", "displacement_slope_scaling", "measured_rms_mm"):
+        assert table[name].iloc[0] == pytest.approx(one[name].iloc[0])
+
+
+def test_other_vertices_are_refused():
+    with pytest.raises(InputError, match="same vertices in the same weeks"):
+        displacement_table([21, 22], np.stack([POINTS] * 2), np.stack([POINTS[:9]] * 2), FACES)
+
+
+def groove(depth: float) -> tuple[TriangleMesh, np.ndarray]:
+    """Returns a sphere with a groove along the equator's front, and the depth of its vertices below the ball."""
+    across, along = POINTS[:, 2], np.abs(np.arctan2(POINTS[:, 1], POINTS[:, 0])) * 20
+    depths = depth * np.exp(-((across / 2) ** 2)) * (along < 15)
+    return TriangleMesh(POINTS * (1 - depths / 20)[:, None], FACES), depths
+
+
+REGIONS = np.where((np.abs(POINTS[:, 2]) < 1.5) & (POINTS[:, 0] > 17), 1, np.where(POINTS[:, 0] < -19, 2, 0))
+NAMES = {1: "central", 2: "calcarine", 3: "nowhere"}
+
+
+def test_relief_is_bottom_below_crowns_not_depth_below_the_hull():
+    mesh, depths = groove(3.0)
+    table = relief(mesh, depths, REGIONS, NAMES).set_index("region")
+    assert table.loc["central", "relief_mm"] == pytest.approx(3.0, abs=0.35)
+    assert table.loc["calcarine", "relief_mm"] == pytest.approx(0.0, abs=1e-9)
+    assert np.isnan(table.loc["nowhere", "relief_mm"])
+    # a wide place that lies deep, as the insula does, is no sulcus
+    sunken = relief(mesh, np.where(POINTS[:, 0] > 0, 6.0, 0.0), REGIONS, NAMES)
+    assert sunken["relief_mm"].iloc[0] == 0
+
+
+def test_onset_is_when_two_millimetres_are_reached():
+    reliefs = {}
+    for week, depth in {21.0: 0.0, 22.0: 1.0, 23.0: 1.6, 24.0: 2.8, 25.0: 3.5}.items():
+        mesh, depths = groove(depth)
+        reliefs[week] = relief(mesh, depths, REGIONS, NAMES)
+    central = {week: table.set_index("region").loc["central", "relief_mm"] for week, table in reliefs.items()}
+    table = onset(reliefs).set_index("region")
+    expected = 23 + (2 - central[23.0]) / (central[24.0] - central[23.0])
+    assert 23 < expected < 24
+    assert table.loc["central", "onset_week"] == pytest.approx(expected)
+    assert not table.loc["central", "there_at_start"]
+    assert np.isnan(table.loc["calcarine", "onset_week"])
+    late = onset({week: reliefs[week] for week in (24.0, 25.0)}).set_index("region")
+    assert late.loc["central", "there_at_start"]
+    assert np.isnan(late.loc["central", "onset_week"])
+
+
+def test_sulci_are_valleys_found_by_their_depth_and_carried_to_an_earlier_surface():
+    mesh, depths = groove(4.0)
+    bend = np.where(depths > 1.0, -0.2, 0.05)
+    regions = sulcal_regions(mesh, depths, bend)
+    assert set(regions) == {0, 1}
+    inside = regions == 1
+    assert depths[inside].min() >= 2.0 > depths[~inside].min()
+    assert not sulcal_regions(mesh, depths, np.abs(bend)).any()
+    smooth, _ = groove(0.0)
+    found = regions_on(smooth, np.asarray(smooth.vertices), mesh, regions)
+    assert np.mean((found == 1) == inside) > 0.98
+    assert not sulcal_regions(*groove(1.0), bend).any()
+
+
+def test_sulci_are_named_by_the_regions_that_they_lie_in():
+    longitude = np.degrees(np.arctan2(POINTS[:, 1], POINTS[:, 0]))
+    band = np.abs(POINTS[:, 2]) < 3
+    # a long valley over two regions and a bit of a third, a short one in the second, and one in none
+    sulci = np.select(
+        [band & (np.abs(longitude + 10) < 50), band & (np.abs(longitude - 90) < 12), POINTS[:, 2] < -18.5], [1, 2, 3], 0
+    )
+    regions = np.select([POINTS[:, 2] < -10, longitude < -57, longitude < 0], [0, 9, 4], 7)
+    mesh = TriangleMesh(POINTS, FACES)
+    found, names = named(mesh, sulci, regions, {4: "central", 7: "calcarine", 9: "cingulate"}, "left")
+    assert sorted(names.values()) == ["left 3", "left calcarine", "left calcarine 2", "left central"]
+    of = {name: found == number for number, name in names.items()}
+    assert np.array_equal(of["left calcarine"], (sulci == 1) & (regions == 7))
+    # the bit of the third goes to the largest part, and nothing is lost
+    assert np.array_equal(of["left central"] | of["left calcarine"], sulci == 1)
+    assert np.array_equal(of["left calcarine 2"], sulci == 2)
+    assert np.array_equal(of["left 3"], sulci == 3)
+    assert np.array_equal(found > 0, sulci > 0)
+    # a rim in no region is the sulcus's too
+    rim = np.where(np.abs(POINTS[:, 2]) > 2, 0, regions)
+    within, same_names = named(mesh, sulci, rim, {4: "central", 7: "calcarine", 9: "cingulate"}, "left")
+    assert sorted(same_names.values()) == sorted(names.values())
+    assert np.array_equal(within > 0, sulci > 0)
+    # without names all is as it was
+    same, numbers = named(mesh, sulci, regions, {}, "left")
+    assert sorted(numbers.values()) == ["left 1", "left 2", "left 3"]
+    assert {numbers[int(number)] for number in np.unique(same[sulci == 2])} == {"left 2"}
+
+
+def test_the_same_sulcus_has_its_name_at_its_week():
+    """A groove in a named region, which deepens: its row has the region's name and the week."""
+    mesh, depths = groove(4.0)
+    sulci = sulcal_regions(mesh, depths, np.where(depths > 1.0, -0.2, 0.05))
+    regions, names = named(mesh, sulci, np.where(POINTS[:, 0] > 0, 3, 5), {3: "central", 5: "calcarine"}, "right")
+    reliefs = {20.0 + depth: relief(*groove(depth), regions, names) for depth in (0.0, 1.0, 2.0, 3.0, 4.0)}
+    table = onset(reliefs).set_index("region")
+    assert list(table.index) == ["right central"]
+    assert 22 <= table.loc["right central", "onset_week"] < 24

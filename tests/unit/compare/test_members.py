@@ -1,0 +1,139 @@
+"""Which run of a study is nearest, by each measure, and what is said of it."""
+
+import pandas as pd
+import pytest
+
+from gyriflow.compare.members import distances_to, member_row, nearest, side_by_side
+from gyriflow.compare.published import comparison_caption, displacement_table, with_published_nearest
+
+
+def spectra(run, subject, powers, *, complete=True):
+    rows = [
+        {"subject": subject, "run": run, "hemisphere": "left", "band": band, "relative_power": power,
+         "relative_power_weyl": float("nan") if band == 6 else 2 * power, "complete": complete, "resolved": band < 6}
+        for band, power in zip((4, 5, 6), powers, strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+METRICS = pd.DataFrame(
+    [
+        ("sim", "a", "whole", "area", 90.0, "cm2"),
+        ("real", "b", "whole", "area", 100.0, "cm2"),
+        ("sim", "a", "left", "weyl_number", 600.0, "1"),
+        ("real", "b", "left", "weyl_number", 700.0, "1"),
+    ],
+    columns=["run", "subject", "hemisphere", "metric", "value", "unit"],
+)
+SPECTRAL = pd.DataFrame([("b", "left", "spectral_distance_B4", 0.2, "ok")],
+                        columns=["real", "hemisphere", "metric", "value", "flag"])  # fmt: skip
+SIMILARITY = pd.DataFrame(
+    [("b", "whole", "symmetric_mean", 1.5, "mm"), ("b", "whole", "rotation", 3.0, "deg")],
+    columns=["real", "hemisphere", "metric", "value", "unit"],
+)
+
+
+def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
+    both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))])
+    table = distances_to("b", METRICS, both, SPECTRAL, SIMILARITY).set_index(["hemisphere", "measure"])
+    cut_off = table.loc[("left", "relative_power_B6_weyl")]
+    assert (cut_off["flag"], cut_off["distance"] == cut_off["distance"]) == ("cut off", False)
+    assert table["distance"].dropna().to_dict() == {
+        ("left", "relative_power_B4"): pytest.approx(0.1),
+        ("left", "relative_power_B5"): pytest.approx(0.1),
+        ("left", "relative_power_B4_weyl"): pytest.approx(0.2),
+        ("left", "relative_power_B5_weyl"): pytest.approx(0.2),
+        ("left", "relative_power_B6"): pytest.approx(0.0),
+        ("whole", "area"): pytest.approx(0.1),
+        ("left", "spectral_distance_B4"): 0.2,
+        ("whole", "surface_symmetric_mean"): 1.5,
+    }
+    assert table.loc[("left", "relative_power_B6"), "flag"] == "not resolved"
+    assert table.loc[("left", "relative_power_B4"), "real_value"] == 0.4
+    # where a spectrum is cut is told, and is no likeness
+    assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
+    printed = side_by_side(table.reset_index().assign(subject="a", real="b", thickness_mm=1.0), ["thickness_mm"])
+    assert "weyl_number" not in set(printed["measure"])
+
+
+def test_a_band_that_is_cut_off_has_no_distance():
+    both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1), complete=False), spectra("real", "b", (0.4, 0.3, 0.1))])
+    table = distances_to("b", METRICS, both, SPECTRAL, SIMILARITY).set_index("measure")
+    assert table.loc["relative_power_B4", "distance"] != table.loc["relative_power_B4", "distance"]
+    assert table.loc["relative_power_B4", "flag"] == "cut off"
+
+
+def member(run, thickness, through=2.0, diverged=None):
+    return member_row(
+        {"study": "thickness", "run": run, "subject": "a", "compare_week": 28},
+        {"thickness_mm": thickness},
+        {"thickness_mm": thickness, "shear_modulus_cortex_pa": 3000, "end_week": 28},
+        {"elements_through_cortex": through, "order": 1},
+        {"diverged": diverged, "reached_week": 28 if diverged is None else 26.5, "steps": 7, "cpu_seconds": 3.0},
+    )
+
+
+MEMBERS = pd.DataFrame([member("t1", 1.0, 1.3), member("t2", 2.0), member("t3", 3.0), member("t4", 9.0, 9, "det F")])
+
+
+def compared(**distances):
+    rows = [
+        {"subject": "a", "run": run, "real": "b", "real_population": "other", "same_population": False,
+         "hemisphere": "left", "measure": "relative_power_B4", "value": 0.1, "real_value": 0.3, "distance": distance,
+         "unit": "1", "flag": "ok"}
+        for run, distance in distances.items()
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def test_the_nearest_run_is_named_with_the_next():
+    (row,) = nearest(compared(t1=0.3, t2=0.1, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
+    assert (row["thickness_mm"], row["distance"], row["next_thickness_mm"], row["next_distance"]) == (2, 0.1, 3, 0.2)
+    assert row["flag"] == "ok"
+
+
+def test_what_stands_against_the_nearest_is_said():
+    (row,) = nearest(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
+    assert row["flag"] == "not resolved by the mesh; at the end of the range"
+
+
+def test_members_say_how_they_ended():
+    rows = MEMBERS.set_index("run")
+    assert rows["outcome"].to_dict() == {"t1": "finished", "t2": "finished", "t3": "finished", "t4": "diverged"}
+    assert (rows.loc["t4", "reached_week"], rows.loc["t4", "cause"]) == (26.5, "det F")
+    assert rows.loc["t1", "resolution"] == "not resolved by the mesh"
+    assert rows.loc["t2", "resolution"] == "ok"
+
+
+def test_the_papers_value_stands_beside_ours_where_it_reports_one():
+    published = {"nearest": [{"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 2.25}]}
+    table = nearest(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
+    assert with_published_nearest(table, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
+    cut = table.assign(measure="relative_power_B4_weyl")
+    assert with_published_nearest(cut, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
+    assert with_published_nearest(table, published, ["thickness_mm"], 27)["paper"].isna().all()
+    assert with_published_nearest(table, published, ["poisson_ratio"], 28)["paper"].isna().all()
+
+
+def test_another_population_is_said():
+    assert "other is another population" in comparison_caption("s", 28, compared(t1=0.1))
+    assert "another" not in comparison_caption("s", 28, compared(t1=0.1).assign(same_population=True))
+
+
+def test_runs_stand_side_by_side():
+    table = compared(t1=0.3, t2=0.1).merge(MEMBERS[["run", "thickness_mm"]], on="run")
+    wide = side_by_side(table, ["thickness_mm"])
+    assert wide[["real value", "thickness_mm 1.0", "thickness_mm 2.0"]].to_numpy().tolist() == [[0.3, 0.3, 0.1]]
+
+
+def test_displacements_of_runs_and_paper_share_their_intervals():
+    published = {
+        "displacement": {"from_weeks": [21, 22], "rows": [{"source": "S", "max_mm": [2.5, 2.2], "mean_mm": [0.4, 0.3]}]}
+    }
+    rows = [("r", 21.0, 22.0, "all", 3.0, 0.5), ("r", 21.0, 22.0, "pial", 9.0, 9.0), ("r", 25.0, 26.0, "all", 4.0, 0.6)]
+    moves = pd.DataFrame(rows, columns=["run", "from_week", "to_week", "nodes", "max_mm", "mean_mm"])
+    table = displacement_table(published, moves).set_index(["quantity", "source"])
+    assert list(table) == ["21-22 GW", "22-23 GW", "25-26 GW"]
+    assert table.loc[("largest displacement (mm)", "r (simulated, all nodes)"), "21-22 GW"] == 3.0
+    assert table.loc[("largest displacement (mm)", "r (simulated, surface)"), "21-22 GW"] == 9.0
+    assert table.loc[("mean displacement (mm)", "FetalFoldSim paper: S"), "22-23 GW"] == 0.3

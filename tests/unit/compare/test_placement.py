@@ -1,0 +1,189 @@
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gyriflow.compare.placement import correlation, drawn_patches, gain_interval, patches, placement, skill
+from gyriflow.compare.shapes import Shape, ready
+from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import fit_onto
+from gyriflow.geometry.matching import spins, spun
+from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, signed_volume, transformed
+
+sys.path.insert(0, str(Path(__file__).parent))
+from bumpy import RADIUS, bumpy, field, shaped
+
+REAL = bumpy(1)
+TRUTH = shaped(REAL)
+SMOOTH = bumpy(1, height=0.0)
+
+
+def motion(degrees: float, shift: tuple[float, float, float]) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_rotvec([0, 0, degrees], degrees=True).as_matrix()
+    matrix[:3, 3] = shift
+    return matrix
+
+
+def noise(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=len(REAL.vertices))
+
+
+def test_weighted_correlation_is_that_of_repeated_values():
+    x, y, weights = np.array([1.0, 2.0, 4.0]), np.array([1.0, 3.0, 2.0]), np.array([1, 2, 3])
+    repeated = np.corrcoef(np.repeat(x, weights), np.repeat(y, weights))[0, 1]
+    assert correlation(x, y, weights.astype(float)) == pytest.approx(repeated)
+    assert np.isnan(correlation(x, np.full(3, 0.3), np.ones(3)))
+
+
+def test_skill_is_between_the_start_and_the_adjacent_week():
+    assert skill(0.6, 0.4, 0.8, 4) == pytest.approx(0.5)
+    assert skill(0.2, 0.4, 0.8, 2) == pytest.approx(-0.5)
+    assert np.isnan(skill(0.6, 0.4, 0.8, 1))
+    assert np.isnan(skill(0.6, 0.4, 0.3, 4))
+
+
+def test_a_brain_that_is_laid_back_has_its_folds_in_place():
+    scaled = transformed(REAL, motion(12, (5, -3, 2)) @ np.diag([0.7, 0.7, 0.7, 1.0]))
+    laid = ready(scaled, REAL)
+    assert signed_volume(laid) == pytest.approx(signed_volume(REAL), rel=0.01)
+    assert mean_edge_length(laid) == pytest.approx(1.0, abs=0.1)
+    row = placement(TRUTH, shaped(laid), shaped(SMOOTH, noise(1)), None, horizon=3, seed=1)
+    assert row["r_mean_curvature"] > 0.95
+    assert row["r_start_mean_curvature"] == pytest.approx(0, abs=0.06)
+    assert row["matched_share"] == pytest.approx(1.0)
+
+
+def test_a_rotated_copy_that_stays_so_has_no_folds_in_place():
+    rotated = transformed(REAL, motion(90, (0, 0, 0)))
+    row = placement(TRUTH, shaped(rotated), shaped(SMOOTH, noise(1)), TRUTH, horizon=3, seed=1)
+    assert abs(row["r_mean_curvature"]) < 0.25
+    assert row["r_adjacent_mean_curvature"] == pytest.approx(1.0)
+
+
+def test_noise_has_the_correlation_that_it_leaves():
+    pattern = TRUTH.mean_curvature
+    added = pattern + pattern.std() * noise(4)
+    row = placement(TRUTH, Shape(REAL, added, added), shaped(SMOOTH, noise(2)), TRUTH, horizon=3, seed=1)
+    assert row["r_mean_curvature"] == pytest.approx(1 / np.sqrt(2), abs=0.06)
+    assert row["skill_mean_curvature"] == pytest.approx(row["r_mean_curvature"], abs=0.08)
+    assert row["gain_low_mean_curvature"] < row["gain_mean_curvature"] < row["gain_high_mean_curvature"]
+    assert row["gain_low_mean_curvature"] > 0
+
+
+def test_mean_curvature_is_clipped():
+    spike = np.zeros(len(REAL.vertices))
+    spike[7] = 50.0
+    assert Shape(REAL, spike, spike * 0).mean_curvature.max() == 1.0
+    with pytest.raises(ValueError, match="shape_index"):
+        Shape(REAL, spike, spike[:3])
+
+
+def test_patches_cover_the_surface_evenly():
+    areas = np.full(len(REAL.vertices), 4 * np.pi * RADIUS**2 / len(REAL.vertices))
+    patch = patches(REAL.vertices, areas, 10.0)
+    sizes = np.bincount(patch, areas)
+    assert len(sizes) == round(4 * np.pi * RADIUS**2 / 100)
+    assert sizes.min() > 25
+    assert sizes.max() < 300
+
+
+def test_interval_is_as_wide_as_gains_scatter_from_surface_to_surface():
+    points, areas = SMOOTH.vertices, np.ones(len(SMOOTH.vertices))
+    directions = points / RADIUS
+    patch = patches(points, np.full(len(points), 4 * np.pi * RADIUS**2 / len(points)), 10.0)
+    gains, inside = [], []
+    for seed in range(30):
+        shared, own, other = (field(directions, 100 * seed + k) for k in range(3))
+        truth, run, start = shared, shared + own, 0.5 * shared + other
+        gains.append(correlation(truth, run, areas) - correlation(truth, start, areas))
+        low, high = gain_interval(truth, run, start, areas, patch, seed=seed)
+        expected = 1 / np.sqrt(2) - 0.5 / np.sqrt(1.25)
+        inside.append(low < expected < high)
+    assert np.mean(inside) > 0.75
+    assert gain_interval(truth, run, start, areas, patch, seed=3) == gain_interval(
+        truth, run, start, areas, patch, seed=3
+    )
+
+
+def two_sided(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns the surface beside its mirror image."""
+    away = mesh.vertices + [1.5 * RADIUS, 0, 0]
+    return TriangleMesh(
+        np.concatenate([away, away * [-1, 1, 1]]),
+        np.concatenate([mesh.faces, flipped(mesh).faces + len(away)]),
+    )
+
+
+def test_mirror_patches_are_drawn_together_where_the_brain_is_its_mirror_image():
+    brain = two_sided(bumpy(1))
+    half = len(REAL.vertices)
+    # wherever the brain lies
+    laid = transformed(brain, motion(8, (5, -3, 2)))
+    patch, drawn = drawn_patches(shaped(laid, np.zeros(2 * half)))
+    assert drawn["mirrored_patches"] is True
+    assert drawn["asymmetry_mm"] == pytest.approx(0, abs=0.02)
+    assert np.mean(patch[:half] == patch[half:]) > 0.98
+    assert patch.max() + 1 == round(shaped(laid, np.zeros(2 * half)).areas.sum() / 20**2 / 2)
+    # another brain on the other side: only on demand
+    other = transformed(bumpy(5), motion(0, (-1.5 * RADIUS, 0, 0)))
+    unlike = TriangleMesh(
+        np.concatenate([brain.vertices[:half], other.vertices]), np.concatenate([REAL.faces, REAL.faces + half])
+    )
+    shape = shaped(unlike, np.zeros(2 * half))
+    patch, drawn = drawn_patches(shape)
+    assert drawn["mirrored_patches"] is False
+    assert drawn["asymmetry_mm"] > 0.4
+    assert not set(patch[:half]) & set(patch[half:])
+    patch, drawn = drawn_patches(shape, mirrored=True)
+    assert drawn["mirrored_patches"] is True
+    assert set(patch[:half]) & set(patch[half:])
+
+
+def test_intervals_of_symmetric_brains_are_root_two_wider_when_mirror_patches_are_drawn_together():
+    brain = two_sided(SMOOTH)
+    areas = np.ones(len(brain.vertices))
+    directions = SMOOTH.vertices / RADIUS
+    place = brain.vertices * [-1, 1, 1]
+    sizes = np.full(len(areas), 8 * np.pi * RADIUS**2 / len(areas))
+    ratios = []
+    for seed in range(10):
+        shared, own, other = (np.tile(field(directions, 100 * seed + k), 2) for k in range(3))
+        widths = [
+            np.ptp(gain_interval(shared, shared + own, 0.5 * shared + other, areas, patch, seed=seed))
+            for patch in (patches(brain.vertices, sizes, 10.0), patches(brain.vertices, sizes, 10.0, place))
+        ]
+        ratios.append(widths[1] / widths[0])
+    assert np.mean(ratios) == pytest.approx(np.sqrt(2), abs=0.15)
+
+
+def test_closest_points_find_the_motion_back():
+    matrix = motion(10, (4, 3, -2))
+    back = fit_onto(transformed(REAL, matrix), REAL)
+    assert back @ matrix == pytest.approx(np.eye(4), abs=0.02)
+
+
+def test_open_or_turned_surfaces_are_refused():
+    with pytest.raises(InputError, match="encloses no volume"):
+        ready(flipped(REAL), REAL)
+
+
+def test_spins_rotate_a_map_and_keep_its_values():
+    height = SMOOTH.vertices[:, 2]
+    quarter = Rotation.from_rotvec([90, 0, 0], degrees=True).as_matrix()
+    moved = spun(SMOOTH.vertices, height, quarter)
+    # what was at the pole is where the turn leads the pole
+    assert moved == pytest.approx(SMOOTH.vertices @ (quarter @ [0, 0, 1]), abs=1.5)
+    assert moved.std() == pytest.approx(height.std(), rel=0.02)
+
+
+def test_spun_maps_of_hemispheres_stay_symmetric():
+    left = TriangleMesh(SMOOTH.vertices - [25, 0, 0], SMOOTH.faces)
+    points = np.concatenate([left.vertices, left.vertices * [-1, 1, 1]])
+    right = np.arange(len(points)) >= len(left.vertices)
+    values = field(SMOOTH.vertices / RADIUS, 5)
+    moved = spun(points, np.concatenate([values, values]), spins(1, 8)[0], right)
+    assert moved[~right] == pytest.approx(moved[right])
+    assert correlation(values, moved[right], np.ones(len(values))) < 0.5
