@@ -41,9 +41,7 @@ OF_THE_OTHER_BRAIN = SHAPE | {
 # a table of the study is shown by the report
 NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "methods": 1}
 OF_THE_SOLVER = {
-    rule: count
-    for rule, count in BOTH_RUNS.items()
-    if rule not in ("parameters", "regions", "zones_figure", "growth_zone_figure", "layers_figure", "mesh_figure")
+    rule: count for rule, count in BOTH_RUNS.items() if rule not in ("parameters", "regions", "zones_figure")
 }
 
 

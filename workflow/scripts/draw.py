@@ -16,7 +16,6 @@ from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_m
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import parameters_from
-from gyriflow.parameters.terms import BASE, CORTEX
 from gyriflow.step import step
 from gyriflow.units import SECONDS_PER_GW
 
@@ -103,74 +102,11 @@ def outlines_chart(runs, real, **shown):
     return {"runs": laid, "real": real, **shown}
 
 
-def mesh_picture(mesh, **shown):
-    """Returns a mesh and which of its elements belong to the cortex."""
-    return {"mesh": mesh.mesh, "in_cortex": mesh.cell_tags["layer"] == CORTEX, "synthetic": shown["synthetic"]}
-
-
 def zones_picture(mesh, params, synthetic, **_):
     """Returns the boundary of the start mesh with its zones."""
     boundary = TriangleMesh(mesh.mesh.vertices, mesh.facets)
     shown = {"fissure_x_mm": params.fissure_x_mm, "synthetic": synthetic}
     return {"mesh": boundary, "zones": mesh.facet_tags["zone"], **shown}
-
-
-def field_picture(mesh, params, synthetic, **_):
-    """Returns the growth of the pial surface at the start."""
-    surface, pial = boundary_surface(mesh.mesh)
-    shown = {"fissure_x_mm": params.fissure_x_mm, "synthetic": synthetic}
-    return {"mesh": surface, "values": growth_per_week(mesh, params)[pial], **shown}
-
-
-def growth_per_week(mesh, params):
-    """Returns the tangential growth of the first step at the vertices in % per week."""
-    return 100 * SECONDS_PER_GW / params.step_s * mesh.fields["tangential_growth_per_step"]
-
-
-def region_sections(mesh, params, synthetic, **_):
-    """Returns the start mesh with its fields and tags, and the ellipsoid of no growth."""
-    from gyriflow.folding.zones import no_growth_ellipsoid
-
-    ellipsoid = no_growth_ellipsoid(mesh.mesh.vertices, params)
-    fields = {**mesh.fields, "tangential_growth_percent_per_gw": growth_per_week(mesh, params)}
-    return {"mesh": mesh.mesh, "fields": fields, "tags": mesh.cell_tags, "ellipsoid": ellipsoid,
-            "synthetic": synthetic}  # fmt: skip
-
-
-def normal_arrows(mesh, params, frames, maps, synthetic, **_):
-    """Returns the normals that orient growth at the first and the last week."""
-    from gyriflow.folding.output import layer_fields
-    from gyriflow.folding.zones import zones_of_run
-    from gyriflow.report.sections import Normals
-
-    pial, found = mesh.facets[mesh.facet_tags["zone"] < BASE], zones_of_run(mesh.mesh, params)
-    weeks = {}
-    for week in dict.fromkeys((read_weeks(frames)[0], read_weeks(frames)[-1])):
-        at = TetrahedralMesh(read_positions(frames, week), mesh.mesh.tets)
-        fields = layer_fields(at.vertices, found, params, maps or {}, week, ("normal", "cortex_weight"))
-        weeks[week] = Normals(at, fields["pial_normal"], fields["cortex_weight"], pial)
-    return {"weeks": weeks, "synthetic": synthetic}
-
-
-def contact_scheme(mesh, params, synthetic, **_):
-    """Returns the walls of contact and its law: by planes, or by the distance of the walls."""
-    from gyriflow.folding.contact import BARRIER, DISTANCE_PER_EDGE
-    from gyriflow.folding.zones import zones_of_run
-    from gyriflow.geometry.triangles import mean_edge_length
-    from gyriflow.report.sections import barrier_law, penalty_law
-
-    found = zones_of_run(mesh.mesh, params)
-    boundary, settings = TriangleMesh(mesh.mesh.vertices, found.facets), params.contact
-    by_planes = settings.kind == "planes"
-    distance = settings.distance_mm or DISTANCE_PER_EDGE * mean_edge_length(boundary)
-    return {
-        "mesh": boundary,
-        "zones": found.facet_zone,
-        "law": penalty_law(settings.penalty_pa_per_m) if by_planes else barrier_law(BARRIER),
-        "planes_mm": found.planes_mm if by_planes else None,
-        "distance": f"d̂ = {distance:.2g} mm",
-        "synthetic": synthetic,
-    }
 
 
 def norms_chart(metrics, reference, **shown):

@@ -40,7 +40,6 @@ class Panel:
     caption : what stands below
     material : how it takes the light
     mark : (3,) a point of the surface around which a ring is drawn, dotted where it lies on the side turned away
-    edges : whether the edges of its triangles are drawn
     lines : (k, 2, 3) ends of lines that are drawn on it
     """
 
@@ -50,7 +49,6 @@ class Panel:
     caption: str = ""
     material: Material = TISSUE
     mark: Floats | None = None
-    edges: bool = False
     lines: Floats | None = None
 
 
@@ -215,7 +213,6 @@ def _draw_row(
             half_height_mm=half_height,
             pixels_per_mm=PIXELS_PER_INCH * layout.inches_per_mm,
             material=panel.material,
-            edges=panel.edges,
             lines=panel.lines,
         )
         axes.imshow(image, extent=(-half_width, half_width, -half_height, half_height), aspect="auto")

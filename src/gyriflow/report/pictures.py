@@ -11,8 +11,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
-from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, submesh, vertex_normals
+from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.terms import (
     BASE,
@@ -27,12 +26,11 @@ from ..parameters.terms import (
     ZONE_NAMES,
 )
 from ..units import CM2_PER_MM2
-from .labels import AREA_GROWTH, DEVIATIONS, DISTANCE, GROWTH, MAPS, PRESSURES, column_label, plain, value_labels
+from .labels import AREA_GROWTH, DEVIATIONS, DISTANCE, MAPS, PRESSURES, column_label, plain, value_labels
 from .panels import MOST_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
     UNKNOWN_COLOUR,
-    VIEWS,
     View,
     colour_scale,
     hemisphere_faces,
@@ -84,8 +82,6 @@ ZONE_COLOURS = {
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
 CORTEX_COLOUR, CORE_COLOUR = "#E8A33D", "#F3EBDD"
-CUTS = {"cut across, front view": (1, "front"), "cut along, top view": (2, "top")}
-"""The planes in which the mesh is cut open: the axis across and the side that is seen."""
 TINTS = (0.0, 0.4, 0.7)
 """How far towards white the colours of further regions are."""
 
@@ -482,68 +478,10 @@ def zones_picture(
         for code, colour in ZONE_COLOURS.items()
         if areas[code]
     ]
-    columns, rows = _one_row(mesh, palette[zones], views, fissure_x_mm)
-    return panel_grid(columns, rows, synthetic=synthetic, legend=legend)
-
-
-@styled
-def field_picture(
-    mesh: TriangleMesh,
-    values: Floats,
-    *,
-    fissure_x_mm: float,
-    views: Sequence[str] = MEDIAL_VIEWS,
-    synthetic: bool = False,
-) -> Figure:
-    """Returns the (n,) growth of the pial vertices in % per week from several sides; grey where it is zero."""
-    scale = signed_scale(values) if goes_below_zero(values) else magnitude_scale(values, MAGNITUDES)
-    columns, rows = _one_row(mesh, paint(values, scale, zero_is_nothing=True), views, fissure_x_mm)
-    legend = [] if values.all() else [Patch(color=NEUTRAL_COLOUR, label="zero")]
-    return panel_grid(columns, rows, synthetic=synthetic, colour_bars=[(scale, GROWTH)], legend=legend)
-
-
-def _one_row(
-    mesh: TriangleMesh, colours: Floats, views: Sequence[str], fissure_x_mm: float
-) -> tuple[list[str], list[Row]]:
     # a brain of one hemisphere has no medial view of the other
     shown = [view for view in named_views(views) if hemisphere_faces(mesh, view.hemisphere, fissure_x_mm).any()]
-    panels = [Panel(*restricted(mesh, colours, view.hemisphere, fissure_x_mm), view, material=MAP) for view in shown]
-    return [f"{view.name} view" for view in shown], [Row("", panels)]
-
-
-@styled
-def mesh_picture(mesh: TetrahedralMesh, in_cortex: NDArray[np.bool_], *, synthetic: bool = False) -> Figure:
-    """Returns the mesh from the left, and cut open in a coronal and in an axial plane, with the edges of its elements.
-
-    Elements are left out whole, those whose centroid lies before or above the plane through the middle.
-
-    Parameters
-    ----------
-    mesh : in RAS+ mm, linear or quadratic
-    in_cortex : (m,) whether an element belongs to the cortex
-    """
-    centroid = mesh.vertices[mesh.corners].mean(axis=1)
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    shown: dict[str, Any] = {"left view": (np.ones(len(mesh.tets), dtype=bool), "left")}
-    shown |= {name: (centroid[:, axis] <= middle[axis], view) for name, (axis, view) in CUTS.items()}
     panels = [
-        Panel(*_open(mesh, keep, in_cortex), VIEWS[view], material=MAP, edges=True) for keep, view in shown.values()
+        Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, material=MAP) for view in shown
     ]
-    colours = {"pial surface": SIMULATED_SURFACE_COLOUR, "elements of the cortex": CORTEX_COLOUR}
-    colours["elements of the core"] = CORE_COLOUR
-    legend = [Patch(color=colour, label=label) for label, colour in colours.items()]
-    return panel_grid(list(shown), [Row("", panels)], synthetic=synthetic, legend=legend)
-
-
-def _open(mesh: TetrahedralMesh, keep: NDArray[np.bool_], in_cortex: NDArray[np.bool_]) -> tuple[TriangleMesh, Floats]:
-    """Returns the boundary of some of the elements, and the (k, 3) colours of its faces."""
-    faces, owners = boundary_faces(TetrahedralMesh(mesh.vertices, mesh.tets[keep]))
-    count = len(mesh.vertices)
-    own, pial = (
-        np.sort(triangles, axis=1) @ np.array([count * count, count, 1])
-        for triangles in (faces, boundary_faces(mesh)[0])
-    )
-    inside = np.where(in_cortex[keep][owners][:, None], to_rgb(CORTEX_COLOUR), to_rgb(CORE_COLOUR))
-    colours = np.where(np.isin(own, pial)[:, None], to_rgb(SIMULATED_SURFACE_COLOUR), inside)
-    part, _ = submesh(TriangleMesh(mesh.vertices, faces), np.ones(len(faces), dtype=bool))
-    return part, colours
+    headings = [f"{view.name} view" for view in shown]
+    return panel_grid(headings, [Row("", panels)], synthetic=synthetic, legend=legend)

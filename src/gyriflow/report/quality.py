@@ -194,7 +194,7 @@ def _draw_planes(figure: Figure, brain: Brain, *, top: float) -> None:
         wide, tall = inches * (extent[1] - extent[0]), inches * (extent[3] - extent[2])
         box = (left / FULL_WIDTH_IN, (top - 0.17 - tall) / height, wide / FULL_WIDTH_IN, tall / height)
         axes = figure.add_axes(box)
-        keys = _draw_volumes(axes, brain.volumes, points, extent, (plane, at[plane], low, high))
+        keys = _draw_volumes(axes, brain.volumes, points, extent)
         if brain.white is not None:
             draw_outline(axes, brain.white, plane, at[plane], INNER_COLOUR)
         draw_outline(axes, brain.pial, plane, at[plane], PIAL_COLOUR)
@@ -235,13 +235,12 @@ def _draw_volumes(
     volumes: Sequence[Volume],
     points: Floats,
     extent: tuple[float, float, float, float],
-    where: tuple[str, float, Floats, Floats],
 ) -> list[Patch]:
     """Draws the image, or else the labels, and the inner border of the cortex where there are labels."""
     keys: list[Patch] = []
     image = next((volume for volume in volumes if volume.image is not None), None)
     if image is not None and image.image is not None:
-        draw_image(axes, image.image, image.affine, *where)
+        draw_image(axes, image.image, image.affine, points, extent)
     for volume in volumes:
         if volume.tissues is None:
             continue

@@ -179,7 +179,6 @@ def render(
     half_height_mm: float,
     pixels_per_mm: float,
     material: Material = TISSUE,
-    edges: bool = False,
     lines: Floats | None = None,
 ) -> Image:
     """Returns a picture of the surface in parallel projection, its bounding box in the middle.
@@ -187,8 +186,6 @@ def render(
     Parameters
     ----------
     colours : (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1
-    edges
-        Whether the edges of the triangles are drawn.
     lines : (k, 2, 3) ends of lines that are drawn where the surface does not hide them
 
     Returns
@@ -208,15 +205,12 @@ def render(
             surface,
             scalars="colour",
             rgb=True,
-            interpolation="flat" if edges else "phong",
+            interpolation="phong",
             ambient=material.ambient,
             diffuse=material.diffuse,
             specular=material.specular,
             specular_power=15,
             culling="back",
-            show_edges=edges,
-            edge_color="#303030",
-            line_width=1.0,
         )
         # the inside of a surface that is open where a connected brain is parted
         plotter.add_mesh(

@@ -23,9 +23,6 @@ INFLUENCE = f"{STUDY}/{{study}}/figures"
 WEEKLY = f"{STUDY_FIGURES}/weekly.{{brain}}.png"
 AROUND = ("left", "right", "top", "bottom")
 ZONES = ("contact", "no_growth", "support", "medial_wall")
-GROWTH_OF_START = (*ZONES, "thickness_mm", "growth_rate_per_s", "follow", "allow_negative_growth", "step_s")
-MODULI = ("shear_modulus_cortex_pa", "shear_modulus_core_pa")
-"""Settings of a run that decide what figures of the brain at its start show: runs alike in them have one figure."""
 
 
 def nothing(**_: str) -> dict[str, Any]:
@@ -194,9 +191,6 @@ class Figures:
 
     def _synthetic(self, *brains: str) -> dict[str, Any]:
         return {"synthetic": all(self.config.brain(brain).synthetic for brain in brains)}
-
-    def _of_start(self, run: str, brain: str, **_: str) -> dict[str, Any]:
-        return self._synthetic(brain)
 
     def _beside(self, run: str, brain: str, **_: str) -> dict[str, Any]:
         """Returns the options of figures that show simulated beside measured brains."""
@@ -374,8 +368,6 @@ class Figures:
     @property
     def _of_folding(self) -> Iterator[Figure]:
         at = f"{RUN}/figures"
-        start = {"mesh": REGIONS["mesh"], "data": REGIONS["data"]}
-        of_run = {"params": PARAMETERS}
 
         def files(**patterns: str) -> Callable[..., dict[str, Any]]:
             return lambda run, brain: {key: path.format(run=run, brain=brain) for key, path in patterns.items()}
@@ -415,12 +407,6 @@ class Figures:
             paper=True,
         )  # fmt: skip
         yield Figure(
-            "mesh_figure", "Folding", "the mesh, cut open", f"{at}/mesh.png", "pictures.mesh_picture",
-            """Mesh at the start of run *{run}*: from the left (a), cut open across, from the front (b), and along,
-            from above (c).""",
-            files(**start), self._of_start, self._each_start_with("thickness_mm"), paper=True, technical=True,
-        )  # fmt: skip
-        yield Figure(
             "displacement_maps", "Folding", "displacement maps", f"{STUDY_FIGURES}/displacement_maps.{{brain}}.png",
             "pictures.displacement_maps",
             """Norm of the displacement between output weeks on the pial surface, on one scale for all runs. One vertex
@@ -453,54 +439,19 @@ class Figures:
             """Zones of the boundary at the start of run *{run}*, from the left (a), from below (b) and on the medial
             sides (c, d): free, clamped (inside the ellipsoid of no growth), the facets of each hemisphere that may
             touch at the fissure, and those between the contact planes. Grey: the inside of the surface.""",
-            files(**start, **of_run), self._of_start, self._each_start_with(*ZONES), paper=True, technical=True,
-        )  # fmt: skip
-        yield Figure(
-            "contact_scheme", "Folding", "scheme of contact", f"{at}/contact_scheme.png", "sections.contact_scheme",
-            """Contact in run *{run}* at the start: an axial section with the walls that may touch (a), the fissure
-            enlarged, with the pressure that acts (b), and the law of contact (c).""",
-            files(**start, **of_run), self._of_start,
-            tuple(of for of in self._each_start_with(*ZONES) if self.config.run(of["run"]).contact.kind != "none"),
-            paper=True, technical=True,
-        )  # fmt: skip
-        yield Figure(
-            "growth_zone_figure", "Folding", "growth on the surface", f"{at}/growth_zone.png", "pictures.field_picture",
-            """Tangential growth of the pial surface at the start of run *{run}*: from the left (a), from
-            below (b), and the medial sides (c, d). Grey: nothing grows, as inside the ellipsoid of no growth and where
-            tissue bridges the planes at the fissure. Below zero the surface shrinks.""",
-            files(**start, **of_run), self._of_start, self._each_start_with(*GROWTH_OF_START),
-            paper=True, technical=True,
+            files(mesh=REGIONS["mesh"], data=REGIONS["data"], params=PARAMETERS),
+            lambda run, brain: self._synthetic(brain), self._each_start_with(*ZONES), paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
             "growth_found_figure", "Folding", "growth found", f"{at}/growth_found.png", "pictures.scalar_maps",
             """Growth of area along the pial surface that takes run *{run}* from week to week towards the shapes that it
             is to have, on the surface at the interval's end. Lines: the direction along the surface in which it is
             largest, the longer the more it exceeds the growth across.""",
-            files(frames=FOLDING["frames"], **of_run),
+            files(frames=FOLDING["frames"], params=PARAMETERS),
             lambda run, brain: {
                 **self._synthetic(brain), "quantity": "area_growth_percent_per_gw", "views": ["left", "top", "bottom"]
             },
             self._each_run_with(lambda run: self.runs.closed(run) and "growth" in self.config.run(run).fields),
-        )  # fmt: skip
-        yield Figure(
-            "layers_figure", "Folding", "regions and growth in sections", f"{at}/layers.png",
-            "sections.region_sections",
-            """Start brain of run *{run}* in sections through its middle: hemispheres (neither between the contact
-            planes), what grows, cortical weight, tangential growth, and shear modulus. Dashed: the
-            ellipsoid of no growth.""",
-            files(**start, **of_run), self._of_start, self._each_start_with(*GROWTH_OF_START, *MODULI),
-            paper=True, technical=True,
-        )  # fmt: skip
-        yield Figure(
-            "normals_figure", "Folding", "pial normals at two weeks", f"{at}/normals.png", "sections.normal_arrows",
-            """Normals that orient growth in run *{run}* at its first and last week, at a sample of vertices near the
-            sections; inner vertices have that of the nearest pial one. Arrows show the part within the section, so
-            those that cross it look short. Growth is across them. Normals are computed again in every step.""",
-            lambda run, brain: {
-                **files(**start, **of_run, frames=FOLDING["frames"])(run, brain),
-                "maps": self.runs.maps(run, brain),
-            },
-            self._of_start, self._each_run, paper=True, technical=True,
         )  # fmt: skip
         order = self.config.mesh.order
         kind = "quadratic" if order == 2 else "linear"

@@ -4,37 +4,32 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from pictures import colour_bar, covered, picture, pictures, tone, words
-from shapes import box, ellipsoid, ellipsoid_mesh, sphere
+from shapes import box, ellipsoid, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.io.figures import write_figure
 from gyriflow.parameters.terms import ZONE_NAMES
-from gyriflow.report.labels import AREA_GROWTH, GROWTH
+from gyriflow.report.labels import AREA_GROWTH
 from gyriflow.report.panels import round_length
 from gyriflow.report.pictures import (
     ABSENT,
-    CORE_COLOUR,
-    CORTEX_COLOUR,
     LINES_MM,
     ZONE_COLOURS,
     brains_picture,
     direction_lines,
     displacement_maps,
-    field_picture,
     influence_picture,
-    mesh_picture,
     region_colours,
     regions_picture,
     round_up,
     runs_by_week,
     scalar_maps,
     shape_maps,
-    signed_scale,
     zones_picture,
 )
 from gyriflow.report.scene import MAP, TISSUE, VIEWS, render, uniform_colours
-from gyriflow.report.style import RUN_COLOURS, SIMULATED_SURFACE_COLOUR
+from gyriflow.report.style import RUN_COLOURS
 
 BRAIN = box((20, 30, 20))
 SMOOTH = ellipsoid((20.0, 26.0, 18.0))
@@ -248,24 +243,6 @@ def test_zones_that_do_not_fit_are_refused():
         zones_picture(BRAIN, np.full(12, 9), fissure_x_mm=0.0)
 
 
-def test_field_picture_names_the_field():
-    figure = field_picture(BRAIN, np.linspace(0, 2, 8), fissure_x_mm=0.0)
-    bar = colour_bar(figure, GROWTH)
-    assert bar.get_xlim() == (0.0, 2.0)
-
-
-def test_a_field_that_goes_below_zero_has_a_scale_as_wide_on_both_sides():
-    figure = field_picture(BRAIN, np.linspace(-1, 2, 8), fissure_x_mm=0.0)
-    bar = colour_bar(figure, GROWTH)
-    assert bar.get_xlim() == (-2.0, 2.0)
-    scale = signed_scale(np.array([-1.0, 0.0, 2.0]))
-    minus, zero, plus = scale.to_rgba([-1.0, 0.0, 1.0])[:, :3]
-    # blue, pale, red
-    assert minus[2] > minus[0]
-    assert zero.min() > 0.9
-    assert plus[0] > plus[2]
-
-
 def test_lines_on_a_map_run_along_directions_where_these_are_seen():
     right = np.tile([0.0, 0.5, 0.0], (len(SMOOTH.vertices), 1)) * (SMOOTH.vertices[:, :1] > 0)
     ends = direction_lines(SMOOTH, right, VIEWS["right"])
@@ -354,25 +331,6 @@ def test_a_study_has_renders_and_maps_of_all_members_and_says_which_did_not_come
     # the measured brain is beige
     red, _, blue = tone(picture(figure, 2))
     assert red > blue
-
-
-def test_the_mesh_is_cut_open_with_cortex_and_core_apart():
-    ball = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
-    deep = np.linalg.norm(ball.vertices[ball.tets].mean(axis=1) / [20.0, 26.0, 18.0], axis=1)
-    figure = mesh_picture(ball, deep > 0.7)
-    palette = np.array([to_rgb(colour) for colour in (SIMULATED_SURFACE_COLOUR, CORTEX_COLOUR, CORE_COLOUR)])
-
-    def shares(number):
-        """Returns which part of a picture has the hue of each colour."""
-        image = picture(figure, number).astype(float)
-        inside = image[covered(image)]
-        hues = inside / np.linalg.norm(inside, axis=1, keepdims=True)
-        near = np.argmax(hues @ (palette / np.linalg.norm(palette, axis=1, keepdims=True)).T, axis=1)
-        return np.bincount(near, minlength=3) / len(near)
-
-    assert shares(0)[0] > 0.8
-    outside, cortex, _ = shares(1)
-    assert cortex > 0.2 > outside
 
 
 def test_regions_are_seen_in_their_colours_where_they_are():
