@@ -45,6 +45,5 @@ rule paper:
     input:
         FIGURES.target("paper"),
         rules.growth_rates.output if PLAN.chains.grown else [],
-        rules.published_tables.output,
         rules.replication.output,
         rules.studies.input,

@@ -44,25 +44,6 @@ rule study_tables:
         "../scripts/study_tables.py"
 
 
-# what stands beside the paper's own tables
-rule published_tables:
-    input:
-        published=PUBLISHED,
-        params=PLAN.runs.of(PARAMETERS),
-        displacement=PLAN.runs.of(DISPLACEMENT),
-        rates=GROWTH["rates"] if PLAN.chains.grown else [],
-        summaries=PLAN.runs.of(FOLDING["summary"]),
-    output:
-        **tables(
-            f"{STUDY}/tables", "parameters", "displacement", "growth_rates", "cost"
-        ),
-    params:
-        folded=PLAN.runs.folded,
-        populations=[PLAN.brains.population(brain) for _, brain in PLAN.runs.folded],
-    script:
-        "../scripts/published_tables.py"
-
-
 # each result of the paper beside the same here, with a verdict
 rule replication:
     input:
@@ -72,6 +53,7 @@ rule replication:
         },
         published=PUBLISHED,
         displacement=PLAN.runs.of(DISPLACEMENT)[:1],
+        summary=PLAN.runs.of(FOLDING["summary"])[:1],
     output:
         csv=f"{STUDY}/replication.csv",
         page=f"{STUDY}/replication.html",
@@ -81,6 +63,9 @@ rule replication:
             for name, study in CONFIG.studies.items()
         },
         run=PLAN.runs.folded[0],
+        power=CONFIG.report.energy.model_dump(
+            include={"core_power_w", "carbon_intensity_g_per_kwh"}
+        ),
     script:
         "../scripts/replication.py"
 

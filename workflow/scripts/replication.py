@@ -4,7 +4,7 @@ from markupsafe import Markup
 
 from gyriflow.compare.published import StudyTables, comparison_caption, replication
 from gyriflow.io.figures import write_html
-from gyriflow.io.files import read_table, write_table
+from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.tables import html_table
 from gyriflow.step import step
@@ -18,9 +18,12 @@ with step(snakemake.log[0]):
         name: StudyTables(**params.studies[name], **dict(zip(NAMES, of, strict=True))) for name, of in tables.items()
     }
     published = read_yaml(files.published)
-    table = replication(published, read_table(files.displacement[0]), list(studies.values()))
+    displacement, summary = read_table(files.displacement[0]), read_json(files.summary[0])
+    table = replication(published, displacement, list(studies.values()), summary, params.power)
     write_table(snakemake.output.csv, table)
-    said = [f"Displacements are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}."]
+    said = [
+        f"Displacements and cost are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}."
+    ]
     said += [comparison_caption(name, study.week, study.comparison) for name, study in studies.items()]
     body = html_table(table, caption="The FetalFoldSim paper, and the same here")
     write_html(snakemake.output.page, Markup("").join(Markup("<p>{}</p>\n").format(line) for line in said) + body)

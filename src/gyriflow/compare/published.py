@@ -2,16 +2,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
-from operator import getitem
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from .members import MODES
-
-PAPER = "FetalFoldSim paper"
 
 
 def comparison_caption(study: str, week: float, comparison: pd.DataFrame) -> str:
@@ -47,83 +43,11 @@ def with_published_nearest(
     return pd.concat([nearest.iloc[:, :place], pd.DataFrame({"paper": values}), nearest.iloc[:, place:]], axis=1)
 
 
-def parameters_table(published: Mapping[str, Any], runs: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """Returns the parameters that the paper prints, a row each: its values, then those of each run's `params.yaml`."""
-    keys = list(dict.fromkeys(key for entry in published["parameters"] for key in entry["values"]))
-    columns: dict[str, list[Any]] = {"parameter": keys}
-    for entry in published["parameters"]:
-        columns[f"paper, {entry['run']}"] = [entry["values"].get(key, "varied") for key in keys]
-    for name, params in runs.items():
-        values = [reduce(getitem, key.split("."), params) for key in keys]
-        columns[name] = ["a curve or map" if isinstance(value, dict) else value for value in values]
-    return pd.DataFrame(columns)
-
-
-def displacement_table(published: Mapping[str, Any], displacement: pd.DataFrame) -> pd.DataFrame:
-    """Returns largest and mean norm of the displacement in mm, a row per quantity and source, a column per interval.
-
-    Displacement has the columns run, from_week, to_week, nodes, max_mm, mean_mm. The paper does not say whether its
-    numbers are of all nodes or of the surface, so both stand here.
-    """
-    rows = displacement.replace({"nodes": {"all": "all nodes", "pial": "surface"}})
-    groups = rows.groupby(["run", "nodes"], sort=False)
-    sources = {f"{run} (simulated, {nodes})": of_run.set_index("from_week") for (run, nodes), of_run in groups}
-    for entry in published["displacement"]["rows"]:
-        paper = pd.DataFrame(entry, index=published["displacement"]["from_weeks"])
-        sources[f"{PAPER}: {entry['source']}"] = paper
-    weeks = sorted({*published["displacement"]["from_weeks"], *rows["from_week"]})
-    table = []
-    for column, name in (("max_mm", "largest displacement (mm)"), ("mean_mm", "mean displacement (mm)")):
-        for source, values in sources.items():
-            intervals = {f"{week:g}-{week + 1:g} GW": values[column].get(week, float("nan")) for week in weeks}
-            table.append({"quantity": name, "source": source, **intervals})
-    return pd.DataFrame(table)
-
-
-def growth_table(published: Mapping[str, Any], rates: pd.DataFrame) -> pd.DataFrame:
-    """Returns growth rates from the brains' areas and volumes by interval and series, the paper's two in the last rows.
-
-    Rates have the columns series, from_week, to_week, rate_per_s, core_rate_per_s.
-    """
-    own = pd.DataFrame(
-        {
-            "source": rates["series"],
-            "interval": [f"{a:g}-{b:g} GW" for a, b in zip(rates["from_week"], rates["to_week"], strict=True)],
-            "tangential rate (1e-7 1/s)": 1e7 * rates["rate_per_s"],
-            "core rate (1e-7 1/s)": 1e7 * rates["core_rate_per_s"],
-        }
-    )
-    rate = published["growth_rate"]
-    paper = pd.DataFrame(
-        {
-            "source": [f"{PAPER}: least, from surfaces", f"{PAPER}: used"],
-            "interval": ["21-29 GW", "all"],
-            "tangential rate (1e-7 1/s)": [1e7 * rate["least_per_s"], 1e7 * rate["used_per_s"]],
-        }
-    )
-    return pd.concat([own, paper], ignore_index=True)
-
-
-def cost_table(published: Mapping[str, Any], summaries: Mapping[str, tuple[float, Mapping[str, Any]]]) -> pd.DataFrame:
-    """Returns what each run took, by its name the weeks that it folds over and its summary; and the paper's own."""
-    rows: list[dict[str, Any]] = []
-    for name, (weeks, summary) in summaries.items():
-        wall, processor = summary["seconds"] / 3600, summary["cpu_seconds"] / 3600
-        for quantity, value in (
-            (f"hours ({summary['ranks']} ranks, {summary['tets']} elements)", wall),
-            ("processor hours", processor),
-            ("hours per gestational week", wall / weeks),
-        ):
-            rows.append({"source": name, "quantity": quantity, "value": value})
-    rows += [{"source": PAPER, **row} for row in published["cost"]["rows"]]
-    return pd.DataFrame(rows)
-
-
 CLOSE = 0.1
 """Relative difference of displacements up to which they agree."""
 WEAK = 0.05
 """Share of the spectrum's power below which a band is very weak."""
-NOT_RUN, AGREES = "not run", "as in the paper"
+NOT_RUN, AGREES, NOT_ALIKE = "not run", "as in the paper", "another machine and mesh"
 REAL = "real "
 
 
@@ -139,13 +63,18 @@ class StudyTables:
 
 
 def replication(
-    published: Mapping[str, Any], displacement: pd.DataFrame, studies: Sequence[StudyTables]
+    published: Mapping[str, Any],
+    displacement: pd.DataFrame,
+    studies: Sequence[StudyTables],
+    summary: Mapping[str, Any],
+    power: Mapping[str, float],
 ) -> pd.DataFrame:
-    """Returns each result of the paper beside the same here: result, place, paper, here, verdict.
+    """Return each result of the paper beside the same here: result, place, paper, here, verdict.
 
-    Displacement has the rows of one run, in the columns of `displacement_table`. Where the paper's study is not among
-    `studies`, the verdict is `NOT_RUN`. Bands are cut at Weyl's number, here each surface's own and in the paper the
-    largest of all compared, and stand in whole beside it.
+    Displacement has the rows of one run, in the columns from_week, to_week, nodes, max_mm, mean_mm; `summary` is that
+    run's, and `power` has core_power_w and carbon_intensity_g_per_kwh. Where the paper's study is not among `studies`,
+    the verdict is `NOT_RUN`. Bands are cut at Weyl's number, here each surface's own and in the paper the largest of
+    all compared, and stand in whole beside it.
     """
     rows = [*_displacements(published["displacement"], displacement), *_modes(published["weyl_number"], studies)]
     for entry in [*published["nearest"], *published["findings"]]:
@@ -158,6 +87,7 @@ def replication(
             paper = f"{entry['value']:g}"
             here, verdict = _nearest(entry, of_it[0].nearest) if of_it else ("–", NOT_RUN)
         rows.append((result, entry["place"], paper, here, verdict))
+    rows += _costs(published["cost"], summary, **power)
     return pd.DataFrame(rows, columns=["result", "place", "paper", "here", "verdict"])
 
 
@@ -173,6 +103,22 @@ def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> 
                 away = [value / paper - 1 for value in found]
                 verdict = AGREES if min(map(abs, away)) <= CLOSE else "{:+.0%}, {:+.0%}".format(*away)
             yield f"{name} displacement, {week}-{week + 1} GW (mm)", published["place"], f"{paper:.2f}", text, verdict
+
+
+def _costs(
+    published: Mapping[str, Any],
+    summary: Mapping[str, Any],
+    core_power_w: float,
+    carbon_intensity_g_per_kwh: float,
+) -> Iterator[tuple[str, ...]]:
+    """Yield time, energy and emissions of a gestational week."""
+    weeks = (summary["reached_week"] - summary["weeks"][0]) or np.nan
+    energy_wh = summary["cpu_seconds"] / 3600 * core_power_w / weeks
+    here = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * carbon_intensity_g_per_kwh)
+    of_run = f"{summary['tets']} elements, {summary['ranks']} ranks"
+    for entry, value in zip(published["rows"], here, strict=True):
+        paper = f"{entry['value']:g} ({published['machine']})"
+        yield f"{entry['quantity']} a gestational week", published["place"], paper, f"{value:.3g} ({of_run})", NOT_ALIKE
 
 
 def _modes(published: Mapping[str, Any], studies: Sequence[StudyTables]) -> Iterator[tuple[str, ...]]:

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from gyriflow.compare.members import distances_to, member_row, nearest, side_by_side
-from gyriflow.compare.published import comparison_caption, displacement_table, with_published_nearest
+from gyriflow.compare.published import comparison_caption, with_published_nearest
 
 
 def spectra(run, subject, powers, *, complete=True):
@@ -124,16 +124,3 @@ def test_runs_stand_side_by_side():
     table = compared(t1=0.3, t2=0.1).merge(MEMBERS[["run", "thickness_mm"]], on="run")
     wide = side_by_side(table, ["thickness_mm"])
     assert wide[["real value", "thickness_mm 1.0", "thickness_mm 2.0"]].to_numpy().tolist() == [[0.3, 0.3, 0.1]]
-
-
-def test_displacements_of_runs_and_paper_share_their_intervals():
-    published = {
-        "displacement": {"from_weeks": [21, 22], "rows": [{"source": "S", "max_mm": [2.5, 2.2], "mean_mm": [0.4, 0.3]}]}
-    }
-    rows = [("r", 21.0, 22.0, "all", 3.0, 0.5), ("r", 21.0, 22.0, "pial", 9.0, 9.0), ("r", 25.0, 26.0, "all", 4.0, 0.6)]
-    moves = pd.DataFrame(rows, columns=["run", "from_week", "to_week", "nodes", "max_mm", "mean_mm"])
-    table = displacement_table(published, moves).set_index(["quantity", "source"])
-    assert list(table) == ["21-22 GW", "22-23 GW", "25-26 GW"]
-    assert table.loc[("largest displacement (mm)", "r (simulated, all nodes)"), "21-22 GW"] == 3.0
-    assert table.loc[("largest displacement (mm)", "r (simulated, surface)"), "21-22 GW"] == 9.0
-    assert table.loc[("mean displacement (mm)", "FetalFoldSim paper: S"), "22-23 GW"] == 0.3

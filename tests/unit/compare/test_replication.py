@@ -5,11 +5,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from gyriflow.compare.published import StudyTables, replication
+from gyriflow.compare.published import NOT_ALIKE, StudyTables, replication
 from gyriflow.io.yaml_files import read_yaml
 
 PUBLISHED = read_yaml(Path(__file__).parents[3] / "workflow" / "published" / "fetalfoldsim.yaml")
 SIDES = ("left", "right")
+SUMMARY = {"weeks": [21.0, 23.0], "reached_week": 23.0, "seconds": 3600, "cpu_seconds": 7200, "tets": 9, "ranks": 2}
+POWER = {"core_power_w": 10.0, "carbon_intensity_g_per_kwh": 400.0}
 
 
 def moves(**largest: float) -> pd.DataFrame:
@@ -43,7 +45,7 @@ SHARES = {("thin", "left"): (0.5, 0.2), ("thin", "right"): (0.6, 0.3), ("thick",
 
 
 def verdicts(displacement: pd.DataFrame, *studies: StudyTables) -> dict[str, tuple[str, str]]:
-    table = replication(PUBLISHED, displacement, studies)
+    table = replication(PUBLISHED, displacement, studies, SUMMARY, POWER)
     assert list(table) == ["result", "place", "paper", "here", "verdict"]
     return {row["result"]: (row["here"], row["verdict"]) for row in table.to_dict("records")}
 
@@ -54,6 +56,14 @@ def test_displacements_agree_by_all_nodes_or_by_the_surface():
     # the paper's 0.42 for 0.50 and 1.25
     assert found["mean displacement, 21-22 GW (mm)"] == ("all nodes 0.50, surface 1.25", "+19%, +198%")
     assert found["largest displacement, 22-23 GW (mm)"] == ("–", "not run")
+
+
+def test_energy_and_emissions_are_those_of_a_week_of_the_run():
+    found = verdicts(moves())
+    assert found["hours a gestational week"][0] == "0.5 (9 elements, 2 ranks)"
+    # 2 h of a core of 10 W in two weeks
+    assert found["energy (Wh) a gestational week"][0] == "10 (9 elements, 2 ranks)"
+    assert found["emissions (g CO2e) a gestational week"][0] == "4 (9 elements, 2 ranks)"
 
 
 def test_modes_of_cut_spectra_stand_beside_the_papers():
@@ -85,7 +95,7 @@ def test_findings_of_a_study_are_checked_one_by_one():
 def test_another_study_is_not_the_papers(week, varied):
     own = study(SHARES, (0.4, 0.35), 0.01)
     other = StudyTables(varied, week, own.members, own.comparison, own.nearest)
-    assert {verdict for _, verdict in verdicts(moves(), other).values()} == {"not run"}
+    assert {verdict for _, verdict in verdicts(moves(), other).values()} == {"not run", NOT_ALIKE}
 
 
 def test_weak_whole_bands_need_no_cut():
