@@ -68,8 +68,10 @@ rule calibration_tables:
     input:
         scores=PLAN.calibrating.scores_before(len(PLAN.runs.calibrated) + 1),
     output:
-        **tables(CALIBRATION, "runs", "optimum", "sensitivities"),
-        profiles=f"{CALIBRATION}/profiles.csv",
+        **{
+            name: f"{CALIBRATION}/{name}.csv"
+            for name in ("runs", "optimum", "sensitivities", "profiles")
+        },
     params:
         bounds=lambda wildcards: CONFIG.calibrate.parameters,
         seed=lambda wildcards: CONFIG.calibrate.seed,

@@ -1,8 +1,7 @@
 # Studies: runs that differ from one in a few parameters, measured at one week and compared with real brains of it.
 #
 # results/study/STUDY/ holds members (a row a run: values, resolution, outcome with its cause, time), comparison (how far
-# each is from each real brain by each measure), and nearest (which is nearest, with the paper's beside it), each as CSV,
-# Markdown and LaTeX. A run that has diverged before the week of comparison stands in `members` alone.
+# each is from each real brain by each measure), and nearest (which is nearest, with the paper's beside it). A run that has diverged before the week of comparison stands in `members` alone.
 PUBLISHED = f"{workflow.basedir}/workflow/published/fetalfoldsim.yaml"
 
 
@@ -34,7 +33,9 @@ rule study_tables:
         unpack(of(PLAN.studying.inputs)),
         published=PUBLISHED,
     output:
-        **tables(f"{STUDY}/{{study}}", "members", "comparison", "nearest"),
+        members=f"{STUDY}/{{study}}/members.csv",
+        comparison=f"{STUDY}/{{study}}/comparison.csv",
+        nearest=f"{STUDY}/{{study}}/nearest.csv",
     wildcard_constraints:
         study=one_of(CONFIG.studies),
     params:

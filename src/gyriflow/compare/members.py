@@ -135,20 +135,6 @@ def nearest(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[st
     return pd.DataFrame(rows).reindex(columns=columns)
 
 
-def side_by_side(comparison: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
-    """Returns a comparison as a reader wants it: a row per real brain, hemisphere and measure, a column per run.
-
-    The comparison has the columns subject, run, real, those of `COLUMNS`, and the varied values, which name them.
-    """
-    labels = ["subject", "real", "hemisphere", "measure", "unit"]
-    runs = [", ".join(f"{name} {row[name]}" for name in varied) for _, row in comparison.iterrows()]
-    real = comparison.groupby(labels, sort=False)["real_value"].first().rename("real value")
-    wide = comparison.assign(column=runs).pivot_table(
-        index=labels, columns="column", values="distance", aggfunc="first", sort=False
-    )
-    return real.to_frame().join(wide, how="right").reset_index()
-
-
 def _flags(best: pd.Series, of_best: Mapping[Hashable, Any], members: pd.DataFrame, varied: Sequence[str]) -> str:
     flags = [] if best["flag"] == "ok" else [f"band {best['flag']}"]
     if of_best["resolution"] != "ok":

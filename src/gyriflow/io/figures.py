@@ -1,41 +1,20 @@
-"""What readers look at: figures as PNG and PDF, pages as HTML with pictures in them, tables for print.
-
-A table for print is CSV with all digits, and Markdown and LaTeX with the digits that a reader needs.
-"""
+"""What readers look at: figures as PNG and PDF, and pages as HTML with pictures in them."""
 
 import re
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
-import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from PIL import Image
 
-from .files import AnyPath, replaced, write_table, write_text
+from .files import AnyPath, replaced, write_text
 
 WIDTHS = (1800, 1400, 1100, 800)
 """Widths in pixels that pictures are tried with, until all of them together fit."""
 QUALITY = 82
-DIGITS = 4
-"""Significant digits in Markdown and LaTeX."""
-IN_LATEX = {
-    "²": r"\textsuperscript{2}",
-    "³": r"\textsuperscript{3}",
-    "⁻⁷": r"\textsuperscript{-7}",
-    "⁻¹": r"\textsuperscript{-1}",
-    "μ": r"$\mu$",
-    "ν": r"$\nu$",
-    "·": r"$\cdot$",
-    "×": r"$\times$",
-    "–": "--",
-    "−": r"$-$",
-    "≤": r"$\le$",
-    "≥": r"$\ge$",
-}
-"""Characters that not every LaTeX engine sets."""
 
 TABLE_LOOK = (
     "body { font: 13px sans-serif } p { max-width: 60em } table { border-collapse: collapse; margin: 1em 0 } "
@@ -97,52 +76,3 @@ def read_body(path: AnyPath) -> str:
     text = Path(path).read_text(encoding="utf-8")
     body = re.fullmatch(r"<!DOCTYPE html>.*?</style>\n(.*)\n</html>\n", text, re.DOTALL)
     return body[1] if body else text
-
-
-def write_printed(
-    paths: Mapping[str, AnyPath], table: pd.DataFrame, caption: str, *, printed: pd.DataFrame | None = None
-) -> None:
-    """Writes a table to the paths `csv`, `md` and `tex`.
-
-    CSV holds the values; the others hold them as a reader wants them, with the caption, empty cells as a dash, and in
-    the form `printed` where that is easier to read. LaTeX needs the package booktabs.
-    """
-    write_table(paths["csv"], table)
-    shown = (table if printed is None else printed).map(as_printed)
-    plain = shown.rename(columns=lambda name: str(name).replace("|", r"\|")).map(lambda cell: cell.replace("|", r"\|"))
-    text = plain.to_markdown(index=False, disable_numparse=True)
-    write_text(paths["md"], f"{caption}\n\n{text}\n")
-    write_text(paths["tex"], latex(shown, caption))
-
-
-def as_printed(value: object) -> str:
-    """Returns a cell as it is printed: numbers with four significant digits, nothing as a dash."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if not isinstance(value, int | float):
-        return str(value).strip() or "–" if value is not None else "–"
-    if pd.isna(value):
-        return "–"
-    return f"{value:.{DIGITS}g}" if abs(value) < 10**DIGITS else f"{value:,.0f}".replace(",", " ")
-
-
-def latex(shown: pd.DataFrame, caption: str) -> str:
-    """Returns a table of text as LaTeX with booktabs."""
-    plain = shown.rename(columns=str).map(_escaped)
-    plain.columns = [_escaped(name) for name in plain.columns]
-    text = plain.style.hide(axis="index").to_latex(
-        hrules=True,
-        caption=_escaped(caption),
-        position="htbp",
-        position_float="centering",
-        column_format="l" * len(plain.columns),
-    )
-    return str(text)
-
-
-def _escaped(text: str) -> str:
-    marks = {"\\": r"\textbackslash{}", **{mark: f"\\{mark}" for mark in "&%$#_{}"}, "~": r"\textasciitilde{}"}
-    safe = "".join(marks.get(mark, mark) for mark in text)
-    for mark, command in IN_LATEX.items():
-        safe = safe.replace(mark, command)
-    return safe

@@ -53,11 +53,6 @@ def region_files(folder: str) -> dict[str, str]:
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
 
-def tables(folder: str, *names: str) -> dict[str, str]:
-    """Returns the files of several tables for print in a folder, by name and kind."""
-    return {f"{name}_{kind}": f"{folder}/{name}.{kind}" for name in names for kind in ("csv", "md", "tex")}
-
-
 LABELS = f"{BRAIN}/surface/labels.nii.gz"
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 POSE = f"{BRAIN}/surface/pose.json"

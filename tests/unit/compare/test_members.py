@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from gyriflow.compare.members import distances_to, member_row, nearest, side_by_side
+from gyriflow.compare.members import distances_to, member_row, nearest
 from gyriflow.compare.published import comparison_caption, with_published_nearest
 
 
@@ -52,8 +52,6 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     assert table.loc[("left", "relative_power_B4"), "real_value"] == 0.4
     # where a spectrum is cut is told, and is no likeness
     assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
-    printed = side_by_side(table.reset_index().assign(subject="a", real="b", thickness_mm=1.0), ["thickness_mm"])
-    assert "weyl_number" not in set(printed["measure"])
 
 
 def test_a_band_that_is_cut_off_has_no_distance():
@@ -118,9 +116,3 @@ def test_the_papers_value_stands_beside_ours_where_it_reports_one():
 def test_another_population_is_said():
     assert "other is another population" in comparison_caption("s", 28, compared(t1=0.1))
     assert "another" not in comparison_caption("s", 28, compared(t1=0.1).assign(same_population=True))
-
-
-def test_runs_stand_side_by_side():
-    table = compared(t1=0.3, t2=0.1).merge(MEMBERS[["run", "thickness_mm"]], on="run")
-    wide = side_by_side(table, ["thickness_mm"])
-    assert wide[["real value", "thickness_mm 1.0", "thickness_mm 2.0"]].to_numpy().tolist() == [[0.3, 0.3, 0.1]]
