@@ -1,12 +1,8 @@
-"""`python -m gyriflow.config` writes config/README.md and config/schema.json anew."""
+"""`python -m gyriflow.config > config/schema.json` writes the JSON schema of all keys, for editors."""
 
 import json
 
-from ..shipped import SHIPPED
-from .documentation import documentation, schema
+from .root import Config
 
 if __name__ == "__main__":
-    texts = {"README.md": documentation(), "schema.json": json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"}
-    for name, text in texts.items():
-        (SHIPPED / "config" / name).write_text(text, encoding="utf-8")
-        print(f"wrote {SHIPPED / 'config' / name}")
+    print(json.dumps(Config.model_json_schema(), indent=1, ensure_ascii=False))

@@ -8,9 +8,9 @@ from pathlib import Path
 from string import Formatter
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from ..parameters.settings import Key, Settings, located, nearest, refused, setting
+from ..parameters.settings import Key, Settings, located, nearest, refused
 from ..parameters.terms import AffineSource, Coordinates
 from ..parameters.varying import Week
 from ..shipped import SHIPPED
@@ -44,18 +44,25 @@ def _names_weeks(pattern: str) -> bool:
 class AtlasLicence(Settings):
     """Terms of use, shown before any file is fetched."""
 
-    name: str = setting(..., "", "Name of the licence, as `CC0 1.0`.")
-    terms: str = setting(..., "", "Summary in a sentence or two.")
-    url: str | None = setting(None, "", "Address of the full text.")
-    accept: bool = setting(False, "", "Whether users have to accept terms that are narrow or unclear.")
+    name: str
+    """Name of the licence, as `CC0 1.0`."""
+    terms: str
+    """Summary in a sentence or two."""
+    url: str | None = None
+    """Address of the full text."""
+    accept: bool = False
+    """Whether users have to accept terms that are narrow or unclear."""
 
 
 class AtlasReference(Settings):
     """What to cite."""
 
-    citation: str = setting(..., "", "Authors, title, journal and year.")
-    doi: str | None = setting(None, "", "Digital object identifier.")
-    url: str | None = setting(None, "", "Page of the atlas.")
+    citation: str
+    """Authors, title, journal and year."""
+    doi: str | None = None
+    """Digital object identifier."""
+    url: str | None = None
+    """Page of the atlas."""
 
     @property
     def text(self) -> str:
@@ -67,30 +74,30 @@ class AtlasReference(Settings):
 class AtlasFileRecord(Settings):
     """Size and checksum of a file."""
 
-    bytes: int | None = setting(None, "", "Size of the file.", ge=1)
-    sha256: str | None = setting(
-        None, "", "SHA-256; `null`: unknown, the file only has to be readable.", pattern="^[0-9a-f]{64}$"
-    )
+    bytes: int | None = Field(None, ge=1)
+    """Size of the file."""
+    sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
+    """SHA-256; `null`: unknown, the file only has to be readable."""
 
 
 class AtlasSeries(Settings):
     """One population by week."""
 
-    population: str = setting(..., "", "Name of these brains in figures and tables.", min_length=1)
-    scheme: str | None = setting(None, "", "Meaning of the labels, as for `brains`; required with `labels`.")
-    affine_from: AffineSource = setting("auto", "", "As for `brains`, with `labels`.")
-    coordinates: Coordinates = setting("auto", "", "As for `brains`, with surfaces.")
-    matched: bool = setting(
-        False, "", "Whether surfaces of all weeks have the same vertices; believed until the files are there."
-    )
-    files: dict[FileKey, str] = setting(
-        ..., "",
-        "Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week: `labels` "
-        "and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one.",
-    )  # fmt: skip
-    weeks: dict[Week, dict[FileKey, AtlasFileRecord]] = setting(
-        ..., "GW", "The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files."
-    )
+    population: str = Field(min_length=1)
+    """Name of these brains in figures and tables."""
+    scheme: str | None = None
+    """Meaning of the labels, as for `brains`; required with `labels`."""
+    affine_from: AffineSource = "auto"
+    """As for `brains`, with `labels`."""
+    coordinates: Coordinates = "auto"
+    """As for `brains`, with surfaces."""
+    matched: bool = False
+    """Whether surfaces of all weeks have the same vertices; believed until the files are there."""
+    files: dict[FileKey, str]
+    """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week:
+    `labels` and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one."""
+    weeks: dict[Week, dict[FileKey, AtlasFileRecord]]
+    """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files. [GW]"""
 
     @field_validator("weeks", mode="before")
     @classmethod
@@ -141,15 +148,20 @@ class AtlasSeries(Settings):
 class Atlas(Settings):
     """The file `atlas.yaml` of an atlas: one in the folder `atlases`, or yours."""
 
-    name: str = setting(..., "", "Name, with which ids of its brains begin.", pattern=NAME)
-    title: str = setting(..., "", "What it is.")
-    licence: AtlasLicence = setting(..., "", "Terms of use.")
-    reference: AtlasReference | None = setting(None, "", "What to cite.")
-    url: str | None = setting(None, "", "Address of the files' root; `null`: not online.", pattern="^https?://")
-    folder: str | None = setting(None, "", "Folder with local files, relative to `atlas.yaml`.")
-    series: dict[Annotated[str, Field(pattern=NAME)], AtlasSeries] = setting(
-        ..., "", "Populations by name, each a series over the weeks.", min_length=1
-    )
+    name: str = Field(pattern=NAME)
+    """Name, with which ids of its brains begin."""
+    title: str
+    """What it is."""
+    licence: AtlasLicence
+    """Terms of use."""
+    reference: AtlasReference | None = None
+    """What to cite."""
+    url: str | None = Field(None, pattern="^https?://")
+    """Address of the files' root; `null`: not online."""
+    folder: str | None = None
+    """Folder with local files, relative to `atlas.yaml`."""
+    series: dict[Annotated[str, Field(pattern=NAME)], AtlasSeries] = Field(min_length=1)
+    """Populations by name, each a series over the weeks."""
 
     def brain_id(self, series: str, week: float) -> str:
         """Returns the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas has one series."""
@@ -174,18 +186,32 @@ class AtlasSettings(Settings):
     when a stage needs them, or by `./run snakemake --cores 1 retrieve`. An existing file is never replaced.
     """
 
-    name: str | None = setting(None, "", "An atlas that comes with gyriflow: the name of a folder in `atlases`.")
-    file: str | None = setting(None, "", "Instead, the `atlas.yaml` of your own atlas.")
-    series: str | tuple[str, ...] | None = setting(None, "", "Series to use; `null`: all.")
-    weeks: tuple[Week, ...] | None = setting(None, "GW", "Weeks to use, as in the file names; `null`: all.")
-    images: bool = setting(False, "", "Whether T2-weighted volumes are shown with the surfaces' outlines.")
-    folder: str | None = setting(
-        None, "",
-        "Folder where files are found by name, at any depth, and missing ones are put; `null`: "
-        "`resources/atlases/NAME` in the working directory.",
-    )  # fmt: skip
-    url: str | None = setting(None, "", "A mirror with the same paths.")
-    accept_licence: bool = setting(False, "", "Whether you accept the licence, where the `atlas.yaml` asks for it.")
+    model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
+
+    name: str | None = None
+    """An atlas that comes with gyriflow: the name of a folder in `atlases`."""
+    file: str | None = None
+    """Instead, the `atlas.yaml` of your own atlas."""
+    series: str | tuple[str, ...] | None = None
+    """Series to use; `null`: all."""
+    weeks: tuple[Week, ...] | None = None
+    """Weeks to use, as in the file names; `null`: all. [GW]"""
+    images: bool = False
+    """Whether T2-weighted volumes are shown with the surfaces' outlines."""
+    folder: str | None = None
+    """Folder where files are found by name, at any depth, and missing ones are put; `null`:
+    `resources/atlases/NAME` in the working directory."""
+    url: str | None = None
+    """A mirror with the same paths."""
+    accept_licence: bool = False
+    """Whether you accept the licence, where the `atlas.yaml` asks for it."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_form(cls, value: Any) -> Any:
+        if isinstance(value, str):
+            return {"file" if value.endswith((".yaml", ".yml")) else "name": value}
+        return value
 
     @model_validator(mode="after")
     def _name_or_file(self) -> "AtlasSettings":
@@ -335,13 +361,10 @@ class UsedAtlas:
 
 
 def atlas_sections(raw: Any) -> list[tuple[Key, Any]]:
-    """Returns the entries of `atlas` as given (raw) with the keys that lead to them, names and files as sections."""
-    entries = [] if raw is None else [raw] if not isinstance(raw, list) else raw
-    sections = [
-        {"file" if entry.endswith((".yaml", ".yml")) else "name": entry} if isinstance(entry, str) else entry
-        for entry in entries
-    ]
-    return [(("atlas", number) if isinstance(raw, list) else ("atlas",), each) for number, each in enumerate(sections)]
+    """Returns the entries of `atlas` as given (raw) with the keys that lead to them."""
+    if isinstance(raw, list):
+        return [(("atlas", number), entry) for number, entry in enumerate(raw)]
+    return [] if raw is None else [(("atlas",), raw)]
 
 
 def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:

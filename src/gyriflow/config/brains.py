@@ -7,9 +7,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import ConfigDict, Field, model_validator
+
 from ..errors import InputError
 from ..parameters.schemes import Label
-from ..parameters.settings import InputFile, Problem, Settings, beside, check, located, setting
+from ..parameters.settings import InputFile, Problem, Settings, beside, check, located
 from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
 from ..parameters.varying import Week
@@ -37,11 +39,9 @@ PLACEHOLDERS = ("{image}", "{labels}")
 class SegmentationSettings(Settings):
     """Your own program that makes a label volume from the brain's `image`; gyriflow itself does not segment."""
 
-    command: str = setting(
-        ..., "",
-        "Shell command that reads the file {image} and writes the labels of the brain's `scheme`, on the same grid, to "
-        "the NIfTI file {labels}.",
-    )  # fmt: skip
+    command: str
+    """Shell command that reads the file {image} and writes the labels of the brain's `scheme`, on the same
+    grid, to the NIfTI file {labels}."""
 
     @check
     def _names_its_files(self) -> Iterator[Problem]:
@@ -54,27 +54,33 @@ class SegmentationSettings(Settings):
 class WhiteFiles(Settings):
     """The white surfaces of both hemispheres: the inner border of the cortex."""
 
-    left: InputFile = setting(..., "", "File of the left hemisphere.")
-    right: InputFile = setting(..., "", "File of the right hemisphere.")
+    left: InputFile
+    """File of the left hemisphere."""
+    right: InputFile
+    """File of the right hemisphere."""
 
 
 class HemisphereFiles(Settings):
     """The pial surfaces of both hemispheres: GIFTI, VTK, STL, PLY or FreeSurfer files."""
 
-    left: InputFile = setting(..., "", "File of the left hemisphere.")
-    right: InputFile = setting(..., "", "File of the right hemisphere.")
-    white: WhiteFiles | None = setting(None, "", "White surfaces in the same coordinates, for the cortical thickness.")
+    left: InputFile
+    """File of the left hemisphere."""
+    right: InputFile
+    """File of the right hemisphere."""
+    white: WhiteFiles | None = None
+    """White surfaces in the same coordinates, for the cortical thickness."""
 
 
 class OneHemisphere(Settings):
     """The only hemisphere of a brain, after hemispherectomy or where the data has one side."""
 
-    file: InputFile = setting(
-        ..., "",
-        "Its closed pial surface or, with the brain's `scheme`, a label volume without cortex of the other hemisphere.",
-    )  # fmt: skip
-    side: Side = setting(..., "", "Which hemisphere it is.")
-    white: InputFile | None = setting(None, "", "White surface in the same coordinates, for the cortical thickness.")
+    file: InputFile
+    """Its closed pial surface or, with the brain's `scheme`, a label volume without cortex of the other
+    hemisphere."""
+    side: Side
+    """Which hemisphere it is."""
+    white: InputFile | None = None
+    """White surface in the same coordinates, for the cortical thickness."""
 
 
 class Brain(Settings):
@@ -82,42 +88,42 @@ class Brain(Settings):
     `shape`.
     """
 
-    id: str = setting(
-        ..., "", "Name in paths and tables: letters, digits, - _ .",
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME,
-    )  # fmt: skip
-    week: Week = setting(..., "GW", "Gestational age.")
-    population: str | None = setting(
-        None, "", "Population in figures and tables, such as `spina bifida aperta`; `null`: real brain.", min_length=1
-    )
-    subject: str | None = setting(
-        None, "",
-        "Subject of whom several brains are scans. Change between scans is tabled, and simulations are compared with "
-        "scans of their subject first.", min_length=1,
-    )  # fmt: skip
-    covariates: dict[str, str] = setting(
-        {}, "", "What else is known of it, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."
-    )
-    labels: InputFile | None = setting(None, "", "Tissue label volume (NIfTI or MGZ).")
-    image: InputFile | None = setting(
-        None, "", "T2-weighted volume (NIfTI): input of `segmentation`, or with `labels` shown in a figure."
-    )
-    segmentation: SegmentationSettings | None = setting(None, "", "Your program that makes labels from `image`.")
-    scheme: str | None = setting(
-        None, "",
-        "What the labels mean: the name of a file in the folder `schemes`, such as `dhcp-19`, or of the key `schemes`. "
-        "Needed with `labels` and `segmentation`.",
-    )  # fmt: skip
-    affine_from: AffineSource = setting(
-        "auto", "", "NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."
-    )
-    hemispheres: HemisphereFiles | None = setting(None, "", "Surface files of both hemispheres.")
-    hemisphere: OneHemisphere | None = setting(None, "", "The only hemisphere, as a surface or as labels.")
-    pial: InputFile | None = setting(None, "", "Closed surface of the whole brain.")
-    white: InputFile | None = setting(None, "", "White surface of `pial`, for the cortical thickness.")
-    coordinates: Coordinates = setting("auto", "", "Axes of surface files; `auto` finds any pose.")
-    phantom: PhantomSettings | None = setting(None, "", "A synthetic brain; `{}` takes all defaults.")
-    shape: ShapeSettings | None = setting(None, "", "A simple geometry in place of a brain.")
+    id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME)
+    """Name in paths and tables: letters, digits, - _ ."""
+    week: Week
+    """Gestational age. [GW]"""
+    population: str | None = Field(None, min_length=1)
+    """Population in figures and tables, such as `spina bifida aperta`; `null`: real brain."""
+    subject: str | None = Field(None, min_length=1)
+    """Subject of whom several brains are scans. Change between scans is tabled, and simulations are compared
+    with scans of their subject first."""
+    covariates: dict[str, str] = Field({})
+    """What else is known of it, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."""
+    labels: InputFile | None = None
+    """Tissue label volume (NIfTI or MGZ)."""
+    image: InputFile | None = None
+    """T2-weighted volume (NIfTI): input of `segmentation`, or with `labels` shown in a figure."""
+    segmentation: SegmentationSettings | None = None
+    """Your program that makes labels from `image`."""
+    scheme: str | None = None
+    """What the labels mean: the name of a file in the folder `schemes`, such as `dhcp-19`, or of the key
+    `schemes`. Needed with `labels` and `segmentation`."""
+    affine_from: AffineSource = "auto"
+    """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
+    hemispheres: HemisphereFiles | None = None
+    """Surface files of both hemispheres."""
+    hemisphere: OneHemisphere | None = None
+    """The only hemisphere, as a surface or as labels."""
+    pial: InputFile | None = None
+    """Closed surface of the whole brain."""
+    white: InputFile | None = None
+    """White surface of `pial`, for the cortical thickness."""
+    coordinates: Coordinates = "auto"
+    """Axes of surface files; `auto` finds any pose."""
+    phantom: PhantomSettings | None = None
+    """A synthetic brain; `{}` takes all defaults."""
+    shape: ShapeSettings | None = None
+    """A simple geometry in place of a brain."""
 
     @property
     def source(self) -> str:
@@ -230,7 +236,7 @@ ALMOST = 0.85
 
 
 class ParticipantsSettings(Settings):
-    """A table with a brain a row. `participants: FILE` is short for a section.
+    """A table with a brain in each row. `participants: FILE` is short for a section.
 
     Columns are `participant_id` (or `id`); the gestational age, `gestational_age` (or `week`, another usual name, or
     one that the table's sidecar describes so), as `24.3`, `24+2` or `24w2d`; and keys of brains, inner ones with a dot
@@ -239,12 +245,19 @@ class ParticipantsSettings(Settings):
     a `sub-01/sub-01_sessions.tsv` beside the table has a brain for each of its sessions, with that one's age.
     """
 
-    file: str = setting(..., "", "Tab-separated file; paths in it are relative to it.")
-    columns: dict[str, str] = setting(
-        {}, "",
-        "Columns that the table lacks, with one value for all rows, in which `{subject}`, `{session}` and `{id}`, such "
-        "as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme: feta-7}`.",
-    )  # fmt: skip
+    model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
+
+    file: str
+    """Tab-separated file; paths in it are relative to it."""
+    columns: dict[str, str] = Field({})
+    """Columns that the table lacks, with one value for all rows, in which `{subject}`, `{session}` and `{id}`,
+    such as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme:
+    feta-7}`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_form(cls, value: Any) -> Any:
+        return {"file": value} if isinstance(value, str) else value
 
 
 def participants_brains(
@@ -347,8 +360,10 @@ def _of_files(files: list[str], side: str | None) -> dict[str, str]:
 class SurfaceRegions(Settings):
     """Regions at the vertices of a hemisphere's surface."""
 
-    labels: InputFile = setting(..., "", "GIFTI label file (.label.gii), a label for each vertex.")
-    surface: InputFile = setting(..., "", "The surface, in the coordinates of the brain's own files.")
+    labels: InputFile
+    """GIFTI label file (.label.gii), a label for each vertex."""
+    surface: InputFile
+    """The surface, in the coordinates of the brain's own files."""
 
 
 class GivenRegions(Settings):
@@ -357,16 +372,15 @@ class GivenRegions(Settings):
     Left and right regions of one name are compared. Other brains get the regions of the brain nearest in week.
     """
 
-    volume: InputFile | None = setting(
-        None, "", "Label volume (NIfTI) in the space of the brain's `labels`, with regions along the cortex."
-    )
-    left: SurfaceRegions | None = setting(None, "", "Instead of a volume, labels of the left hemisphere.")
-    right: SurfaceRegions | None = setting(None, "", "Labels of the right hemisphere.")
-    names: dict[Label, str] = setting(
-        {}, "",
-        "Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name are one region, "
-        "unnamed ones none. Needed with a volume; else the label files' names count.",
-    )  # fmt: skip
+    volume: InputFile | None = None
+    """Label volume (NIfTI) in the space of the brain's `labels`, with regions along the cortex."""
+    left: SurfaceRegions | None = None
+    """Instead of a volume, labels of the left hemisphere."""
+    right: SurfaceRegions | None = None
+    """Labels of the right hemisphere."""
+    names: dict[Label, str] = Field({})
+    """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name are one region,
+    unnamed ones none. Needed with a volume; else the label files' names count."""
 
     @check
     def _one_source(self) -> Iterator[Problem]:

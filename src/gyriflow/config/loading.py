@@ -63,7 +63,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
         raise InputError(
             f"the configuration has {len(problems)} problem{'s' if len(problems) > 1 else ''}:\n  "
             + "\n  ".join(problems)
-            + "\nAll keys are explained in config/README.md"
+            + "\nconfig/README.md says where all keys are described"
             + ("; once each key is valid, they are checked against each other" if waiting else "")
             + ("; with --keep-going, rows that can't be used are left out" if left_out and not keep_going else "")
         )
@@ -76,8 +76,6 @@ def _participants(
     """Returns the brains of `participants` and its rows that can't be used, or adds what is wrong to `problems`."""
     if plain.get("participants") is None:
         return [], {}
-    if isinstance(plain["participants"], str):
-        plain["participants"] = {"file": plain["participants"]}
     try:
         settings = ParticipantsSettings.model_validate(plain["participants"])
         entries, left_out, found = participants_brains(settings, base_dir)

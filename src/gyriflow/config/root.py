@@ -5,14 +5,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import PrivateAttr, field_validator
+from pydantic import Field, PrivateAttr, field_validator
 
 from ..errors import InputError
 from ..io.schemes import SCHEMES
 from ..io.yaml_files import read_keys
 from ..parameters.folding import VARYING, FoldingSettings, output_weeks
 from ..parameters.schemes import LabelScheme, SchemeSettings
-from ..parameters.settings import Settings, refused, setting
+from ..parameters.settings import Settings, refused
 from ..parameters.synthetic import PhantomSettings
 from ..parameters.varying import Varying, files_of
 from ..units import week_tag
@@ -41,33 +41,40 @@ REAL_BRAIN = "real brain"
 class Config(Settings):
     """All keys stand in these sections; `folding` is the base of every run."""
 
-    brains: tuple[Brain, ...] = setting(
-        (), "", "The brains: those to fold, and others to compare with and to estimate growth from."
-    )
-    atlas: tuple[AtlasSettings, ...] = setting(
-        (), "", "Atlases whose weeks are brains: a name, the `atlas.yaml` of your own, a section, or a list of these."
-    )
-    participants: ParticipantsSettings | None = setting(
-        None, "", "A table of brains, such as the `participants.tsv` of BIDS."
-    )
-    schemes: dict[str, SchemeSettings] = setting({}, "", "Your own label schemes by name, for the brains' `scheme`.")
-    start: Start | None = setting(
-        None, "", "Id of the brain to fold, a list of ids, `first` (of the list, of an atlas the earliest) or `all`."
-    )
-    surface: SurfaceSettings = setting(SurfaceSettings(), "", "Pial surfaces.")
-    mesh: MeshSettings = setting(MeshSettings(), "", "Tetrahedral mesh.")
-    growth: GrowthSettings = setting(GrowthSettings(), "", "Growth rates.")
-    folding: FoldingSettings = setting(..., "", "Folding simulation.")
-    runs: dict[str, Run] = setting(
-        {}, "", "Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."
-    )
-    studies: dict[str, Study] = setting(
-        {}, "", "Studies by name: runs that differ in a few parameters, compared with real brains."
-    )
-    calibrate: Calibration | None = setting(None, "", "A search for the parameters that meet a real brain best.")
-    metrics: MetricsSettings = setting(MetricsSettings(), "", "Metrics.")
-    report: ReportSettings = setting(ReportSettings(), "", "Figures and report.")
+    brains: tuple[Brain, ...] = ()
+    """The brains: those to fold, and others to compare with and to estimate growth from."""
+    atlas: tuple[AtlasSettings, ...] = ()
+    """Atlases whose weeks are brains: a name, the `atlas.yaml` of your own, a section, or a list of these."""
+    participants: ParticipantsSettings | None = None
+    """A table of brains, such as the `participants.tsv` of BIDS."""
+    schemes: dict[str, SchemeSettings] = Field({})
+    """Your own label schemes by name, for the brains' `scheme`."""
+    start: Start | None = None
+    """Id of the brain to fold, a list of ids, `first` (of the list, of an atlas the earliest) or `all`."""
+    surface: SurfaceSettings = SurfaceSettings()
+    """Pial surfaces."""
+    mesh: MeshSettings = MeshSettings()
+    """Tetrahedral mesh."""
+    growth: GrowthSettings = GrowthSettings()
+    """Growth rates."""
+    folding: FoldingSettings
+    """Folding simulation."""
+    runs: dict[str, Run] = Field({})
+    """Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."""
+    studies: dict[str, Study] = Field({})
+    """Studies by name: runs that differ in a few parameters, compared with real brains."""
+    calibrate: Calibration | None = None
+    """A search for the parameters that meet a real brain best."""
+    metrics: MetricsSettings = MetricsSettings()
+    """Metrics."""
+    report: ReportSettings = ReportSettings()
+    """Figures and report."""
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
+
+    @field_validator("atlas", mode="before", json_schema_input_type=AtlasSettings | tuple[AtlasSettings, ...])
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return [value] if isinstance(value, str | dict) else value
 
     @field_validator("brains", mode="before")
     @classmethod

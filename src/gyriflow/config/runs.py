@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from ..parameters.folding import FoldingSettings
-from ..parameters.settings import Problem, Settings, check, setting
+from ..parameters.settings import Problem, Settings, check
 from ..parameters.terms import SCORES, Score
 from .brains import Brain
 
@@ -72,9 +72,10 @@ PRESETS: dict[str, dict[str, Any]] = {
 class Run(FoldingSettings):
     """The complete settings of a run: those of `folding` with the run's own on top."""
 
-    start: Start | None = setting(
-        None, "", "Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the study's `start`."
-    )
+    model_config = ConfigDict(json_schema_extra={"type": ["object", "null"], "required": []})
+
+    start: Start | None = None
+    """Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the study's `start`."""
 
     # not of parameters, which hold the sizes of the shapes
     @check
@@ -97,20 +98,15 @@ Series = Annotated[
 class GrowthSettings(Settings):
     """Which brains the growth rates are estimated from."""
 
-    brains: Series | None = setting(
-        None, "",
-        "Ids of the brains whose areas and volumes are used, of at least two weeks; or several such lists by name, as "
-        "`{surface: [...], volume: [...]}`. `null`: all brains. Each population is then a series of its own, as are "
-        "surfaces (`surface`) and label volumes (`volume`) if both have two weeks.",
-    )  # fmt: skip
-    estimated_from: str | None = setting(
-        None, "", "Series that gives the `estimated` rates of the folding; `null`: the start brain's."
-    )
-    matched_surfaces: bool = setting(
-        True, "",
-        "Whether equal vertices and triangles of a series' surfaces mean equal places, so that local growth comes from "
-        "them without registration.",
-    )  # fmt: skip
+    brains: Series | None = None
+    """Ids of the brains whose areas and volumes are used, of at least two weeks; or several such lists by name,
+    as `{surface: [...], volume: [...]}`. `null`: all brains. Each population is then a series of its own, as
+    are surfaces (`surface`) and label volumes (`volume`) if both have two weeks."""
+    estimated_from: str | None = None
+    """Series that gives the `estimated` rates of the folding; `null`: the start brain's."""
+    matched_surfaces: bool = True
+    """Whether equal vertices and triangles of a series' surfaces mean equal places, so that local growth comes
+    from them without registration."""
 
 
 def growth_series(
@@ -183,13 +179,13 @@ MOST_RUNS = 40
 class Compared(Settings):
     """What runs are compared with: real brains of a week."""
 
-    base: str = setting(..., "", "Name of the run that all others differ from.")
-    compare_week: float = setting(..., "GW", "Week of the comparison, at which the runs end.", gt=15, le=45)
-    compare_with: tuple[str, ...] | None = setting(
-        None, "",
-        "Ids of the real brains of that week to compare with; `null`: all of the start's population, or of any if "
-        "it has none.",
-    )  # fmt: skip
+    base: str
+    """Name of the run that all others differ from."""
+    compare_week: float = Field(gt=15, le=45)
+    """Week of the comparison, at which the runs end. [GW]"""
+    compare_with: tuple[str, ...] | None = None
+    """Ids of the real brains of that week to compare with; `null`: all of the start's population, or of any if
+    it has none."""
 
 
 class Study(Compared):
@@ -198,15 +194,13 @@ class Study(Compared):
     Equal runs are solved once. A run that diverges is reported in the study's tables, and the others go on.
     """
 
-    vary: dict[str, tuple[Value, ...]] = setting(
-        ..., "",
-        "Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; inner keys with dots "
-        "(`contact.gap_mm`).",
-    )  # fmt: skip
-    fixed: dict[str, Value] = setting({}, "", "Keys of `folding` that differ from the base's in all runs.")
-    fixed_at: dict[float, dict[str, Value]] = setting(
-        {}, "", "The same for the runs of single values of the first varied key, such as `{1.5: {step_s: 43200}}`."
-    )
+    vary: dict[str, tuple[Value, ...]]
+    """Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; inner keys with dots
+    (`contact.gap_mm`)."""
+    fixed: dict[str, Value] = Field({})
+    """Keys of `folding` that differ from the base's in all runs."""
+    fixed_at: dict[float, dict[str, Value]] = Field({})
+    """The same for the runs of single values of the first varied key, such as `{1.5: {step_s: 43200}}`."""
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Returns all keys by which the run of some varied values differs from the base."""
@@ -221,20 +215,20 @@ class Calibration(Compared):
     process through the scores expects the most. Runs that diverge count as worse than all others.
     """
 
-    parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]] = setting(
-        ..., "",
-        "One to three keys of `folding` with their lowest and highest values, such as `{thickness_mm: [1, 3]}`; inner "
-        "keys with dots. `stiffness_ratio` is the cortex's shear modulus over the core's; `KEY.amplitude` scales the "
-        "base run's curve of KEY.",
-    )  # fmt: skip
-    score: dict[Score, Annotated[float, Field(gt=0)]] = setting(
-        ..., "",
-        "What is minimised: weights of " + ", ".join(f"`{name}`" for name in SCORES) + " (docs/metrics.md).",
-    )  # fmt: skip
-    first_runs: int = setting(12, "", "Runs of the first round.", ge=3, le=MOST_RUNS)
-    rounds: int = setting(3, "", "Rounds after the first.", ge=0, le=20)
-    runs_per_round: int = setting(4, "", "Runs of each of these rounds.", ge=1, le=MOST_RUNS)
-    seed: int = setting(0, "", "Seed of the sequence and of the Gaussian process.", ge=0)
+    parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
+    """One to three keys of `folding` with their lowest and highest values, such as `{thickness_mm: [1, 3]}`;
+    inner keys with dots. `stiffness_ratio` is the cortex's shear modulus over the core's; `KEY.amplitude`
+    scales the base run's curve of KEY."""
+    score: dict[Score, Annotated[float, Field(gt=0)]]
+    """What is minimised: the weights of one or more measures (docs/metrics.md)."""
+    first_runs: int = Field(12, ge=3, le=MOST_RUNS)
+    """Runs of the first round."""
+    rounds: int = Field(3, ge=0, le=20)
+    """Rounds after the first."""
+    runs_per_round: int = Field(4, ge=1, le=MOST_RUNS)
+    """Runs of each of these rounds."""
+    seed: int = Field(0, ge=0)
+    """Seed of the sequence and of the Gaussian process."""
 
     @check
     def _few_bounded_and_scored(self) -> Iterator[Problem]:

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, fi
 
 from ..errors import InputError
 from .following import Follow
-from .settings import Problem, Settings, check, line, setting, validated
+from .settings import Problem, Settings, check, line, validated
 from .terms import FieldName, MaterialName, MedialWall, Side
 from .varying import (
     Floats,
@@ -18,6 +18,7 @@ from .varying import (
     VaryingNumber,
     VaryingOrEstimated,
     Week,
+    bounds_of,
     map_of,
     require_bounds,
     value_at,
@@ -43,7 +44,7 @@ def _memory(value: Any) -> float:
 Memory = Annotated[
     float,
     Field(allow_inf_nan=True),
-    BeforeValidator(_memory),
+    BeforeValidator(_memory, json_schema_input_type=Annotated[float, Field(ge=0)] | Literal["infinite"]),
     PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
 ]
 Fraction = Annotated[float, Field(gt=0, le=2)]
@@ -58,45 +59,45 @@ VENTRICLES = "ventricles"
 class Contact(Settings):
     """Contact between folds, and between the two hemispheres."""
 
-    kind: Literal["global", "planes", "none"] = setting(
-        "global", "",
-        "`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's "
-        "plane, but folds may cross each other (the paper); `none`: no contact.",
-    )  # fmt: skip
-    distance_mm: float | None = setting(
-        None, "mm", "With `global`, distance at which contact begins; `null`: a fifth of the surface's mean edge, at "
-        "most the smallest gap at the start.", gt=0, le=5,
-    )  # fmt: skip
-    stiffness_pa: float | None = setting(
-        None, "Pa", "With `global`, stiffness of the barrier; `null`: a tenth of the cortex's largest shear modulus.",
-        gt=0, le=1e9,
-    )  # fmt: skip
-    penalty_pa_per_m: float = setting(5.0e5, "Pa/m", "With `planes`, pressure per depth of penetration.", gt=0, le=1e9)
-    gap_mm: float = setting(
-        2.5, "mm", "Width of the fissure, unless `none`. Planes are a quarter of it from the middle; nothing grows "
-        "between them.", gt=0, le=20,
-    )  # fmt: skip
+    kind: Literal["global", "planes", "none"] = "global"
+    """`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's
+    plane, but folds may cross each other (the paper); `none`: no contact."""
+    distance_mm: float | None = Field(None, gt=0, le=5)
+    """With `global`, distance at which contact begins; `null`: a fifth of the surface's mean edge, at most the
+    smallest gap at the start. [mm]"""
+    stiffness_pa: float | None = Field(None, gt=0, le=1e9)
+    """With `global`, stiffness of the barrier; `null`: a tenth of the cortex's largest shear modulus. [Pa]"""
+    penalty_pa_per_m: float = Field(5.0e5, gt=0, le=1e9)
+    """With `planes`, pressure per depth of penetration. [Pa/m]"""
+    gap_mm: float = Field(2.5, gt=0, le=20)
+    """Width of the fissure, unless `none`. Planes are a quarter of it from the middle; nothing grows between
+    them. [mm]"""
 
 
 class NoGrowth(Settings):
     """The ellipsoid inside which nothing grows, and whose pial facets are clamped with `support: ellipsoid`."""
 
-    kind: Literal["ellipsoid", "none"] = setting(
-        "ellipsoid", "",
-        "`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`: all tissue grows.",
-    )  # fmt: skip
-    shift_y: float = setting(0.05, "Y-extent", "Anterior shift of its centre from the middle.", ge=-1, le=1)
-    shift_z: float = setting(-0.15, "Z-extent", "Superior shift of its centre from the middle.", ge=-1, le=1)
-    semi_axes: tuple[Fraction, Fraction, Fraction] = setting((0.35, 0.40, 0.50), "extents", "Semi-axes along X, Y, Z.")
+    kind: Literal["ellipsoid", "none"] = "ellipsoid"
+    """`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`: all tissue grows."""
+    shift_y: float = Field(0.05, ge=-1, le=1)
+    """Anterior shift of its centre from the middle. [Y-extent]"""
+    shift_z: float = Field(-0.15, ge=-1, le=1)
+    """Superior shift of its centre from the middle. [Z-extent]"""
+    semi_axes: tuple[Fraction, Fraction, Fraction] = (0.35, 0.40, 0.50)
+    """Semi-axes along X, Y, Z. [extents]"""
 
 
 class Solver(Settings):
     """The nonlinear and the linear solver."""
 
-    newton_tolerance: float = setting(1e-4, "", "Residual at which Newton stops, over its value at u = 0.", gt=0, lt=1)
-    krylov_tolerance: float = setting(1e-3, "", "Relative tolerance of the linear solver.", gt=0, lt=1)
-    max_newton: int = setting(20, "", "Newton iterations without progress before a step is halved.", ge=1, le=200)
-    max_halvings: int = setting(6, "", "Halvings of the time step before the run ends.", ge=0, le=30)
+    newton_tolerance: float = Field(1e-4, gt=0, lt=1)
+    """Residual at which Newton stops, over its value at u = 0."""
+    krylov_tolerance: float = Field(1e-3, gt=0, lt=1)
+    """Relative tolerance of the linear solver."""
+    max_newton: int = Field(20, ge=1, le=200)
+    """Newton iterations without progress before a step is halved."""
+    max_halvings: int = Field(6, ge=0, le=30)
+    """Halvings of the time step before the run ends."""
 
 
 class FoldingSettings(Settings):
@@ -106,61 +107,58 @@ class FoldingSettings(Settings):
     {order: 1}`).
     """
 
-    preset: Literal["fetalfoldsim", "measured", "expected"] | None = setting(
-        None, "",
-        "Parameters to start from; other keys come on top, for the preset of a run the run's own. `fetalfoldsim`: the "
-        "paper's; `measured`: growth that takes the brain to the shapes that its series was measured to have; "
-        "`expected`: to those that the growth of another population, such as an atlas, would give it.",
-    )  # fmt: skip
-    end_week: float = setting(..., "GW", "Gestational age at which the simulation ends.", gt=15, le=45)
-    step_s: float = setting(43200.0, "s", "Time step; shortened where an output week comes first.", gt=0, le=604800)
-    thickness_mm: VaryingNumber = varying(1.5, "mm", "Cortical thickness H₀ at the start.", gt=0, le=10)
-    thickness_growth_mm_per_gw: float = setting(
-        0.0, "mm/GW", "Growth rate β of the thickness: H = H₀ + β·t.", ge=-1, le=1
-    )
-    shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, "Pa", "Shear modulus of the cortex.", gt=0, le=1e7)
-    shear_modulus_core_pa: VaryingNumber = varying(300.0, "Pa", "Shear modulus of the core.", gt=0, le=1e7)
-    material: MaterialName = setting("neo-hookean", "", "Constitutive law (docs/model.md), as in the paper.")
-    poisson_ratio: float = setting(0.45, "", "Poisson's ratio ν.", ge=0, lt=0.5)
-    growth_rate_per_s: VaryingOrEstimated = varying(
-        2.0e-7, "1/s", "Tangential growth rate of the cortex; `estimated` from the brains' areas.", ge=-1e-5, le=1e-5
-    )
-    radial_growth_rate_per_s: VaryingNumber = varying(
-        0.0, "1/s", "Radial growth rate of the core, along the cortical normal.", ge=-1e-5, le=1e-5
-    )
-    core_growth_rate_per_s: VaryingOrEstimated = varying(
-        0.0, "1/s", "Isotropic growth rate of the core; `estimated` from the brains' volumes.", ge=-1e-5, le=1e-5
-    )
-    follow: Follow | None = setting(None, "", "Curves of area and volume to follow, instead of these two rates.")
-    allow_negative_growth: bool = setting(False, "", "Whether growth rates may be negative (atrophy).")
-    stress_memory_gw: Memory = setting(
-        0.0, "GW",
-        "Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.",
-        word="infinite",
-    )  # fmt: skip
-    support: Literal["ellipsoid", "base", "box", "free"] = setting(
-        "ellipsoid", "",
-        "What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the flat "
-        "base, `box` too, and lets upright sides slide; `free` removes rigid motions only.",
-    )  # fmt: skip
-    medial_wall: MedialWall = setting(
-        "sliding", "",
-        "What holds the medial wall, which has no cortex, of a hemisphere alone: `sliding` keeps it in its plane, as "
-        "the other hemisphere would; `held` clamps it.",
-    )  # fmt: skip
-    contact: Contact = setting(Contact(), "", "Contact.")
-    no_growth: NoGrowth = setting(NoGrowth(), "", "Tissue that does not grow.")
-    output_every_gw: float = setting(
-        1.0, "GW",
-        "Interval between output weeks, besides the first and the last, and where some run foretells the start "
-        "(`follow.growth_of: another`) those of the brains to compare with.",
-        ge=0.01, le=10,
-    )  # fmt: skip
-    fields: tuple[FieldName, ...] = setting(
-        ("displacement", "cortex_weight", "growth"), "", "Fields for ParaView at each output week."
-    )
-    solver: Solver = setting(Solver(), "", "Solvers.")
-    ranks: int = setting(2, "", "MPI ranks of a simulation.", ge=1, le=4096)
+    preset: Literal["fetalfoldsim", "measured", "expected"] | None = None
+    """Parameters to start from; other keys come on top, for the preset of a run the run's own. `fetalfoldsim`:
+    the paper's; `measured`: growth that takes the brain to the shapes that its series was measured to have;
+    `expected`: to those that the growth of another population, such as an atlas, would give it."""
+    end_week: float = Field(gt=15, le=45)
+    """Gestational age at which the simulation ends. [GW]"""
+    step_s: float = Field(43200.0, gt=0, le=604800)
+    """Time step; shortened where an output week comes first. [s]"""
+    thickness_mm: VaryingNumber = varying(1.5, gt=0, le=10)
+    """Cortical thickness H₀ at the start. [mm]"""
+    thickness_growth_mm_per_gw: float = Field(0.0, ge=-1, le=1)
+    """Growth rate β of the thickness: H = H₀ + β·t. [mm/GW]"""
+    shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, gt=0, le=1e7)
+    """Shear modulus of the cortex. [Pa]"""
+    shear_modulus_core_pa: VaryingNumber = varying(300.0, gt=0, le=1e7)
+    """Shear modulus of the core. [Pa]"""
+    material: MaterialName = "neo-hookean"
+    """Constitutive law (docs/model.md), as in the paper."""
+    poisson_ratio: float = Field(0.45, ge=0, lt=0.5)
+    """Poisson's ratio ν."""
+    growth_rate_per_s: VaryingOrEstimated = varying(2.0e-7, ge=-1e-5, le=1e-5)
+    """Tangential growth rate of the cortex; `estimated` from the brains' areas. [1/s]"""
+    radial_growth_rate_per_s: VaryingNumber = varying(0.0, ge=-1e-5, le=1e-5)
+    """Radial growth rate of the core, along the cortical normal. [1/s]"""
+    core_growth_rate_per_s: VaryingOrEstimated = varying(0.0, ge=-1e-5, le=1e-5)
+    """Isotropic growth rate of the core; `estimated` from the brains' volumes. [1/s]"""
+    follow: Follow | None = None
+    """Curves of area and volume to follow, instead of these two rates."""
+    allow_negative_growth: bool = False
+    """Whether growth rates may be negative (atrophy)."""
+    stress_memory_gw: Memory = 0.0
+    """Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.
+    [GW]"""
+    support: Literal["ellipsoid", "base", "box", "free"] = "ellipsoid"
+    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the
+    flat base, `box` too, and lets upright sides slide; `free` removes rigid motions only."""
+    medial_wall: MedialWall = "sliding"
+    """What holds the medial wall, which has no cortex, of a hemisphere alone: `sliding` keeps it in its plane,
+    as the other hemisphere would; `held` clamps it."""
+    contact: Contact = Contact()
+    """Contact."""
+    no_growth: NoGrowth = NoGrowth()
+    """Tissue that does not grow."""
+    output_every_gw: float = Field(1.0, ge=0.01, le=10)
+    """Interval between output weeks, besides the first and the last, and where some run foretells the start
+    (`follow.growth_of: another`) those of the brains to compare with. [GW]"""
+    fields: tuple[FieldName, ...] = ("displacement", "cortex_weight", "growth")
+    """Fields for ParaView at each output week."""
+    solver: Solver = Solver()
+    """Solvers."""
+    ranks: int = Field(2, ge=1, le=4096)
+    """MPI ranks of a simulation."""
 
     @check
     def _rates_or_curves(self) -> Iterator[Problem]:
@@ -171,18 +169,11 @@ class FoldingSettings(Settings):
     @field_validator("*")
     @classmethod
     def _hold_bounds(cls, value: Any, info: ValidationInfo) -> Any:
-        require_bounds(value, bounds_of(str(info.field_name), cls))
+        require_bounds(value, bounds_of(cls.model_fields[str(info.field_name)]))
         return value
 
 
-def bounds_of(parameter: str, settings: type[Settings] = FoldingSettings) -> dict[str, float]:
-    """Returns the bounds (gt, ge, le) of a parameter that may vary, none for other keys."""
-    extra = settings.model_fields[parameter].json_schema_extra
-    bounds: Any = extra.get("bounds", {}) if isinstance(extra, dict) else {}
-    return dict(bounds)
-
-
-VARYING = tuple(name for name in FoldingSettings.model_fields if bounds_of(name))
+VARYING = tuple(name for name, field in FoldingSettings.model_fields.items() if bounds_of(field))
 """Parameters that may vary with week and place."""
 GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_s"))
 
@@ -200,28 +191,28 @@ class FoldingParameters(FoldingSettings):
     A map has the name of its parameter.
     """
 
-    start_week: Week = setting(..., "GW", "Gestational age at the start.")
-    output_weeks: tuple[Week, ...] = setting(..., "GW", "Output weeks, from `start_week` to `end_week`.")
-    fissure_x_mm: float = setting(..., "mm", "Position of the interhemispheric fissure.")
-    side: Side | None = setting(None, "", "The only hemisphere that the brain has; `null`: it has both.")
-    regional_growth: dict[Week, str] = setting(
-        {}, "GW", "With `follow.regional`: by the week from which each holds, the names of maps of relative growth."
-    )
-    regional_growth_of_cortex: dict[Week, str] = setting(
-        {}, "GW", "The same of the cortex, where it differs from that of the core."
-    )
+    start_week: Week
+    """Gestational age at the start. [GW]"""
+    output_weeks: tuple[Week, ...]
+    """Output weeks, from `start_week` to `end_week`. [GW]"""
+    fissure_x_mm: float
+    """Position of the interhemispheric fissure. [mm]"""
+    side: Side | None = None
+    """The only hemisphere that the brain has; `null`: it has both."""
+    regional_growth: dict[Week, str] = Field({})
+    """With `follow.regional`: by the week from which each holds, the names of maps of relative growth. [GW]"""
+    regional_growth_of_cortex: dict[Week, str] = Field({})
+    """The same of the cortex, where it differs from that of the core. [GW]"""
 
-    regional_strain: dict[Week, str] = setting(
-        {}, "GW", "With `follow.directional`: likewise what the names of the six maps of measured strain begin with."
-    )
+    regional_strain: dict[Week, str] = Field({})
+    """With `follow.directional`: likewise what the names of the six maps of measured strain begin with. [GW]"""
 
-    targets: dict[Week, str] = setting(
-        {}, "GW", "With `follow.loop: closed`: by week what the names of the maps of the mesh's positions begin with."
-    )
+    targets: dict[Week, str] = Field({})
+    """With `follow.loop: closed`: by week what the names of the maps of the mesh's positions begin with.
+    [GW]"""
 
-    ventricle_growth_rate_per_s: float = setting(
-        0.0, "1/s", "With `follow.ventricles_ml`: growth of the ventricles in all directions, set before each step."
-    )
+    ventricle_growth_rate_per_s: float = 0.0
+    """With `follow.ventricles_ml`: growth of the ventricles in all directions, set before each step. [1/s]"""
 
     @property
     def with_ventricles(self) -> bool:

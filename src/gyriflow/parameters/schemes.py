@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..shipped import SHIPPED
-from .settings import Problem, Settings, check, setting
+from .settings import Problem, Settings, check
 
 SCHEME_FILES = {path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))}
 """The files of the schemes that come with gyriflow, by name."""
@@ -19,23 +19,24 @@ Label = Annotated[int, Field(ge=1, le=2**31 - 1)]
 class SchemeSettings(Settings):
     """What the labels of a volume mean; 0 is background. A brain names its scheme: `scheme: NAME`."""
 
-    cerebrum: tuple[Label, ...] = setting(
-        ..., "", "Labels that together fill the cerebrum inside the pial surface; not all need occur."
-    )
-    cortex: tuple[Label, ...] = setting(
-        (), "", "Those of the cortex, of which some must occur: for opening the fissure, and for cortical thickness."
-    )
-    left: tuple[Label, ...] = setting((), "", "Those of the left hemisphere only, which with `right` part the brain.")
-    right: tuple[Label, ...] = setting((), "", "Those of the right hemisphere only.")
-    white_matter: tuple[Label, ...] = setting((), "", "Those of white matter, of which some must occur.")
-    ventricles: tuple[Label, ...] = setting(
-        (), "", "Those of fluid, which is left out where tissue does not enclose it."
-    )
-    cerebellum: tuple[Label, ...] = setting((), "", "Labels outside the cerebrum; with `brainstem`, for the pose.")
-    brainstem: tuple[Label, ...] = setting((), "", "Labels of the brainstem, outside the cerebrum.")
-    known: dict[Label, str] = setting(
-        {}, "", "Tissue by label, such as `{4: outer CSF}`; every label in no list must be named here."
-    )
+    cerebrum: tuple[Label, ...]
+    """Labels that together fill the cerebrum inside the pial surface; not all need occur."""
+    cortex: tuple[Label, ...] = ()
+    """Those of the cortex, of which some must occur: for opening the fissure, and for cortical thickness."""
+    left: tuple[Label, ...] = ()
+    """Those of the left hemisphere only, which with `right` part the brain."""
+    right: tuple[Label, ...] = ()
+    """Those of the right hemisphere only."""
+    white_matter: tuple[Label, ...] = ()
+    """Those of white matter, of which some must occur."""
+    ventricles: tuple[Label, ...] = ()
+    """Those of fluid, which is left out where tissue does not enclose it."""
+    cerebellum: tuple[Label, ...] = ()
+    """Labels outside the cerebrum; with `brainstem`, for the pose."""
+    brainstem: tuple[Label, ...] = ()
+    """Labels of the brainstem, outside the cerebrum."""
+    known: dict[Label, str] = Field({})
+    """Tissue by label, such as `{4: outer CSF}`; every label in no list must be named here."""
 
     @property
     def labels(self) -> dict[int, str]:
@@ -67,7 +68,8 @@ class SchemeSettings(Settings):
 class LabelScheme(SchemeSettings):
     """A label scheme with its name."""
 
-    name: str = setting(..., "", "The scheme's name.")
+    name: str
+    """The scheme's name."""
 
 
 def _as_text(labels: list[int]) -> str:

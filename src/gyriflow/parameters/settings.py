@@ -1,4 +1,4 @@
-"""The base of all settings: each key has its unit, bounds and description, and problems are told together.
+"""The base of all settings: a key's docstring is its description, with the unit, and problems are told together.
 
 Pydantic checks single keys. A check across keys is a method with the decorator `check` that yields a `Problem` for each
 mistake; it runs where all keys are valid.
@@ -54,7 +54,15 @@ def refused(text: str) -> PydanticCustomError:
 class Settings(BaseModel):
     """Settings that are validated as a whole and cannot change afterwards."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        validate_default=True,
+        use_attribute_docstrings=True,
+        # an empty section, such as `mesh:`
+        json_schema_extra={"type": ["object", "null"]},
+    )
     checks: ClassVar[tuple[Callable[[Any], Iterator[Problem]], ...]] = ()
 
     @classmethod
@@ -78,7 +86,6 @@ class Settings(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        # an empty section, such as `mesh:`
         settings = handler({} if raw is None else raw)
         if found := dict.fromkeys(problem for check in cls.checks for problem in check(settings)):
             errors = [InitErrorDetails(type=refused(problem.text), loc=problem.key, input=None) for problem in found]
@@ -90,14 +97,9 @@ class Settings(BaseModel):
         return key in self.model_fields_set and getattr(self, key) is not None
 
 
-def setting(default: Any, unit: str, description: str, *, word: str | None = None, **bounds: Any) -> Any:
-    """Returns a pydantic field with its unit; `default` is ... if the user has to give the value.
-
-    `word` is accepted in place of a number. `bounds` are those of pydantic: gt, ge, lt, le, min_length, max_length,
-    pattern.
-    """
-    extra: dict[str, Any] = {"unit": unit} if word is None else {"unit": unit, "word": word}
-    return Field(default, description=description, json_schema_extra=extra, **bounds)
+def setting(default: Any, unit: str, description: str, **bounds: Any) -> Any:
+    """Returns a pydantic field with its unit; `default` is ... if the user has to give the value."""
+    return Field(default, description=f"{description} [{unit}]" if unit else description, **bounds)
 
 
 # messages: the full path of each key, what was found, what is allowed

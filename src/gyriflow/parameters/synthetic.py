@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .settings import Problem, Settings, check, setting
+from .settings import Problem, Settings, check
 
 PHANTOM_WEEKS = (21.0, 36.0)
 """First and last gestational week of phantoms."""
@@ -32,14 +32,15 @@ Length = Annotated[float, Field(ge=5, le=150)]
 class PhantomSettings(Settings):
     """A synthetic brain of the brain's week."""
 
-    voxel_mm: float = setting(0.8, "mm", "Edge of the isotropic voxels.", ge=0.3, le=2.0)
-    seed: int = setting(0, "", "Seed of the folds' random pattern.", ge=0)
-    cortex_mm: float = setting(2.0, "mm", "Thickness of the cortex.", ge=0.8, le=4.0)
-    pathology: Pathology | None = setting(
-        None, "",
-        "`agenesis` of the corpus callosum, `holoprosencephaly`, `midline-shift` to the right by 8 mm, or in the right "
-        "hemisphere `wide-ventricle`, `hypoplasia`, `hemimegalencephaly`.",
-    )  # fmt: skip
+    voxel_mm: float = Field(0.8, ge=0.3, le=2.0)
+    """Edge of the isotropic voxels. [mm]"""
+    seed: int = Field(0, ge=0)
+    """Seed of the folds' random pattern."""
+    cortex_mm: float = Field(2.0, ge=0.8, le=4.0)
+    """Thickness of the cortex. [mm]"""
+    pathology: Pathology | None = None
+    """`agenesis` of the corpus callosum, `holoprosencephaly`, `midline-shift` to the right by 8 mm, or in the
+    right hemisphere `wide-ventricle`, `hypoplasia`, `hemimegalencephaly`."""
 
     @property
     def scheme(self) -> str:
@@ -50,23 +51,21 @@ class PhantomSettings(Settings):
 class ShapeSettings(Settings):
     """A simple geometry in place of a brain, for teaching and verification, centred on x = 0 and y = 0."""
 
-    kind: ShapeKind = setting(
-        ..., "",
-        "`sphere` and `ellipsoid` are centred on z = 0; `half-ellipsoid` (a dome) and `slab` (a box) stand on z = 0.",
-    )  # fmt: skip
-    radius_mm: float = setting(23.0, "mm", "Radius of a sphere.", ge=5, le=150)
-    semi_axes_mm: tuple[Length, Length, Length] = setting(
-        (21.0, 28.0, 22.0), "mm",
-        "Semi-axes along X, Y, Z of an ellipsoid or half-ellipsoid; the longest is at most twice the shortest.",
-    )  # fmt: skip
-    extent_mm: tuple[Length, Length, Length] = setting((40.0, 40.0, 12.0), "mm", "Extents of a slab along X, Y, Z.")
-    noise_mm: float = setting(
-        0.05, "mm",
-        "Root mean square height of the smooth bumps that start the folding, at most a fiftieth of the smallest size. "
-        "Flat bases and a slab's sides have none.",
-        ge=0, le=0.5,
-    )  # fmt: skip
-    seed: int = setting(0, "", "Seed of the bumps' random pattern.", ge=0)
+    kind: ShapeKind
+    """`sphere` and `ellipsoid` are centred on z = 0; `half-ellipsoid` (a dome) and `slab` (a box) stand on z =
+    0."""
+    radius_mm: float = Field(23.0, ge=5, le=150)
+    """Radius of a sphere. [mm]"""
+    semi_axes_mm: tuple[Length, Length, Length] = (21.0, 28.0, 22.0)
+    """Semi-axes along X, Y, Z of an ellipsoid or half-ellipsoid; the longest is at most twice the shortest.
+    [mm]"""
+    extent_mm: tuple[Length, Length, Length] = (40.0, 40.0, 12.0)
+    """Extents of a slab along X, Y, Z. [mm]"""
+    noise_mm: float = Field(0.05, ge=0, le=0.5)
+    """Root mean square height of the smooth bumps that start the folding, at most a fiftieth of the smallest
+    size. Flat bases and a slab's sides have none. [mm]"""
+    seed: int = Field(0, ge=0)
+    """Seed of the bumps' random pattern."""
 
     @property
     def size_mm(self) -> tuple[float, float, float]:

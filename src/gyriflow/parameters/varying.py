@@ -1,13 +1,15 @@
 """Parameters that may vary: a number, a curve over weeks, a map over the brain, map times curve, or an estimate."""
 
+import operator
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic.fields import FieldInfo
 
-from .settings import InputFile, Problem, Settings, check, setting
+from .settings import InputFile, Problem, Settings, check
 
 Floats = NDArray[np.float64]
 Maps = Mapping[str, Floats]
@@ -28,11 +30,12 @@ class Varying(Settings):
     coordinates. Maps move with the tissue.
     """
 
-    weeks: dict[Week, float] | None = setting(
-        None, "GW", "Values by week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside."
-    )
-    map: FileOrPair | None = setting(None, "", "File with the values, or a list of the left and the right one.")
-    surface: FileOrPair | None = setting(None, "", "Surface file of the map, or the left and the right one.")
+    weeks: dict[Week, float] | None = None
+    """Values by week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside. [GW]"""
+    map: FileOrPair | None = None
+    """File with the values, or a list of the left and the right one."""
+    surface: FileOrPair | None = None
+    """Surface file of the map, or the left and the right one."""
 
     @field_validator("weeks", mode="before")
     @classmethod
@@ -96,16 +99,23 @@ VaryingOrEstimated = Annotated[
 ]
 
 
-def varying(default: float, unit: str, description: str, **bounds: float) -> Any:
-    """Returns a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
-    return Field(default, description=description, json_schema_extra={"unit": unit, "bounds": dict(bounds)})
-
-
 BOUND_TEXTS = {
-    "gt": ("greater than", lambda value, bound: value > bound),
-    "ge": ("greater than or equal to", lambda value, bound: value >= bound),
-    "le": ("less than or equal to", lambda value, bound: value <= bound),
+    "gt": ("exclusiveMinimum", "greater than", operator.gt),
+    "ge": ("minimum", "greater than or equal to", operator.ge),
+    "le": ("maximum", "less than or equal to", operator.le),
 }
+"""The bounds of parameters that may vary: how they are called in JSON schemas and messages, and when they hold."""
+
+
+def varying(default: float, **bounds: float) -> Any:
+    """Returns a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
+    return Field(default, json_schema_extra={BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()})
+
+
+def bounds_of(field: FieldInfo) -> dict[str, float]:
+    """Returns the bounds (gt, ge, le) of a parameter that may vary, none for other keys."""
+    extra: Any = field.json_schema_extra or {}
+    return {name: extra[key] for name, (key, *_) in BOUND_TEXTS.items() if key in extra}
 
 
 def require_bounds(value: float | Varying | str, bounds: Mapping[str, float]) -> None:
@@ -117,7 +127,7 @@ def require_bounds(value: float | Varying | str, bounds: Mapping[str, float]) ->
     else:
         numbers = [value]
     for name, bound in bounds.items():
-        text, holds = BOUND_TEXTS[name]
+        _, text, holds = BOUND_TEXTS[name]
         if not all(holds(number, bound) for number in numbers):
             raise ValueError(f"be {text} {bound:g}")
 

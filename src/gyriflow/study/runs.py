@@ -5,7 +5,8 @@ from functools import cached_property
 from typing import Any
 
 from ..config.root import Config
-from ..parameters.folding import bounds_of
+from ..parameters.folding import FoldingSettings
+from ..parameters.varying import bounds_of
 from ..units import week_tag
 from .brains import Brains
 from .paths import CURVES, GROWTH, MAPS
@@ -97,7 +98,7 @@ class Runs:
 
     def map_bounds(self, run: str) -> dict[str, dict[str, float]]:
         """Returns the bounds of the parameters of a run that have maps."""
-        return {name: bounds_of(name) for name in self.config.maps(run)}
+        return {name: bounds_of(FoldingSettings.model_fields[name]) for name in self.config.maps(run)}
 
     def regional_settings(self, run: str) -> dict[str, Any] | None:
         """Returns how a run's growth follows what is measured where it differs between regions, else None."""
