@@ -68,10 +68,8 @@ rule calibration_tables:
     input:
         scores=PLAN.calibrating.scores_before(len(PLAN.runs.calibrated) + 1),
     output:
-        **{
-            name: f"{CALIBRATION}/{name}.csv"
-            for name in ("runs", "optimum", "sensitivities", "profiles")
-        },
+        runs=f"{CALIBRATION}/runs.csv",
+        optimum=f"{CALIBRATION}/optimum.csv",
     params:
         bounds=lambda wildcards: CONFIG.calibrate.parameters,
         seed=lambda wildcards: CONFIG.calibrate.seed,

@@ -17,7 +17,7 @@ DIGITS = 6
 
 
 def sobol_design(bounds: Mapping[str, Sequence[float]], count: int, seed: int) -> pd.DataFrame:
-    """Returns `count` rows of values that fill the box of the bounds evenly: a scrambled Sobol sequence.
+    """Spread `count` rows of values evenly over the box of the bounds: a scrambled Sobol sequence.
 
     The same seed gives the same rows. Source: Sobol 1967; Owen 1998 for the scrambling.
     """
@@ -28,20 +28,20 @@ def sobol_design(bounds: Mapping[str, Sequence[float]], count: int, seed: int) -
 
 
 def in_bounds(points: Floats, bounds: Mapping[str, Sequence[float]]) -> pd.DataFrame:
-    """Returns (n, d) points of the unit box as values between the bounds, by the names of the parameters."""
+    """Scale (n, d) points of the unit box to values between the bounds, in columns of the parameters' names."""
     low, high = np.transpose(list(bounds.values()))
     values = low + points * (high - low)
     return pd.DataFrame(values, columns=list(bounds)).map(lambda value: float(f"{value:.{DIGITS}g}"))
 
 
 def in_unit_box(values: pd.DataFrame, bounds: Mapping[str, Sequence[float]]) -> Floats:
-    """Returns the rows of values as (n, d) points of the unit box."""
+    """Scale rows of values to (n, d) points of the unit box."""
     low, high = np.transpose(list(bounds.values()))
     return np.asarray((values[list(bounds)].to_numpy(dtype=float) - low) / (high - low))
 
 
 def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], week: float) -> dict[str, Any]:
-    """Returns the content of `params.yaml` of a run of a calibration, which ends at a week.
+    """Return the content of `params.yaml` of a run of a calibration, which ends at a week.
 
     Parameters
     ----------
@@ -56,15 +56,15 @@ def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], 
             params["shear_modulus_cortex_pa"] = value * params["shear_modulus_core_pa"]
             continue
         *outer, last = key.removesuffix(AMPLITUDE).split(".")
-        place = params
+        section = params
         for name in outer:
-            place = place[name]
-        place[last] = _scaled(place[last], value) if key.endswith(AMPLITUDE) else value
+            section = section[name]
+        section[last] = _scaled(section[last], value) if key.endswith(AMPLITUDE) else value
     return params | {"end_week": week, "output_weeks": [params["start_week"], week]}
 
 
 def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
-    """Returns a curve, {week: value} or {weeks: {week: value}, …}, with its values times a factor."""
+    """Multiply the values of a curve, {week: value} or {weeks: {week: value}, …}."""
     if "weeks" in curve:
         return dict(curve) | {"weeks": _scaled(curve["weeks"], factor)}
     return {week: factor * value for week, value in curve.items()}

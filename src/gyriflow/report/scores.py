@@ -393,44 +393,30 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
 
 @styled
 def calibration_chart(
-    runs: pd.DataFrame,
-    optimum: pd.DataFrame,
-    sensitivities: pd.DataFrame,
-    profiles: pd.DataFrame,
-    *,
-    score: Sequence[str],
-    synthetic: bool = False,
+    runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str], synthetic: bool = False
 ) -> Figure:
-    """Returns a panel for each parameter with the runs' scores and the surrogate, and one with the sensitivities.
+    """Returns a panel for each parameter, with the scores of the runs and the optimum of the surrogate.
 
     Parameters
     ----------
     runs : columns of the parameters, round, score (NaN: diverged)
-    optimum, sensitivities, profiles
-        Tables of `comparison.surrogate`.
+    optimum
+        Of `compare.surrogate`.
     score
         What the score is the sum of.
     """
-    names = list(optimum["parameter"])
     figure = new_figure(FULL_WIDTH_IN, 2.7, synthetic=synthetic)
-    panels = figure.subplots(1, len(names) + 1, width_ratios=[1.0] * len(names) + [0.7])
-    rows = optimum.set_index("parameter")
-    for axes, name in zip(panels, names, strict=False):
-        _parameter_panel(axes, name, runs, rows.loc[name], profiles[profiles["parameter"] == name])
+    panels = figure.subplots(1, len(optimum), squeeze=False)[0]
+    for axes, best in zip(panels, optimum.itertuples(), strict=True):
+        _parameter_panel(axes, best.parameter, runs, best.value)
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
-    _sensitivity_panel(panels[-1], sensitivities)
     add_letters(panels)
-    handles = [handle for panel in (panels[0], panels[-1]) for handle in panel.get_legend_handles_labels()[0]]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    figure.legend(handles=panels[0].get_legend_handles_labels()[0], loc="outside lower center", ncols=5)
     return figure
 
 
-def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, best: pd.Series, line: pd.DataFrame) -> None:
-    axes.axvspan(best["low"], best["high"], color=OPTIMUM_COLOUR, alpha=0.15, linewidth=0, label="95 % of the optima")
-    axes.axvline(best["value"], color=OPTIMUM_COLOUR, linestyle="--", label="optimum")
-    low, high = line["mean"] - 2 * line["sd"], line["mean"] + 2 * line["sd"]
-    axes.fill_between(line["value"], low, high, color=LINE_COLOUR, alpha=0.15, linewidth=0)
-    axes.plot(line["value"], line["mean"], color=LINE_COLOUR, label="surrogate")
+def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, optimum: float) -> None:
+    axes.axvline(optimum, color=OPTIMUM_COLOUR, linestyle="--", label="optimum")
     finished = runs[runs["score"].notna()]
     rounds = sorted(runs["round"].unique())
     for place, number in enumerate(rounds):
@@ -445,16 +431,3 @@ def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, best: pd.Series,
         axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
     axes.set_xlabel(parameter_label(name))
     light_grid(axes)
-
-
-def _sensitivity_panel(axes: Axes, sensitivities: pd.DataFrame) -> None:
-    places = np.arange(len(sensitivities))
-    for shift, column, label, colour in (
-        (-0.18, "first_order", "variance by it alone", LINE_COLOUR),
-        (0.18, "total", "and by its interactions", MUTED_COLOUR),
-    ):
-        axes.barh(places + shift, sensitivities[column].clip(0, 1), height=0.34, color=colour, label=label)
-    axes.set_yticks(places, [parameter_label(name).replace(" ", "\n") for name in sensitivities["parameter"]])
-    axes.invert_yaxis()
-    axes.set_xlim(0, 1)
-    axes.set_xlabel("part of the variance")

@@ -742,11 +742,10 @@ class Figures:
 
     @property
     def _of_calibration(self) -> Iterator[Figure]:
-        names = ("runs", "optimum", "sensitivities", "profiles")
         # a calibration is looked at by itself
         yield Figure(
             "calibration_figure", "", "calibration", f"{CALIBRATION}/calibration.png", "scores.calibration_chart",
-            inputs=lambda: {name: f"{CALIBRATION}/{name}.csv" for name in names},
+            inputs=lambda: {name: f"{CALIBRATION}/{name}.csv" for name in ("runs", "optimum")},
             options=lambda: {
                 **self._synthetic(*self.config.start_brains),
                 "score": list(self.config.calibrate.score if self.config.calibrate else ()),

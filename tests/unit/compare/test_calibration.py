@@ -1,11 +1,11 @@
-"""Designs fill their bounds, and the surrogate finds a known least with an interval that holds it."""
+"""Designs fill their bounds, and the surrogate finds a known least."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from gyriflow.compare.design import calibrated_parameters, in_unit_box, sobol_design
-from gyriflow.compare.surrogate import fit, optimum, profiles, propose, sensitivities
+from gyriflow.compare.surrogate import fit, optimum, propose
 
 BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
 TRUTH = {"thickness_mm": 1.7, "growth_rate_per_s": 3.2e-7}
@@ -28,7 +28,7 @@ def test_a_design_fills_every_part_of_the_bounds_and_is_the_same_again():
         assert sorted(np.minimum((16 * axis).astype(int), 15)) == list(range(16))
 
 
-def test_the_optimum_is_found_and_its_interval_holds_the_truth():
+def test_the_optimum_is_found():
     runs = scored(sobol_design(BOUNDS, 10, seed=0))
     for _ in range(2):
         runs = pd.concat([runs, scored(propose(fit(runs, BOUNDS, seed=0), 3))], ignore_index=True)
@@ -36,8 +36,6 @@ def test_the_optimum_is_found_and_its_interval_holds_the_truth():
     for name, truth in TRUTH.items():
         width = BOUNDS[name][1] - BOUNDS[name][0]
         assert best.loc[name, "value"] == pytest.approx(truth, abs=0.03 * width)
-        assert best.loc[name, "low"] <= truth <= best.loc[name, "high"]
-        assert best.loc[name, "high"] - best.loc[name, "low"] < 0.5 * width
     assert not best["at_bound"].any()
     assert best["score"].iloc[0] == pytest.approx(0.1, abs=0.02)
 
@@ -66,26 +64,6 @@ def test_a_diverged_run_keeps_others_away():
     assert (chosen["thickness_mm"] < 2.4).all()
     with pytest.raises(ValueError, match="0 runs with a score"):
         fit(runs.assign(score=np.nan), BOUNDS, seed=0)
-
-
-def test_sensitivities_are_those_of_the_bowl():
-    runs = scored(sobol_design(BOUNDS, 32, seed=0))
-    found = sensitivities(fit(runs, BOUNDS, seed=0)).set_index("parameter")
-    # a sum of two functions has no interactions
-    np.testing.assert_allclose(found["first_order"].sum(), 1, atol=0.05)
-    np.testing.assert_allclose(found["first_order"], found["total"], atol=0.05)
-    points = np.random.default_rng(0).random((20000, 2)) - in_unit_box(pd.DataFrame([TRUTH]), BOUNDS)
-    parts = np.var(0.3 * points[:, 0] ** 2), np.var(2.0 * points[:, 1] ** 2)
-    assert found.loc["growth_rate_per_s", "first_order"] == pytest.approx(parts[1] / sum(parts), abs=0.05)
-
-
-def test_profiles_pass_through_the_optimum():
-    surrogate = fit(scored(sobol_design(BOUNDS, 16, seed=0)), BOUNDS, seed=0)
-    lines = profiles(surrogate, list(TRUTH.values()))
-    for name, truth in TRUTH.items():
-        line = lines[lines["parameter"] == name]
-        assert line["value"].iloc[[0, -1]].tolist() == pytest.approx(BOUNDS[name])
-        assert line["value"][line["mean"].idxmin()] == pytest.approx(truth, abs=0.1 * np.ptp(BOUNDS[name]))
 
 
 def test_values_take_their_places_in_the_parameters():
