@@ -175,7 +175,7 @@ FIGURES = {
             },
         ),
         ("report", {"dpi": 100}, NEW_RESULTS | FIGURES),
-        ("report", {"energy": {"pue": 1.67}}, RESOURCES),
+        ("report", {"core_power_w": 15.0}, RESOURCES),
         # a setting for another kind of input, and the number of ranks, which changes no result: the report alone,
         # as it shows the configuration
         ("surface", {"gap_mm": 1.0}, REPORT),

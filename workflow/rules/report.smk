@@ -11,8 +11,6 @@ rule study_resources:
         rules.figures.input,
         rules.metrics.input,
         rules.quality_table.output,
-        summaries=PLAN.runs.of(FOLDING["summary"]),
-        steps=PLAN.runs.of(FOLDING["steps"]),
     output:
         csv=f"{STUDY}/resources.csv",
         table=f"{STUDY}/resources.html",
@@ -25,7 +23,7 @@ rule study_resources:
             )
             if job.benchmark
         },
-        power=CONFIG.report.energy.model_dump(),
+        power=CONFIG.report.power,
         folded=PLAN.runs.folded,
     script:
         "../scripts/study_resources.py"

@@ -64,9 +64,7 @@ rule replication:
             for name, study in CONFIG.studies.items()
         },
         run=PLAN.runs.folded[0],
-        power=CONFIG.report.energy.model_dump(
-            include={"core_power_w", "carbon_intensity_g_per_kwh"}
-        ),
+        power=CONFIG.report.power,
     script:
         "../scripts/replication.py"
 

@@ -121,31 +121,21 @@ class MetricsSettings(Settings):
     """How the target `export` names files; `bids` as in derivatives."""
 
 
-class EnergySettings(Settings):
-    """The estimated energy is t × (cores × core_power_w + GB × memory_w_per_gb) × pue.
-
-    The formula and the defaults are those of Green Algorithms (Lannelongue, Grealey & Inouye 2021,
-    doi:10.1002/advs.202100707) for an unknown processor, a private machine, and no particular country.
-    """
-
-    core_power_w: float = Field(12.0, gt=0, le=1000)
-    """Power of a busy core: the processor's over its cores. [W]"""
-    memory_w_per_gb: float = Field(0.3725, ge=0, le=100)
-    """Power of the memory in use. [W/GB]"""
-    pue: float = Field(1.0, ge=1, le=10)
-    """Power usage effectiveness: 1 for your own machine, 1.67 for an average data centre."""
-    carbon_intensity_g_per_kwh: float = Field(475.0, ge=0, le=5000)
-    """CO₂ emitted for electricity; 475 is the world's average of 2019 (IEA). [g/kWh]"""
-
-
 class ReportSettings(Settings):
-    """Figures, and assumptions of the estimated energy."""
+    """Figures and report."""
 
     figures: Literal["essential", "all"] = "essential"
-    """Whether figures of the mesh, the zones and the solver, and all maps are drawn, too."""
+    """Whether figures of the zones and the solver, and all maps are drawn, too."""
     dpi: int = Field(300, ge=50, le=1200)
     """Resolution of PNG figures; journals ask for 300 to 600. [dots per inch]"""
     paths: bool = False
     """Whether the report shows paths of files, which may hold names. It never shows headers of images."""
-    energy: EnergySettings = EnergySettings()
-    """Energy and emissions in the table of resources."""
+    core_power_w: float = Field(12.0, gt=0, le=1000)
+    """Power of a busy core, for the estimate of energy: the processor's over its cores. [W]"""
+    carbon_intensity_g_per_kwh: float = Field(475.0, ge=0, le=5000)
+    """CO₂ emitted for electricity; 475 is the world's average of 2019 (IEA). [g/kWh]"""
+
+    @property
+    def power(self) -> dict[str, float]:
+        """What energy and emissions are estimated with."""
+        return self.model_dump(include={"core_power_w", "carbon_intensity_g_per_kwh"})

@@ -772,10 +772,12 @@ class Figures:
             options=lambda: {"measured": self.config.measured_name([row.subject for row in real])},
             target="view",
         )  # fmt: skip
+        report = self.config.report
         yield Figure(
             "study_resources", "Resources", "time, memory, energy and emissions", f"{STUDY}/resources.html",
-            caption="""What the jobs behind this report took, with an estimate of their energy and emissions, whose
-            assumptions stand below. As numbers in ``results/study/resources.csv``.""",
+            caption=f"""What the jobs behind this report took. Energy is core hours × {report.core_power_w:g} W,
+            emissions are energy × {report.carbon_intensity_g_per_kwh:g} g CO₂e per kWh: nobody has measured power. As
+            numbers in ``results/study/resources.csv``.""",
             target="report", technical=True,
         )  # fmt: skip
 
