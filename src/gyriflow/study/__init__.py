@@ -1,5 +1,6 @@
-"""What a study consists of: from a configuration to its brains, runs, chains, comparisons, and where results lie."""
+"""What a study consists of: from a configuration to its brains, runs, comparisons, and where results lie."""
 
-from .study import Plan
+from .plan import Plan
+from .resolve import resolve
 
-__all__ = ["Plan"]
+__all__ = ["Plan", "resolve"]

@@ -1,0 +1,126 @@
+"""The growth series of a study: the brains that growth is taken from, and how they correspond."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..config.brains import Brain as GivenBrain
+from ..config.root import Config
+from ..config.runs import growth_series
+from ..errors import InputError
+from .paths import MATCHED, REGISTERED
+from .records import Brain
+
+
+@dataclass(frozen=True)
+class Series:
+    """The growth series by name, and how the brains in them correspond.
+
+    Attributes
+    ----------
+    brains
+        The brains of each series, in the order of the configuration.
+    preferred
+        The series that is used where a brain has several; None where none is named.
+    matched
+        The ids of the brains whose surfaces have the same vertices, by the series' name.
+    unmatched
+        Why the vertices of other series of surfaces are not matched.
+    """
+
+    brains: Mapping[str, tuple[Brain, ...]]
+    preferred: str | None
+    matched: Mapping[str, frozenset[str]]
+    unmatched: Mapping[str, str]
+
+    def with_brain(self, brain: Brain) -> str:
+        """Return the series that a brain is in, of several the preferred one; "" for none."""
+        names = [name for name, brains in self.brains.items() if brain in brains]
+        return min(names, key=lambda name: name != self.preferred, default="")
+
+    def for_sizes(self, brain: Brain) -> str | None:
+        """Return the series whose curves a start brain follows: the preferred one, the only one, or that with it."""
+        if self.preferred is not None:
+            return self.preferred if self.preferred in self.brains else None
+        return next((name for name, brains in self.brains.items() if len(self.brains) == 1 or brain in brains), None)
+
+    def of_others(self, start: Brain) -> list[str]:
+        """Return the series of other populations with a brain's hemispheres; of several, the preferred one alone."""
+        population = start.given.population
+        names = [
+            name
+            for name, brains in self.brains.items()
+            if start not in brains
+            and all(population is None or brain.given.population != population for brain in brains)
+            and all(brain.sides == start.sides for brain in brains)
+        ]
+        return [self.preferred] if self.preferred in names else names
+
+    def are_matched(self, *brains: Brain) -> bool:
+        """Return whether brains have surfaces with the same vertices."""
+        return any({brain.id for brain in brains} <= ids for ids in self.matched.values())
+
+    def correspondence(self, earlier: Brain, later: Brain) -> str:
+        """Return the file that says where one brain's points are in another: by matched vertices, or registration."""
+        file = MATCHED if self.are_matched(earlier, later) else REGISTERED
+        return file.format(earlier=earlier.id, later=later.id)
+
+    def posed(self, *pair: Brain) -> list[bool]:
+        """Return for two brains whether they correspond in the pose of their surfaces, as masks of surfaces do.
+
+        Others correspond in the world of their files.
+        """
+        return [not brain.given.has_labels and not self.are_matched(*pair) for brain in pair]
+
+
+def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
+    """Return the growth series of a configuration among some of its brains.
+
+    Surfaces are read to tell whether their vertices are matched, but for files of an atlas that are missing still: its
+    description is believed.
+    """
+    names = growth_series([brain.given for brain in brains.values()], config.growth.brains)
+    series = {name: tuple(brains[brain] for brain in ids) for name, ids in names.items()}
+    believed = {str(f.path) for used in config.atlases for f in used.missing if used.atlas.series[f.series].matched}
+    matched, unmatched = {}, {}
+    for name, members in series.items():
+        if not all(brain.given.has_vertices for brain in members):
+            continue
+        cause: str | None = "growth.matched_surfaces is false"
+        if config.growth.matched_surfaces:
+            cause = why_unmatched([brain.given for brain in sorted(members, key=lambda brain: brain.week)], believed)
+        if cause is None:
+            matched[name] = frozenset(brain.id for brain in members)
+        else:
+            unmatched[name] = cause
+    return Series(series, config.growth.estimated_from, matched, unmatched)
+
+
+def why_unmatched(brains: Sequence[GivenBrain], believed: Collection[str] = ()) -> str | None:
+    """Return why the surfaces of brains are not matched by their vertices; None where they are.
+
+    They are where all brains are given by surface files of one kind, with as many vertices and the same triangles for
+    each hemisphere. Files that are `believed` to be so need not be there.
+    """
+    # files are looked at where growth by vertices is planned, which few configurations ask for
+    from ..io.surfaces import connectivity
+
+    first = brains[0]
+    for brain in brains:
+        if brain.source != first.source:
+            return f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
+    known: list[tuple[str, list[tuple[int, int, str]]]] = []
+    for brain in brains:
+        if believed and all(path in believed for path in brain.files):
+            continue
+        try:
+            known.append((brain.id, [connectivity(Path(path)) for path in brain.files]))
+        except InputError as error:
+            return str(error)
+        (name, expected), (other, found) = known[0], known[-1]
+        for one, two in zip(expected, found, strict=True):
+            if one[:2] != two[:2]:
+                return f"{other} has {two[0]} vertices and {two[1]} triangles where {name} has {one[0]} and {one[1]}"
+            if one != two:
+                return f"{other} has other triangles than {name}"
+    return None
