@@ -1,10 +1,10 @@
-"""Registration of an atlas week to week: overlap, folding, time, and how much growth differs from place to place.
+"""Registration of an atlas week to week: overlap, folding, time.
 
     ./run python benchmarks/registration.py ATLAS_FOLDER --out deformations
 
 ATLAS_FOLDER holds `week21_labels.nii.gz`, `week21_t2w.nii.gz` and so on; the weeks after `week25_operated` are of
 operated fetuses, and the two populations are not registered with each other. The deformations are kept in `--out` and
-used again; a row per pair and per smoothing length is printed. The last line is one JSON object.
+used again; a row per pair is printed. The last line is one JSON object.
 """
 
 import argparse
@@ -24,7 +24,6 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh, connected_parts, grid,
 from gyriflow.growth.carrying import carry_over_weeks
 from gyriflow.growth.channels import Channels, channels
 from gyriflow.growth.diffeomorphic import register
-from gyriflow.growth.local import local_growth
 from gyriflow.growth.registration_quality import judge, require_good
 from gyriflow.io.registrations import read_deformation, write_deformation
 from gyriflow.io.schemes import SCHEMES
@@ -35,7 +34,6 @@ POPULATIONS = {
     "operated": {25: "week25_operated"} | {week: f"week{week}" for week in range(26, 35)},
 }
 SCHEME = SCHEMES["spina-bifida-atlas"]
-SIGMAS_MM = (25.0, 15.0, 10.0, 6.0, 3.0)
 TETS_MM = 1.6
 
 
@@ -72,7 +70,7 @@ def solid(brain: Channels) -> TetrahedralMesh:
 
 def main() -> None:
     arguments = parse()
-    pairs, growth, summary = [], [], {}
+    pairs, summary = [], {}
     for population in arguments.populations:
         weeks = [week for week in POPULATIONS[population] if week <= arguments.last]
         brains = {week: read(arguments.atlas, POPULATIONS[population][week], arguments.labels_only) for week in weeks}
@@ -98,12 +96,6 @@ def main() -> None:
         positions = carry_over_weeks(mesh.vertices, deformations)
         volumes = np.stack([volumes_between(position, mesh.tets) for position in positions])
         sizes = vertex_sizes(mesh.vertices, mesh.tets)
-        for sigma in SIGMAS_MM:
-            rates = local_growth(positions, mesh.tets, weeks, sigma)
-            whole = np.average(rates, axis=1, weights=sizes)
-            sd = np.sqrt(np.average((rates - whole[:, None]) ** 2, axis=1, weights=sizes))
-            for week, rate, spread in zip(weeks[:-1], np.diff(np.log(volumes.sum(axis=1))), sd, strict=True):
-                growth.append({"population": population, "week": week, "sigma_mm": sigma, "rate": rate, "sd": spread})
         pairs_of = (positions[i : i + 2] for i in range(len(deformations)))
         moves = [np.linalg.norm(without_rigid_motion(*pair, sizes), axis=1).mean() for pair in pairs_of]
         true = [np.count_nonzero(brain.tissue & 1) * brain.voxel_mm**3 for brain in brains.values()]
@@ -115,15 +107,10 @@ def main() -> None:
             "volume_growth_kept": float(volumes[-1].sum() / volumes[0].sum() / (true[-1] / true[0])),
             "mean_displacement_mm_per_week": (moves / np.diff(weeks)).round(3).tolist(),
         }
-    table, spread = pd.DataFrame(pairs), pd.DataFrame(growth)
+    table = pd.DataFrame(pairs)
     shown = ["population", "from", "to", "dice_cerebrum", "dice_cortex", "least_determinant", "folded_share"]
     shown += ["log_growth_sd", "rim_mm", "inside_mm", "seconds", "cpu_seconds"]
     print(table[shown].to_string(index=False, float_format="%.3f"))
-    print(
-        spread.pivot_table(index=["population", "week", "rate"], columns="sigma_mm", values="sd").to_string(
-            float_format="%.3f"
-        )
-    )
     for population, found in summary.items():
         rows = table[table["population"] == population]
         found |= {
@@ -132,7 +119,6 @@ def main() -> None:
             "least_determinant": rows["least_determinant"].min(),
             "most_seconds": rows["seconds"].max(),
             "most_cpu_seconds": rows["cpu_seconds"].max(),
-            "growth_sd_at_6_mm": spread.query("population == @population and sigma_mm == 6")["sd"].mean(),
         }
     print(json.dumps(summary))
 

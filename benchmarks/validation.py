@@ -60,7 +60,7 @@ def main() -> None:
     validation = read_table(folder / "validation.csv")
     moves = folder / "displacement_agreement.csv"
     displacement = read_table(moves) if moves.exists() else pd.DataFrame()
-    shown = ["run", "kind", "start_week", "week", "seed", "distance_mm", "distance95_mm", "cortex_dice"]
+    shown = ["run", "kind", "start_week", "week", "distance_mm", "distance95_mm", "cortex_dice"]
     shown += ["area_error", "volume_error", "r_shape_index"]
     shown += ["r_start_shape_index", "r_adjacent_shape_index", "gain_low_shape_index", "gain_high_shape_index"]
     shown += ["skill_shape_index", "skill_mean_curvature", "curvature_rms_ratio"]
@@ -69,13 +69,6 @@ def main() -> None:
         str(run): summary(rows, displacement[displacement["run"] == run] if len(displacement) else displacement)
         for run, rows in validation.groupby("run", sort=False)
     }
-    horizons = folder / "horizon.csv"
-    if horizons.exists():
-        shown = ["gain_shape_index", "gain_mean_curvature", "skill_shape_index", "skill_mean_curvature"]
-        shown += ["displacement_r", "displacement_r_scaling"]
-        print("\nby horizon, over the starts:")
-        groups = read_table(horizons).groupby(["model", "kind", "known_gw", "horizon"], dropna=False)
-        print(groups[shown].mean().to_string(float_format="%.3f"))
     agreement = folder / "folding_agreement.csv"
     if agreement.exists():
         table = read_table(agreement)

@@ -10,7 +10,6 @@ from gyriflow.cli.cost import folding_needs
 rule parameters:
     input:
         surface=PIAL["report"],
-        rates=of(PLAN.runs.rates),
         curves=of(PLAN.runs.curves),
         targets=of(PLAN.expecting.targets),
     output:
@@ -21,8 +20,6 @@ rule parameters:
         settings=of(CONFIG.parameters),
         weeks=of(CONFIG.weeks),
         estimated_from=of(PLAN.runs.estimated_from),
-        regional_weeks=of(PLAN.chains.regional_weeks),
-        unmatched=of(PLAN.chains.unmatched),
     script:
         "../scripts/parameters.py"
 
@@ -33,8 +30,6 @@ rule parameter_maps:
         mesh=MESH["mesh"],
         data=MESH["data"],
         surface=PIAL["report"],
-        carried=of(PLAN.chains.carried_mesh),
-        labels=of(PLAN.runs.ventricle_labels),
         targets=of(PLAN.expecting.targets),
     output:
         MAPS,
@@ -46,9 +41,7 @@ rule parameter_maps:
     params:
         **of_brain("affine_from"),
         maps=of(CONFIG.maps),
-        follow=of(PLAN.runs.regional_settings),
         bounds=of(PLAN.runs.map_bounds),
-        ventricles=of(PLAN.brains.ventricles),
         # volumes of maps are read like those of the brain
     script:
         "../scripts/parameter_maps.py"

@@ -22,7 +22,6 @@ rule growth_curves:
         **CURVES,
     params:
         may_shrink=CONFIG.folding.allow_negative_growth,
-        known_until_gw=PLAN.chains.known_until_gw,
     script:
         "../scripts/growth_curves.py"
 

@@ -78,7 +78,7 @@ rule targets:
     output:
         TARGETS,
     wildcard_constraints:
-        whose="own|another",
+        whose="self|atlas",
     resources:
         mem_mb=8000,
         runtime=30,
@@ -96,18 +96,15 @@ rule carried_mesh:
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
-        earlier=of(PLAN.chains.correspondences_earlier),
         later=of(PLAN.chains.correspondences_later),
     output:
         CARRIED_MESH,
     wildcard_constraints:
-        brain=one_of(PLAN.chains.with_chain),
+        brain=one_of(PLAN.chains.carried),
     resources:
         mem_mb=8000,
         runtime=30,
     params:
-        weeks=of(PLAN.chains.weeks),
-        strain=of(PLAN.chains.with_strain),
-        smoothing_mm=of(PLAN.chains.smoothing_mm),
+        weeks=of(PLAN.chains.later_weeks),
     script:
         "../scripts/carried_mesh.py"

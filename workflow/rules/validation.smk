@@ -32,7 +32,6 @@ rule validation:
         start_week=of(PLAN.brains.week),
         series=of(CONFIG.estimated_from),
         kinds=of(PLAN.validating.kinds),
-        seed=of(PLAN.runs.seed),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
         mirrored_patches=CONFIG.metrics.mirrored_patches,
     script:
@@ -44,7 +43,7 @@ rule prediction:
         unpack(of(PLAN.validating.prediction)),
         mesh=MESH["mesh"],
         data=MESH["data"],
-        targets=TARGETS.format(brain="{brain}", whose="another"),
+        targets=TARGETS.format(brain="{brain}", whose="atlas"),
     output:
         PREDICTION,
     resources:
@@ -53,7 +52,7 @@ rule prediction:
     params:
         start_week=of(PLAN.brains.week),
         weeks=lambda wildcards: list(PLAN.validating.compared(**wildcards)),
-        atlas_weeks=lambda wildcards: PLAN.expecting.weeks(wildcards.brain, "another"),
+        atlas_weeks=lambda wildcards: PLAN.expecting.weeks(wildcards.brain, "atlas"),
         of_atlas=of(PLAN.validating.predicts),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -119,9 +118,8 @@ rule displacement_agreement:
         labels=lambda wildcards: {
             "run": wildcards.run,
             "start_week": CONFIG.brain(wildcards.brain).week,
-            "seed": PLAN.runs.seed(wildcards.run),
         },
-        known_until=of(PLAN.validating.registered_until),
+        registered=of(PLAN.validating.registered),
     script:
         "../scripts/displacement_agreement.py"
 
@@ -157,23 +155,6 @@ rule folding_agreement:
         "../scripts/folding_agreement.py"
 
 
-rule horizon:
-    input:
-        validation=f"{STUDY}/validation.csv",
-        displacement=(
-            f"{STUDY}/displacement_agreement.csv" if PLAN.validating.carried else []
-        ),
-    output:
-        f"{STUDY}/horizon.csv",
-    params:
-        models=PLAN.validating.models,
-        known_until_gw={
-            run: PLAN.runs.followed(run, "known_until_gw") for run in CONFIG.runs
-        },
-    script:
-        "../scripts/horizon.py"
-
-
 rule validate:
     input:
         [
@@ -181,6 +162,5 @@ rule validate:
             for name, files in PLAN.validating.tables.items()
             if files
         ],
-        rules.horizon.output if PLAN.validating.pairs else [],
         rules.deviation_scores.output if PLAN.validating.expected else [],
         PLAN.figures.target("validate"),

@@ -17,6 +17,5 @@ with step(snakemake.log[0]):
     surface, pial = boundary_surface(TetrahedralMesh(start, read_tets(files.frames)))
     simulated = np.stack([read_positions(files.frames, week)[pial] for week in both])
     measured = np.stack([carried.positions[np.isclose(carried.weeks, week).argmax()][pial] for week in both])
-    known_until = snakemake.params.known_until
-    table = displacement_table(both, simulated, measured, surface.faces, known_until=known_until)
+    table = displacement_table(both, simulated, measured, surface.faces, registered=snakemake.params.registered)
     write_table(snakemake.output[0], table.assign(**labels)[[*labels, *table.columns]])

@@ -51,17 +51,6 @@ def surface_overlay(image, surface, report, affine_from, **_):
     return {"values": volume.values, "affine": pose_from(report["pose"]).world @ volume.affine, "surface": surface}
 
 
-def growth_chart(areas, rates, agreement, folding_rate_per_s, estimated_from, **shown):
-    """Returns the tables of growth, with the curve of the folding's rate where it is estimated."""
-    from gyriflow.growth.rates import FOLDING_RATES, rate_curve
-
-    rate = folding_rate_per_s
-    if rate == "estimated":
-        chosen = rates[rates["series"] == estimated_from]
-        rate = dict(zip(*rate_curve(chosen, FOLDING_RATES["growth_rate_per_s"], allow_negative=True), strict=True))
-    return {"areas": areas, "rates": rates, "agreement": agreement, "folding_rate_per_s": rate, **shown}
-
-
 def displacement_maps(frames, **shown):
     """Returns the displacement of runs between output weeks on the pial surface at the interval's end."""
     maps = {}

@@ -10,11 +10,9 @@ from gyriflow.step import step
 params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):
     areas, curves, away = read_table(snakemake.input[0]), [], []
-    for until in (None, *params.known_until_gw):
-        for name, fits in fits_of_series(areas, until=until, may_shrink=params.may_shrink).items():
-            first = {"series": name, "known_until_gw": until}
-            tables = curve_table({quantity: fit.curve for quantity, fit in fits.items()}), errors(fits)
-            for table, joined in zip(tables, (curves, away), strict=True):
-                joined.append(table.assign(**first)[[*first, *table.columns]])
+    for name, fits in fits_of_series(areas, may_shrink=params.may_shrink).items():
+        tables = curve_table({quantity: fit.curve for quantity, fit in fits.items()}), errors(fits)
+        for table, joined in zip(tables, (curves, away), strict=True):
+            joined.append(table.assign(series=name)[["series", *table.columns]])
     write_table(output.curves, pd.concat(curves, ignore_index=True))
     write_table(output.errors, pd.concat(away, ignore_index=True))

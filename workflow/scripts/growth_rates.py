@@ -1,9 +1,9 @@
-"""Cortical areas and brain volumes of all brains, the growth rates between their weeks, and how far series agree."""
+"""Cortical areas and brain volumes of all brains, and the growth rates between their weeks."""
 
 import pandas as pd
 
 from gyriflow.geometry.triangles import area, signed_volume
-from gyriflow.growth.rates import TISSUES, agreement, rates_of_series
+from gyriflow.growth.rates import TISSUES, rates_of_series
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.step import step
@@ -22,4 +22,3 @@ with step(snakemake.log[0]):
         areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in known]
     write_table(output.areas, areas)
     write_table(output.rates, rates_of_series(areas))
-    write_table(output.agreement, agreement(areas))

@@ -21,7 +21,7 @@ from ..io.files import files_in, read_json, write_text
 from ..io.schemes import SCHEMES
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import read_keys
-from ..parameters.following import BEFORE_GW
+from ..parameters.growth import BEFORE_GW
 from ..parameters.settings import validated
 from ..shipped import SHIPPED
 

@@ -1,9 +1,9 @@
-"""What a study's simulations are worth: a row per run and week, and what these say by horizon.
+"""What a study's simulations are worth: a row per run and week.
 
 Beside them how the surface moves and how much it is folded, each against the real brain.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -23,15 +23,13 @@ from ..geometry.triangles import (
     vertex_areas,
 )
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .placement import MEASURES, placement
+from .placement import placement
 from .prediction import apart, distances
 from .shapes import Shape, against_real, cortex_dice
 
 type Kind = Literal["explained", "predicted"]
 """Whether growth came from the weeks that are compared, or from another brain, atlas or only earlier weeks."""
 
-GAINS = [f"{name}_{measure}" for name in ("gain", "gain_low", "gain_high", "skill") for measure in MEASURES]
-MOVES = ["displacement_r", "displacement_slope", "displacement_r_scaling"]
 AGREEMENT = ("gyrification_index", "gyrification_index_envelope", "mean_sulcal_depth", "mean_curvedness")
 """What is compared of the table of metrics."""
 BAND = "spangy_share_B"
@@ -40,16 +38,12 @@ BAND = "spangy_share_B"
 
 @dataclass(frozen=True)
 class Comparison:
-    """Which simulated brain is compared: weeks are those that the run began at, and that is compared.
-
-    The seed is that of the noise of the run's start, and of the bootstrap.
-    """
+    """Which simulated brain is compared: weeks are those that the run began at, and that is compared."""
 
     run: str
     kind: Kind
     start_week: float
     week: float
-    seed: int = 0
 
     @property
     def horizon(self) -> float:
@@ -71,7 +65,7 @@ def validation_row(
 ) -> dict[str, Any]:
     """Returns a row of validation.csv.
 
-    Columns: run, kind, start_week, week, horizon, seed; distance_mm and distance95_mm of `prediction.distances` and
+    Columns: run, kind, start_week, week, horizon; distance_mm and distance95_mm of `prediction.distances` and
     `cortex_dice`, both of the surfaces as they are, laid onto each other rigidly; area_cm2, volume_ml and the same with
     real_ and curve_ in front; area_error and volume_error against the curve and area_difference and volume_difference
     from the real brain, as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
@@ -90,61 +84,17 @@ def validation_row(
     for name, unit, aim in (("area", "cm2", wanted[0]), ("volume", "ml", wanted[1])):
         row[f"{name}_error"] = row[f"{name}_{unit}"] / aim - 1
         row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"real_{name}_{unit}"] - 1
-    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=comparison.seed, mirrored=mirrored)
+    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=0, mirrored=mirrored)
     return row | against_real(run, real)
 
 
 def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
-    """Returns rows of `validation_row` as a table, what is compared first, by run, start, seed and week."""
-    first = ["run", "kind", "start_week", "week", "horizon", "seed", "distance_mm", "distance95_mm", "cortex_dice"]
+    """Returns rows of `validation_row` as a table, what is compared first, by run, start and week."""
+    first = ["run", "kind", "start_week", "week", "horizon", "distance_mm", "distance95_mm", "cortex_dice"]
     table = pd.DataFrame(rows)
     return table[[*first, *table.columns.difference(first, sort=False)]].sort_values(
-        ["run", "start_week", "seed", "week"], ignore_index=True
+        ["run", "start_week", "week"], ignore_index=True
     )
-
-
-def horizon_table(
-    validation: pd.DataFrame,
-    displacement: pd.DataFrame,
-    models: Mapping[str, str],
-    known_until_gw: Mapping[str, float | None],
-) -> pd.DataFrame:
-    """Returns what each model is worth by start week and by horizon, explained and predicted weeks apart.
-
-    Parameters
-    ----------
-    validation
-        Rows of `validation_row`.
-    displacement
-        Those of `displacement_table` with the columns run, start_week and seed; may be empty.
-    models
-        What runs are called that differ in their start, their seed or in what is known only, by run.
-    known_until_gw
-        The week up to which the brains of a run's growth are known, by run; None for all.
-
-    Returns
-    -------
-    DataFrame
-        model, kind, known_gw (weeks after the start that growth is known for, NaN for all), start_week, horizon, week,
-        runs (how many rows are averaged: seeds and starts of one week); gain_…, gain_low_…, gain_high_… and skill_… of
-        each measure; displacement_r, displacement_slope and displacement_r_scaling of the interval that ends there.
-    """
-    rows = validation.assign(
-        model=validation["run"].map(models).fillna(validation["run"]),
-        known_gw=validation["run"].map({run: week for run, week in known_until_gw.items() if week is not None}),
-    )
-    rows["known_gw"] = (rows["known_gw"].astype(float) - rows["start_week"]).clip(lower=0)
-    if len(displacement):
-        ends = displacement.rename(columns={"to_week": "week"})
-        same = ["run", "start_week", "seed", "week"]
-        rows = rows.merge(ends[[*same, *MOVES]].groupby(same, as_index=False).mean(), on=same, how="left")
-    else:
-        rows = rows.assign(**dict.fromkeys(MOVES, np.nan))
-    keys = ["model", "kind", "known_gw", "start_week", "horizon", "week"]
-    groups = rows.groupby(keys, dropna=False, sort=True)
-    table = groups[[*GAINS, *MOVES]].mean().reset_index()
-    table.insert(len(keys), "runs", groups.size().to_numpy())
-    return table
 
 
 def _sizes(mesh: TriangleMesh) -> dict[str, float]:
@@ -170,7 +120,7 @@ def vector_agreement(one: Floats, measured: Floats, weights: Floats) -> tuple[fl
 
 
 def displacement_table(
-    weeks: Sequence[float], simulated: Floats, measured: Floats, faces: Ints, *, known_until: float = -np.inf
+    weeks: Sequence[float], simulated: Floats, measured: Floats, faces: Ints, *, registered: bool = False
 ) -> pd.DataFrame:
     """Returns how the displacement of the pial vertices agrees with the measured one, a row per interval of weeks.
 
@@ -180,8 +130,8 @@ def displacement_table(
     nothing joins hemispheres that are bodies of their own, so that growth does not say how they lie to each other.
 
     Weeks ascend; simulated and measured are (w, n, 3) positions in mm of the same vertices, of the run and carried
-    along the registration; faces the (m, 3) triangles of the closed surface. Up to the week `known_until` growth came
-    from that very registration: there the agreement tests the solver's consistency, not the model.
+    along the registration; faces the (m, 3) triangles of the closed surface. Growth that came
+    from that very registration (`registered`) tests the solver's consistency, not the model.
 
     Returns
     -------
@@ -215,7 +165,7 @@ def displacement_table(
         r, slope = vector_agreement(own, real, weights)
         r_scaling, slope_scaling = vector_agreement(scaling, real, weights)
         sizes = [float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights))) for vectors in (own, real)]
-        test = "consistency" if weeks[number + 1] <= known_until else "comparison"
+        test = "consistency" if registered else "comparison"
         rows.append((weeks[number], weeks[number + 1], test, r, slope, r_scaling, slope_scaling, *sizes))
     columns = ["displacement_r", "displacement_slope", "displacement_r_scaling", "displacement_slope_scaling"]
     return pd.DataFrame(rows, columns=["from_week", "to_week", "test", *columns, "rms_mm", "measured_rms_mm"])

@@ -6,9 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pydantic import ValidationError
 
 from ..io.schemes import SCHEMES
-from ..parameters.folding import GROWTH_RATES, VARYING, value_problems
+from ..parameters.folding import VARYING, value_problems
 from ..parameters.settings import Key, Problem, messages, nearest
-from ..parameters.synthetic import PhantomSettings
 from ..parameters.terms import AMPLITUDE, LONGEST_NAME, STIFFNESS_RATIO
 from ..parameters.varying import Varying
 from .brains import Brain
@@ -132,23 +131,10 @@ def runs(config: Config) -> Iterator[Problem]:
                 ids = ", ".join(brain.id for brain in brains)
                 text = f"has a map on a surface, which belongs to one brain; the run starts from {ids}"
                 yield Problem(text, _place(name, (key,), config))
-        if run.follow is not None and run.follow.ventricles_ml is not None:
-            for cause in filter(None, (_no_ventricles(brain, config) for brain in brains)):
-                text = f"needs a start brain whose labels know ventricles; {cause}"
-                yield Problem(text, _place(name, ("follow", "ventricles_ml"), config))
-
-
-def _no_ventricles(brain: Brain, config: Config) -> str:
-    """Returns why the labels of a brain know no ventricles; empty where they do, or their scheme is unknown."""
-    if not brain.has_labels:
-        return f"{brain.id} has no labels"
-    scheme = brain.scheme or (brain.phantom or PhantomSettings()).scheme
-    found = config.schemes.get(scheme) or SCHEMES.get(scheme)
-    return "" if found is None or found.ventricles else f"{scheme}, the scheme of {brain.id}, names none"
 
 
 def growth(config: Config) -> Iterator[Problem]:
-    """Yields what is wrong between the brains, the series that growth rates are estimated from, and the runs."""
+    """Yields what is wrong between the brains, and the series that growth is measured on."""
     given, brains = config.growth.brains, {brain.id: brain for brain in config.brains}
     lists = dict(given) if isinstance(given, Mapping) else {"": given} if given is not None else {}
     paths = {name: ("growth", "brains", *([name] if name else [])) for name in lists}
@@ -165,23 +151,10 @@ def growth(config: Config) -> Iterator[Problem]:
     series, wanted = config.growth_series, config.growth.estimated_from
     if wanted is not None and series and wanted not in series:
         yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))
-    used = {name for ids in lists.values() for name in ids} if lists else brains
-    reason = _too_few_weeks([brains[name] for name in used])
-    for run_name, run in config.runs.items():
-        found, without = reason, [name for name in config.starts(run_name) if config.estimated_from(name) is None]
-        if not found and without and wanted is None:
-            plural = f"the start brain{'s' if len(without) > 1 else ''} {', '.join(without)}"
-            found = (
-                f"{plural} {'are' if len(without) > 1 else 'is'} in none of the series {', '.join(series)}; name "
-                "one under growth.estimated_from"
-            )
-        for key in GROWTH_RATES:
-            if found and getattr(run, key) == "estimated":
-                yield Problem(f"can't be estimated: {found}", _place(run_name, (key,), config))
 
 
 def _too_few_weeks(brains: Sequence[Brain]) -> str:
-    """Returns what is wrong with the weeks of brains that are to give growth rates, empty where nothing is."""
+    """Returns what is wrong with the weeks of brains that growth is measured on, empty where nothing is."""
     found = len({brain.week for brain in brains})
     return (
         "" if found > 1 else f"found brains of {found} week{'s' if not found else ''}; a growth rate needs two or more"
@@ -303,9 +276,9 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
     if key.endswith(AMPLITUDE):
         curve = key.removesuffix(AMPLITUDE)
         value = getattr(base, curve) if curve in VARYING else None
-        if curve in CURVES and (base.follow is None or base.follow.loop == "closed"):
+        if curve in CURVES and base.growth.model != "sizes":
             yield "the base run follows no curve"
-        elif curve not in CURVES and value != "estimated" and not (isinstance(value, Varying) and value.weeks):
+        elif curve not in CURVES and not (isinstance(value, Varying) and value.weeks):
             yield f"{curve} is no curve in the base run"
     elif key in NOT_VARIED:
         yield "cannot be calibrated"

@@ -123,9 +123,20 @@ def _with_preset(base: dict[str, Any], override: dict[str, Any]) -> dict[str, An
 def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
     both = dict(base)
     for key, value in override.items():
+        if key == "growth":
+            both[key] = _merged_growth(base.get(key), value)
+            continue
         nested = isinstance(value, dict) and isinstance(base.get(key), dict) and key not in VARYING
         both[key] = _merge(base[key], value) if nested else value
     return both
+
+
+def _merged_growth(base: Any, override: Any) -> Any:
+    """Returns growth with the keys of `base` too where both have one model; either may be the model's name alone."""
+    old, new = ({"model": given} if isinstance(given, str) else given for given in (base, override))
+    if not isinstance(old, dict) or not isinstance(new, dict):
+        return new
+    return new if new.get("model", old.get("model")) != old.get("model") else {**old, **new}
 
 
 def _atlases(raw: Any, base_dir: Path) -> tuple[list[UsedAtlas], list[str]]:

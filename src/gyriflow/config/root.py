@@ -221,8 +221,8 @@ class Config(Settings):
 
     def expects(self, run: str) -> bool:
         """Returns whether a run has the growth of another population than the start's."""
-        follow = self.run(run).follow
-        return follow is not None and follow.growth_of == "another"
+        growth = self.run(run).growth
+        return growth.model == "shapes" and growth.of == "atlas"
 
     def comparable(self, brain: str) -> list[Brain]:
         """Returns the brains that a start brain may be compared with.
@@ -285,7 +285,7 @@ class Config(Settings):
         return {name: brains for name, brains in series.items() if all(brain.has_vertices for brain in brains)}
 
     def estimated_from(self, brain: str) -> str | None:
-        """Returns the series that `estimated` rates are taken from where a brain is the start; None without one."""
+        """Returns the series that measured curves are taken from where a brain is the start; None without one."""
         return estimated_from(self.growth_series, self.growth.estimated_from, brain)
 
     def own_series(self, brain: str) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from ..parameters.folding import FoldingSettings
+from ..parameters.growth import SIZES
 from ..parameters.settings import Problem, Settings, check
 from ..parameters.terms import SCORES, Score
 from .brains import Brain
@@ -39,7 +40,7 @@ PRESETS: dict[str, dict[str, Any]] = {
     # the paper's model, whatever the defaults become; its linear elements are `order: 1` of the mesh
     "fetalfoldsim": {
         "step_s": 43_200.0,
-        "follow": None,
+        "growth": {"model": "rates"},
         "allow_negative_growth": False,
         "thickness_mm": 1.5,
         "thickness_growth_mm_per_gw": 0.0,
@@ -58,12 +59,12 @@ PRESETS: dict[str, dict[str, Any]] = {
     # growth that takes the brain to its measured shapes
     "measured": {
         **FREE_GROWTH,
-        "follow": {"loop": "closed", "smoothing_mm": 1.5},
+        "growth": {"model": "shapes"},
     },
     # the brain as it is to be expected: as `measured`, towards where the growth of another population would take it
     "expected": {
         **FREE_GROWTH,
-        "follow": {"loop": "closed", "growth_of": "another", "smoothing_mm": 1.5},
+        "growth": {"model": "shapes", "of": "atlas"},
     },
 }
 """Sets of parameters by name, from which a configuration starts; its own keys come on top."""
@@ -80,10 +81,9 @@ class Run(FoldingSettings):
     # not of parameters, which hold the sizes of the shapes
     @check
     def _shapes_have_their_own_sizes(self) -> Iterator[Problem]:
-        for key in ("area_cm2", "volume_ml"):
-            if self.follow is not None and self.follow.loop == "closed" and getattr(self.follow, key) != "measured":
-                text = "has no meaning where growth leads to whole shapes: set it to measured, or loop to open"
-                yield Problem(text, ("follow", key))
+        for key in SIZES:
+            if self.growth.model == "shapes" and getattr(self.growth, key) != "measured":
+                yield Problem("has no meaning with the model shapes; expected sizes", ("growth", key))
 
 
 # growth
@@ -96,17 +96,17 @@ Series = Annotated[
 
 
 class GrowthSettings(Settings):
-    """Which brains the growth rates are estimated from."""
+    """Which brains growth is measured on."""
 
     brains: Series | None = None
     """Ids of the brains whose areas and volumes are used, of at least two weeks; or several such lists by name,
     as `{surface: [...], volume: [...]}`. `null`: all brains. Each population is then a series of its own, as
     are surfaces (`surface`) and label volumes (`volume`) if both have two weeks."""
     estimated_from: str | None = None
-    """Series that gives the `estimated` rates of the folding; `null`: the start brain's."""
+    """Series that gives measured curves or an atlas' growth, of several; `null`: the start brain's."""
     matched_surfaces: bool = True
-    """Whether equal vertices and triangles of a series' surfaces mean equal places, so that local growth comes
-    from them without registration."""
+    """Whether equal vertices and triangles of a series' surfaces mean equal places, so that brains
+    correspond without registration."""
 
 
 def growth_series(
@@ -145,7 +145,7 @@ def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
 
 
 def estimated_from(series: Mapping[str, Sequence[str]], given: str | None, start: str) -> str | None:
-    """Returns the name of the series that gives the `estimated` rates; None if it is not determined.
+    """Returns the name of the series that gives the measured curves; None if it is not determined.
 
     It is the given one, or the only one, or the one with the start brain.
     """
@@ -169,7 +169,7 @@ NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields
 """Keys of a run that say nothing of its model, or that the study sets."""
 
 
-CURVES = ("follow.area_cm2", "follow.volume_ml")
+CURVES = tuple(f"growth.{size}" for size in SIZES)
 """Further curves than those of parameters that may vary."""
 MOST_PARAMETERS = 3
 MOST_RUNS = 40

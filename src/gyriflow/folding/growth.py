@@ -1,24 +1,23 @@
-"""Growth: what the solver knows of it, its tensor G in a step, and growth by rates and in measured directions.
+"""Growth: what the solver knows of it, its tensor G in a step, and growth by rates.
 
 A growth model says how tissue grows in each step, from where the brain is at its start. A new one is a subclass of
 `Growth` with its model, and a line in `growth_models`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces, volumes_between
+from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
 from ..geometry.triangles import TriangleMesh, area, signed_volume
-from ..parameters.folding import STRAIN, VENTRICLES, FoldingParameters
+from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 from .layers import Tissue
-from .stress import unpacked
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -28,14 +27,10 @@ NO_GROWTH = 1e-10
 
 @dataclass(frozen=True)
 class Size:
-    """The size of a brain: of the surface under which cortex lies, of all that the surface encloses, of the ventricles.
-
-    The last is 0 where they are not known.
-    """
+    """The size of a brain: of the surface under which cortex lies, and of all that the surface encloses."""
 
     area_mm2: float
     volume_mm3: float
-    ventricles_mm3: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +56,9 @@ class GrowthInputs:
 
     def size(self, positions_mm: Floats) -> Size:
         """Returns the size of the brain, for (n, 3) positions of all vertices."""
-        ventricles = 0.0
-        if VENTRICLES in self.maps:
-            parts = self.maps[VENTRICLES][self.pieces].mean(axis=1)
-            ventricles = float(parts @ volumes_between(positions_mm, self.pieces))
         return Size(
             area(TriangleMesh(positions_mm, self.zones.measured_facets)),
             signed_volume(TriangleMesh(positions_mm, self.zones.facets)),
-            ventricles,
         )
 
 
@@ -141,27 +131,20 @@ class GrowthModel(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class GrowthByRates(Growth):
-    """Growth by the parameters' rates of cortex and core, as in the middle of the step, and in measured directions."""
+    """Growth by the parameters' rates of cortex and core, as in the middle of the step."""
 
     def inverse(self, tissue: Tissue) -> Floats:
         p, start = self.parameters, self.start
         dg, dr = increments_at(p, tissue.weight, tissue.growing, tissue.maps, start.week(p, 0.5), start.step_s)
         # the direction matters only where growth differs along and across it
         chosen, normals = tissue.normals(np.abs(dg - dr) > NO_GROWTH)
-        result = layered_inverse(tissue.at_points(dg), tissue.at_points(dr), chosen, normals)
-        strain = strain_at(p, tissue.maps, start.week(p, 1.0))
-        if strain is None:
-            return result
-        of_step = start.step_s / SECONDS_PER_GW * tissue.at_points(strain * tissue.growing)
-        return undone(np.moveaxis(of_step, 0, -1)) @ result
+        return layered_inverse(tissue.at_points(dg), tissue.at_points(dr), chosen, normals)
 
 
-def increments(
-    w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float, *, across: Any = 0.0
-) -> tuple[Any, Any]:
+def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float) -> tuple[Any, Any]:
     """Returns the increments dg along the pial surface and dr across it, as stretches less 1.
 
-    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = ((α_RAD + α_CORE)(1 − w) + α_ACROSS w) · g · Δt.
+    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt.
 
     Parameters
     ----------
@@ -174,11 +157,9 @@ def increments(
         all directions, in 1/s.
     step_s
         Length of the step in s.
-    across
-        Rate α_ACROSS of the cortex along the normal, 0 in the paper.
     """
     isotropic = core * (1 - w)
-    return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + across * w + isotropic) * (g * step_s)
+    return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + isotropic) * (g * step_s)
 
 
 def increments_at(
@@ -189,11 +170,7 @@ def increments_at(
         value_at(rate, week, maps)
         for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
     )
-    if p.with_ventricles:
-        core = core + maps[VENTRICLES] * (p.ventricle_growth_rate_per_s - core)
-    # where directions are measured, the rates are those of volume
-    across = tangential if p.regional_strain else 0.0
-    return increments(w, g, tangential, radial, core, step_s, across=across)
+    return increments(w, g, tangential, radial, core, step_s)
 
 
 def layered_inverse(dg: Floats, dr: Floats, chosen: NDArray[np.bool_], normals: Floats) -> Floats:
@@ -213,21 +190,3 @@ def layered_inverse(dg: Floats, dr: Floats, chosen: NDArray[np.bool_], normals: 
     inverse[chosen] = (np.eye(3) - across) / (1 + dg[chosen])[..., None, None]
     inverse[chosen] += across / (1 + dr[chosen])[..., None, None]
     return inverse
-
-
-def strain_at(p: FoldingParameters, maps: Maps, week: float) -> Floats | None:
-    """Returns the (6, n) measured strain per week that holds at a week, None where growth has no directions."""
-    name = map_at(p.regional_strain, week)
-    return None if name is None else np.stack([maps[f"{name}_{part}"] for part in STRAIN])
-
-
-def undone(strain: Floats) -> Floats:
-    """Returns the (..., 3, 3) inverse of growth by small (..., 6) strains, which leaves volumes as they are."""
-    inverse = np.linalg.inv(np.eye(3) + unpacked(strain))
-    return np.asarray(inverse / np.cbrt(np.linalg.det(inverse))[..., None, None])
-
-
-def map_at(maps: Mapping[float, str], week: float) -> str | None:
-    """Returns the name of the map that holds at a week: that of the last week before it, or else the first."""
-    before = [start for start in maps if start < week]
-    return maps[max(before)] if before else next(iter(maps.values()), None)

@@ -23,7 +23,7 @@ def growth_model(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Float
     """Returns the model of a run that starts at (n, 3) positions."""
     if p.targets:
         return GrowthToTargets.of(p, inputs)
-    return PrescribedGrowth(p) if p.follow is None else SteeredGrowth(p, inputs, inputs.size(positions_mm))
+    return SteeredGrowth(p, inputs, inputs.size(positions_mm)) if p.growth.model == "sizes" else PrescribedGrowth(p)
 
 
 def growth_at_start(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats) -> Growth:

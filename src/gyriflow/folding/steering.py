@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from ..errors import SolverError
 from ..geometry.tetrahedra import volumes_between
 from ..geometry.triangles import TriangleMesh, area_vectors
-from ..parameters.folding import VENTRICLES, FoldingParameters
-from ..parameters.varying import Varying, value_at
-from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
-from .growth import Growth, GrowthByRates, GrowthInputs, Size, StepStart, increments, map_at, strain_at
+from ..parameters.folding import FoldingParameters
+from ..parameters.varying import value_at
+from ..units import CM2_PER_MM2, ML_PER_MM3
+from .growth import Growth, GrowthByRates, GrowthInputs, Size, StepStart, increments
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight
-from .stress import unpacked
 
 Floats = NDArray[np.float64]
 Response = Floats
@@ -99,7 +98,7 @@ class SteeredStep(GrowthByRates):
             return None
         return replace(
             self,
-            parameters=with_rates(self.parameters, rates, self.start.week(self.parameters, 1.0)),
+            parameters=with_rates(self.parameters, rates),
             rates=rates,
             response=response,
             tries=self.tries + 1,
@@ -107,20 +106,10 @@ class SteeredStep(GrowthByRates):
         )
 
     def learnt(self, after: Size) -> tuple[float, ...]:
-        learnt = tuple((self._taught(after) - self.free).ravel().tolist())
-        if not self.parameters.with_ventricles:
-            return learnt
-        grown = math.log(after.ventricles_mm3 / self.before.ventricles_mm3) / self.start.step_s
-        return (*learnt, grown - 3 * self.parameters.ventricle_growth_rate_per_s)
+        return tuple((self._taught(after) - self.free).ravel().tolist())
 
     def row(self, after: Size) -> dict[str, Any]:
         row = super().row(after)
-        if self.parameters.with_ventricles:
-            row |= {
-                "ventricles_ml": after.ventricles_mm3 * ML_PER_MM3,
-                "ventricles_aim_ml": self.aim.ventricles_mm3 * ML_PER_MM3,
-                "ventricle_growth_rate_per_s": self.parameters.ventricle_growth_rate_per_s,
-            }
         # what the cortex would grow in area if nothing held it
         free = (self.free[0, 0] + self.free[0, 1]) * self.rates.tangential + self.free[0, 2]
         return row | {
@@ -155,30 +144,20 @@ class SteeredGrowth:
 
     def growth(self, start: StepStart) -> Growth:
         """Returns the growth of a step, as it is tried first."""
-        p, week, learnt = self.parameters, start.week(self.parameters, 1.0), start.learnt
+        p, week = self.parameters, start.week(self.parameters, 1.0)
         before, aim = self.inputs.size(start.positions_mm), self.aim(week)
-        if p.with_ventricles:
-            known = 0.0 if learnt is None else learnt[-1]
-            rate = (math.log(aim.ventricles_mm3 / before.ventricles_mm3) / start.step_s - known) / 3
-            rate = min(max(rate, bounds(p)[0]), bounds(p)[1])
-            p = p.model_copy(update={"ventricle_growth_rate_per_s": rate})
-            learnt = None if learnt is None else learnt[:-1]
-        free = free_growth(p, start.positions_mm, self.inputs, week)
-        return steered_step(p, replace(start, learnt=learnt), before, aim, free)
+        return steered_step(p, start, before, aim, free_growth(p, start.positions_mm, self.inputs, week))
 
     def aim(self, week: float) -> Size:
         """Returns the size to be reached at a week."""
         p, at_start = self.parameters, self.at_start
-        follow = p.follow
-        assert follow is not None
 
         def joining(curve: Any, value: float, unit: float) -> float:
             return joined(curve, value * unit, p.start_week, week) / unit
 
         return Size(
-            joining(follow.area_cm2, at_start.area_mm2, CM2_PER_MM2),
-            joining(follow.volume_ml, at_start.volume_mm3, ML_PER_MM3),
-            joining(follow.ventricles_ml, at_start.ventricles_mm3, ML_PER_MM3) if follow.ventricles_ml else 0.0,
+            joining(p.growth.area_cm2, at_start.area_mm2, CM2_PER_MM2),
+            joining(p.growth.volume_ml, at_start.volume_mm3, ML_PER_MM3),
         )
 
 
@@ -191,19 +170,12 @@ def steered_step(p: FoldingParameters, start: StepStart, before: Size, aim: Size
     if not _grows(response):
         response = free
     rates = steered_rates(logarithmic_rates(before, aim, start.step_s), response, bounds(p))
-    return SteeredStep(with_rates(p, rates, start.week(p, 1.0)), start, before, aim, rates, free, response)
+    return SteeredStep(with_rates(p, rates), start, before, aim, rates, free, response)
 
 
-def with_rates(p: FoldingParameters, rates: GrowthRates, week: float) -> FoldingParameters:
-    """Returns the parameters of a step that ends at a week with rates of growth."""
-    values: dict[str, Any] = {}
-    for name, rate, maps_by_week in (
-        ("growth_rate_per_s", rates.tangential, p.regional_growth_of_cortex or p.regional_growth),
-        ("core_growth_rate_per_s", rates.core, p.regional_growth),
-    ):
-        regional = map_at(maps_by_week, week)
-        values[name] = rate if regional is None else Varying(weeks={week: rate}, map=regional)
-    return p.model_copy(update=values)
+def with_rates(p: FoldingParameters, rates: GrowthRates) -> FoldingParameters:
+    """Returns the parameters of a step with rates of growth."""
+    return p.model_copy(update={"growth_rate_per_s": rates.tangential, "core_growth_rate_per_s": rates.core})
 
 
 def bounds(p: FoldingParameters) -> tuple[float, float]:
@@ -305,7 +277,7 @@ def steered_rates(
             "growth that follows curves finds no rates: its maps are such that growth makes the brain smaller",
             found=f"volume growing by {volume_t:.3g} with a unit of the cortex's rate, {volume_c:.3g} with the core's",
             expected="positive numbers",
-            remedy="Less folding.follow.regional, or more folding.follow.smoothing_mm, makes the maps less negative.",
+            remedy="Give a map of growth rates that is less negative.",
         )
     share = volume_t / (volume_t + volume_c)
     mean = wanted_volume / (volume_t + volume_c)
@@ -334,8 +306,7 @@ def steered_rates(
 def free_growth(p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs, week: float) -> Response:
     """Returns what free growth would make of the brain's sizes, in 1/s for unit rates of cortex and core.
 
-    Each place grows by its maps' multiples of the two rates, and with measured strain where there is one; ventricles
-    by a rate of their own. Volume is that of all tissue; area is as growth along the surface makes it.
+    Volume is that of all tissue; area is as growth along the surface makes it.
 
     Parameters
     ----------
@@ -349,53 +320,25 @@ def free_growth(p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs
     reach = WEIGHT_REACH * float(np.max(thickness))
     distance = PialSearch(positions_mm, zones.cortex_facets).distance(positions_mm, reach)
     w = cortical_weight(distance, thickness)
-    of_cortex, of_core = (
-        1.0 if name is None else maps[name]
-        for name in (
-            map_at(p.regional_growth_of_cortex or p.regional_growth, week),
-            map_at(p.regional_growth, week),
-        )
-    )
-    ventricles = maps[VENTRICLES] if p.with_ventricles else 0.0
     volumes = volumes_between(positions_mm, inputs.pieces)
     whole = volumes.sum()
 
-    def of_volume(
-        tangential: float | Floats, radial: float | Floats, core: float | Floats, across: float | Floats
-    ) -> float:
-        dg, dr = increments(w, zones.growth, tangential, radial, core, 1.0, across=across)
+    def of_volume(tangential: float, radial: float | Floats, core: float) -> float:
+        dg, dr = increments(w, zones.growth, tangential, radial, core, 1.0)
         return float((2 * dg + dr)[inputs.pieces].mean(axis=1) @ volumes / whole)
 
     faces = zones.measured_facets
-    normals = area_vectors(TriangleMesh(positions_mm, faces))
-    areas = np.linalg.norm(normals, axis=1)
-    local = (zones.growth * of_cortex)[faces].mean(axis=1)
-    surface = 2 * float(local @ areas / areas.sum())
-    strain = strain_at(p, maps, week)
-    stretched = 0.0
-    if strain is not None:
-        tensors = unpacked((strain * zones.growth).T[faces].mean(axis=1))
-        across = np.einsum("fi,fij,fj->f", normals, tensors, normals) / areas**2
-        stretched = float((np.trace(tensors, axis1=1, axis2=2) - across) @ areas / areas.sum()) / SECONDS_PER_GW
-    response = free_response(
-        surface,
-        of_volume(of_cortex, 0.0, 0.0, of_cortex if p.regional_strain else 0.0),
-        of_volume(0.0, 0.0, of_core * (1.0 - ventricles), 0.0),
-        area_else=stretched,
-        volume_else=of_volume(0.0, value_at(p.radial_growth_rate_per_s, week, maps), 0.0, 0.0),
-    )
-    if p.with_ventricles:
-        # the surface gives way to ventricles as it does to the core around them
-        wider = p.ventricle_growth_rate_per_s * of_volume(0.0, 0.0, ventricles, 0.0)
-        response[:, 2] += wider * response[0, 1] / response[1, 1], wider
-    return response
+    areas = np.linalg.norm(area_vectors(TriangleMesh(positions_mm, faces)), axis=1)
+    surface = 2 * float(zones.growth[faces].mean(axis=1) @ areas / areas.sum())
+    radial = value_at(p.radial_growth_rate_per_s, week, maps)
+    core = of_volume(0.0, 0.0, 1.0)
+    return free_response(surface, of_volume(1.0, 0.0, 0.0), core, volume_else=of_volume(0.0, radial, 0.0))
 
 
 def missed_curves(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Returns what to say of curves that are missed by more than `FOLLOWED`; empty where none is.
 
-    Area and volume count where the last step ends; the ventricles, whose rate is not corrected within a step, where
-    they were farthest off.
+    They count where the last step ends.
 
     Parameters
     ----------
@@ -411,13 +354,6 @@ def missed_curves(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         if parts:
             why = ": no rates within their bounds lead to both on this shape" if row.get("growth_limited") else ""
             notes.append(f"at GW {row['week']:g} the brain is {' and '.join(parts)}{why}")
-    if row.get("ventricles_aim_ml") is not None:
-        farthest = max(rows, key=lambda each: abs(_error(each, "ventricles", "ml")))
-        error = _error(farthest, "ventricles", "ml")
-        if abs(error) > FOLLOWED:
-            at_bound = error > 0 and farthest["ventricle_growth_rate_per_s"] == 0
-            why = ": at a rate of 0 what grows around them takes them along" if at_bound else ""
-            notes.append(f"at GW {farthest['week']:.4g} the ventricles are {100 * error:+.1f} % off their curve{why}")
     return notes
 
 

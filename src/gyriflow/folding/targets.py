@@ -72,7 +72,6 @@ class GrowthToTargets:
     @classmethod
     def of(cls, p: FoldingParameters, inputs: GrowthInputs) -> "GrowthToTargets":
         """Returns the model of a run whose maps hold the targets that its parameters name."""
-        assert p.follow is not None
         targets = {
             week: np.stack([inputs.maps[f"{name}_{axis}"] for axis in AXES], axis=1) for week, name in p.targets.items()
         }
@@ -82,7 +81,7 @@ class GrowthToTargets:
                 found=f"shapes up to {max(targets):g} GW and a run to {p.end_week:g} GW",
                 remedy="End the run earlier, or add brains of later weeks.",
             )
-        return cls(p, inputs, targets, p.follow.smoothing_mm)
+        return cls(p, inputs, targets, p.growth.smoothing_mm)
 
     def growth(self, start: StepStart) -> Growth:
         """Returns the growth of a step: its part of what is left to the next target.

@@ -8,9 +8,6 @@ from scipy.ndimage import map_coordinates
 
 from .triangles import Floats, TriangleMesh, frozen, transformed
 
-INVERSION_ROUNDS = 100
-INVERTED_MM = 1e-3
-
 
 @dataclass(frozen=True, eq=False)
 class Deformation:
@@ -74,29 +71,6 @@ def displacement_at(deformation: Deformation, points: Floats) -> Floats:
 def carry(deformation: Deformation, points: Floats) -> Floats:
     """Returns where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
     return transform_points(points + displacement_at(deformation, points), deformation.matrix)
-
-
-def carry_back(deformation: Deformation, points: Floats) -> Floats:
-    """Returns which (n, 3) points of the first brain come to lie at given points of the second, in mm.
-
-    By fixed-point iteration p ← A⁻¹(q) − u(p), which halves its steps where they grow (Chen et al. 2008, doi
-    10.1118/1.2816107). Where the map folds there is no inverse, and the nearest approach found is returned.
-    """
-    aim = transform_points(points, np.linalg.inv(deformation.matrix))
-    found = aim.copy()
-    left = np.full(len(aim), np.inf)
-    share = np.ones(len(aim))
-    best = found.copy()
-    for _ in range(INVERSION_ROUNDS):
-        missing = aim - found - displacement_at(deformation, found)
-        away = np.linalg.norm(missing, axis=1)
-        nearer = away < left
-        best[nearer], left[nearer] = found[nearer], away[nearer]
-        if not (left > INVERTED_MM).any():
-            break
-        share[~nearer] *= 0.5
-        found = np.where(nearer[:, None], found + share[:, None] * missing, 0.5 * (found + best))
-    return best
 
 
 def determinants(deformation: Deformation) -> Floats:

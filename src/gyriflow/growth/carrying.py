@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, carry_back, transform_points
+from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, transform_points
 from ..geometry.matching import labels_at, match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
@@ -32,24 +32,14 @@ def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Flo
     return np.stack(positions)
 
 
-def carry_back_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:
-    """Returns the (w + 1, n, 3) positions of points of the last week, carried back; the first week's come first."""
-    positions = [points]
-    for deformation in reversed(deformations):
-        positions.append(carry_back(deformation, positions[-1]))
-    return np.stack(positions[::-1])
-
-
-def carry_mesh(mesh: TetrahedralMesh, earlier: Sequence[Correspondence], later: Sequence[Correspondence]) -> Floats:
-    """Returns the (w, n, 3) positions of a mesh's vertices in all weeks: carried back, as given, and carried on.
+def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence]) -> Floats:
+    """Returns the (w + 1, n, 3) positions of a mesh's vertices: as given, and carried to the later weeks.
 
     Along matched surfaces its boundary follows them, and the inside harmonically.
     """
-    matched = [pair for pair in (*earlier, *later) if isinstance(pair, MatchedSurfaces)]
-    if matched:
-        return follow_inside(mesh, matched, own=len(earlier))
-    back, on = ([pair for pair in pairs if isinstance(pair, Deformation)] for pairs in (earlier, later))
-    return np.concatenate([carry_back_over_weeks(mesh.vertices, back), carry_over_weeks(mesh.vertices, on)[1:]])
+    if matched := [pair for pair in later if isinstance(pair, MatchedSurfaces)]:
+        return follow_inside(mesh, matched)
+    return carry_over_weeks(mesh.vertices, [pair for pair in later if isinstance(pair, Deformation)])
 
 
 def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floats:

@@ -65,16 +65,16 @@ def match_surfaces(first: TriangleMesh, second: TriangleMesh) -> tuple[MatchedSu
     return MatchedSurfaces(first, second.vertices), numbers
 
 
-def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces], *, own: int = 0) -> Floats:
+def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
     """Returns the (w + 1, n, 3) positions of a surface's vertices that go along w pairs of matched surfaces.
 
-    Each vertex keeps its place beside the point of its own week's matched surface that is nearest with an agreeing
+    Each vertex keeps its place beside the point of the first matched surface that is nearest with an agreeing
     normal, turned as the whole surface is, and moves as that point does.
 
     Parameters
     ----------
     mesh
-        A surface of the week with the index `own`: of the same brain, with other triangles.
+        A surface of the first week: of the same brain, with other triangles.
     chain
         Pairs of successive weeks.
 
@@ -82,11 +82,11 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces], *, own
     """
     faces = chain[0].first.faces
     surfaces = np.stack([chain[0].first.vertices, *(pair.second for pair in chain)])
-    start = TriangleMesh(surfaces[own], faces)
+    start = TriangleMesh(surfaces[0], faces)
     match = match_points(mesh.vertices, vertex_normals(mesh), start)
     if match.distance_mm.mean() > AWAY_MM:
         raise InputError(
-            "the surface is not that of the matched surfaces' own week",
+            "the surface is not that of the first matched surface",
             found=f"{match.distance_mm.mean():.2f} mm from it on average, {match.distance_mm.max():.2f} mm at most",
             expected=f"at most {AWAY_MM:g} mm on average",
             remedy="Both must be in one pose and of one week.",
@@ -98,13 +98,13 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces], *, own
     )
 
 
-def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces], *, own: int = 0) -> Floats:
+def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
     """Returns the (w + 1, n, 3) positions of a tetrahedral mesh's vertices that go along matched surfaces.
 
     Its boundary follows them; the displacement inside is harmonic, as smooth as the boundary allows.
     """
     boundary, used = boundary_surface(mesh)
-    along = follow_surfaces(boundary, chain, own=own)
+    along = follow_surfaces(boundary, chain)
     moves = (along - boundary.vertices).transpose(1, 0, 2).reshape(len(used), -1)
     inside = continue_harmonically(mesh.vertices, linear_pieces(mesh), used, moves)
     return np.asarray(mesh.vertices + inside.reshape(len(mesh.vertices), len(along), 3).transpose(1, 0, 2))

@@ -4,17 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from ..errors import InputError
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
-
-FOLDING_RATES = {
-    "growth_rate_per_s": "compound_rate_per_s",
-    "core_growth_rate_per_s": "core_compound_rate_per_s",
-}
-"""Parameters of the folding that can be estimated, and the columns they come from."""
-
 
 TISSUES = ("tissue", "ventricles", "cortex")
 """What labels know of the volume inside the pial surface; the volume itself contains the ventricles."""
@@ -73,56 +64,3 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
                 rates[f"{tissue}_compound_rate_per_s"] = np.log(rates[f"{tissue}_ratio"]) / (3 * seconds)
         tables.append(rates)
     return pd.concat(tables, ignore_index=True)
-
-
-def agreement(areas: pd.DataFrame) -> pd.DataFrame:
-    """Returns how far series of brains agree with the first one: differences of their rates between common weeks.
-
-    Rates are taken between the successive weeks that both series have, so that the intervals are the same. Areas are as
-    for `rates_of_series`.
-
-    Returns
-    -------
-    DataFrame
-        series, reference (the first series), from_week, to_week, rate_per_s, reference_rate_per_s, difference_per_s
-        (the series' rate less the reference's), and the same three with core_ in front. No row where series have no two
-        common weeks.
-    """
-    names = list(dict.fromkeys(areas["series"]))
-    columns = ["series", "reference", "from_week", "to_week"]
-    columns += [f"{kind}{of}_per_s" for kind in ("", "core_") for of in ("rate", "reference_rate", "difference")]
-    tables = [pd.DataFrame(columns=columns)]
-    for name in names[1:]:
-        pair = [areas[areas["series"] == series] for series in (name, names[0])]
-        weeks = set(pair[0]["week"]) & set(pair[1]["week"])
-        if len(weeks) > 1:
-            table, others = (rates_of_series(brains[brains["week"].isin(weeks)]) for brains in pair)
-            for kind in ("", "core_"):
-                table[f"{kind}reference_rate_per_s"] = other = others[f"{kind}rate_per_s"]
-                table[f"{kind}difference_per_s"] = table[f"{kind}rate_per_s"] - other
-            tables.append(table.assign(reference=names[0])[columns])
-    return pd.concat(tables[1:] or tables, ignore_index=True)
-
-
-def rate_curve(
-    rates: pd.DataFrame, column: str, *, allow_negative: bool = False
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the weeks and the values (1/s) of a column of `growth_rates`, each rate in the middle of its interval.
-
-    The rate is linear in between and constant outside. InputError where rates are negative and must not be, all such
-    intervals named.
-    """
-    below = rates[rates[column] < 0]
-    if len(below) and not allow_negative:
-        intervals = [
-            f"{rate:.3g} 1/s from week {start:g} to {end:g}"
-            for start, end, rate in zip(below["from_week"], below["to_week"], below[column], strict=True)
-        ]
-        raise InputError(
-            f"the estimated growth is negative ({column})",
-            found=", ".join(intervals),
-            expected="0 or more",
-            remedy="Leave the brain that does not fit out of growth.brains, or set allow_negative_growth: true.",
-        )
-    middle = (rates["from_week"] + rates["to_week"]) / 2
-    return middle.to_numpy(dtype=float), rates[column].to_numpy(dtype=float)

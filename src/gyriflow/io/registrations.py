@@ -60,7 +60,7 @@ def read_correspondence(path: AnyPath) -> Correspondence:
 
 @dataclass(frozen=True, eq=False)
 class CarriedMesh:
-    """A mesh carried over weeks, with its local growth.
+    """A mesh carried over weeks.
 
     Attributes
     ----------
@@ -68,34 +68,24 @@ class CarriedMesh:
         Gestational weeks, ascending.
     positions : (w, n, 3) float
         Of the vertices, in mm.
-    growth : {smoothing length in mm: {"area" or "volume": (w - 1, n) float}}
-        Local log growth per week between successive weeks; of area at vertices of the surface, NaN elsewhere.
     """
 
     weeks: Floats
     positions: Floats
-    growth: Mapping[float, Mapping[str, Floats]]
 
 
 def write_carried_mesh(path: AnyPath, carried: CarriedMesh) -> None:
-    """Writes the data sets weeks, positions, and growth/{length}mm/{area, volume}."""
+    """Writes the data sets weeks and positions."""
     with new_hdf5(path) as file:
         file["weeks"] = np.asarray(carried.weeks, dtype=np.float64)
         file.create_dataset("positions", data=carried.positions.astype(np.float32), compression="gzip", shuffle=True)
-        for length, kinds in carried.growth.items():
-            for kind, rates in kinds.items():
-                file[f"growth/{length:g}mm/{kind}"] = np.asarray(rates, dtype=np.float64)
 
 
 def read_carried_mesh(path: AnyPath) -> CarriedMesh:
     """Returns what `write_carried_mesh` has written; InputError where the file is none of it."""
     expected = "an HDF5 file with weeks and positions"
     with reading_hdf5(path, "a carried mesh", expected, "Carry the mesh again.") as file:
-        growth = {
-            float(length.removesuffix("mm")): {kind: rates[:] for kind, rates in kinds.items()}
-            for length, kinds in file.get("growth", {}).items()
-        }
-        return CarriedMesh(file["weeks"][:], file["positions"][:].astype(np.float64), growth)
+        return CarriedMesh(file["weeks"][:], file["positions"][:].astype(np.float64))
 
 
 @dataclass(frozen=True, eq=False)

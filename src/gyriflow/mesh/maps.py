@@ -1,7 +1,7 @@
 """Maps over a brain brought onto the vertices of its tetrahedral mesh: from surfaces and from volumes."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..geometry.matching import barycentric, nearest_on
 from ..geometry.triangles import TriangleMesh, corners, face_areas, transformed
-from ..parameters.folding import VENTRICLES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,28 +94,6 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
             remedy="Continue the map over the whole brain, or give it on a surface.",
         )
     return values
-
-
-def ventricle_map(
-    mesh_vertices_mm: Floats, labels: NDArray[np.integer], affine: ArrayLike, ventricles: Sequence[int], path: str
-) -> dict[str, Floats]:
-    """Returns, by its name, the map of the part of ventricles in the tissue around the n vertices of a mesh, 0 to 1.
-
-    `labels` (i, j, k) have the (4, 4) affine to the mesh in mm; those of `ventricles` are fluid. InputError, with the
-    volume's `path`, where no vertex lies in a ventricle.
-    """
-    fluid = np.isin(labels, ventricles).astype(float)
-    found = volume_map_on_mesh(mesh_vertices_mm, fluid, affine, path)
-    if found.max() < 0.5:
-        named = ", ".join(map(str, ventricles))
-        raise InputError(
-            "the labels know no ventricles in the brain, so that these cannot grow by a curve of their own",
-            path=path,
-            found=f"no vertex of the mesh in voxels labelled {named}" if named else "a scheme that names none",
-            expected="ventricles in the cerebrum, named by the labels' scheme",
-            remedy="Set follow.ventricles_ml to null, or name the ventricles in the scheme.",
-        )
-    return {VENTRICLES: found}
 
 
 def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:

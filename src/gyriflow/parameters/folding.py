@@ -1,14 +1,14 @@
 """The mechanical model, its parameters and its numerics: settings of a study, parameters of a run."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
 from ..errors import InputError
-from .following import Follow
+from .growth import Growth
 from .settings import Problem, Settings, check, line, validated
 from .terms import FieldName, MaterialName, MedialWall, Side
 from .varying import (
@@ -16,7 +16,6 @@ from .varying import (
     Maps,
     Varying,
     VaryingNumber,
-    VaryingOrEstimated,
     Week,
     bounds_of,
     map_of,
@@ -48,12 +47,8 @@ Memory = Annotated[
     PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
 ]
 Fraction = Annotated[float, Field(gt=0, le=2)]
-STRAIN = ("xx", "yy", "zz", "xy", "xz", "yz")
-"""Parts of a symmetric tensor, which end the names of their maps."""
 AXES = ("x", "y", "z")
 """Which end the names of the maps of positions."""
-VENTRICLES = "ventricles"
-"""The map of the part of ventricles in the tissue around a vertex."""
 
 
 class Contact(Settings):
@@ -127,14 +122,14 @@ class FoldingSettings(Settings):
     """Constitutive law (docs/model.md), as in the paper."""
     poisson_ratio: float = Field(0.45, ge=0, lt=0.5)
     """Poisson's ratio ν."""
-    growth_rate_per_s: VaryingOrEstimated = varying(2.0e-7, ge=-1e-5, le=1e-5)
-    """Tangential growth rate of the cortex; `estimated` from the brains' areas. [1/s]"""
+    growth_rate_per_s: VaryingNumber = varying(2.0e-7, ge=-1e-5, le=1e-5)
+    """Tangential growth rate of the cortex. [1/s]"""
     radial_growth_rate_per_s: VaryingNumber = varying(0.0, ge=-1e-5, le=1e-5)
     """Radial growth rate of the core, along the cortical normal. [1/s]"""
-    core_growth_rate_per_s: VaryingOrEstimated = varying(0.0, ge=-1e-5, le=1e-5)
-    """Isotropic growth rate of the core; `estimated` from the brains' volumes. [1/s]"""
-    follow: Follow | None = None
-    """Curves of area and volume to follow, instead of these two rates."""
+    core_growth_rate_per_s: VaryingNumber = varying(0.0, ge=-1e-5, le=1e-5)
+    """Isotropic growth rate of the core. [1/s]"""
+    growth: Growth = Growth()
+    """What the brain grows by."""
     allow_negative_growth: bool = False
     """Whether growth rates may be negative (atrophy)."""
     stress_memory_gw: Memory = 0.0
@@ -151,8 +146,8 @@ class FoldingSettings(Settings):
     no_growth: NoGrowth = NoGrowth()
     """Tissue that does not grow."""
     output_every_gw: float = Field(1.0, ge=0.01, le=10)
-    """Interval between output weeks, besides the first and the last, and where some run foretells the start
-    (`follow.growth_of: another`) those of the brains to compare with. [GW]"""
+    """Interval between output weeks, besides the first and the last, and where some run predicts the start's growth
+    (`growth.of: atlas`) those of the brains to compare with. [GW]"""
     fields: tuple[FieldName, ...] = ("displacement", "cortex_weight", "growth")
     """Fields for ParaView at each output week."""
     solver: Solver = Solver()
@@ -161,10 +156,10 @@ class FoldingSettings(Settings):
     """MPI ranks of a simulation."""
 
     @check
-    def _rates_or_curves(self) -> Iterator[Problem]:
+    def _rates_belong_to_their_model(self) -> Iterator[Problem]:
         for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
-            if self.follow is not None and self.gives(key) and type(self) is FoldingSettings:
-                yield Problem("has no meaning with `follow`, which sets it at each step", (key,))
+            if self.growth.model != "rates" and self.gives(key) and type(self) is FoldingSettings:
+                yield Problem(f"has no meaning with the growth model {self.growth.model}", (key,))
 
     @field_validator("*")
     @classmethod
@@ -199,35 +194,15 @@ class FoldingParameters(FoldingSettings):
     """Position of the interhemispheric fissure. [mm]"""
     side: Side | None = None
     """The only hemisphere that the brain has; `null`: it has both."""
-    regional_growth: dict[Week, str] = Field({})
-    """With `follow.regional`: by the week from which each holds, the names of maps of relative growth. [GW]"""
-    regional_growth_of_cortex: dict[Week, str] = Field({})
-    """The same of the cortex, where it differs from that of the core. [GW]"""
-
-    regional_strain: dict[Week, str] = Field({})
-    """With `follow.directional`: likewise what the names of the six maps of measured strain begin with. [GW]"""
-
     targets: dict[Week, str] = Field({})
-    """With `follow.loop: closed`: by week what the names of the maps of the mesh's positions begin with.
+    """With `growth.model: shapes`: by week what the names of the maps of the mesh's positions begin with.
     [GW]"""
-
-    ventricle_growth_rate_per_s: float = 0.0
-    """With `follow.ventricles_ml`: growth of the ventricles in all directions, set before each step. [1/s]"""
-
-    @property
-    def with_ventricles(self) -> bool:
-        """Whether ventricles grow by a rate of their own."""
-        return self.follow is not None and self.follow.ventricles_ml is not None
 
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
-        own = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
-        strain = {f"{name}_{part}" for name in self.regional_strain.values() for part in STRAIN}
-        ventricles = {VENTRICLES} if self.with_ventricles else set()
-        targets = {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
-        local = set(self.regional_growth.values()) | set(self.regional_growth_of_cortex.values())
-        return own | strain | local | targets | ventricles
+        varying = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
+        return varying | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
@@ -238,9 +213,6 @@ class FoldingParameters(FoldingSettings):
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
             yield Problem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
-        for key in GROWTH_RATES:
-            if getattr(self, key) == "estimated":
-                yield Problem("found 'estimated'; expected the curve of the growth stage", (key,))
         yield from value_problems(self, self.start_week, {})
 
 
@@ -252,7 +224,7 @@ def thickness_at(p: FoldingSettings, start_week: float, week: float, maps: Maps)
 def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[Problem]:
     """Yields the inconsistencies between the settings of a run, over all its weeks and vertices.
 
-    Parameters whose maps are not among `maps`, and estimated ones, are left out.
+    Parameters whose maps are not among `maps` are left out.
 
     Parameters
     ----------
@@ -266,8 +238,7 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     known = {
         key: value
         for key in VARYING
-        if (value := getattr(p, key)) != "estimated"
-        and not (isinstance(value, Varying) and value.map not in (None, *maps))
+        if not (isinstance(value := getattr(p, key), Varying) and value.map not in (None, *maps))
     }
     for week in weeks_within(known["thickness_mm"], start_week, end) if "thickness_mm" in known else ():
         if (reached := float(np.min(thickness_at(p, start_week, week, maps)))) <= 0:
@@ -283,6 +254,20 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
             yield Problem(f"found {least:g}; it should be 0 or more unless allow_negative_growth is true", (key,))
     if (growth := p.step_s * sum(max(map(abs, rate)) for rate in rates.values())) >= 1:
         yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
+
+
+def target_map(week: float) -> str:
+    """Returns what the names of the maps of positions that a mesh is to have at a week begin with."""
+    return f"target_{week:05.2f}"
+
+
+def target_maps(weeks: Iterable[float], positions: Floats) -> dict[str, Floats]:
+    """Returns the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at w weeks."""
+    return {
+        f"{target_map(week)}_{axis}": values
+        for week, places in zip(weeks, positions, strict=True)
+        for axis, values in zip(AXES, places.T, strict=True)
+    }
 
 
 def parameters_from(values: Any) -> FoldingParameters:

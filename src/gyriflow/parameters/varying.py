@@ -1,8 +1,8 @@
-"""Parameters that may vary: a number, a curve over weeks, a map over the brain, map times curve, or an estimate."""
+"""Parameters that may vary: a number, a curve over weeks, a map over the brain, or map times curve."""
 
 import operator
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,26 +77,11 @@ def files_of(files: str | tuple[str, str] | None) -> list[str]:
     return [files] if isinstance(files, str) else list(files or ())
 
 
-Estimated = Literal["estimated"]
-"""A rate that the growth stage estimates as a curve."""
-
-
-def _kind(value: Any) -> str:
-    if isinstance(value, dict | Varying):
-        return "(table)"
-    return "(word)" if value == "estimated" else "(number)"
-
-
 VaryingNumber = Annotated[
     Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")],
-    Discriminator(lambda value: "(table)" if _kind(value) == "(table)" else "(number)"),
+    Discriminator(lambda value: "(table)" if isinstance(value, dict | Varying) else "(number)"),
 ]
 """A number, a curve or a map."""
-
-VaryingOrEstimated = Annotated[
-    Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")] | Annotated[Estimated, Tag("(word)")],
-    Discriminator(_kind),
-]
 
 
 BOUND_TEXTS = {
@@ -118,10 +103,8 @@ def bounds_of(field: FieldInfo) -> dict[str, float]:
     return {name: extra[key] for name, (key, *_) in BOUND_TEXTS.items() if key in extra}
 
 
-def require_bounds(value: float | Varying | str, bounds: Mapping[str, float]) -> None:
+def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
     """Raises ValueError where a number, or one of a curve without a map, is out of its bounds."""
-    if isinstance(value, str):
-        return
     if isinstance(value, Varying):
         numbers = [] if value.map is not None else list((value.weeks or {}).values())
     else:
@@ -132,38 +115,36 @@ def require_bounds(value: float | Varying | str, bounds: Mapping[str, float]) ->
             raise ValueError(f"be {text} {bound:g}")
 
 
-def map_of(value: float | Varying | str) -> str | None:
+def map_of(value: float | Varying) -> str | None:
     """Returns the name of the map of a parameter in a run's parameters, None where it has none."""
     return value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
 
 
-def weeks_of(value: float | Varying | str) -> dict[float, float]:
+def weeks_of(value: float | Varying) -> dict[float, float]:
     """Returns the curve of a parameter, {week: value} in ascending order; empty where it has none."""
     return (value.weeks or {}) if isinstance(value, Varying) else {}
 
 
-def curve_at(value: float | Varying | str, week: float) -> float:
+def curve_at(value: float | Varying, week: float) -> float:
     """Returns the number, or the curve's value at a week: linear in between, constant beyond, 1 without a curve."""
-    if isinstance(value, str):
-        raise ValueError("an estimated rate has no value before the growth stage has found its curve")
     if not isinstance(value, Varying):
         return value
     curve = weeks_of(value)
     return float(np.interp(week, list(curve), list(curve.values()))) if curve else 1.0
 
 
-def value_at(value: float | Varying | str, week: float, maps: Maps) -> float | Floats:
+def value_at(value: float | Varying, week: float, maps: Maps) -> float | Floats:
     """Returns a parameter's value at a week: a number, or (n,) values where there is a map."""
     name = map_of(value)
     return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
 
 
-def weeks_within(value: float | Varying | str, start: float, end: float) -> list[float]:
+def weeks_within(value: float | Varying, start: float, end: float) -> list[float]:
     """Returns start, end, and the weeks of the curve between them: where its extremes lie."""
     return [start, *(week for week in weeks_of(value) if start < week < end), end]
 
 
-def value_range(value: float | Varying | str, maps: Maps, start: float, end: float) -> tuple[float, float]:
+def value_range(value: float | Varying, maps: Maps, start: float, end: float) -> tuple[float, float]:
     """Returns the smallest and the largest value of a parameter from a week to a week, over all places."""
     name = map_of(value)
     places = np.ones(1) if name is None else maps[name]

@@ -1,4 +1,4 @@
-"""Areas, volumes and growth rates of series of brains, and how far these agree, as a chart."""
+"""Areas, volumes and growth rates of series of brains as a chart."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -30,30 +30,26 @@ SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 def growth_chart(
     areas: pd.DataFrame,
     rates: pd.DataFrame,
-    agreement: pd.DataFrame | None = None,
     *,
     folding_rate_per_s: float | Mapping[float, float] | None = None,
     measured: str = REAL_BRAIN,
 ) -> Figure:
     """Returns cortical area, volume over weeks, and the tangential growth rate of each interval as bars: three panels.
 
-    Several series of brains share the panels of areas and of volumes; each has a panel of bars, on one scale, and a
-    further panel shows how their rates differ between common weeks.
+    Several series of brains share the panels of areas and of volumes; each has a panel of bars, on one scale.
 
     Parameters
     ----------
     areas : columns series, subject, week, area_cm2, volume_ml
     rates : columns series, from_week, to_week, rate_per_s (1/s)
-    agreement : columns series, reference, from_week, to_week, difference_per_s (1/s)
     folding_rate_per_s
         Growth rate of the folding in 1/s, drawn as a line over the bars: a number, or values by week that are linear
         in between and constant beyond.
     """
     names = list(dict.fromkeys(rates["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
-    compared = agreement is not None and len(agreement) > 0
     shown: dict[str, Any] = {"panel_in": 2.4, "foot_in": 0.0, "synthetic": all_synthetic(measured)}
-    figure, grid = panel_figure(2 + compared + len(names), **shown)
+    figure, grid = panel_figure(2 + len(names), **shown)
     panels = iter(grid)
     for column, label in (("area_cm2", "pial area (cm²)"), ("volume_ml", "volume (mL)")):
         _sizes_panel(next(panels), areas, column, label, colours, measured)
@@ -66,8 +62,6 @@ def growth_chart(
     limits = np.array([axes.get_ylim() for axes in drawn])
     for axes in drawn:
         axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
-    if agreement is not None and compared:
-        _differences_panel(next(panels), agreement, colours)
     return figure
 
 
@@ -111,32 +105,6 @@ def _rates_panel(
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
     axes.margins(y=0.25 if crowded else 0.12)
-    _interval_axis(axes, labels)
-
-
-def _differences_panel(axes: Axes, agreement: pd.DataFrame, colours: Mapping[str, str]) -> None:
-    """Draws for each interval how far the rates of the series are from the reference's, and their mean as a line."""
-    intervals = agreement[["from_week", "to_week"]].drop_duplicates().sort_values(["from_week", "to_week"])
-    places = {pair: place for place, pair in enumerate(intervals.itertuples(index=False, name=None))}
-    series = list(dict.fromkeys(agreement["series"]))
-    width = 0.7 / len(series)
-    for number, name in enumerate(series):
-        rows = agreement[agreement["series"] == name]
-        difference = rows["difference_per_s"] * 1e7
-        offset = (number - (len(series) - 1) / 2) * width
-        pairs = rows[["from_week", "to_week"]].itertuples(index=False, name=None)
-        axes.bar([places[pair] + offset for pair in pairs], difference, width=width, color=colours[name])
-        mean, spread = (f"{value:.2f}".replace("-", "−") for value in (difference.mean(), difference.abs().mean()))
-        label = f"{name} − {rows['reference'].iloc[0]}: mean {mean}, mean size {spread}"
-        axes.axhline(float(difference.mean()), color=colours[name], linestyle=":", label=label)
-    axes.axhline(0, color="black", linewidth=0.6)
-    axes.set_ylabel("difference (10⁻⁷ s⁻¹)")
-    # the legend is above the axes, where no bar can be, and below the title
-    axes.set_title("difference of the growth rates", pad=6.0 + 10.0 * len(series))
-    labels = _interval_labels(intervals)
-    axes.set_xticks(range(len(labels)), labels)
-    axes.margins(y=0.12)
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.01), borderaxespad=0)
     _interval_axis(axes, labels)
 
 

@@ -102,10 +102,6 @@ class Brains:
             "edge_length_mm": self.config.surface.edge_length_mm,
         }
 
-    def ventricles(self, brain: str) -> list[int]:
-        """Returns the labels of a brain's ventricles, none where it has no labels."""
-        return list((self.scheme(brain) or {}).get("ventricles", []))
-
     def known_files(self, brain: str) -> dict[str, tuple[str, str]]:
         """Returns by their paths the atlas and the SHA-256 of a brain's files that are an atlas's."""
         known = self.config.known_files

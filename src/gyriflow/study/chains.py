@@ -7,10 +7,9 @@ from itertools import pairwise
 from typing import Any
 
 from ..config.root import Config
-from ..parameters.following import Follow
 from ..units import week_tag
 from .brains import Brains
-from .paths import CARRIED_MESH, MATCHED, PIAL, REGISTERED, region_files
+from .paths import MATCHED, PIAL, REGISTERED, region_files
 from .runs import Runs
 
 
@@ -39,14 +38,8 @@ class Chains:
     @property
     def with_thickness(self) -> list[str]:
         """The brains whose cortical thickness gives a curve, where some run follows it."""
-        followed = any(self.runs.follows_measured(run, "thickness_mm") for run in self.config.runs)
+        followed = any(self.runs.measured(run, "thickness_mm") for run in self.config.runs)
         return [brain for brain in self.grown if followed and brain in self.brains.with_thickness]
-
-    @property
-    def known_until_gw(self) -> list[float]:
-        """The weeks up to which predictions know the brains."""
-        known = {self.runs.followed(run, "known_until_gw") for run in self.config.runs}
-        return sorted(known - {None})
 
     @cached_property
     def matched_series(self) -> dict[str, set[str]]:
@@ -81,19 +74,6 @@ class Chains:
         last = min(past, default=end)
         return self._one_a_week(brain, lambda week: start < week <= last)
 
-    def earlier(self, brain: str) -> list[str]:
-        """Returns the brains of a start brain's growth series up to it, one a week, where a run predicts from them."""
-        predicts = any(follow.known_until_gw is not None for follow in self._regional_from(brain))
-        return self._one_a_week(brain, lambda week: predicts and week < self.brains.week(brain))
-
-    def chain(self, brain: str) -> list[str]:
-        """Returns the brains, one a week, that a start brain's mesh is carried through, itself among them."""
-        return self.earlier(brain)[:-1] + self.later(brain)
-
-    def weeks(self, brain: str) -> list[float]:
-        """Returns the weeks of the brains that a start brain's mesh is carried through."""
-        return [self.brains.week(name) for name in self.chain(brain)]
-
     def later_weeks(self, brain: str) -> list[float]:
         """Returns the weeks of a start brain and of the real ones that follow it."""
         return [self.brains.week(name) for name in self.later(brain)]
@@ -102,11 +82,6 @@ class Chains:
     def carried(self) -> list[str]:
         """Start brains that real ones of later weeks follow."""
         return [brain for brain in self.config.start_brains if len(self.later(brain)) > 1]
-
-    @cached_property
-    def with_chain(self) -> list[str]:
-        """Start brains that real ones of any week are registered with."""
-        return [brain for brain in self.config.start_brains if len(self.chain(brain)) > 1]
 
     def correspondence(self, earlier: str, later: str) -> str:
         """Returns the file that says where one brain's points are in another: by matched vertices, or registration."""
@@ -127,23 +102,11 @@ class Chains:
             for brain in (earlier, later)
         ]
 
-    def carried_mesh(self, run: str, brain: str) -> str | list[str]:
-        """Returns the carried mesh where a run's growth differs between regions.
-
-        Where no brains tell of local growth there is none; the run's parameters say why.
-        """
-        known = self._registered(run) and brain in self.with_chain
-        return CARRIED_MESH.format(brain=brain) if known else []
-
-    def regional_weeks(self, run: str, brain: str) -> list[float]:
-        """Returns the weeks between which a run has regional growth."""
-        return self.weeks(brain) if self._registered(run) else []
-
     @property
     def folding_rate_per_s(self) -> Any:
-        """The folding's growth rate: a number, {week: number}, `estimated`, or None where it has a map."""
+        """The folding's growth rate: a number, {week: number}, or None where it has a map."""
         rate = self.config.folding.growth_rate_per_s
-        if isinstance(rate, (float, str)):
+        if isinstance(rate, float):
             return rate
         return dict(rate.weeks or {}) if rate.map is None else None
 
@@ -179,21 +142,9 @@ class Chains:
         """Returns the same for the brain of the regions and the brain that gets them."""
         return self.in_pose(self.config.regions_from(brain) or brain, brain)
 
-    def correspondences_earlier(self, brain: str) -> list[str]:
-        """Returns these files from each brain of a start brain's chain to the next, up to the start."""
-        return self.between(self.earlier(brain))
-
     def correspondences_later(self, brain: str) -> list[str]:
         """Returns these files from the start brain on."""
         return self.between(self.later(brain))
-
-    def with_strain(self, brain: str) -> bool:
-        """Returns whether a run from a start brain grows in measured directions."""
-        return any(follow.directional > 0 for follow in self._regional_from(brain))
-
-    def smoothing_mm(self, brain: str) -> list[float]:
-        """Returns the smoothing lengths that runs from a start brain ask for."""
-        return sorted({follow.smoothing_mm for follow in self._regional_from(brain)})
 
     def _series_of(self, brain: str) -> list[str]:
         return self.config.growth_series.get(self.config.own_series(brain), [])
@@ -210,11 +161,3 @@ class Chains:
             if within(self.brains.week(other)) and self._correspond(brain, other):
                 chosen.setdefault(week_tag(self.brains.week(other)), other)
         return sorted(chosen.values(), key=self.brains.week)
-
-    def _registered(self, run: str) -> bool:
-        """Returns whether a run's regional growth is measured on the start's own series."""
-        return self.runs.regional(run) and not self.config.expects(run)
-
-    def _regional_from(self, brain: str) -> list[Follow]:
-        runs = {run for run, start, _ in self.config.ends if start == brain and self._registered(run)}
-        return [follow for run in runs if (follow := self.config.run(run).follow) is not None]

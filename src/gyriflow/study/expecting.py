@@ -1,11 +1,11 @@
-"""Which shapes runs grow towards: a start brain's own later ones, or those of another population's growth."""
+"""Which shapes runs grow towards: a start brain's own later ones, or those of an atlas' growth."""
 
 from dataclasses import dataclass
 from itertools import pairwise
 
 from ..config.root import Config
 from ..errors import InputError
-from ..parameters.following import BEFORE_GW
+from ..parameters.growth import BEFORE_GW
 from ..units import week_tag
 from .brains import Brains
 from .chains import Chains
@@ -15,9 +15,9 @@ from .runs import Runs
 
 @dataclass(frozen=True)
 class Expecting:
-    """The chains of brains behind the shapes that runs with a closed loop grow towards, or with another's growth.
+    """The chains of brains behind the shapes that runs grow towards.
 
-    `whose` is `own` for the start's own series and `another` for another population's.
+    `whose` is `self` for the start's own series and `atlas` for another population's.
     """
 
     config: Config
@@ -27,12 +27,12 @@ class Expecting:
 
     def whose(self, run: str) -> str:
         """Returns whose growth a run has."""
-        return "another" if self.config.expects(run) else "own"
+        return self.config.run(run).growth.of
 
     def targets(self, run: str, brain: str) -> str | list[str]:
-        """Returns the file with the shapes that give a run from a brain its growth, none where brains or rates do."""
+        """Returns the file with the shapes that give a run from a brain its growth, none where sizes or rates do."""
         base = self.runs.base(run)
-        return TARGETS.format(brain=brain, whose=self.whose(base)) if self.runs.shaped(base) else []
+        return TARGETS.format(brain=brain, whose=self.whose(base)) if self.runs.grows_by(base) == "shapes" else []
 
     def unled(self) -> dict[str, InputError]:
         """Returns by start brain why no brains lead a run that grows towards shapes to its end.
@@ -41,7 +41,7 @@ class Expecting:
         """
         found: dict[str, InputError] = {}
         for run, brain, end in self.config.ends:
-            if self.runs.shaped(run) and (lacking := self._lacking(brain, self.whose(run), end)):
+            if self.runs.grows_by(run) == "shapes" and (lacking := self._lacking(brain, self.whose(run), end)):
                 named = f"run {run} from {brain} is to grow towards brains that are not there"
                 found.setdefault(brain, InputError(named, **lacking))
         return found
@@ -50,11 +50,11 @@ class Expecting:
         """Returns what leads a start brain to an end week, what should, and what to do; nothing where it is led."""
         week, weeks = self.brains.week(brain), self.weeks(brain, whose)
         found = ", ".join(f"{name} ({self.brains.week(name):g} GW)" for name in self.chain(brain, whose))
-        if whose == "own":
+        if whose == "self":
             led, series = bool(weeks), [self.config.own_series(brain)]
             found += f"; {cause}" if (cause := self.chains.unmatched(brain)) else ""
             expected = "the start's own growth series with label volumes or matched surfaces"
-            remedy = "Add later brains to its series (growth.brains), or set follow.loop to open."
+            remedy = "Add later brains to its series (growth.brains), or grow by sizes or rates."
         else:
             led, series = len(weeks) > 1 and week >= weeks[0] - BEFORE_GW, self.config.other_series(brain)
             expected = "one series of another population with the same hemispheres"
@@ -73,7 +73,7 @@ class Expecting:
         Of another population they begin with the last week that is not after the start, or else its first. They go on
         to the end of the runs, as far as there are brains.
         """
-        if whose == "own":
+        if whose == "self":
             return self.chains.later(brain)
         series, of = self.config.other_series(brain), self.brains.week
         names = self.config.growth_series[series[0]] if len(series) == 1 else []
@@ -86,7 +86,7 @@ class Expecting:
     def reads_only_others(self, brain: str) -> bool:
         """Returns whether what is expected of a brain is a prediction: neither a later brain that it may be compared
         with nor a later scan of its subject is behind it."""
-        start, later = self.config.brain(brain), set(self.chain(brain, "another")[1:])
+        start, later = self.config.brain(brain), set(self.chain(brain, "atlas")[1:])
         own = [other for other in self.config.brains if start.subject is not None and other.subject == start.subject]
         return all(other.week <= start.week for other in (*self.config.comparable(brain), *own) if other.id in later)
 
@@ -97,7 +97,7 @@ class Expecting:
     def further_weeks(self, brain: str, whose: str) -> list[float]:
         """Returns the other weeks in which what is expected of a brain is compared."""
         known, last = {week_tag(week) for week in self.weeks(brain, whose)}, self.config.last_week(brain)
-        compared = self.config.compared_weeks(brain) if whose == "another" else []
+        compared = self.config.compared_weeks(brain) if whose == "atlas" else []
         return [week for week in compared if week <= last and week_tag(week) not in known]
 
     def posed(self, brain: str, whose: str) -> list[list[bool]]:

@@ -331,12 +331,11 @@ class Figures:
             "growth_figure", "Growth", "cortical growth rates", f"{STUDY}/growth/growth.png", "growth.growth_chart",
             f"""Pial area (a; both hemispheres, without the cut at the midline) and brain volume (b) of the brains that
             were given, and the tangential growth rate between successive weeks{" (c)" if len(series) == 1 else ""},
-            α = (√θ − 1)/Δt with θ the ratio of the areas. {self._series_note(series)} {self._rate_note(series)}""",
+            α = (√θ − 1)/Δt with θ the ratio of the areas. {self._series_note(series)} {self._rate_note()}""",
             lambda: dict(GROWTH),
             lambda: {
                 "measured": measured,
                 "folding_rate_per_s": self.chains.folding_rate_per_s,
-                "estimated_from": self.config.start_brains and self.config.estimated_from(self.config.start_brains[0]),
             },
             ({},) if self.chains.grown else (),
             "growth", paper=True,
@@ -345,21 +344,10 @@ class Figures:
     def _series_note(self, series: list[str]) -> str:
         if len(series) < 2:
             return ""
-        return (
-            f"The series {', '.join(series)} are brains from different data. Differences are those from *{series[0]}*, "
-            "between weeks that both have."
-        )
+        return f"The series {', '.join(series)} are brains from different data."
 
-    def _rate_note(self, series: list[str]) -> str:
+    def _rate_note(self) -> str:
         rate = self.chains.folding_rate_per_s
-        if rate == "estimated":
-            start = self.config.start_brains
-            source = f"areas of *{self.config.estimated_from(start[0])}*" if len(series) > 1 and start else "same areas"
-            return (
-                f"The dashed line is the growth rate of the simulation, estimated from the {source}: ln θ/(2Δt) at the "
-                "middle of each interval, linear in between. It is lower than α since the model's growth compounds "
-                "from step to step."
-            )
         if not rate:
             return ""
         of = f", {1e7 * rate:.3g}·10⁻⁷ s⁻¹," if isinstance(rate, float) else ""
@@ -451,7 +439,9 @@ class Figures:
             lambda run, brain: {
                 **self._synthetic(brain), "quantity": "area_growth_percent_per_gw", "views": ["left", "top", "bottom"]
             },
-            self._each_run_with(lambda run: self.runs.closed(run) and "growth" in self.config.run(run).fields),
+            self._each_run_with(
+                lambda run: self.runs.grows_by(run) == "shapes" and "growth" in self.config.run(run).fields
+            ),
         )  # fmt: skip
         order = self.config.mesh.order
         kind = "quadratic" if order == 2 else "linear"
@@ -592,7 +582,6 @@ class Figures:
     def _of_validation(self) -> Iterator[Figure]:
         compared: tuple[Wildcards, ...] = ({},) if self.validating.pairs else ()
         ceiling = [f"{STUDY}/registration_ceiling.csv"] if self.validating.with_ceiling else []
-        smoothing = self.validating.smoothing_mm
         runs = {"runs": list(self.config.runs)}
 
         def beside(**tables: str) -> Callable[[], dict[str, Any]]:
@@ -607,22 +596,6 @@ class Figures:
             intervals of a bootstrap over patches of the surface. Full marks explain a week whose own brains gave the
             growth, open ones predict it. Dotted: the start carried to the real brain by registration.""",
             beside(validation=f"{STUDY}/validation.csv"), lambda: runs, compared, target="validate",
-        )  # fmt: skip
-        yield Figure(
-            "smoothing_figure", "Validation", "gain by the smoothing of measured growth",
-            f"{STUDY_FIGURES}/smoothing.png", "scores.smoothing_chart",
-            """How local growth must be known: the gain of runs that differ in the smoothing of measured growth
-            alone.""",
-            beside(validation=f"{STUDY}/validation.csv"), lambda: {"smoothing_mm": smoothing},
-            ({},) if len(set(smoothing.values())) > 2 else (), target="validate",
-        )  # fmt: skip
-        yield Figure(
-            "horizon_figure", "Validation", "gain by weeks after the start", f"{STUDY_FIGURES}/horizon.png",
-            "scores.horizon_chart",
-            """Prediction horizon: the same gain by weeks after each start, whose week stands at the line's end, where
-            growth was known and where it was not.""",
-            beside(horizon=f"{STUDY}/horizon.csv"), lambda: runs,
-            compared if len(self.config.start_brains) > 1 else (), target="validate",
         )  # fmt: skip
         foretold: tuple[Wildcards, ...] = ({},) if self.validating.foretold else ()
         prediction = {"prediction": f"{STUDY}/prediction.csv"}

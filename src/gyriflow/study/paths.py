@@ -76,7 +76,7 @@ MESH = {
 CARRIED_MESH = f"{BRAIN}/mesh/carried.h5"
 TARGETS = f"{BRAIN}/mesh/targets.{{whose}}.h5"
 
-GROWTH = {name: f"{STUDY}/growth/{name}.csv" for name in ("areas", "rates", "agreement")}
+GROWTH = {name: f"{STUDY}/growth/{name}.csv" for name in ("areas", "rates")}
 CURVES = {"curves": f"{STUDY}/growth/curves.csv", "errors": f"{STUDY}/growth/curve_errors.csv"}
 
 PARAMETERS = f"{RUN}/params.yaml"

@@ -8,9 +8,9 @@ from typing import Any, Literal
 from ..config.brains import Brain as GivenBrain
 from ..config.runs import Run
 from ..io.schemes import SCHEMES
-from ..parameters.folding import VARYING, bounds_of
+from ..parameters.folding import VARYING
 from ..parameters.terms import Side
-from ..parameters.varying import Varying, files_of
+from ..parameters.varying import Varying, bounds_of, files_of
 from ..units import week_tag
 from .paths import (
     CALIBRATION,
@@ -39,7 +39,6 @@ Origin = Literal["self", "atlas"]
 Kind = Literal["explained", "predicted"]
 """Whether growth taken from brains of a week explains the brain of this week, or it is predicted."""
 Files = Mapping[str, str]
-WHOSE = {"self": "own", "atlas": "another"}
 
 
 @dataclass(frozen=True)
@@ -290,7 +289,7 @@ class Simulation:
     @property
     def targets(self) -> str | list[str]:
         """The file with the shapes that the run grows towards."""
-        return TARGETS.format(brain=self.start.id, whose=WHOSE[self.shapes]) if self.shapes else []
+        return TARGETS.format(brain=self.start.id, whose=self.shapes) if self.shapes else []
 
     @property
     def map_sources(self) -> dict[str, dict[str, list[str]]]:
@@ -307,7 +306,7 @@ class Simulation:
 
     @property
     def map_bounds(self) -> dict[str, dict[str, float]]:
-        return {name: bounds_of(name) for name in self.map_sources}
+        return {name: bounds_of(type(self.settings).model_fields[name]) for name in self.map_sources}
 
     @property
     def maps(self) -> str | list[str]:

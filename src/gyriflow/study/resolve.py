@@ -9,8 +9,8 @@ from ..config.brains import Brain as GivenBrain
 from ..config.root import Config
 from ..config.runs import ALL, FIRST, Compared, Member, Run, members_of
 from ..errors import InputError
-from ..parameters.folding import GROWTH_RATES, output_weeks
-from ..parameters.following import BEFORE_GW
+from ..parameters.folding import output_weeks
+from ..parameters.growth import BEFORE_GW
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import SIDES
 from ..units import week_tag
@@ -72,16 +72,13 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
 
 def shapes_of(settings: Run) -> Origin | None:
     """Return whose growth gives the shapes that a run grows towards; None where it grows by rates or sizes."""
-    follow = settings.follow
-    if follow is None or (follow.loop == "open" and follow.growth_of == "own"):
-        return None
-    return "atlas" if follow.growth_of == "another" else "self"
+    return settings.growth.of if settings.growth.model == "shapes" else None
 
 
 def follows_measured_sizes(settings: Run) -> bool:
     """Return whether a run's area or volume follows a curve through measured brains."""
-    follow = settings.follow
-    return follow is not None and "measured" in (follow.area_cm2, follow.volume_ml)
+    growth = settings.growth
+    return growth.model == "sizes" and "measured" in (growth.area_cm2, growth.volume_ml)
 
 
 def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain:
@@ -268,7 +265,7 @@ def _unreachable(folded: _Folded, series: Series, chains: Mapping[tuple[str, Ori
             reaches, names = bool(chain), [name for name in [series.with_brain(start)] if name]
             found += f"; {cause}" if (cause := series.unmatched.get(series.with_brain(start))) else ""
             expected = "the start's own growth series with label volumes or matched surfaces"
-            remedy = "Add later brains to its series (growth.brains), or set follow.loop to open."
+            remedy = "Add later brains to its series (growth.brains), or grow by sizes or rates."
         else:
             reaches, names = len(chain) > 1 and start.week >= chain[0].week - BEFORE_GW, series.of_others(start)
             expected = "one series of another population with the same hemispheres"
@@ -304,7 +301,7 @@ def _simulation(
     settings, weeks = folded.settings[run], folded.weeks[run, start.id]
     shapes, sizes = shapes_of(settings), follows_measured_sizes(settings)
     calibrated = config.calibrate is not None and run in config.calibrate.runs
-    measured_thickness = settings.follow is not None and settings.follow.thickness_mm == "measured"
+    measured_thickness = settings.growth.thickness_mm == "measured"
     curves: str | list[str] = CURVES["curves"] if (sizes and not shapes) or measured_thickness else []
     compared: dict[str, tuple[Brain, ...]] = {}
     ordered = sorted(comparable(start, brains), key=lambda other: other.subject != start.subject)
@@ -317,7 +314,7 @@ def _simulation(
         if not start.given.synthetic and not all(brain.given.synthetic for brain in of_week)
     }
     others_only = shapes == "atlas" and _sees_no_later_brain(start, chains[start.id, "atlas"], brains)
-    explained = not others_only and (shapes or sizes or "estimated" in [getattr(settings, key) for key in GROWTH_RATES])
+    explained = not others_only and (shapes or sizes)
     return Simulation(
         run=run,
         start=start,

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from ..config.root import Config
 from ..parameters.folding import FoldingSettings
+from ..parameters.growth import SIZES
 from ..parameters.varying import bounds_of
 from ..units import week_tag
 from .brains import Brains
-from .paths import CURVES, GROWTH, MAPS
+from .paths import CURVES, MAPS
 
 
 @dataclass(frozen=True)
@@ -42,34 +42,14 @@ class Runs:
         """Returns the output weeks of a run from a brain as they stand in file names."""
         return [week_tag(week) for week in self.config.weeks(run, brain)]
 
-    def followed(self, run: str, key: str) -> Any:
-        """Returns a setting of what the growth of a run follows, None where it follows nothing."""
-        follow = self.config.run(run).follow
-        return None if follow is None else getattr(follow, key)
+    def grows_by(self, run: str) -> str:
+        """Returns the growth model of a run."""
+        return self.config.run(run).growth.model
 
-    def regional(self, run: str) -> bool:
-        """Returns whether a run's growth differs between regions or directions as measured by registration."""
-        return not self.closed(run) and bool(self.followed(run, "regional") or self.followed(run, "directional"))
-
-    def closed(self, run: str) -> bool:
-        """Returns whether a run grows towards known shapes."""
-        return self.followed(run, "loop") == "closed"
-
-    def shaped(self, run: str) -> bool:
-        """Returns whether a run's growth and sizes are those of shapes that its brain is to have."""
-        return self.closed(run) or self.config.expects(run)
-
-    def follows_measured(self, run: str, *keys: str) -> bool:
+    def measured(self, run: str, *keys: str) -> bool:
         """Returns whether a run follows one of some curves as it is measured."""
-        return "measured" in [self.followed(run, key) for key in keys]
-
-    def estimates(self, run: str) -> bool:
-        """Returns whether a growth rate of a run is one that is estimated from the brains."""
-        return "estimated" in self.config.parameters(run).values()
-
-    def seed(self, run: str) -> int:
-        """Returns the seed of the randomness in a run's growth, 0 where there is none."""
-        return self.followed(run, "seed") or 0
+        growth = self.config.run(run).growth
+        return growth.model != "rates" and "measured" in [getattr(growth, key) for key in keys]
 
     def base(self, run: str) -> str:
         """Returns the run whose maps and ranks a run has: the calibration's base for its runs, else itself."""
@@ -81,11 +61,9 @@ class Runs:
 
     @cached_property
     def with_maps(self) -> list[str]:
-        """The runs with parameters that have maps, or growth that does."""
+        """The runs with parameters that have maps, or growth towards shapes."""
         runs = [*self.config.runs, *self.config.study_runs]
-        maps_grow = [run for run in runs if self.regional(run) or self.closed(run)]
-        grown = [run for run in runs if run in maps_grow or self.followed(run, "ventricles_ml") is not None]
-        return [run for run in runs if self.config.maps(run) or run in grown]
+        return [run for run in runs if self.config.maps(run) or self.grows_by(run) == "shapes"]
 
     def maps(self, run: str, brain: str) -> str | list[str]:
         """Returns the file with the maps of a run from a brain, none where it has no maps."""
@@ -100,25 +78,11 @@ class Runs:
         """Returns the bounds of the parameters of a run that have maps."""
         return {name: bounds_of(FoldingSettings.model_fields[name]) for name in self.config.maps(run)}
 
-    def regional_settings(self, run: str) -> dict[str, Any] | None:
-        """Returns how a run's growth follows what is measured where it differs between regions, else None."""
-        follow = self.config.run(run).follow
-        return follow.model_dump() if follow is not None and self.regional(run) else None
-
-    def ventricle_labels(self, run: str, brain: str) -> str | list[str]:
-        """Returns the labels of the start brain where the run's ventricles grow by a rate of their own."""
-        return [] if self.followed(run, "ventricles_ml") is None else self.brains.label_volume(brain)
-
-    def rates(self, run: str) -> str | list[str]:
-        """Returns the table of growth rates where a run uses one of them."""
-        return GROWTH["rates"] if self.estimates(run) else []
-
     def curves(self, run: str) -> str | list[str]:
         """Returns the table of the measured curves where a run follows one of them."""
-        sizes = () if self.shaped(run) else ("area_cm2", "volume_ml")
-        sizes = (*sizes, "thickness_mm", "ventricles_ml")
-        return CURVES["curves"] if self.follows_measured(run, *sizes) else []
+        sizes = SIZES if self.grows_by(run) == "sizes" else ()
+        return CURVES["curves"] if self.measured(run, *sizes, "thickness_mm") else []
 
     def estimated_from(self, run: str, brain: str) -> str | None:
-        """Returns the series that a run's measured growth is taken from, None where it has none."""
-        return self.config.estimated_from(brain) if self.rates(run) or self.curves(run) else None
+        """Returns the series that a run's measured curves are taken from, None where it has none."""
+        return self.config.estimated_from(brain) if self.curves(run) else None

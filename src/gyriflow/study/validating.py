@@ -1,11 +1,11 @@
 """What simulations are compared with to tell what they are worth: which real brain in which week, and which runs."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
 from ..config.root import Config
+from ..parameters.growth import SIZES
 from ..units import week_tag
 from .brains import Brains
 from .chains import Chains
@@ -93,20 +93,14 @@ class Validating:
         """Returns by compared week whether growth taken from brains of that week explains it, or it is predicted."""
         if self.predicts(run, brain):
             return {float(week): "predicted" for week in self.compared(run, brain)}
-        until = self.runs.followed(run, "known_until_gw")
-        measured = self.runs.follows_measured(run, "area_cm2", "volume_ml")
-        explains = self.runs.closed(run) or measured or self.runs.regional(run) or self.runs.estimates(run)
-        return {
-            float(week): "explained" if explains and (until is None or float(week) <= until) else "predicted"
-            for week in self.compared(run, brain)
-        }
+        kind: Kind = (
+            "explained" if self.runs.grows_by(run) == "shapes" or self.runs.measured(run, *SIZES) else "predicted"
+        )
+        return {float(week): kind for week in self.compared(run, brain)}
 
-    def registered_until(self, run: str, brain: str) -> float:
-        """Returns the last week whose registration a run takes its growth from: −inf for none, inf for all."""
-        if self.predicts(run, brain) or not (self.runs.closed(run) or self.runs.regional(run)):
-            return -math.inf
-        until = self.runs.followed(run, "known_until_gw")
-        return math.inf if until is None else float(until)
+    def registered(self, run: str, brain: str) -> bool:
+        """Returns whether a run takes its growth from the registration that its displacement is compared with."""
+        return self.runs.grows_by(run) == "shapes" and not self.predicts(run, brain)
 
     def ceiling_weeks(self, brain: str) -> list[float]:
         """Returns the compared weeks that a start brain's mesh is carried to."""
@@ -189,7 +183,7 @@ class Validating:
         return {
             **{name: [at.format(run=run, brain=brain, week=week) for week in weeks] for name, at in patterns.items()},
             "whole": [self.real_surface(brain, week) for week in weeks],
-            "atlas": self.expecting.surfaces(brain, "another"),
+            "atlas": self.expecting.surfaces(brain, "atlas"),
         }
 
     @property
@@ -216,38 +210,3 @@ class Validating:
             for run, brain in self.pairs
             for week, real in self.compared(run, brain).items()
         ]
-
-    @cached_property
-    def smoothing_mm(self) -> dict[str, float]:
-        """The compared runs that differ in nothing but the smoothing of measured growth, and their lengths.
-
-        They are those like the first run with regional growth; one that is like it but uniform has an infinite length.
-        """
-        like: dict[str, Any] | None = None
-        found = {}
-        for run in self.config.runs:
-            settings = self.config.run(run).model_dump(exclude={"preset"})
-            follow, regional = settings["follow"], self.runs.regional(run)
-            if follow is None:
-                continue
-            length = follow.pop("smoothing_mm")
-            amounts = follow.pop("regional"), follow.pop("directional")
-            if like is None and regional:
-                like = settings | {"amounts": amounts}
-            # all that is left of a uniform run is compared, whatever the amounts
-            if like is not None and settings | {"amounts": amounts if regional else like["amounts"]} == like:
-                found[run] = length if regional else float("inf")
-        validated = {run for run, _ in self.pairs}
-        return {run: length for run, length in found.items() if run in validated}
-
-    @property
-    def models(self) -> dict[str, str]:
-        """For each run the first one that differs from it only in its start, seed, end, or in what is known."""
-        known: dict[str, str] = {}
-        found = {}
-        for run in self.config.runs:
-            settings = self.config.run(run).model_dump(exclude={"preset", "start", "end_week", "ranks"})
-            if settings["follow"] is not None:
-                settings["follow"].update(seed=None, known_until_gw=None)
-            found[run] = known.setdefault(repr(settings), run)
-        return found

@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 from shapes import sphere
 
-from gyriflow.errors import InputError
-from gyriflow.growth.rates import FOLDING_RATES, agreement, growth_rates, rate_curve, rates_of_series
+from gyriflow.growth.rates import growth_rates, rates_of_series
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
 
@@ -60,22 +59,6 @@ def test_compound_rates_multiply_up_to_the_ratios(weeks: float) -> None:
     assert row["core_rate_per_s"] > row["core_compound_rate_per_s"]
 
 
-def test_the_curve_has_each_rate_in_the_middle_of_its_interval() -> None:
-    table = growth_rates([21, 22, 24], [100.0, 121.0, 144.0], [1.0, 1.5, 2.0])
-    for column in FOLDING_RATES.values():
-        weeks, values = rate_curve(table, column)
-        assert weeks.tolist() == [21.5, 23.0]
-        assert values.tolist() == table[column].tolist()
-
-
-def test_negative_rates_are_refused_with_their_intervals_unless_allowed() -> None:
-    table = growth_rates([21, 22, 23, 24], [100.0, 90.0, 95.0, 85.0], [1.0, 1.1, 1.2, 1.3])
-    with pytest.raises(InputError, match=r"from week 21 to 22, .*from week 23 to 24; .*growth\.brains.*allow_negative"):
-        rate_curve(table, "compound_rate_per_s")
-    assert (rate_curve(table, "compound_rate_per_s", allow_negative=True)[1] < 0).tolist() == [True, False, True]
-    assert (rate_curve(table, "core_compound_rate_per_s")[1] > 0).all()
-
-
 def brains(series: str, areas_cm2: dict[float, float], volumes_ml: dict[float, float]) -> pd.DataFrame:
     """Returns areas and volumes by week as the workflow's table has them."""
     columns = {"week": list(areas_cm2), "area_cm2": list(areas_cm2.values()), "volume_ml": list(volumes_ml.values())}
@@ -97,28 +80,7 @@ def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean(
     assert table["to_week"].tolist() == [22, 23]
 
 
-def test_agreement_is_between_the_weeks_that_both_series_have() -> None:
-    first = brains("surface", {21: 100.0, 22: 121.0, 23: 144.0}, {21: 1000.0, 22: 1331.0, 23: 1728.0})
-    second = brains("volume", {20: 1.0, 21: 100.0, 23: 169.0}, {20: 1.0, 21: 1000.0, 23: 1000.0})
-    row = agreement(pd.concat([first, second]))
-    assert len(row) == 1
-    assert row[["series", "reference", "from_week", "to_week"]].iloc[0].tolist() == ["volume", "surface", 21, 23]
-    assert row["rate_per_s"][0] == pytest.approx(0.3 / (2 * WEEK_S))
-    assert row["reference_rate_per_s"][0] == pytest.approx(0.2 / (2 * WEEK_S))
-    assert row["difference_per_s"][0] == pytest.approx(0.1 / (2 * WEEK_S))
-    assert row["core_difference_per_s"][0] == pytest.approx(-0.2 / (2 * WEEK_S))
-
-
-def test_one_series_or_one_common_week_has_no_agreement_but_its_columns() -> None:
-    first = brains("surface", {21: 100.0, 22: 121.0}, {21: 1.0, 22: 1.0})
-    second = brains("volume", {22: 100.0, 23: 121.0}, {22: 1.0, 23: 1.0})
-    for areas in (first, pd.concat([first, second])):
-        table = agreement(areas)
-        assert len(table) == 0
-        assert {"series", "difference_per_s", "core_difference_per_s"} <= set(table.columns)
-
-
-def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(tmp_path) -> None:
+def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
     files = []
     for number, radius_mm in enumerate((20.0, 22.0, 20.0, 21.0)):
         files.append(tmp_path / f"{number}.gii")
@@ -130,23 +92,20 @@ def test_the_first_series_of_the_configuration_is_what_others_are_compared_with(
         write_json(report, {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {})
     job = SimpleNamespace(
         input=SimpleNamespace(whole=files, reports=reports, thickness=[thickness]),
-        output=SimpleNamespace(**{name: tmp_path / f"{name}.csv" for name in ("areas", "rates", "agreement")}),
+        output=SimpleNamespace(**{name: tmp_path / f"{name}.csv" for name in ("areas", "rates")}),
         params=SimpleNamespace(
             series=["mine", "mine", "atlas", "atlas"], brains=[*"abcd"], weeks=[21, 22, 21, 22], with_thickness=["b"]
         ),
         log=[str(tmp_path / "log")],
     )
     runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
-    (row,) = pd.read_csv(tmp_path / "agreement.csv").itertuples()
-    assert (row.series, row.reference) == ("atlas", "mine")
-    # radii grow as the square root of areas
-    assert row.difference_per_s == pytest.approx((1.05 - 1.1) / WEEK_S, rel=1e-5)
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]
     assert areas["thickness_mm"].isna().tolist() == [True, False, True, True]
-    # of the labels where these are known
     np.testing.assert_array_equal(areas["tissue_ml"], [30.0, 40.0, np.nan, np.nan])
     rates = pd.read_csv(tmp_path / "rates.csv").set_index("series")
+    # radii grow as the square root of areas
+    assert rates["rate_per_s"].tolist() == pytest.approx([0.1 / WEEK_S, 0.05 / WEEK_S], rel=1e-5)
     assert rates.loc["mine", "tissue_ratio"] == pytest.approx(4 / 3)
     assert rates.loc["mine", "tissue_compound_rate_per_s"] == pytest.approx(np.log(4 / 3) / (3 * WEEK_S))
     assert np.isnan(rates.loc["atlas", "tissue_ratio"])
