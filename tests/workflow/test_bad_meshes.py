@@ -31,7 +31,7 @@ STUDY = {
     "folding": {"end_week": 22},
 }
 MESH = "results/brains/apart/mesh/brain.xdmf"
-QUALITY = "results/brains/apart/figures/mesh_quality.png"
+QUALITY = "results/study/mesh_quality.html"
 REFUSED = "results/brains/apart/mesh/refused"
 
 
@@ -52,13 +52,12 @@ def workflow(checkout_copy, tmp_path_factory):
 
 
 @pytest.mark.fault(23)
-def test_the_quality_of_the_mesh_is_told_and_drawn(workflow):
+def test_the_quality_of_the_mesh_is_in_the_report(workflow):
     quality = read_json(workflow.directory / "results/brains/apart/mesh/quality.json")
     assert quality["volume_mm3"] / 1e3 == pytest.approx(2 * VOLUME_ML, rel=0.05)
-    assert {sum(kind["counts"]) for kind in quality["histogram"].values()} == {quality["tets"]}
     assert quality["gap_mm"]["input"]["median"] == pytest.approx(1.5, abs=0.5)
     assert quality["gap_kept"] > 0.95
-    assert (workflow.directory / QUALITY).stat().st_size > 10_000
+    assert f">{quality['tets']}<" in (workflow.directory / QUALITY).read_text()
 
 
 def remeshing(workflow, brain="apart", **settings):
@@ -103,9 +102,6 @@ def test_what_was_refused_can_be_looked_at(workflow):
     quality = read_json(workflow.directory / REFUSED / "quality.json")
     assert quality["tets"] == len(read_tetrahedral_mesh(workflow.directory / REFUSED / "brain.xdmf").tets)
     assert quality["min_radius_ratio"] < 0.9
-    drawn = workflow.run(f"{REFUSED}/quality.png", "--cores", "1", "--configfile", "changed.yaml")
-    assert drawn.returncode == 0, drawn.stderr
-    assert (workflow.directory / REFUSED / "quality.png").stat().st_size > 10_000
 
 
 @pytest.mark.fault(20)

@@ -177,20 +177,12 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
     that of the volume, relative to the one inside it. Of quadratic elements all of them are taken on the triangles
     between nodes. `gap_mm` holds the gaps of both, and `gap_kept` the share of the
-    given one's gaps that the mesh leaves open, None where it has none (see `fidelity`). `histogram` holds for radius
-    ratio, dihedral angles and volume the edges of the classes and the number of elements in each.
+    given one's gaps that the mesh leaves open, None where it has none (see `fidelity`).
     """
     quality = element_quality(mesh)
     own, _ = boundary_surface(mesh)
     volume = quality["volume_mm3"]
     walls = gap_walls(surface)
-    tenths = 10 * np.log10(volume)
-    classes = {
-        "radius_ratio": np.linspace(0, 1, 41),
-        "min_dihedral_deg": np.linspace(0, 90, 46),
-        "max_dihedral_deg": np.linspace(60, 180, 61),
-        "volume_mm3": 10.0 ** (np.arange(np.floor(tenths.min()) - 1, np.ceil(tenths.max()) + 2) / 10),
-    }
     return {
         "order": mesh.order,
         "tets": len(mesh.tets),
@@ -210,10 +202,6 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "max_dihedral_deg": float(quality["max_dihedral_deg"].max()),
         "min_volume_mm3": float(volume.min()),
         "min_jacobian_ratio": float(quality["jacobian_ratio"].min()),
-        "histogram": {
-            name: {"edges": edges.tolist(), "counts": np.histogram(quality[name], edges)[0].tolist()}
-            for name, edges in classes.items()
-        },
     }
 
 

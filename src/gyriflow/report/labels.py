@@ -58,13 +58,6 @@ MAPS = {
 """The quantities that are drawn as maps, with the labels of their colour bars."""
 WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth (% per week)", "shear modulus (Pa)"
 """The fields of the folding, with their units."""
-QUALITY = {
-    "radius_ratio": "radius ratio (1 = regular)",
-    "min_dihedral_deg": "smallest dihedral angle (°)",
-    "max_dihedral_deg": "largest dihedral angle (°)",
-    "volume_mm3": "volume (mm³)",
-}
-"""The measures of an element's quality."""
 STEPS = {
     "newton": "Newton\niterations",
     "krylov": "CG iterations",

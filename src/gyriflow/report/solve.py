@@ -4,15 +4,13 @@ import math
 from collections.abc import Mapping
 from typing import Any, Unpack
 
-import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..parameters.terms import ELEMENTS_NEEDED
-from .labels import QUALITY, STEPS, shown_number, week_label
+from .labels import STEPS, week_label
 from .style import (
-    FULL_WIDTH_IN,
     MUTED_COLOUR,
     RUN_COLOURS,
     SINGLE_COLUMN_IN,
@@ -28,12 +26,6 @@ from .style import (
     week_axis,
 )
 
-GATES = {
-    "radius_ratio": "min_radius_ratio",
-    "min_dihedral_deg": "min_dihedral_deg",
-    "max_dihedral_deg": "max_dihedral_deg",
-    "volume_mm3": "min_volume_mm3",
-}
 FALLBACKS = {
     "cg": "conjugate gradients",
     "cg, preconditioner rebuilt": "preconditioner rebuilt",
@@ -99,53 +91,6 @@ def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> 
         )
     if len(unusual):
         panels["newton"].legend(**above)
-    return figure
-
-
-@styled
-def quality_histogram(
-    quality: Mapping[str, Any], *, gates: Mapping[str, float] | None = None, synthetic: bool = False
-) -> Figure:
-    """Returns histograms of the tetrahedra's radius ratio, dihedral angles and volumes, and words on the surface.
-
-    Parameters
-    ----------
-    quality
-        What the mesh stage says: `histogram` ({measure: {"edges": (k + 1,), "counts": (k,)}}), and of the surface
-        `surface_distance_mm`, `crossing_faces`, `volume_change` and `gap_kept`.
-    gates : {min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3: limit}
-        The gates of the configuration, drawn as lines; others are left out.
-    """
-    figure = new_figure(FULL_WIDTH_IN, 2.5, synthetic=synthetic)
-    panels = figure.subplots(1, len(QUALITY), sharey=False)
-    for axes, (column, label) in zip(panels, QUALITY.items(), strict=True):
-        counts, edges = (np.asarray(quality["histogram"][column][name]) for name in ("counts", "edges"))
-        axes.stairs(counts, edges, fill=True, color=RUN_COLOURS[0])
-        # a few bad elements decide: a linear axis would hide them
-        axes.set_yscale("log")
-        axes.set_ylim(bottom=0.7)
-        axes.set_xlabel(label)
-        filled = np.flatnonzero(counts)
-        said = f"{edges[filled[0]]:.3g} to {edges[filled[-1] + 1]:.3g}"
-        limit = (gates or {}).get(GATES[column])
-        if limit is not None:
-            # a least volume far below all others would stretch their axis: it is only told
-            if column != "volume_mm3" or limit >= edges[0]:
-                axes.axvline(limit, color=RUN_COLOURS[1], linestyle="--")
-            said += f", limit {shown_number(limit)}"
-        axes.set_title(said, fontsize=7)
-        light_grid(axes)
-    panels[-1].set_xscale("log")
-    add_letters(panels)
-    count = f"{int(counts.sum()):,}".replace(",", "\u2009")
-    panels[0].set_ylabel(f"elements (of {count})")
-    surface = (
-        f"surface: 99 % within {quality['surface_distance_mm']['hausdorff99']:.3f} mm of the given one, "
-        f"{quality['crossing_faces']} faces cross; volume {100 * quality['volume_change']:+.2f} %"
-    ).replace("-", "−")
-    if quality["gap_kept"] is not None:
-        surface += f"; gaps open along {100 * quality['gap_kept']:.1f} % of their walls"
-    figure.supxlabel(surface, fontsize=7)
     return figure
 
 

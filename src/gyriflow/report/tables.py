@@ -34,6 +34,19 @@ OF_EVERY_RUN = (
 """Parameters and summaries that are told of runs even where all have the same."""
 AROUND_ZERO = "mean_shape_index"
 """A metric that may be zero, so that a difference in per cent says nothing."""
+OF_THE_MESH = {
+    "tets": "elements",
+    "min_radius_ratio": "least radius ratio",
+    "median_radius_ratio": "median radius ratio",
+    "min_dihedral_deg": "smallest dihedral angle (°)",
+    "max_dihedral_deg": "largest dihedral angle (°)",
+    "min_volume_mm3": "smallest volume (mm³)",
+    "surface_distance_mm": "99 % of the surface within (mm)",
+    "crossing_faces": "crossing faces",
+    "volume_change": "relative change of volume",
+    "gap_kept": "share of narrow gaps that is open",
+}
+"""What is told of the quality of a mesh."""
 QUANTILE = r"_q\d\d$"
 """How the metrics end that are told in the CSV alone."""
 
@@ -257,3 +270,20 @@ def _shown(value: object, digits: int = 6) -> str:
             return ", ".join(_shown(item, digits) for item in value)
         case _:
             return str(value)
+
+
+def mesh_quality_page(quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]) -> str:
+    """Draw up the quality of meshes as HTML: a row per measure with its limit, a column per brain.
+
+    Parameters
+    ----------
+    quality : {brain: content of its quality.json}
+    gates : the limits in the configuration, by their keys in the section mesh
+    """
+    columns = {
+        brain: {**found, "surface_distance_mm": found["surface_distance_mm"]["hausdorff99"]}
+        for brain, found in quality.items()
+    }
+    table = pd.DataFrame(columns, dtype=object).reindex(list(OF_THE_MESH)).rename(index=OF_THE_MESH)
+    limits = [gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}"))) for name in OF_THE_MESH]
+    return html_table(table.assign(limit=limits).rename_axis("measure"), digits=3)

@@ -150,7 +150,9 @@ class Figures:
 
     def _wanted(self, figure: Figure) -> bool:
         """Returns whether the report shows a figure; what other rules make is there anyway."""
-        return not (figure.technical and figure.draw) or self.config.report.figures == "all"
+        return not (figure.technical and figure.path.endswith("png") and figure.draw) or (
+            self.config.report.figures == "all"
+        )
 
     def entries(self) -> list[dict[str, Any]]:
         """Returns what the report says of each figure and table: file, section, title and caption."""
@@ -298,21 +300,13 @@ class Figures:
             paper=True, technical=True,
         )  # fmt: skip
         yield Figure(
-            "quality_figure", "Inputs", "mesh quality", f"{BRAIN}/figures/mesh_quality.png", "solve.quality_histogram",
-            """Quality of the tetrahedra: radius ratio (3 × inscribed / circumscribed radius, 1 for a regular element),
-            dihedral angles and volume. Dashed: the limits of the configuration. Below: distance from the pial surface,
-            crossing faces, difference in volume, and how much of gaps narrower than 3 mm, as the fissure, is open.""",
-            lambda brain: {"quality": MESH["quality"].format(brain=brain)},
-            lambda brain: {**self._synthetic(brain), "gates": self.gates},
-            self._each_brain(self.config.start_brains), technical=True,
-        )  # fmt: skip
-        # of a mesh that did not pass the gates; made on request
-        yield Figure(
-            "refused_quality_figure", "Inputs", "refused mesh", f"{BRAIN}/mesh/refused/quality.png",
-            "solve.quality_histogram",
-            inputs=lambda brain: {"quality": f"{BRAIN}/mesh/refused/quality.json".format(brain=brain)},
-            options=lambda brain: {**self._synthetic(brain), "gates": self.gates},
-            of=(),
+            "mesh_quality", "Inputs", "mesh quality", f"{STUDY}/mesh_quality.html", "tables.mesh_quality_page",
+            """Radius ratio (3 × inscribed / circumscribed radius, 1 for a regular element), dihedral angles and volume
+            of the tetrahedra, how far the mesh is from the pial surface, and how much of gaps narrower than 3 mm, as
+            the fissure, is open; beside them the limits of the configuration.""",
+            lambda: {"quality": {brain: MESH["quality"].format(brain=brain) for brain in self.config.start_brains}},
+            lambda: {"gates": self.gates},
+            technical=True,
         )  # fmt: skip
         yield Figure(
             "quality_page", "Inputs", "quality of the brain", f"{BRAIN}/figures/quality.png",

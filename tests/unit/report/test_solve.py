@@ -10,7 +10,6 @@ from gyriflow.parameters.terms import ELEMENTS_NEEDED
 from gyriflow.report.growth import growth_chart
 from gyriflow.report.solve import (
     displacement_chart,
-    quality_histogram,
     steps_chart,
 )
 
@@ -136,28 +135,6 @@ def test_steps_are_drawn_and_those_that_needed_another_solver_are_marked():
     assert quality.lines[0].get_ydata()[-1] == 0.3
     assert seconds.lines[0].get_ydata().sum() == 21
     assert "(s)" in seconds.get_ylabel()
-
-
-def test_quality_histogram_has_the_classes_their_limits_and_words_on_the_surface():
-    classes = {"edges": [1e-3, 0.5, 1.0], "counts": [1, 7]}
-    quality = {
-        "histogram": dict.fromkeys(("radius_ratio", "min_dihedral_deg", "max_dihedral_deg", "volume_mm3"), classes),
-        "surface_distance_mm": {"hausdorff99": 0.05},
-        "crossing_faces": 0,
-        "volume_change": -0.001,
-        "gap_kept": 0.9,
-    }
-    gates = {"min_radius_ratio": 0.1, "min_dihedral_deg": 2.0, "max_dihedral_deg": 175.0, "min_volume_mm3": 1e-6}
-    figure = quality_histogram(quality, gates=gates)
-    for axes in figure.axes:
-        assert axes.patches[0].get_data().values.tolist() == [1, 7]
-    assert [[line.get_xdata()[0] for line in axes.lines] for axes in figure.axes] == [[0.1], [2.0], [175.0], []]
-    assert figure.axes[3].get_title() == "0.001 to 1, limit 10$^{-6}$"
-    assert "of 8" in figure.axes[0].get_ylabel()
-    (said,) = [text for text in words(figure) if text.startswith("surface")]
-    assert said.endswith(
-        "0.050 mm of the given one, 0 faces cross; volume −0.10 %; gaps open along 90.0 % of their walls"
-    )
 
 
 def test_displacement_chart_draws_the_chosen_nodes_at_the_middle_of_the_interval():

@@ -5,7 +5,14 @@ import re
 import numpy as np
 import pandas as pd
 
-from gyriflow.report.tables import html_table, metrics_page, metrics_table, prediction_page, runs_table
+from gyriflow.report.tables import (
+    html_table,
+    mesh_quality_page,
+    metrics_page,
+    metrics_table,
+    prediction_page,
+    runs_table,
+)
 
 
 def test_metrics_table_gives_the_difference_from_the_measured_brain():
@@ -97,3 +104,12 @@ def test_simpler_ways_of_several_runs_are_one_row():
     cells = re.findall("<td.*?>(.*?)</td>", prediction_page(pd.DataFrame(rows)))
     assert cells[2::11] == ["expected", "the atlas&#39; brain, scaled", "stiff"]
     assert cells[3:11] == ["0.123"] * 8
+
+
+def test_the_quality_of_a_mesh_stands_beside_its_limits():
+    quality = {"tets": 8, "min_radius_ratio": 0.2, "surface_distance_mm": {"hausdorff99": 0.05}, "gap_kept": None}
+    page = mesh_quality_page({"young": quality}, {"min_radius_ratio": 0.1, "max_surface_distance_mm": 0.3})
+    rows = [re.findall("<td.*?>(.*?)</td>", row) for row in page.split("<tr>")]
+    assert ["least radius ratio", "0.2", "0.1"] in rows
+    assert ["99 % of the surface within (mm)", "0.05", "0.3"] in rows
+    assert ["share of narrow gaps that is open", "–", "–"] in rows
