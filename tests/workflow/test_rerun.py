@@ -55,7 +55,7 @@ OF_THE_SOLVER = {
         (["workflow/scripts/quality_table.py"], RESOURCES | {"quality_table": 1, "study_warnings": 1}),
         # what the terminal says, the command line, comments in rules and the environment make no result
         (
-            ["src/gyriflow/cli/terminal.py", "src/gyriflow/cli/commands.py", "src/gyriflow/cli/launch.py"]
+            ["src/gyriflow/cli/status.py", "src/gyriflow/cli/commands.py", "src/gyriflow/cli/launch.py"]
             + ["workflow/rules/metrics.smk", "profiles/default/config.yaml", "envs/gyriflow.yaml"],
             {},
         ),

@@ -1,10 +1,6 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
-from functools import cache
-
-from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.io.files import read_json
-from gyriflow.cli.cost import MEASURED as MEASURED_COSTS
-from gyriflow.cli.cost import folding_needs
+from gyriflow.cli.cost import job_limits
 
 
 rule parameters:
@@ -89,20 +85,12 @@ SOLVE = (
 FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
 
 
-@cache
-def folding_limits(run, brain):
-    """Returns the memory in MiB and the minutes of a run's job on a cluster, predicted from measured runs."""
-    return folding_needs(
-        run, brain, CONFIG, read_json(MEASURED_COSTS), predicted_memory_mib
-    )
-
-
 # what both rules of a folding ask of a cluster
 LIMITED = {
     "mpi": "mpiexec",
     "tasks": of(PLAN.runs.ranks),
-    "mem_mb": lambda wildcards: folding_limits(wildcards.run, wildcards.brain)[0],
-    "runtime": lambda wildcards: folding_limits(wildcards.run, wildcards.brain)[1],
+    "mem_mb": lambda wildcards: job_limits(wildcards.run, wildcards.brain, CONFIG)[0],
+    "runtime": lambda wildcards: job_limits(wildcards.run, wildcards.brain, CONFIG)[1],
 }
 
 

@@ -7,7 +7,6 @@ own command line.
 """
 
 import fcntl
-import io
 import os
 import re
 import shutil
@@ -15,8 +14,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
@@ -50,8 +49,6 @@ KEEP_GOING = frozenset(("--keep-going", "-k"))
 REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 """Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
 
-OF_PROFILES = "for setting default command line arguments."
-"""How the line ends that Snakemake prints of its profiles before any logger is there."""
 FULL_BYTES = 4 * 2**20
 """With less space left, a run that ended without a code of its own has met a full disk."""
 HELD: list[IO[str]] = []
@@ -157,50 +154,15 @@ def add_snakefile(arguments: Sequence[str]) -> list[str]:
     return ["--snakefile", str(SHIPPED / "Snakefile"), *arguments]
 
 
-class Terminal(io.TextIOWrapper):
-    """A stream to the terminal that leaves Snakemake's line on its profiles to the log."""
-
-    def __init__(self, number: int) -> None:
-        # line by line, so that messages of both streams keep their order
-        super().__init__(os.fdopen(number, "wb", buffering=0), line_buffering=True, errors="replace")
-        self._left_out = False
-
-    def write(self, text: str) -> int:
-        """Writes a text, but for that line: it and the line break that `print` sends after it go to the log."""
-        if text.endswith(OF_PROFILES) or (self._left_out and text == "\n"):
-            self._left_out = text != "\n"
-            # the standard error is the log here
-            return os.write(2, text.encode())
-        self._left_out = False
-        return super().write(text)
-
-
-@contextmanager
-def prints_go_to(log: Path) -> Iterator[None]:
-    """Has all that this process's libraries and children print go to the end of a file.
-
-    Python's own `sys.stdout` and `sys.stderr` stay on the terminal, or wherever they were.
-    """
+def send_prints_to(log: Path) -> None:
+    """Send what this process' libraries and children print to a file; Python's own streams stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
-    before = sys.stdout, sys.stderr
-    for stream in before:
-        stream.flush()
-    kept = [os.dup(1), os.dup(2)]
-    # kept for those who own the log: it may hold names of subjects
+    # for those alone who own it: it may hold names of subjects
     file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-    for number in (1, 2):
+    for number, stream in ((1, "stdout"), (2, "stderr")):
+        getattr(sys, stream).flush()
+        setattr(sys, stream, os.fdopen(os.dup(number), "w", buffering=1, errors="replace"))
         os.dup2(file, number)
-    os.close(file)
-    sys.stdout, sys.stderr = (Terminal(os.dup(number)) for number in kept)
-    try:
-        yield
-    finally:
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
-        for number, original in zip((1, 2), kept, strict=True):
-            os.dup2(original, number)
-            os.close(original)
-        sys.stdout, sys.stderr = before
 
 
 def refused_brains() -> dict[str, str]:
@@ -247,7 +209,8 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
     # after an interruption the same command goes on from here
     with suppress(KeyboardInterrupt):
         again = [sys.executable, "-m", "gyriflow.cli.launch", *arguments]
-        subprocess.run(again, env=os.environ | {REFUSED_FILE: str(path)}, check=False)
+        environment = os.environ | {REFUSED_FILE: str(path)}
+        subprocess.run(again, env=environment, stdout=sys.stdout, stderr=sys.stderr, check=False)
     path.unlink(missing_ok=True)
 
 
@@ -291,16 +254,15 @@ def main(arguments: Sequence[str]) -> int:
     sys.argv[0] = "snakemake"
     complete = add_snakefile(arguments)
     details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
-    quiet = runs_quietly(arguments)
-    if quiet:
+    if runs_quietly(arguments):
         complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]
-    with prints_go_to(details) if quiet else nullcontext():
-        try:
-            cli.main(complete)
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        except KeyboardInterrupt:
-            code = INTERRUPTED
+        send_prints_to(details)
+    try:
+        cli.main(complete)
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    except KeyboardInterrupt:
+        code = INTERRUPTED
     recorded = recorded_exit_code(exit_file)
     exit_file.unlink(missing_ok=True)
     if code and interrupts:

@@ -1,7 +1,7 @@
 """How far a study is, from its working directory alone: the run that is live or was the last, and the results there."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,8 +17,10 @@ from ..shipped import CONFIG
 from ..units import week_tag
 from .launch import hold_lock
 from .provenance import STUDY
-from .terminal import REPORT, STATE, as_duration, at_week
 
+STATE = Path(".snakemake", "gyriflow-run.json")
+"""Where, in a working directory, the state of its live or last run is."""
+REPORT = Path("results", "report", "report.html")
 BRAIN_FILES = {"surface": "surface/pial.surf.gii", "mesh": "mesh/brain.xdmf", "metrics": "metrics/metrics.csv"}
 OF_BRAINS = ("brain", *BRAIN_FILES)
 OF_RUNS = ("run", "brain", "folding", "surfaces", "metrics", "figures")
@@ -50,6 +52,20 @@ def status(directory: Path) -> Status:
     runs = [_row(run, results / "runs" / run / brain) for run, brain in names]
     report = directory / REPORT
     return Status(_lines(directory, state), brains, runs, report if report.is_file() else None)
+
+
+def as_duration(seconds: float) -> str:
+    """Return a duration in words, no more exact than an estimate is."""
+    if seconds < 90:
+        return f"{max(5 * round(seconds / 5), 5)} s"
+    if seconds < 90 * 60:
+        return f"{round(seconds / 60)} min"
+    return f"{seconds / 3600:.1f} h" if seconds < 36 * 3600 else f"{seconds / 86400:.1f} days"
+
+
+def at_week(step: Mapping[str, Any]) -> str:
+    """Return how far a folding is, by one of its events."""
+    return f"GW {step['week']:.2f} of {step['end_week']:g}"
 
 
 def _configured(directory: Path) -> list[tuple[str, str]]:

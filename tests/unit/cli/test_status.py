@@ -6,8 +6,7 @@ import pytest
 
 from gyriflow.cli.launch import hold_lock
 from gyriflow.cli.provenance import STUDY
-from gyriflow.cli.status import as_json, as_text, status
-from gyriflow.cli.terminal import STATE
+from gyriflow.cli.status import STATE, as_json, as_text, status
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
 

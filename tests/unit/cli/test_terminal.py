@@ -1,15 +1,16 @@
-"""The lines of a run: on a terminal and in a file, with warnings, weeks, failures and the end."""
+"""What a run tells by Snakemake's records: on a terminal and in a file, with warnings, weeks, failures and the end."""
 
 import io
+import logging
 
 import pytest
 
-from gyriflow.cli.terminal import ORDER, RunDisplay, ended_by_slurm, stages, subject
-from gyriflow.shipped import SHIPPED
+from gyriflow.cli.status import STATE
+from gyriflow.cli.terminal import RunDisplay
+from gyriflow.io.files import read_json
 from gyriflow.step import EXIT_FILE, recorded_exit_code
 
-STAGES = {"pial_from_labels": "surface", "simulate": "folding", "html_report": "report"}
-STEP = '{{"event": "step", "week": {week}, "end_week": 23, "step": 1, "left_s": {left}}}\n'
+STEP = '{{"event": "step", "week": {week}, "end_week": 23, "left_s": {left}}}\n'
 
 
 class Terminal(io.StringIO):
@@ -17,236 +18,147 @@ class Terminal(io.StringIO):
         return True
 
 
-class Clock:
-    now = 0.0
+class Run:
+    """A run that Snakemake tells of, and what its display has written."""
 
-    def __call__(self):
-        return self.now
+    def __init__(self, folder, stream):
+        self.now = 0.0
+        self.folder = folder
+        self.display = RunDisplay(stream, folder / ".snakemake" / "log" / "x.log", lambda: self.now)
+
+    def tell(self, event=None, text="", level=logging.INFO, **said):
+        record = logging.LogRecord("snakemake", level, "", 0, text, (), None)
+        vars(record).update(said | {"event": event})
+        self.display.show(record)
+
+    def begin(self, rule, number=1, **wildcards):
+        log = self.folder / f"{rule}.log"
+        self.tell("job_info", jobid=number, rule_name=rule, wildcards=wildcards, output=["x"], log=[str(log)])
+        return log
+
+    def end(self, number=1, done=1, total=1):
+        self.tell("job_finished", job_id=number)
+        self.tell("progress", done=done, total=total)
+
+    def fail(self, rule, message="", log=(), number=1):
+        self.tell("job_error", jobid=number, rule_name=rule, log=log, rule_msg=message)
+
+    @property
+    def lines(self):
+        return self.display.console.file.getvalue().splitlines()
+
+    @property
+    def state(self):
+        return read_json(self.folder / STATE)
 
 
 @pytest.fixture
-def clock():
-    return Clock()
+def run(tmp_path):
+    (tmp_path / ".snakemake").mkdir()
+    return Run(tmp_path, io.StringIO())
 
 
-def shown(display):
-    return display.stream.getvalue()
+def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
+    run.tell("run_info", stats={"measure": 100, "total": 100})
+    for number in range(100):
+        run.begin("measure", number, brain=f"b{number}")
+        run.display.tick()
+        run.now += 2.0
+        run.end(number, number + 1, 100)
+    run.display.end()
+    assert run.lines[0].startswith("gyriflow: 100 steps to do; all details: ")
+    assert run.lines[1] == "  0 %  measure b0"
+    assert run.lines[11] == " 50 %  2 min left  measure b50"
+    assert run.lines[-1].startswith("gyriflow: done in ")
+    assert len(run.lines) == 22
+    assert "\x1b" not in "".join(run.lines)
+    assert (run.state["done"], run.state["total"], run.state["running"]) == (100, 100, [])
 
 
-def display_on(stream, clock):
-    return RunDisplay(stream, STAGES, {"pial_from_labels": 10.0, "simulate": 100.0}, clock=clock)
+def test_a_terminal_has_a_bar_with_the_time_left(tmp_path, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    run = Run(tmp_path, Terminal())
+    run.tell("run_info", stats={"measure": 10})
+    for number in range(5):
+        run.begin("measure", number, brain="a")
+        run.now += 20.0
+        run.end(number, number + 1, 10)
+        run.display.tick()
+    run.display.end()
+    # five more at 20 s each
+    assert "50 %" in "".join(run.lines)
+    assert "0:01:40" in "".join(run.lines)
 
 
-@pytest.fixture
-def display(clock):
-    """The display of a run whose terminal is a file."""
-    return display_on(io.StringIO(), clock)
-
-
-def test_a_stage_and_its_brain_are_named_once_and_the_report_at_the_end(display, clock, tmp_path):
-    display.plan({"pial_from_labels": 2, "html_report": 1, "all": 1}, 2)
-    report = tmp_path / "results" / "report.html"
-    report.parent.mkdir()
-    report.touch()
-    for number in (1, 2):
-        display.job_begins(number, "pial_from_labels", {"brain": "a"}, ["x"], None)
-        display.job_ends(number)
-        display.progress(number, 4)
-    display.job_begins(3, "html_report", {}, [str(report)], None)
-    display.job_ends(3)
-    clock.now = 130.0
-    display.progress(4, 4)
-    display.end()
-    lines = shown(display).splitlines()
-    assert lines[0] == "gyriflow: 4 steps to do"
-    assert sum("brain a" in line for line in lines) == 1
-    assert lines[-1] == f"gyriflow: done in 2 min; report: {report}"
-    assert "\x1b" not in shown(display)
-    assert "\r" not in shown(display)
-
-
-def test_warnings_and_weeks_come_from_what_the_job_writes(display, clock, tmp_path):
-    display.plan({"simulate": 1}, 1)
-    log, progress = tmp_path / "simulate.log", tmp_path / "simulate.jsonl"
-    display.job_begins(1, "simulate", {"run": "r", "brain": "a"}, ["x"], str(log))
-    warning = '{"event": "warning", "message": "coarse"}\n'
-    log.write_text("warning: coarse\n2026-11-22 00:54:57,955 WARNING trimesh: not ours\n")
-    progress.write_text(warning + STEP.format(week=21.5, left=40.0))
-    display.tick()
-    display.tick()
-    with progress.open("a") as file:
-        file.write(STEP.format(week=22.0, left=30.0))
-    display.tick()
-    text = shown(display)
-    assert text.count("warning folding, run r, brain a: coarse") == 1
-    assert text.count("GW 22.00 of 23, 30 s left of this run") == 1
-    assert "GW 21.50" not in text
-    assert "not ours" not in text
-    assert display.state()["running"] == ["folding, run r, brain a: GW 22.00 of 23"]
-    # without a terminal, a week that takes long is told each minute
-    clock.now = 61.0
-    with progress.open("a") as file:
-        file.write(STEP.format(week=22.4, left=15.0))
-    display.tick()
-    assert "GW 22.40 of 23" in shown(display)
-
-
-def test_the_share_is_that_of_the_time_and_grows_while_one_job_runs(display, clock, tmp_path):
-    """A folding that takes as long as all else, of which nothing is told for a while."""
-    display.plan({"pial_from_labels": 10, "simulate": 1, "all": 1}, 1)
-    for number in range(10):
-        display.job_begins(number, "pial_from_labels", {"brain": f"b{number}"}, ["x"], None)
-        clock.now += 10.0
-        display.job_ends(number)
-        display.progress(number + 1, 12)
-    log = tmp_path / "simulate.log"
-    display.job_begins(11, "simulate", {"run": "r", "brain": "a"}, ["x"], str(log))
-    assert shown(display).splitlines()[-1].startswith(" 50 %  folding      run r, brain a")
-    # it says itself that it takes longer than foldings do
-    log.with_suffix(".jsonl").write_text(STEP.format(week=21.5, left=800.0))
-    clock.now += 61.0
-    display.tick()
-    assert shown(display).splitlines()[-1].startswith(" 50 %  folding")
-    shares = []
-    for left in (500.0, 200.0, 0.0):
-        with log.with_suffix(".jsonl").open("a") as file:
-            file.write(STEP.format(week=22.0, left=left))
-        clock.now += 300.0
-        display.tick()
-        shares.append(int(shown(display).splitlines()[-1].split("%")[0]))
-    assert shares == [50, 79, 99]
-    # then the log is silent: what runs is named all the same
-    clock.now += 301.0
-    display.tick()
-    assert "running for 21 min" in shown(display).splitlines()[-1]
-
-
-def test_a_failure_begins_with_its_cause_and_names_its_log(display, tmp_path):
-    display.plan({"pial_from_labels": 1, "simulate": 1}, 1)
-    log = tmp_path / "log"
-    log.write_text("2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
-    display.job_begins(1, "pial_from_labels", {"brain": "a"}, ["x"], str(log))
-    display.job_fails(1, "pial_from_labels", [str(log)])
-    display.end()
-    assert shown(display).splitlines()[2:] == [
-        "failed  surface, brain a: a.nii: is no image",
-        f"        log: {log}",
-        "gyriflow: 1 step failed after 5 s, 2 are not done; once the cause is mended, the same command goes on from "
-        "here",
-    ]
-    assert display.state()["failed"] == [{"what": "surface, brain a", "why": "a.nii: is no image", "logs": [str(log)]}]
-
-
-def test_what_a_job_said_right_before_it_failed_is_told(display, tmp_path):
-    display.plan({"simulate": 1}, 1)
-    log = tmp_path / "log"
-    display.job_begins(1, "simulate", {"run": "r", "brain": "a"}, ["x"], str(log))
-    log.write_text("warning: too coarse\ngyriflow: memory ran out\n")
+def test_a_folding_tells_its_size_weeks_and_warnings(run):
+    run.tell("run_info", stats={"simulate": 1})
+    log = run.begin("simulate", run="r", brain="a")
     size = '{"event": "size", "elements": 12, "unknowns": 9, "ranks": 1, "memory_mib": 70}\n'
-    (tmp_path / "log.jsonl").write_text(size)
-    display.job_fails(1, "simulate", [str(log)])
-    lines = shown(display).splitlines()
-    assert "12 elements, 9 unknowns, 1 ranks, about 70 MiB" in lines[-4]
-    assert lines[-3] == "warning folding, run r, brain a: too coarse"
-    assert lines[-2] == "failed  folding, run r, brain a: memory ran out"
+    coarse = '{"event": "warning", "message": "coarse"}\n'
+    log.with_suffix(".jsonl").write_text(size + coarse + STEP.format(week=21.5, left=75.0))
+    log.write_text("warning: coarse\n2026-11-22 00:54:57,955 WARNING trimesh: not ours\n")
+    run.now = 25.0
+    run.display.tick()
+    run.end()
+    assert run.lines[1:] == [
+        "       simulate r a: 12 elements, 1 ranks, about 70 MiB",
+        "warning simulate r a: coarse",
+        # a quarter of its time has passed
+        " 25 %  simulate r a: GW 21.50 of 23",
+    ]
+    assert run.state["running"] == ["simulate r a: GW 21.50 of 23"]
+
+
+def test_a_failure_begins_with_its_cause_after_the_warnings(run):
+    run.tell("run_info", stats={"pial_from_labels": 1, "simulate": 1})
+    log = run.begin("pial_from_labels", brain="a")
+    warned = "2026-11-22 00:54:57,001 WARNING gyriflow.io: thin cortex\n"
+    log.write_text(warned + "2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
+    run.fail("pial_from_labels", log=[str(log)])
+    run.tell(text="Exiting because a job execution failed. Look below", level=logging.ERROR)
+    run.display.end()
+    assert run.lines[1:] == [
+        "warning pial_from_labels a: thin cortex",
+        "failed  pial_from_labels a: a.nii: is no image",
+        f"        log: {log}",
+        "gyriflow: 1 failed after 5 s, 0 of 2 steps are done; the same command goes on from here",
+    ]
+    assert run.state["failed"] == [{"what": "pial_from_labels a", "why": "a.nii: is no image", "logs": [str(log)]}]
 
 
 @pytest.mark.fault(38)
 @pytest.mark.parametrize(
-    ("signal", "said", "code"),
-    [("SIGKILL: 9", "it was killed, most probably because memory ran out", 137), ("SIGSEGV: 11", "it crashed", None)],
-)
-def test_a_program_that_a_signal_has_ended_is_told_as_that(display, tmp_path, monkeypatch, signal, said, code):
-    monkeypatch.setenv(EXIT_FILE, str(tmp_path / "code"))
-    display.plan({"pial_from_labels": 1}, 1)
-    display.job_begins(1, "pial_from_labels", {"brain": "a"}, ["x"], None)
-    display.job_fails(
-        1, "pial_from_labels", [], f"CalledProcessError in file x:\n'python x.py' died with <Signals.{signal}>."
-    )
-    assert f"failed  surface, brain a: {said}" in shown(display)
-    assert recorded_exit_code(tmp_path / "code") == code
-
-
-def test_a_stage_without_results_is_not_called_done(display):
-    display.plan({"calibrate": 1}, 1)
-    display.job_begins(1, "calibrate", {}, [], None)
-    display.job_ends(1)
-    display.progress(1, 1)
-    display.end()
-    assert shown(display).splitlines()[-1].endswith("the configuration asks for no results of this stage")
-
-
-def test_a_terminal_has_a_last_line_that_is_written_over(clock, monkeypatch):
-    monkeypatch.setenv("TERM", "xterm")
-    display = display_on(Terminal(), clock)
-    display.plan({"pial_from_labels": 10}, 1)
-    for number in range(5):
-        display.job_begins(number, "pial_from_labels", {"brain": f"b{number}"}, ["x"], None)
-        clock.now += 20.0
-        display.job_ends(number)
-        display.progress(number + 1, 10)
-    # five more at 20 s each
-    assert display.time_left() == pytest.approx(100.0)
-    assert "\r\x1b[K" in shown(display)
-    assert " 50 %  2 min left" in shown(display).splitlines()[-1]
-
-
-def test_rules_have_the_stage_of_their_file():
-    found = stages(SHIPPED / "workflow" / "rules")
-    assert found["pial_from_labels"] == "surface"
-    # a checkpoint is a rule, too
-    assert found["simulate"] == found["simulate_member"] == "folding"
-    assert found["measure"] == "metrics"
-    # those that `check` lists
-    assert set(found.values()) <= set(ORDER)
-
-
-@pytest.mark.parametrize(
-    ("wildcards", "expected"),
+    ("message", "cause", "code"),
     [
-        ({"brain": "a"}, "brain a"),
-        ({"run": "r", "brain": "a", "week": "21.00"}, "run r, brain a"),
-        ({"where": "brains/a/metrics"}, "brain a"),
-        ({"where": "runs/r/a/metrics/week-22.00"}, "run r, brain a"),
-        ({"earlier": "a", "later": "b"}, "brain a to b"),
-        ({}, "study"),
+        ("died with <Signals.SIGKILL: 9>.", "it was killed, most probably because memory ran out", 137),
+        ("died with <Signals.SIGSEGV: 11>.", "it crashed (SIGSEGV)", None),
+        # as snakemake-executor-plugin-slurm 2.8 puts it
+        ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", "Slurm ended its job 12: CANCELLED", None),
+        ("SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x", "a.nii: is no image", None),
     ],
 )
-def test_a_job_is_named_by_what_it_works_on(wildcards, expected):
-    assert subject(wildcards) == expected
+def test_what_has_ended_a_program_from_outside_is_told(run, monkeypatch, message, cause, code):
+    monkeypatch.setenv(EXIT_FILE, str(run.folder / "code"))
+    log = run.begin("measure", brain="a")
+    log.write_text("2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
+    run.fail("measure", f"CalledProcessError in file x:\n'python x.py' {message}", [str(log)])
+    assert run.lines[0].startswith(f"failed  measure a: {cause}")
+    assert recorded_exit_code(run.folder / "code") == code
 
 
-def test_a_rule_of_the_registry_of_figures_is_of_the_figures(display):
-    display.plan({"overlay_figure": 1}, 1)
-    display.job_begins(1, "overlay_figure", {"brain": "a"}, ["x.png"], None)
-    assert shown(display).splitlines()[-1].endswith("figures      brain a")
+def test_what_was_stopped_is_no_failure(run):
+    run.tell("run_info", stats={"simulate": 2})
+    run.begin("simulate", run="r", brain="a")
+    run.tell(text="Terminating processes on user request, this might take some time.", level=logging.WARNING)
+    run.fail("simulate")
+    run.display.end()
+    assert run.lines[-1] == "gyriflow: stopped after 5 s, 0 of 2 steps are done"
+    assert run.state["interrupted"]
+    assert run.state["failed"] == []
 
 
-def test_what_was_stopped_is_no_failure(display, tmp_path):
-    display.plan({"simulate": 1, "pial_from_labels": 1}, 1)
-    display.progress(1, 2)
-    display.job_begins(1, "simulate", {"run": "r", "brain": "a"}, ["x"], None)
-    display.interrupted = True
-    display.job_fails(1, "simulate", [])
-    display.end()
-    assert "failed" not in shown(display)
-    assert shown(display).splitlines()[-1] == "gyriflow: stopped after 5 s, 1 of 2 steps are done"
-    assert display.state()["interrupted"]
-
-
-@pytest.mark.parametrize(
-    ("state", "expected"),
-    [
-        ("CANCELLED", "Slurm job 12: it was cancelled"),
-        ("OUT_OF_MEMORY", "Slurm job 12: its memory ran out: more is given by --set-resources measure:mem_mb=MIB"),
-        # the log says why
-        ("FAILED", ""),
-    ],
-)
-def test_what_slurm_has_done_to_a_job_is_told(state, expected):
-    # as snakemake-executor-plugin-slurm 2.8 puts it
-    message = f"SLURM-job '12' failed, SLURM status is: '{state}'. Reason: Unknown."
-    assert ended_by_slurm(message, "measure") == expected
-    lost = "SLURM-job '12' failed due to a node failure, SLURM status is: 'NODE_FAIL'. Failed nodes will be excluded"
-    assert ended_by_slurm(lost, "measure") == "Slurm job 12: its node was lost"
-    assert ended_by_slurm("", "measure") == ""
+def test_an_error_of_no_job_is_told(run):
+    run.tell("run_info", stats={"measure": 1})
+    run.tell(text="WorkflowError: no such profile", level=logging.ERROR)
+    run.display.end()
+    assert run.lines[1:] == ["WorkflowError: no such profile"]
