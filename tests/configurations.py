@@ -5,15 +5,18 @@ import pytest
 from gyriflow.config import load
 from gyriflow.errors import InputError
 
+LABELLED = {"labels": __file__, "scheme": "spina-bifida-atlas"}
+"""The source of a brain whose file is there, and not read."""
 
-def phantoms(*weeks, names="abcdefgh"):
-    """Returns brains of some weeks that are called a, b, ..."""
-    return [{"id": name, "week": week, "phantom": {}} for name, week in zip(names, weeks, strict=False)]
+
+def labelled(*weeks, names="abcdefgh"):
+    """Returns brains of labels, of some weeks, that are called a, b, ..."""
+    return [{"id": name, "week": week, **LABELLED} for name, week in zip(names, weeks, strict=False)]
 
 
 def study(brains=None, **changes):
-    """Returns a valid configuration, of two phantoms if no brains are given, with changes on its top level."""
-    return {"brains": brains or phantoms(21, 22.5), "start": "a", "folding": {"end_week": 24}} | changes
+    """Returns a valid configuration, of two brains if no brains are given, with changes on its top level."""
+    return {"brains": brains or labelled(21, 22.5), "start": "a", "folding": {"end_week": 24}} | changes
 
 
 def touched(folder, *names):

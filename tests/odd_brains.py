@@ -1,9 +1,119 @@
-"""Phantoms with differences that no configuration asks for: labels and affine in, labels on the same grid out."""
+"""Phantoms as brains in clinics and labs are: labels and affine in, labels on the same grid out."""
+
+from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
+from phantoms import BRAINSTEM, CALLOSUM, CENTRE_MM, CEREBELLUM, CORTEX, CSF, DEEP_GREY, VENTRICLES, WHITE
 
-from gyriflow.phantom.brain import BRAINSTEM, CALLOSUM, VENTRICLES, WHITE
-from gyriflow.phantom.pathologies import CEREBRUM, SIGN, Floats, Labels, Side, positions, warp
+Floats = NDArray[np.float64]
+Labels = NDArray[np.int32]
+Side = Literal["left", "right"]
+
+CEREBRUM = (WHITE, VENTRICLES, CORTEX, DEEP_GREY, CALLOSUM)
+SIGN = {"left": -1.0, "right": 1.0}
+
+
+def positions(labels: Labels, affine: Floats) -> Floats:
+    """Returns x, y, z of the voxels in mm from the brain's centre, RAS+, (3, i, j, k)."""
+    index = np.indices(labels.shape).reshape(3, -1)
+    return ((affine[:3, :3] @ index).T + affine[:3, 3] - CENTRE_MM).T.reshape(3, *labels.shape)
+
+
+def without_callosum(labels: Labels, affine: Floats) -> Labels:
+    """Returns a brain whose hemispheres are joined at the thalami alone: agenesis of the corpus callosum."""
+    x, _, z = positions(labels, affine)
+    top = z[labels == DEEP_GREY].mean()
+    made = np.where(labels == CALLOSUM, WHITE, labels)
+    return np.where(np.isin(labels, CEREBRUM) & (np.abs(x) < 1.5) & (z > top), CSF, made).astype(np.int32)
+
+
+def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0) -> Labels:
+    """Returns unconnected hemispheres, with a gap of CSF between them."""
+    x, _, _ = positions(labels, affine)
+    made = np.where(labels == CALLOSUM, WHITE, labels)
+    return np.where(np.isin(labels, CEREBRUM) & (np.abs(x) < 0.5 * gap_mm), CSF, made).astype(np.int32)
+
+
+def holoprosencephaly(labels: Labels, affine: Floats) -> Labels:
+    """Returns a brain without a fissure in front, with one ventricle for two and no corpus callosum."""
+    x, y, z = positions(labels, affine)
+    made = np.where(labels == CALLOSUM, WHITE, labels)
+    extent = [np.abs(axis[np.isin(labels, CEREBRUM)]).max() for axis in (x, y, z)]
+    fused = (np.abs(x) < 6.0) & (y > 0.0) & (labels == CSF)
+    hull = (x / extent[0]) ** 2 + (y / extent[1]) ** 2 + (z / extent[2]) ** 2 < 0.72
+    made = np.where(fused & hull, WHITE, made)
+    rim = (x / extent[0]) ** 2 + (y / extent[1]) ** 2 + (z / extent[2]) ** 2 > 0.60
+    made = np.where(fused & hull & rim, CORTEX, made)
+    single = (x / (0.45 * extent[0])) ** 2 + ((y - 2.0) / (0.45 * extent[1])) ** 2 + ((z - 2.0) / 7.0) ** 2 < 1.0
+    return np.where(single & np.isin(made, (WHITE, VENTRICLES, CORTEX)), VENTRICLES, made).astype(np.int32)
+
+
+def warp(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) -> Labels:
+    """Returns labels moved: `came_from` gives the (3, …) place, in mm from the centre, that each place's label has."""
+    place = came_from(positions(labels, affine))
+    index = np.linalg.inv(affine[:3, :3]) @ (place.reshape(3, -1).T + CENTRE_MM - affine[:3, 3]).T
+    nearest = np.rint(index).astype(int)
+    inside = ((nearest >= 0) & (nearest < np.array(labels.shape)[:, None])).all(axis=0)
+    clipped = np.clip(nearest, 0, np.array(labels.shape)[:, None] - 1)
+    return np.where(inside, labels[tuple(clipped)], 0).reshape(labels.shape).astype(np.int32)
+
+
+def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
+    """Returns a brain whose middle is pushed to the right by `mm`, its outer sides in place: a shift of the midline."""
+    x, _, _ = positions(labels, affine)
+    half = np.abs(x[np.isin(labels, CEREBRUM)]).max()
+
+    def came_from(place: Floats) -> Floats:
+        x = place[0]
+        inside = np.abs(x) < half
+        right = x > mm
+        stretched = np.where(right, (x - mm) * half / (half - mm), (x - mm) * half / (half + mm))
+        return np.stack([np.where(inside, stretched, x), place[1], place[2]])
+
+    return warp(labels, affine, came_from)
+
+
+def wide_hemisphere(labels: Labels, affine: Floats, factor: float = 1.3, *, ventricle: bool = False) -> Labels:
+    """Returns a brain whose right hemisphere is wider by `factor`: hemimegalencephaly, or with a wide ventricle."""
+
+    def came_from(place: Floats) -> Floats:
+        return np.stack([np.where(place[0] > 0, place[0] / factor, place[0]), place[1], place[2]])
+
+    made = warp(labels, affine, came_from)
+    if ventricle:
+        x, y, z = positions(made, affine)
+        extent = [np.abs(axis[np.isin(made, CEREBRUM)]).max() for axis in (x, y, z)]
+        fluid = ((x - 0.45 * extent[0]) / (0.3 * extent[0])) ** 2 + (y / (0.6 * extent[1])) ** 2 + (
+            (z - 2.0) / (0.35 * extent[2])
+        ) ** 2 < 1.0
+        made = np.where(fluid & np.isin(made, (WHITE, DEEP_GREY)), VENTRICLES, made)
+    return made.astype(np.int32)
+
+
+def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: Side = "right") -> Labels:
+    """Returns hemispheres apart, one of them shrunk to a share of its volume: hypoplasia."""
+    whole = apart(labels, affine)
+    factor = share ** (1 / 3)
+
+    def came_from(place: Floats) -> Floats:
+        return np.stack(
+            [1.5 * SIGN[side] + (place[0] - 1.5 * SIGN[side]) / factor, place[1] / factor, place[2] / factor]
+        )
+
+    x, _, _ = positions(labels, affine)
+    return np.where(SIGN[side] * x > 0, warp(whole, affine, came_from), whole).astype(np.int32)
+
+
+def add_sides(labels: Labels, affine: Floats) -> Labels:
+    """Returns the labels of a phantom with sides, as in BOUNTI (`dhcp-19`); the callosum is white matter there."""
+    x, _, _ = positions(labels, affine)
+    pairs = {CSF: 1, CORTEX: 3, WHITE: 5, CALLOSUM: 5, VENTRICLES: 7, CEREBELLUM: 11, DEEP_GREY: 16}
+    made = np.where(labels == BRAINSTEM, 10, 0)
+    for number, left in pairs.items():
+        made = np.where(labels == number, np.where(x < 0, left, left + 1), made)
+    return made.astype(np.int32)
 
 
 def with_fourth_ventricle(labels: Labels, affine: Floats) -> Labels:

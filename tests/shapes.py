@@ -6,13 +6,13 @@ import nibabel as nib
 import numpy as np
 import trimesh
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
+from odd_brains import CEREBRUM, positions
+from phantoms import CENTRE_MM, phantom_labels
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
-from gyriflow.phantom.pathologies import CEREBRUM, positions
 
 HALF_AXES = np.array([11.0, 24.0, 16.0])
 """Semi-axes in mm of an ellipsoid as large as a small hemisphere of week 21."""

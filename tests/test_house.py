@@ -32,7 +32,7 @@ ARROWS = {
     "mechanics": set(),
     # the solve is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io"},
-    **dict.fromkeys(("io", "phantom", "anatomy", "mesh", "growth", "metrics"), PLAIN),
+    **dict.fromkeys(("io", "anatomy", "mesh", "growth", "metrics"), PLAIN),
     **dict.fromkeys(("compare", "report"), PLAIN),
     "shipped": set(),
     "version": {"shipped"},

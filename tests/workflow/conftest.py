@@ -10,17 +10,24 @@ from pathlib import Path
 
 import pytest
 import yaml
-from shapes import ellipsoid_mesh, hemisphere
+from shapes import ellipsoid_mesh, hemisphere, phantom, save_labels
 
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
 CHECKOUT = Path(__file__).parents[2]
+
+
+def labelled(week: int) -> dict:
+    """Returns the source of a brain whose labels `Workflow.write` makes, synthetic ones of a week."""
+    return {"labels": f"phantom-{week}.nii.gz", "scheme": "spina-bifida-atlas"}
+
+
 SMALL_STUDY = {
     "brains": [
-        {"id": "a", "week": 21, "phantom": {"voxel_mm": 1.5}},
-        {"id": "b", "week": 22, "phantom": {"voxel_mm": 1.5}},
+        {"id": "a", "week": 21, **labelled(21)},
+        {"id": "b", "week": 22, **labelled(22)},
     ],
     "start": "a",
     "folding": {"end_week": 22},
@@ -107,7 +114,10 @@ class Workflow:
         return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, flags=re.MULTILINE)}
 
     def write(self, name: str, config: dict) -> str:
-        """Writes a configuration into the working directory and returns its name."""
+        """Writes a configuration, and labels that it calls `labelled`, and returns its name."""
+        for brain in config.get("brains", []):
+            if given := re.fullmatch(r"phantom-(\d+)\.nii\.gz", brain.get("labels", "")):
+                save_labels(self.directory / given[0], *phantom(float(given[1]), 2.0))
         (self.directory / name).write_text(yaml.safe_dump(config))
         return name
 

@@ -22,6 +22,7 @@ import pandas as pd
 import pytest
 import pyvista as pv
 from nibabel.freesurfer.io import write_geometry
+from phantoms import CENTRE_MM
 from reliability import trying
 from shapes import cerebrum_surface, phantom, rigid, save_gifti, save_labels
 
@@ -31,8 +32,6 @@ from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface
-from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM
 
 from .conftest import Workflow
 
@@ -40,7 +39,7 @@ pytestmark = pytest.mark.slow
 
 LABELS, AFFINE = phantom(voxel_mm=2.0)
 WHOLE = cerebrum_surface(LABELS, AFFINE)
-APART = pathologies.apart(LABELS, AFFINE)
+APART = odd_brains.apart(LABELS, AFFINE)
 LEFT, RIGHT = sorted(pieces(cerebrum_surface(APART, AFFINE)), key=lambda piece: piece.vertices[:, 0].mean())
 
 
@@ -125,17 +124,17 @@ LARGER = transformed(RIGHT, np.diag([1.09, 1.09, 1.09, 1.0]))
 GOOD = {
     "plain": labelled(),
     "polyp": labelled(odd_brains.with_fourth_ventricle),
-    "agenesis": labelled(pathologies.without_callosum),
-    "holoprosencephaly": labelled(pathologies.holoprosencephaly),
-    "wide": labelled(lambda labels, affine: pathologies.wide_hemisphere(labels, affine, ventricle=True)),
+    "agenesis": labelled(odd_brains.without_callosum),
+    "holoprosencephaly": labelled(odd_brains.holoprosencephaly),
+    "wide": labelled(lambda labels, affine: odd_brains.wide_hemisphere(labels, affine, ventricle=True)),
     "hypoplasia": labelled(
-        lambda labels, affine: pathologies.add_sides(pathologies.small_hemisphere(labels, affine), affine), "dhcp-19"
+        lambda labels, affine: odd_brains.add_sides(odd_brains.small_hemisphere(labels, affine), affine), "dhcp-19"
     ),
-    "shifted": labelled(pathologies.shifted_midline),
-    "hemimegalencephaly": lambda folder, name: {"phantom": {"voxel_mm": 2.0, "pathology": name}},
+    "shifted": labelled(odd_brains.shifted_midline),
+    "hemimegalencephaly": labelled(odd_brains.wide_hemisphere),
     "cropped": labelled(odd_brains.crop),
     "upside_down": labelled(turn=rigid(180, 0, 0)),
-    "backwards": labelled(pathologies.add_sides, "dhcp-19", rigid(0, 0, 180)),
+    "backwards": labelled(odd_brains.add_sides, "dhcp-19", rigid(0, 0, 180)),
     "pial_vtk": whole(with_polyp(WHOLE), "vtk"),
     "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
     "unequal": both_sides(LEFT, LARGER),
@@ -143,7 +142,7 @@ GOOD = {
     "talairach": with_matrix(WHOLE, "UNKNOWN", "TALAIRACH", np.diag([1.16, 1.16, 1.16, 1.0])),
 }
 BAD = {
-    "small_half": (labelled(pathologies.small_hemisphere), "the volume seems to hold one hemisphere only"),
+    "small_half": (labelled(odd_brains.small_hemisphere), "the volume seems to hold one hemisphere only"),
     "whole_as_half": (alone("right", lambda labels, affine: labels), "this is no single hemisphere"),
     "pial_half": (whole(LEFT), "the surface seems to be one hemisphere only"),
 }
@@ -227,13 +226,13 @@ def test_missing_tissues_are_named_and_not_required(study):
 
 
 def cerebrum_ml(labels):
-    return np.isin(labels, pathologies.CEREBRUM).sum() * 2.0**3 / 1e3
+    return np.isin(labels, odd_brains.CEREBRUM).sum() * 2.0**3 / 1e3
 
 
 @pytest.mark.fault(47)
 def test_a_brain_without_a_fissure_in_front_is_cut_in_halves(study):
     found, plain = study.report("holoprosencephaly"), study.report("plain")
-    assert found["volume_mL"] == pytest.approx(cerebrum_ml(pathologies.holoprosencephaly(LABELS, AFFINE)), rel=0.01)
+    assert found["volume_mL"] == pytest.approx(cerebrum_ml(odd_brains.holoprosencephaly(LABELS, AFFINE)), rel=0.01)
     area = found["area_cm2"]
     assert area["left"] == pytest.approx(area["right"], rel=0.03)
     # the walls of the fissure in front are not there
@@ -244,7 +243,7 @@ def test_a_brain_without_a_fissure_in_front_is_cut_in_halves(study):
 @pytest.mark.fault(52)
 def test_a_wide_ventricle_counts_as_brain_and_its_side_is_doubted(study):
     found = study.report("wide")
-    labels = pathologies.wide_hemisphere(LABELS, AFFINE, ventricle=True)
+    labels = odd_brains.wide_hemisphere(LABELS, AFFINE, ventricle=True)
     assert found["volume_mL"] == pytest.approx(cerebrum_ml(labels), rel=0.01)
     assert found["label_volumes_mL"]["ventricles"] == pytest.approx((labels == 2).sum() * 2.0**3 / 1e3)
     assert found["area_cm2"]["right"] / found["area_cm2"]["left"] == pytest.approx(1.16, abs=0.02)

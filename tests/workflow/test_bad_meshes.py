@@ -9,7 +9,7 @@ from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 
-from .conftest import Workflow
+from .conftest import Workflow, labelled
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +25,7 @@ MESHING = {
     "max_volume_change": 0.04,
 }
 STUDY = {
-    "brains": [{"id": name, "week": 21, "phantom": {}} for name in ("apart", "tangled")],
+    "brains": [{"id": name, "week": 21, **labelled(21)} for name in ("apart", "tangled")],
     "start": "apart",
     "mesh": MESHING,
     "folding": {"end_week": 22},

@@ -47,7 +47,7 @@ SAME = {
     "flat": flat,
 }
 READING = {"told": {"affine_from": "sform"}}
-GOOD, SHIFTED = "good", "shifted"
+GOOD = "good"
 
 
 @pytest.fixture(scope="module")
@@ -63,14 +63,7 @@ def study(checkout_copy, tmp_path_factory):
     whole = (workflow.directory / "whole.nii.gz").read_bytes()
     (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
     brains.append({"id": "torn", "week": 21, "labels": "torn.nii.gz", "scheme": "spina-bifida-atlas"})
-    nib.save(image(1000 + LABELS), workflow.directory / "t2w.nii.gz")
-    moved = AFFINE.copy()
-    moved[:3, 3] += 1.0
-    nib.save(image(affine=moved), workflow.directory / "moved.nii.gz")
-    for name, source in {GOOD: "whole", SHIFTED: "moved"}.items():
-        command = f"echo my model on {{image}}; cp {workflow.directory / source}.nii.gz {{labels}}"
-        segmented = {"image": "t2w.nii.gz", "scheme": "mine", "segmentation": {"command": command}}
-        brains.append({"id": name, "week": 21.5, **segmented})
+    brains.append({"id": GOOD, "week": 21.5, "labels": "whole.nii.gz", "scheme": "mine"})
     mine = {"cerebrum": [1, 2, 5, 6, 8], "cortex": [5], "known": {3: "cerebellum", 4: "CSF", 7: "brainstem"}}
     config = {
         "schemes": {"mine": mine},
@@ -117,15 +110,9 @@ def test_flat_voxels_are_used_with_a_warning(study):
     assert "are used as they are" not in study.log(GOOD)
 
 
-def test_labels_on_another_grid_than_their_image_are_refused(study):
-    assert "labels.nii.gz: is not on the grid of its image" in study.log(SHIFTED, "segmentation")
-    assert not [path for path in (study.results / SHIFTED / "surface").rglob("*") if path.is_file()]
-
-
 @pytest.mark.fault(16)
-def test_a_segmentation_of_ones_own_gives_a_surface_with_its_thickness_at_its_week(study):
+def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its_week(study):
     folder = study.results / GOOD / "surface"
-    assert f"my model on {study.directory / 't2w.nii.gz'}" in study.log(GOOD, "segmentation")
     report = study.report(GOOD)
     assert (report["week"], report["scheme"], report["euler_number"]) == (21.5, "mine", 2)
     assert abs(report["smoothing"]["volume_change"]) < 0.01
@@ -136,23 +123,16 @@ def test_a_segmentation_of_ones_own_gives_a_surface_with_its_thickness_at_its_we
     assert "a suggestion for thickness_mm" in study.log(GOOD, "cortical_thickness")
 
 
-def test_images_are_segmented_and_shown_where_they_are_given(workflow):
+def test_images_are_shown_where_they_are_given(workflow):
     for name in ("t2w.nii.gz", "labels.nii.gz"):
         (workflow.directory / name).touch()
-    volume = {"image": "t2w.nii.gz", "scheme": "feta-7"}
     brains = [
-        {"id": "a", "week": 21, **volume, "segmentation": {"command": "model {image} {labels}"}},
-        {"id": "b", "week": 22, **volume, "labels": "labels.nii.gz"},
-        {"id": "c", "week": 23, "labels": "labels.nii.gz", "scheme": "binary"},
+        {"id": "a", "week": 22, "image": "t2w.nii.gz", "labels": "labels.nii.gz", "scheme": "feta-7"},
+        {"id": "b", "week": 23, "labels": "labels.nii.gz", "scheme": "binary"},
     ]
     study = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
     jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
-    assert (jobs["segmentation"], jobs["overlay_figure"], jobs["pial_from_labels"], jobs["cortical_thickness"]) == (
-        1,
-        2,
-        3,
-        2,
-    )
+    assert (jobs["overlay_figure"], jobs["pial_from_labels"], jobs["cortical_thickness"]) == (1, 2, 1)
 
 
 def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):

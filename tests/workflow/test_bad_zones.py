@@ -9,7 +9,7 @@ from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 
-from .conftest import Workflow
+from .conftest import Workflow, labelled
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +19,7 @@ def files_in(folder):
 
 
 FOLDED = {
-    "brains": [{"id": "a", "week": 21, "phantom": {}}],
+    "brains": [{"id": "a", "week": 21, **labelled(21)}],
     "start": "a",
     "folding": {"end_week": 21.25, "output_every_gw": 0.25, "thickness_mm": 4.0},
     "runs": {

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from .conftest import SMALL_STUDY
+from .conftest import SMALL_STUDY, labelled
 
 
 def gyriflow(workflow, *arguments):
@@ -60,7 +60,7 @@ def test_check_says_what_will_run_and_what_it_takes(workflow):
 
 @pytest.mark.slow
 def test_a_study_of_fifty_runs_is_planned_with_its_core_hours_and_cost(workflow):
-    brains = [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 22, "phantom": {}}]
+    brains = [{"id": "a", "week": 21, **labelled(21)}, {"id": "b", "week": 22, **labelled(22)}]
     vary = {"thickness_mm": [1 + 0.2 * i for i in range(10)], "shear_modulus_cortex_pa": [300, 600, 900, 1500, 3000]}
     fifty = {"fifty": {"base": "reference", "vary": vary, "compare_week": 22}}
     study = {"brains": brains, "start": "a", "folding": {"end_week": 22}, "runs": {"reference": {}}, "studies": fifty}

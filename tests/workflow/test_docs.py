@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 import yaml
+from configurations import labelled
 
 from gyriflow.config import load
 
 CHECKOUT = Path(__file__).parents[2]
 PAGES = [CHECKOUT / "README.md", CHECKOUT / "docs" / "tutorial.md", *sorted(CHECKOUT.glob("docs/how-to/*.md"))]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
-BRAINS = [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 24, "phantom": {}}]
+BRAINS = labelled(21, 24)
 FILE = re.compile(r"[\w./-]+\.(?:nii\.gz|gii|tsv|mgz|pial|white)\b")
 
 

@@ -72,7 +72,6 @@ def test_a_given_configuration_replaces_the_demo_and_its_files_are_beside_it(wor
     outcome = workflow.run("-n", "surface", "--configfile", name, "--directory", "elsewhere")
     assert outcome.returncode == 0, outcome.stderr
     assert str(folder / "labels.nii.gz") in outcome.stdout + outcome.stderr
-    assert "phantom" not in outcome.stdout + outcome.stderr
 
 
 def test_a_table_of_participants_is_found_beside_its_configuration(workflow):

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import odd_brains
 import pytest
 from shapes import LPS, cerebrum_surface, phantom, rigid
 
@@ -17,7 +18,6 @@ from gyriflow.io.registrations import read_carried_mesh
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.parameters.terms import SIDES
-from gyriflow.phantom import pathologies
 
 from .conftest import COARSE
 
@@ -60,7 +60,7 @@ def growth_of_volume(points: np.ndarray, first: int) -> np.ndarray:
 def hemispheres() -> dict[str, TriangleMesh]:
     """Closed hemispheres of a phantom of week 21, about its centre."""
     labels, affine = phantom(21.0, 2.0)
-    brain = cerebrum_surface(pathologies.apart(labels, affine), affine)
+    brain = cerebrum_surface(odd_brains.apart(labels, affine), affine)
     centre = brain.vertices.mean(axis=0)
     sides = sorted(pieces(brain), key=lambda piece: piece.vertices[:, 0].mean())
     return {side: TriangleMesh(mesh.vertices - centre, mesh.faces) for side, mesh in zip(SIDES, sides, strict=True)}

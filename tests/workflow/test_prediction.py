@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from phantoms import phantom_labels
 from shapes import cerebrum_surface, rigid, save_gifti, save_labels
 
 from gyriflow.geometry.alignment import angle_deg, rigid_fit
@@ -13,7 +14,6 @@ from gyriflow.io.registrations import read_targets
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.similarity import surface_distance
-from gyriflow.phantom.brain import phantom_labels
 from gyriflow.report.labels import FORETOLD
 
 STUDY = {

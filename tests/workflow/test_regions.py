@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from phantoms import CORTEX, phantom_labels
 from shapes import LPS, hemisphere, save_gifti
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
@@ -13,15 +14,12 @@ from gyriflow.io.poses import read_pose
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps, write_surface, write_vertex_labels
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
-from gyriflow.phantom.brain import CORTEX, phantom_labels
 
-from .conftest import COARSE, Workflow
+from .conftest import COARSE, Workflow, labelled
 
 VOXEL_MM = 2.0
 STUDY = {
-    "brains": [
-        {"id": f"p{week}", "week": week, "subject": "one", "phantom": {"voxel_mm": VOXEL_MM}} for week in (21, 22)
-    ],
+    "brains": [{"id": f"p{week}", "week": week, "subject": "one", **labelled(week)} for week in (21, 22)],
     "start": "p21",
     "surface": {"edge_length_mm": 2.5},
     "mesh": COARSE,
@@ -29,7 +27,6 @@ STUDY = {
     "metrics": {
         "curvature_radius_mm": 6,
         "spangy_modes": 60,
-        "export": "bids",
         "template": "p22",
         "white_surfaces": "all",
         "regions": {"p22": {"volume": "regions.nii.gz", "names": {1: "front", 2: "front", 3: "back", 4: "back"}}},

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from .conftest import SMALL_STUDY
+from .conftest import SMALL_STUDY, labelled
 from .test_dag import BOTH_RUNS, CONFIGURATION, NEW_RESULTS, ONE_RUN, RESOURCES, SHAPE
 
 pytestmark = pytest.mark.slow
@@ -68,15 +68,15 @@ def test_a_change_of_code_runs_again_what_uses_it(finished, names, expected):
 
 
 def with_brain(study):
-    study["brains"].append({"id": "c", "week": 23, "phantom": {"voxel_mm": 1.5}})
+    study["brains"].append({"id": "c", "week": 23, **labelled(23)})
 
 
 def with_run(study):
     study["runs"]["third"] = {"thickness_mm": 2.0}
 
 
-def with_other_phantom(study):
-    study["brains"][1]["phantom"]["seed"] = 3
+def with_other_labels(study):
+    study["brains"][1] |= labelled(23)
 
 
 def with_later_end(study):
@@ -90,7 +90,7 @@ def with_later_end(study):
         (
             with_brain,
             SHAPE
-            | {"phantom": 1, "pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 4}
+            | {"pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 4}
             | {
                 "growth_rates": 1,
                 "growth_figure": 1,
@@ -100,7 +100,7 @@ def with_later_end(study):
             },
         ),
         (with_run, ONE_RUN),
-        (with_other_phantom, OF_THE_OTHER_BRAIN | {"phantom": 1}),
+        (with_other_labels, OF_THE_OTHER_BRAIN),
         (with_later_end, BOTH_RUNS | {"folded_surface": 6, "measure": 6}),
     ],
     ids=["brain", "run", "input", "end"],
@@ -114,7 +114,7 @@ def test_a_change_of_brains_and_runs_makes_what_is_new_and_what_compares(finishe
 
 @pytest.mark.fault(39)
 def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(finished):
-    labels = "results/brains/b/surface/labels.nii.gz"
+    labels = "phantom-22.nii.gz"
     with changed_files(finished.directory, labels):
         assert finished.jobs("--configfile", "study.yaml") == OF_THE_OTHER_BRAIN
         said = finished.run("-n", "--configfile", "study.yaml").stdout

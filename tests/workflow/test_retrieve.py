@@ -188,6 +188,6 @@ def test_no_network_ends_in_5_with_one_message_a_file_and_nothing_torn(workflow)
 
 def test_without_an_atlas_there_is_nothing_to_retrieve(workflow):
     name = workflow.write(
-        "study.yaml", {"brains": [{"id": "a", "week": 21, "phantom": {}}], "start": "a"} | {"folding": {"end_week": 22}}
+        "study.yaml", {"brains": [{"id": "a", "week": 21, "pial": __file__}], "start": "a", "folding": {"end_week": 22}}
     )
     assert workflow.jobs("retrieve", "--configfile", name).get("atlas_file", 0) == 0

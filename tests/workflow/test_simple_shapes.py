@@ -2,17 +2,17 @@
 
 import pytest
 
-from .conftest import Workflow
+from .conftest import Workflow, labelled
 
 STUDY = {
     "brains": [
-        {"id": "dome", "week": 21, "shape": {"kind": "half-ellipsoid"}},
-        {"id": "old", "week": 22, "phantom": {}},
+        {"id": "ball", "week": 21, "shape": {"kind": "ellipsoid"}},
+        {"id": "old", "week": 22, **labelled(22)},
     ],
-    "start": "dome",
+    "start": "ball",
     "folding": {"end_week": 22, "contact": {"kind": "none"}},
 }
-TARGET = "results/brains/dome/surface/pial.surf.gii"
+TARGET = "results/brains/ball/surface/pial.surf.gii"
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def made(checkout_copy, tmp_path_factory):
     """The surface of the shape, which counts as made."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("shape"))
     name = workflow.write("study.yaml", STUDY)
-    folder = workflow.directory / "results" / "brains" / "dome" / "surface"
+    folder = workflow.directory / "results" / "brains" / "ball" / "surface"
     folder.mkdir(parents=True)
     sides = [f"{side}pial.surf.gii" for side in ("", "left.", "right.")]
     for file in ["shape.surf.gii", "pial.stl", "surface.json", *sides]:
@@ -36,10 +36,10 @@ def made(checkout_copy, tmp_path_factory):
     ("change", "expected"),
     [
         ({"surface": {"edge_length_mm": 1.2}}, {"shape": 1, "pial_from_shape": 1}),
-        ({"shape": {"kind": "slab"}}, {"shape": 1, "pial_from_shape": 1}),
-        ({"shape": {"kind": "half-ellipsoid", "seed": 1}}, {"shape": 1, "pial_from_shape": 1}),
+        ({"shape": {"kind": "sphere"}}, {"shape": 1, "pial_from_shape": 1}),
+        ({"shape": {"kind": "ellipsoid", "seed": 1}}, {"shape": 1, "pial_from_shape": 1}),
         # defaults written out, and what is for other kinds of input
-        ({"shape": {"kind": "half-ellipsoid", "noise_mm": 0.05}}, {}),
+        ({"shape": {"kind": "ellipsoid", "noise_mm": 0.05}}, {}),
         ({"surface": {"smoothing_iterations": 3, "max_hole_mm": 1.0}}, {}),
     ],
 )

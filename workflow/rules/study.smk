@@ -65,7 +65,6 @@ rule group_tables:
 
 
 EXPORTED = PLAN.measuring.exported
-EXPORT_LAST = {"plain": "metrics_wide.csv", "bids": "dataset_description.json"}
 
 
 # a target of its own: what a study is handed on as
@@ -90,10 +89,9 @@ rule export:
         wide=rules.group_tables.output.wide,
     output:
         # a folder would hold a file of Snakemake's
-        f"results/export/{EXPORT_LAST[CONFIG.metrics.export]}",
+        "results/export/dataset_description.json",
     params:
         brains=EXPORTED,
-        names=CONFIG.metrics.export,
     script:
         "../scripts/export.py"
 

@@ -22,7 +22,7 @@ rule pial_from_labels:
     output:
         **PIAL,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.from_source("labels", "segmentation", "phantom")),
+        brain=one_of(PLAN.brains.from_source("labels")),
     resources:
         mem_mb=surface_memory,
         runtime=30,

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gyriflow.io.exports import ExportedBrain, export_bids, export_plain
+from gyriflow.io.exports import ExportedBrain, export_bids
 from gyriflow.io.files import emptied, read_table
 from gyriflow.metrics.tables import wide_names
 from gyriflow.step import step
@@ -13,8 +13,5 @@ with step(snakemake.log[0]):
     folder = emptied(Path(snakemake.output[0]).parent)
     brains = [ExportedBrain(**brain) for brain in params.brains]
     tables = {"metrics_long": read_table(files.long), "metrics_wide": read_table(files.wide)}
-    if params.names == "bids":
-        units = dict(zip(wide_names(tables["metrics_long"]), tables["metrics_long"]["unit"], strict=True))
-        export_bids(folder, brains, tables, version(), units)
-    else:
-        export_plain(folder, brains, tables)
+    units = dict(zip(wide_names(tables["metrics_long"]), tables["metrics_long"]["unit"], strict=True))
+    export_bids(folder, brains, tables, version(), units)

@@ -1,7 +1,7 @@
 """A simple geometry as a closed surface in the place of a brain's."""
 
+from gyriflow.anatomy.shapes import shape_surface
 from gyriflow.io.surfaces import write_surface
-from gyriflow.phantom.shapes import shape_surface
 from gyriflow.step import step
 
 with step(snakemake.log[0]):

@@ -187,7 +187,7 @@ def write_bids(
         **{"brains": [_absolute(brain.entry, folder) for brain in found], "start": starts or found[0].entry["id"]},
         **{"runs": runs, **given},
         "folding": {"end_week": max(max(weeks), min(weeks) + 1)} | (given.get("folding") or {}),
-        "metrics": {"white_surfaces": "all"} | (given.get("metrics") or {}) | {"export": "bids"},
+        "metrics": {"white_surfaces": "all"} | (given.get("metrics") or {}),
     }
     write_text(path, yaml.safe_dump(text, sort_keys=False))
     return [brain.entry["id"] for brain in found]

@@ -12,43 +12,24 @@ from pydantic import ConfigDict, Field, model_validator
 from ..errors import InputError
 from ..parameters.schemes import Label
 from ..parameters.settings import InputFile, Problem, Settings, beside, check, located
-from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings, ShapeSettings
+from ..parameters.synthetic import ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
 from ..parameters.varying import Week
 from .scans import AGE, AGES, IDS, NOTHING, SESSION, SURE_AGES, Scan, read_scans
 
-SOURCES = ("labels", "segmentation", "hemispheres", "hemisphere", "pial", "phantom", "shape")
+SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """The keys of which a brain has exactly one."""
 
 VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
 """How the names of volumes end."""
 
-VOLUMES = ("labels", "segmentation")
-"""Sources that give a label volume."""
 MEANINGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("scheme", "image", "affine_from"), (*VOLUMES, "hemisphere")),
+    **dict.fromkeys(("scheme", "image", "affine_from"), ("labels", "hemisphere")),
     "coordinates": ("hemispheres", "hemisphere", "pial"),
     "white": ("pial",),
-    "population": tuple(source for source in SOURCES if source not in ("phantom", "shape")),
+    "population": tuple(source for source in SOURCES if source != "shape"),
 }
 """Keys that make sense only with some sources."""
-PLACEHOLDERS = ("{image}", "{labels}")
-"""Placeholders for the two files in a segmentation command."""
-
-
-class SegmentationSettings(Settings):
-    """Your own program that makes a label volume from the brain's `image`; gyriflow itself does not segment."""
-
-    command: str
-    """Shell command that reads the file {image} and writes the labels of the brain's `scheme`, on the same
-    grid, to the NIfTI file {labels}."""
-
-    @check
-    def _names_its_files(self) -> Iterator[Problem]:
-        missing = [place for place in PLACEHOLDERS if place not in self.command]
-        if missing:
-            text = f"lacks {' and '.join(missing)}, the placeholders for the files it reads and writes"
-            yield Problem(text, ("command",))
 
 
 class WhiteFiles(Settings):
@@ -84,9 +65,7 @@ class OneHemisphere(Settings):
 
 
 class Brain(Settings):
-    """One brain, made from exactly one of `labels`, `segmentation`, `hemispheres`, `hemisphere`, `pial`, `phantom` and
-    `shape`.
-    """
+    """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial` and `shape`."""
 
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME)
     """Name in paths and tables: letters, digits, - _ ."""
@@ -102,12 +81,10 @@ class Brain(Settings):
     labels: InputFile | None = None
     """Tissue label volume (NIfTI or MGZ)."""
     image: InputFile | None = None
-    """T2-weighted volume (NIfTI): input of `segmentation`, or with `labels` shown in a figure."""
-    segmentation: SegmentationSettings | None = None
-    """Your program that makes labels from `image`."""
+    """T2-weighted volume (NIfTI) of the labels, shown in a figure."""
     scheme: str | None = None
     """What the labels mean: the name of a file in the folder `schemes`, such as `dhcp-19`, or of the key
-    `schemes`. Needed with `labels` and `segmentation`."""
+    `schemes`. Needed with `labels`."""
     affine_from: AffineSource = "auto"
     """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
     hemispheres: HemisphereFiles | None = None
@@ -120,8 +97,6 @@ class Brain(Settings):
     """White surface of `pial`, for the cortical thickness."""
     coordinates: Coordinates = "auto"
     """Axes of surface files; `auto` finds any pose."""
-    phantom: PhantomSettings | None = None
-    """A synthetic brain; `{}` takes all defaults."""
     shape: ShapeSettings | None = None
     """A simple geometry in place of a brain."""
 
@@ -132,8 +107,8 @@ class Brain(Settings):
 
     @property
     def synthetic(self) -> bool:
-        """Whether the workflow makes the brain itself."""
-        return self.source in ("phantom", "shape")
+        """Whether it is a shape in place of a brain."""
+        return self.shape is not None
 
     @property
     def sides(self) -> tuple[Side, ...]:
@@ -142,7 +117,7 @@ class Brain(Settings):
 
     @property
     def label_volume(self) -> str | None:
-        """The label volume that the user gives; None where there is none, or the workflow makes it."""
+        """The label volume; None where there is none."""
         if self.hemisphere is not None and self.scheme is not None:
             return self.hemisphere.file
         return self.labels
@@ -150,7 +125,7 @@ class Brain(Settings):
     @property
     def has_labels(self) -> bool:
         """Whether the surface is made from a label volume."""
-        return self.label_volume is not None or self.source in ("segmentation", "phantom")
+        return self.label_volume is not None
 
     @property
     def has_vertices(self) -> bool:
@@ -178,8 +153,7 @@ class Brain(Settings):
         given = [key for key in SOURCES if self.gives(key)]
         if not given and self.image is not None:
             yield Problem(
-                "gyriflow does not segment images; give a label volume under labels, or under segmentation your own "
-                "command that makes one from the image",
+                "gyriflow does not segment images; give a label volume under labels",
                 ("image",),
             )
         elif len(given) != 1:
@@ -189,13 +163,8 @@ class Brain(Settings):
             for key, sources in MEANINGS.items():
                 if key in self.model_fields_set and given[0] not in sources:
                     yield Problem(f"has no meaning with {given[0]}; only with {' or '.join(sources)}", (key,))
-        if set(given) & set(VOLUMES) and self.scheme is None:
+        if self.labels is not None and self.scheme is None:
             yield Problem("is missing; it says what the labels mean", ("scheme",))
-        if self.segmentation is not None and self.image is None:
-            yield Problem("has no image to work on; give one under image", ("segmentation",))
-        first, last = PHANTOM_WEEKS
-        if self.phantom is not None and not first <= self.week <= last:
-            yield Problem(f"found {self.week:g}; a phantom's should be {first:g} to {last:g}", ("week",))
 
     @check
     def _a_hemisphere_is_labels_or_surface(self) -> Iterator[Problem]:
@@ -222,9 +191,7 @@ NESTED: Mapping[str, tuple[str, ...]] = {
                     *(f"hemispheres.white.{key}" for key in WhiteFiles.model_fields)),
     "hemisphere": tuple(f"hemisphere.{key}" for key in OneHemisphere.model_fields),
 }  # fmt: skip
-COMMANDS = tuple(f"segmentation.{key}" for key in SegmentationSettings.model_fields)
-"""Keys of brains that are programs: a configuration's, never a table's, which is data."""
-NOT_OF_TABLES = ("id", "segmentation", "phantom", "shape", "covariates")
+NOT_OF_TABLES = ("id", "shape", "covariates")
 COLUMNS = (
     *(key for key in Brain.model_fields if key not in (*NESTED, *NOT_OF_TABLES)),
     *(column for columns in NESTED.values() for column in columns),
@@ -299,7 +266,7 @@ def covariates(scan: Scan) -> dict[str, dict[str, str]]:
 
 
 def _require_known_columns(path: Path, columns: list[str]) -> None:
-    known = {*IDS, SESSION, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS, *COMMANDS}
+    known = {*IDS, SESSION, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS}
     for column in {name for name in columns if name.lower() not in AGES} - known:
         nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
         if nearest:
@@ -323,7 +290,7 @@ def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str
             return {}, f"files: found {len(parts)}, {'; '.join(parts)}; expected {expected}"
         values |= _of_files(parts, side)
     entry: dict[str, Any] = {}
-    for column in (*COLUMNS, *COMMANDS):
+    for column in COLUMNS:
         if column not in values or column == "week":
             continue
         value = values[column]

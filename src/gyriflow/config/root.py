@@ -13,7 +13,6 @@ from ..io.yaml_files import read_keys
 from ..parameters.folding import VARYING, FoldingSettings, output_weeks
 from ..parameters.schemes import LabelScheme, SchemeSettings
 from ..parameters.settings import Settings, refused
-from ..parameters.synthetic import PhantomSettings
 from ..parameters.varying import Varying, files_of
 from ..units import week_tag
 from .atlas import Atlas, AtlasSettings, UsedAtlas
@@ -136,14 +135,14 @@ class Config(Settings):
         kinds = sorted({brain.shape.kind for brain in chosen if brain.shape is not None})
         names = [
             *(f"{name} ({_span(weeks)} GW)" if several else name for name, weeks in populations.items()),
-            "phantom" if any(brain.source == "phantom" for brain in chosen) else "",
             (kinds[0] if len(kinds) == 1 else "simple shape") if kinds else "",
         ]
         return " or ".join(name for name in names if name) or REAL_BRAIN
 
     def scheme(self, brain: Brain) -> dict[str, Any]:
-        """Returns the scheme of a brain's labels, the fields of a `LabelScheme`; for a phantom too."""
-        name = brain.scheme or (brain.phantom or PhantomSettings()).scheme
+        """Returns the scheme of a brain's labels, the fields of a `LabelScheme`."""
+        name = brain.scheme
+        assert name is not None
         own = self.schemes.get(name)
         scheme = SCHEMES[name] if own is None else LabelScheme(name=name, **own.model_dump())
         return scheme.model_dump()
@@ -313,13 +312,13 @@ class Config(Settings):
         """The ids of the measured brains that others are compared with: the given ones, or else all real ones.
 
         They have the hemispheres of the first start brain: half a brain is no measure of whole ones. If none are given
-        and the real ones are of several populations, those of the start's are used; phantoms where no brain is real.
+        and the real ones are of several populations, those of the start's are used.
         """
         if not self.start_brains:
             return []
         start, given = self.brain(self.start_brains[0]), self.metrics.norm_reference
         brains = [brain for brain in self.brains if brain.sides == start.sides]
-        real = [brain for brain in brains if not brain.synthetic] or [b for b in brains if b.source == "phantom"]
+        real = [brain for brain in brains if not brain.synthetic]
         if len({brain.population for brain in real}) > 1:
             real = [brain for brain in real if brain.population == start.population]
         chosen = real if given is None else [brain for brain in brains if brain.id in given]

@@ -26,8 +26,6 @@ AGES = (*IN_WEEKS, *IN_DAYS)
 """All names of that column, in small letters or capitals."""
 NOTHING = frozenset(("", "n/a"))
 """What stands for no value in BIDS."""
-PROGRAMS = "segmentation."
-"""How keys of brains begin that are programs: a configuration's, never a table's."""
 SUBJECT = re.compile(r"sub-[A-Za-z0-9]{1,100}")
 DAYS = "days"
 UNITS = {
@@ -65,7 +63,7 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None, ids: Sequen
     which `{id}`, `{subject}` and `{session}` are the row's. InputError where a table cannot be read, has no column of
     ids or gestational ages, or several that may be the age.
     """
-    rows = [dict(further or {}) | row for row in _read(path)]
+    rows = [dict(further or {}) | row for row in read_tab_separated(path)]
     id_column = _required(path, list(rows[0]), ids, "ids")
     sessions = _sessions(path.parent, [row[id_column] for row in rows])
     # no age is needed here of those who have sessions
@@ -90,21 +88,6 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None, ids: Sequen
     return scans
 
 
-def _read(path: Path) -> list[dict[str, str]]:
-    """Returns the rows of a table; InputError where it cannot be read, or names programs."""
-    rows = read_tab_separated(path)
-    if commands := [name for name in rows[0] if name.startswith(PROGRAMS)]:
-        raise InputError(
-            "names programs, which are not run: a table is data, whoever sent it",
-            path=path,
-            found=", ".join(commands),
-            expected="columns that name files, ages and the like",
-            remedy="Give what all rows share under participants.columns in the configuration, with {id} for the row's "
-            "id; or list the brains under brains.",
-        )
-    return rows
-
-
 def _sessions(folder: Path, participants: Sequence[str]) -> dict[str, list[tuple["_Ages", dict[str, str]]]]:
     """Returns the sessions of participants that tables of their own are of, each with the ages of its table.
 
@@ -113,7 +96,7 @@ def _sessions(folder: Path, participants: Sequence[str]) -> dict[str, list[tuple
     found: dict[str, list[tuple[_Ages, dict[str, str]]]] = {}
     whole = folder / "sessions.tsv"
     if whole.is_file():
-        rows = _read(whole)
+        rows = read_tab_separated(whole)
         column, ages = _required(whole, list(rows[0]), IDS, "ids"), _Ages(whole, rows)
         for row in rows:
             found.setdefault(row[column], []).append((ages, row))
@@ -136,7 +119,7 @@ class _Ages:
     @classmethod
     def of_sessions(cls, path: Path) -> "_Ages | None":
         """Returns the ages of a table of sessions; None where it has none."""
-        rows = _read(path)
+        rows = read_tab_separated(path)
         _required(path, list(rows[0]), (SESSION,), "sessions")
         aged = any(name.lower() in AGES or _describes_age(_sidecar(path).get(name)) for name in rows[0])
         return cls(path, rows) if aged else None

@@ -10,7 +10,6 @@ from ..parameters.terms import (
     MOST_HOLE_MM,
     SPANGY_MODES,
     SPANGY_PROXY,
-    ExportNames,
     LastBand,
     Mesher,
     SpangyProxy,
@@ -105,7 +104,7 @@ class MetricsSettings(Settings):
     their mirror image; where both are within half a voxel they always do."""
     norm_reference: tuple[str, ...] | None = None
     """Ids of the measured brains that others are compared with in tables of centiles. `null`: all real ones (of
-    several populations, the start brain's), or all phantoms if none is real. Brains with other hemispheres than
+    several populations, the start brain's). Brains with other hemispheres than
     the first start brain are left out."""
     regions: dict[str, GivenRegions] = Field({})
     """Regions of the cortex, by the id of the brain on which they are given. Registration carries them to other
@@ -117,8 +116,6 @@ class MetricsSettings(Settings):
     named_sulci: bool = False
     """Without `regions`: whether named sulci are the regions, as drawn on a brain of the spina bifida atlas and
     carried to others by registration. The weeks in which sulci begin have their names always."""
-    export: ExportNames = "plain"
-    """How the target `export` names files; `bids` as in derivatives."""
 
 
 class ReportSettings(Settings):

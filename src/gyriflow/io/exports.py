@@ -1,4 +1,4 @@
-"""Surfaces, maps and tables of a study in a folder to hand on, with their own names or those of BIDS derivatives."""
+"""Surfaces, maps and tables of a study as BIDS derivatives."""
 
 import re
 import shutil
@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
 from ..parameters.terms import STRUCTURES, Side
-from .files import AnyPath, read_json, replaced, write_json, write_table, write_text
+from .files import AnyPath, read_json, replaced, write_json, write_text
 from .poses import read_pose
 from .surfaces import read_surface, read_vertex_maps, write_surface, write_vertex_maps
 from .volumes import LabelVolume, read_label_volume, write_label_volume
@@ -90,19 +90,6 @@ class ExportedBrain:
     template: str | None = None
     template_maps: Mapping[Side, str] = field(default_factory=dict)
     volume: Mapping[str, Any] = field(default_factory=dict)
-
-
-def export_plain(folder: AnyPath, brains: Sequence[ExportedBrain], tables: Mapping[str, pd.DataFrame]) -> None:
-    """Writes tables as CSV, and the files of each brain under `BRAIN/RUN/week-WEEK` with the names that they have."""
-    folder = Path(folder)
-    for name, table in tables.items():
-        write_table(folder / f"{name}.csv", table)
-    for brain in brains:
-        place = folder / brain.brain / brain.run / f"week-{brain.week:.2f}"
-        of_white = brain.white, brain.white_maps
-        for files in (brain.surfaces, brain.maps, brain.regions, *of_white, brain.template_maps):
-            for path in files.values():
-                _copy(path, place / Path(path).name)
 
 
 def export_bids(

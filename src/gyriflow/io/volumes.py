@@ -99,21 +99,6 @@ def read_values(
     return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
 
 
-def require_same_grid(labels: LabelVolume, path: AnyPath, image_path: AnyPath, affine_from: AffineSource) -> None:
-    """Raises InputError where a label volume, read from `path`, is not on the grid of the image that it was made of."""
-    values, affine = read_values(image_path, affine_from, "grey values")
-    voxel = np.linalg.norm(affine[:3, :3], axis=0).min()
-    same = labels.labels.shape == values.shape
-    if not same or _farthest_corner(labels.affine - affine, values.shape) > AGREEMENT_VOXELS * voxel:
-        raise InputError(
-            "is not on the grid of its image",
-            path=path,
-            found=f"shape {labels.labels.shape}, affine\n{labels.affine}\n",
-            expected=f"those of {image_path}: shape {values.shape}, affine\n{affine}\n",
-            remedy="The segmentation must resample its labels to the image that it was given.",
-        )
-
-
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
     """Writes a label volume as NIfTI in mm, in the smallest integer type that holds its labels."""
     labels = volume.labels

@@ -82,7 +82,7 @@ def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
     """Returns the (n,) straight distance in mm from each vertex outwards to the closed surface around; 0 outside it.
 
     Around is the convex hull of the hemisphere: of the measures that were compared it is nearest to the
-    known depths of phantoms, and does not jump when the lips of a fissure close.
+    known depths of shapes, and does not jump when the lips of a fissure close.
     """
     signed, *_ = igl.signed_distance(
         mesh.vertices, around.vertices, around.faces, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL

@@ -70,9 +70,6 @@ SpangyProxy = Literal["shape_index", "mean_curvature"]
 LastBand = Literal["B4", "B5", "B6"]
 """The last complete band of eigenmodes."""
 
-ExportNames = Literal["plain", "bids"]
-"""How exported files are named."""
-
 CURVATURE_RADIUS_MM = 3.0
 """At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
 SPANGY_PROXY: SpangyProxy = "shape_index"

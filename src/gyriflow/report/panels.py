@@ -13,7 +13,7 @@ from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
 from .scene import PIXELS_PER_INCH, TISSUE, Material, View, half_extents, picture_axes, render, sees
-from .style import FULL_WIDTH_IN, PHANTOM, SINGLE_COLUMN_IN, synthetic_note, wrap
+from .style import FULL_WIDTH_IN, SIMPLE_SHAPE, SINGLE_COLUMN_IN, synthetic_note, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
 _DOTS_PER_INCH = 300
@@ -96,7 +96,7 @@ def panel_grid(
     rows: Sequence[Row],
     *,
     synthetic: bool = False,
-    measured: str = PHANTOM,
+    measured: str = SIMPLE_SHAPE,
     colour_bars: Sequence[tuple[ScalarMappable, str]] = (),
     legend: Sequence[Patch] = (),
 ) -> Figure:

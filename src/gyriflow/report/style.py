@@ -39,10 +39,10 @@ NEUTRAL_COLOUR = "#D9D9D9"
 
 MEASURED = "real"
 """The run name of measured brains."""
-REAL_BRAIN, PHANTOM = "real brain", "phantom"
+REAL_BRAIN, SIMPLE_SHAPE = "real brain", "simple shape"
 """What brains that were not simulated are called where their population is not known."""
-SYNTHETIC_NAMES = frozenset((PHANTOM, "simple shape", "sphere", "ellipsoid", "half-ellipsoid", "slab"))
-"""What brains are called that the workflow made itself."""
+SYNTHETIC_NAMES = frozenset((SIMPLE_SHAPE, "sphere", "ellipsoid"))
+"""What shapes in place of brains are called."""
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
@@ -80,7 +80,7 @@ class Shown(TypedDict, total=False):
     ----------
     runs : all runs of the study, which settle the colours
     measured : what the measured brains are called, "real brain" unless it is said
-    synthetic : whether the folded brains are phantoms
+    synthetic : whether the folded brains are shapes in their place
     """
 
     runs: Sequence[str]
@@ -104,13 +104,13 @@ def styled[**P](chart: Callable[P, Figure]) -> Callable[P, Figure]:
     return drawn
 
 
-def new_figure(width_in: float, height_in: float, *, synthetic: bool, measured: str = PHANTOM) -> Figure:
+def new_figure(width_in: float, height_in: float, *, synthetic: bool, measured: str = SIMPLE_SHAPE) -> Figure:
     """Returns an empty figure. What it shows is said by its caption; that brains are synthetic, by the figure too.
 
     Parameters
     ----------
     synthetic
-        Whether the folded brain is a phantom.
+        Whether the folded brain is a shape in its place.
     measured
         What the brains that it is shown beside are called.
     """
@@ -127,7 +127,7 @@ def panel_figure(
     panel_in: float = 1.9,
     foot_in: float = 0.7,
     synthetic: bool = False,
-    measured: str = PHANTOM,
+    measured: str = SIMPLE_SHAPE,
     **grid: Any,
 ) -> tuple[Figure, list[Axes]]:
     """Returns a figure with so many panels, row after row, and the panels, with their letters.
@@ -157,7 +157,7 @@ def run_panels(
     count: int, present: Iterable[str], shown: Shown, **layout: Any
 ) -> tuple[Figure, list[Axes], dict[str, Any]]:
     """Returns `panel_figure` for runs that are present, and the colours of these."""
-    told: dict[str, Any] = {"synthetic": shown.get("synthetic", False), "measured": shown.get("measured", PHANTOM)}
+    told: dict[str, Any] = {"synthetic": shown.get("synthetic", False), "measured": shown.get("measured", SIMPLE_SHAPE)}
     figure, panels = panel_figure(count, **told, **layout)
     return figure, panels, chosen_colours(present, shown.get("runs", ()))
 
@@ -181,9 +181,9 @@ def add_letters(panels: Iterable[Axes]) -> None:
             )
 
 
-def synthetic_note(measured: str = PHANTOM) -> str:
+def synthetic_note(measured: str = SIMPLE_SHAPE) -> str:
     """Returns the words under which a synthetic brain is shown, alone or beside brains that are called `measured`."""
-    return "synthetic phantom, not a real brain" if all_synthetic(measured) else "simulated from a synthetic phantom"
+    return "a simple shape, not a real brain" if all_synthetic(measured) else "simulated from a simple shape"
 
 
 def all_synthetic(measured: str) -> bool:

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from .charts import WITH_NORMS
 from .labels import FORETOLD, METRICS, parameter_label, plain, week_label, with_unit
-from .style import MEASURED, PHANTOM, REAL_BRAIN, runs_by_name, simulated_runs, synthetic_note
+from .style import MEASURED, REAL_BRAIN, SIMPLE_SHAPE, runs_by_name, simulated_runs, synthetic_note
 
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60
@@ -208,7 +208,7 @@ def prediction_page(prediction: pd.DataFrame) -> str:
 
 
 def html_table(
-    table: pd.DataFrame, *, caption: str = "", digits: int = 4, synthetic: bool = False, measured: str = PHANTOM
+    table: pd.DataFrame, *, caption: str = "", digits: int = 4, synthetic: bool = False, measured: str = SIMPLE_SHAPE
 ) -> Markup:
     """Returns the table as HTML, ready to be put in a page, with a caption if one is given.
 

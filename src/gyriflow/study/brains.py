@@ -8,7 +8,7 @@ from ..config.root import Config
 from ..io.schemes import SCHEMES
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import Side
-from .paths import LABELS, MASK, POSE, THICKNESS, pial_of
+from .paths import MASK, POSE, THICKNESS, pial_of
 
 
 @dataclass(frozen=True)
@@ -88,17 +88,12 @@ class Brains:
         found = self.config.brain(brain)
         return self.config.scheme(found) if found.has_labels else None
 
-    def phantom(self, brain: str) -> dict[str, Any]:
-        """Returns the settings of a synthetic brain, without what is wrong with it."""
-        settings = self.config.brain(brain).phantom
-        return {} if settings is None else settings.model_dump(exclude={"pathology"})
-
     def shape(self, brain: str) -> dict[str, Any]:
-        """Returns what a simple shape depends on, without the sizes of other kinds."""
+        """Returns what a simple shape depends on."""
         shape = self.config.brain(brain).shape
         assert shape is not None
         return {
-            **{"kind": shape.kind, "size_mm": list(shape.size_mm), "noise_mm": shape.noise_mm, "seed": shape.seed},
+            **{"semi_axes_mm": list(shape.size_mm), "noise_mm": shape.noise_mm, "seed": shape.seed},
             "edge_length_mm": self.config.surface.edge_length_mm,
         }
 
@@ -108,8 +103,10 @@ class Brains:
         return {path: known[path] for path in self.config.brain(brain).files if path in known}
 
     def label_volume(self, brain: str) -> str:
-        """Returns the label volume of a brain: the user's, or the one that the workflow makes."""
-        return self.config.brain(brain).label_volume or LABELS.format(brain=brain)
+        """Returns the label volume of a brain that has one."""
+        volume = self.config.brain(brain).label_volume
+        assert volume is not None
+        return volume
 
     def registered_volume(self, brain: str) -> str:
         """Returns the volume by which a brain is registered: its labels, or a mask made of its surface."""

@@ -53,7 +53,6 @@ def region_files(folder: str) -> dict[str, str]:
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
 
-LABELS = f"{BRAIN}/surface/labels.nii.gz"
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 POSE = f"{BRAIN}/surface/pose.json"
 PIAL = pial_of(*SIDES)

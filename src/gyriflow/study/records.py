@@ -16,7 +16,6 @@ from .paths import (
     CALIBRATION,
     COMPARED_MEMBER,
     FOLDING,
-    LABELS,
     MAPS,
     MASK,
     PARAMETERS,
@@ -134,8 +133,9 @@ class Brain:
 
     @property
     def label_volume(self) -> str:
-        """Its label volume: the user's, or the one that the workflow makes."""
-        return self.given.label_volume or LABELS.format(brain=self.id)
+        """Its label volume; only of a brain that has one."""
+        assert self.given.label_volume is not None
+        return self.given.label_volume
 
     @property
     def registered_volume(self) -> str:

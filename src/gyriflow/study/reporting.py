@@ -9,7 +9,7 @@ from .paths import BRAIN, PIAL, THICKNESS
 
 # the step that makes the surface, by the source of a brain, as its log is called
 _PIAL_STEPS = {
-    **dict.fromkeys(("labels", "segmentation", "phantom"), "pial_from_labels"),
+    "labels": "pial_from_labels",
     "hemispheres": "pial_from_hemispheres",
     "hemisphere": "pial_from_{side}_hemisphere",
     "pial": "pial_from_surface",

@@ -14,7 +14,7 @@ from ..parameters.growth import BEFORE_GW
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import SIDES
 from ..units import week_tag
-from .paths import CURVES, LABELS
+from .paths import CURVES
 from .records import Brain, Calibration, Chain, Comparison, Origin, Simulation
 from .series import Series, series_of
 from .study import Study
@@ -88,7 +88,7 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
     if scheme and LabelScheme(**scheme).cortex:
         thickness_from = "labels"
         if config.metrics.white_surfaces == "all":
-            white_from = white_from or {"labels": given.label_volume or LABELS.format(brain=given.id)}
+            white_from = white_from or {"labels": str(given.label_volume)}
     whole = len(given.sides) == len(SIDES)
     with_regions = [name for name in config.metrics.regions if name not in refused]
     regions_from: Literal["given", "carried", "named"] | None = None
@@ -387,7 +387,7 @@ def _norm_reference(config: Config, starts: Sequence[Brain], brains: Iterable[Br
     alike = [brain for brain in brains if brain.sides == start.sides]
     if given is not None:
         return [brain.id for brain in alike if brain.id in given]
-    real = [brain for brain in alike if not brain.given.synthetic] or [b for b in alike if b.given.source == "phantom"]
+    real = [brain for brain in alike if not brain.given.synthetic]
     if len({brain.given.population for brain in real}) > 1:
         real = [brain for brain in real if brain.given.population == start.given.population]
     return [brain.id for brain in real]

@@ -13,7 +13,6 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import transformed
 from gyriflow.io.schemes import SCHEMES
-from gyriflow.phantom import pathologies
 
 TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]
 
@@ -56,7 +55,7 @@ def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
 
 @pytest.mark.parametrize("turn", TURNS)
 def test_a_turned_brain_is_turned_and_a_mirrored_one_is_called_so(brain, turn):
-    labels, affine = pathologies.add_sides(*brain), brain[1]
+    labels, affine = odd_brains.add_sides(*brain), brain[1]
     pose = pose_of_labels(labels, rigid(*turn) @ affine, SCHEMES["dhcp-19"])
     np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*turn)[:3, :3], np.eye(3), atol=1e-9)
     with pytest.raises(InputError, match=r"left hemisphere lie on the right.*affine mirrors"):
@@ -65,7 +64,7 @@ def test_a_turned_brain_is_turned_and_a_mirrored_one_is_called_so(brain, turn):
 
 @pytest.mark.parametrize("lost", [(10,), (11, 12)], ids=["cerebellum", "brainstem"])
 def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(brain, lost):
-    labels, affine = pathologies.add_sides(*brain), brain[1]
+    labels, affine = odd_brains.add_sides(*brain), brain[1]
     labels = np.where(np.isin(labels, lost), 0, labels)
     for turn in TURNS:
         pose = pose_of_labels(labels, rigid(*turn) @ affine, SCHEMES["dhcp-19"])
@@ -100,7 +99,7 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
     labels, affine = brain
     scheme = SCHEMES["spina-bifida-atlas"]
     assert "left and right are exchanged now" in pose_of_labels(labels[:, ::-1], affine, scheme).warnings[0]
-    sided = pathologies.add_sides(*brain)
+    sided = odd_brains.add_sides(*brain)
     turned = pose_of_labels(sided, rigid(0, 0, 180) @ affine, SCHEMES["dhcp-19"])
     assert "exchanged" not in turned.warnings[0]
 
@@ -109,7 +108,7 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
 @pytest.mark.parametrize("pathology", [None, "without_callosum", "holoprosencephaly", "wide_hemisphere"])
 def test_the_shape_tells_lps_from_ras(brain, pathology):
     labels, affine = brain
-    mesh = cerebrum_surface(getattr(pathologies, pathology)(labels, affine) if pathology else labels, affine)
+    mesh = cerebrum_surface(getattr(odd_brains, pathology)(labels, affine) if pathology else labels, affine)
     assert pose_surface_by_shape(mesh, "auto").warnings == ()
     lps = pose_surface_by_shape(transformed(mesh, rigid(*(0, 0, 180))), "auto")
     np.testing.assert_allclose(lps.of_file()[:3, :3], np.diag([-1.0, -1.0, 1.0]))

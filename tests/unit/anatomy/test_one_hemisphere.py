@@ -3,6 +3,7 @@
 import numpy as np
 import odd_brains
 import pytest
+from phantoms import CENTRE_MM
 from shapes import LPS, cerebrum_surface, phantom, rigid
 
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
@@ -11,8 +12,6 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
 from gyriflow.io.schemes import SCHEMES
-from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM
 
 QUICK = {"week": 24.0, "edge_length_mm": 2.0}
 DHCP = SCHEMES["dhcp-19"]
@@ -52,7 +51,7 @@ def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
 
 @pytest.mark.fault(41)
 def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
-    labels, affine = pathologies.add_sides(*brain), brain[1]
+    labels, affine = odd_brains.add_sides(*brain), brain[1]
     left = odd_brains.one_hemisphere(labels, affine, "left")
     surface = from_labels(left, affine, DHCP, "left", **QUICK)
     assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5
@@ -69,7 +68,7 @@ def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain
 
 
 def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_told_so(brain):
-    labels, affine = pathologies.add_sides(*brain), brain[1]
+    labels, affine = odd_brains.add_sides(*brain), brain[1]
     left, right = DHCP.cortex
     for kept, lost, side in ((left, right, "left"), (right, left, "right")):
         merged = np.where(labels == lost, kept, labels)
@@ -78,7 +77,7 @@ def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_told_so(brain)
 
 
 def test_volumes_of_a_hemisphere_whose_affine_is_lps_are_turned_as_its_labels(brain):
-    left = odd_brains.one_hemisphere(pathologies.add_sides(*brain), brain[1], "left")
+    left = odd_brains.one_hemisphere(odd_brains.add_sides(*brain), brain[1], "left")
     affine = rigid(0, 0, 180) @ brain[1]
     surface = from_labels(left, affine, DHCP, "left", **QUICK)
     assert "the shape says that the coordinates are LPS" in surface.report["warnings"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from phantoms import CENTRE_MM
 from scipy.spatial.transform import Rotation
 from shapes import cerebrum_surface, ellipsoid, phantom
 
@@ -9,7 +10,6 @@ from gyriflow.anatomy.extraction import isosurface, smooth_mask
 from gyriflow.anatomy.fissure import fissure_between, mid_plane, open_fissure, upright
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.phantom.brain import CENTRE_MM
 
 
 @pytest.fixture(scope="module")

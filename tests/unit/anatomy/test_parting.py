@@ -3,6 +3,7 @@
 import numpy as np
 import odd_brains
 import pytest
+from phantoms import CENTRE_MM
 from shapes import cerebrum_surface, ellipsoid, phantom, sphere
 
 from gyriflow.anatomy.extraction import isosurface, smooth_mask
@@ -12,8 +13,6 @@ from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged
 from gyriflow.io.schemes import SCHEMES
-from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +43,7 @@ def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
 @pytest.mark.parametrize("mm", [3.0, 6.0])
 def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
     labels, affine = brain
-    mesh = cerebrum_surface(odd_brains.bent_midline(pathologies.apart(labels, affine), affine, mm), affine)
+    mesh = cerebrum_surface(odd_brains.bent_midline(odd_brains.apart(labels, affine), affine, mm), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
     sides = cut_sides(mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1))))
     assert [len(pieces(side)) for side in sides] == [1, 1]
@@ -52,7 +51,7 @@ def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
 
 
 @pytest.mark.parametrize(
-    "pathology", [odd_brains.bent_midline, pathologies.without_callosum, pathologies.shifted_midline]
+    "pathology", [odd_brains.bent_midline, odd_brains.without_callosum, odd_brains.shifted_midline]
 )
 def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
     labels, affine = brain
@@ -121,13 +120,13 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
 
 def test_a_narrow_fissure_shown_by_csf_keeps_its_width(brain):
     labels, affine = phantom(24.0, 0.9)
-    x, _, _ = pathologies.positions(labels, affine)
-    cerebrum = np.isin(labels, pathologies.CEREBRUM)
+    x, _, _ = odd_brains.positions(labels, affine)
+    cerebrum = np.isin(labels, odd_brains.CEREBRUM)
     # one voxel of CSF in the middle, cortex beside it
     middle = np.abs(x) < 0.46
     filled = np.where((labels == 4) & (np.abs(x) < 3.0), 5, labels)
     shown = np.where((labels == 4) & middle & (filled == 5), 4, filled)
     surface = from_labels(shown, affine, SCHEMES["spina-bifida-atlas"], week=24.0, edge_length_mm=1.2)
-    assert cerebrum.sum() < np.isin(shown, pathologies.CEREBRUM).sum()
+    assert cerebrum.sum() < np.isin(shown, odd_brains.CEREBRUM).sum()
     assert surface.report["fissure_opened_mL"] < 0.002 * surface.report["volume_mL"]
     assert surface.report["area_cm2"]["whole"] > 110.0

@@ -5,8 +5,10 @@ import os
 from pathlib import Path
 
 import numpy as np
+import odd_brains
 import pytest
 import shapes
+from phantoms import CENTRE_MM, phantom_labels
 from scipy.spatial.transform import Rotation
 from shapes import LPS, rigid, sphere
 
@@ -31,8 +33,6 @@ from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.mesh.maps import move_to_mesh
-from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM, phantom_labels
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
 ATLAS = SCHEMES["spina-bifida-atlas"]
@@ -304,7 +304,7 @@ def test_gap_between_balls_is_known():
 
 
 def test_sides_of_a_scheme_that_contradict_the_affine_are_refused(volume):
-    labels, affine = pathologies.add_sides(*volume), volume[1]
+    labels, affine = odd_brains.add_sides(*volume), volume[1]
     scheme = SCHEMES["dhcp-19"]
     assert from_labels(labels, affine, scheme, week=24.0, **QUICK).fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.5)
     mirrored = np.diag([-1.0, 1.0, 1.0, 1.0]) @ affine

@@ -1,7 +1,9 @@
 """Left and right from labels that have sides, and the volume that smoothing gives back."""
 
 import numpy as np
+import odd_brains
 import pytest
+from phantoms import CENTRE_MM
 from shapes import phantom, rigid, sphere
 
 from gyriflow.anatomy.pial import from_labels
@@ -11,8 +13,6 @@ from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
 from gyriflow.io.schemes import SCHEMES
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.phantom import pathologies
-from gyriflow.phantom.brain import CENTRE_MM
 
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
 
@@ -54,7 +54,7 @@ def test_a_scheme_of_ones_own_names_its_tissues():
 
 def test_a_side_of_a_few_voxels_is_no_hemisphere():
     labels, affine = phantom(21.0, 2.0)
-    scheme, sided = SCHEMES["dhcp-19"], pathologies.add_sides(labels, affine)
+    scheme, sided = SCHEMES["dhcp-19"], odd_brains.add_sides(labels, affine)
     left = np.argwhere(np.isin(sided, scheme.left))
     # all but the 40 voxels farthest to the left become the right hemisphere's
     outermost = left[np.argsort(left @ affine[0, :3])][40:]

@@ -4,26 +4,83 @@ import numpy as np
 import pytest
 
 from gyriflow.anatomy.pial import from_shape
-from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, area, corners, submesh
+from gyriflow.anatomy.shapes import shape_surface
+from gyriflow.errors import InputError, MeshError
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    corners,
+    edges,
+    euler_number,
+    face_normals,
+    is_closed,
+    signed_volume,
+    submesh,
+    unit,
+)
 from gyriflow.metrics.measure import measure_brain
-from gyriflow.phantom.shapes import shape_surface
+
+AXES = (10.0, 13.0, 8.0)
 
 
-def ball(edge_mm=1.5):
-    return shape_surface("sphere", (15.0, 15.0, 15.0), edge_length_mm=edge_mm, noise_mm=0.0)
+def ball(edge_mm=1.5, **more):
+    return shape_surface((15.0, 15.0, 15.0), edge_length_mm=edge_mm, **{"noise_mm": 0.0} | more)
+
+
+def ellipsoid_area(a, b, c):
+    """Returns the area of an ellipsoid by midpoint quadrature over the unit sphere."""
+    z = np.linspace(-1, 1, 4001)[:-1] + 1 / 4000
+    turn = np.linspace(0, 2 * np.pi, 1001)[:-1]
+    ring = np.sqrt(1 - z**2)[:, None]
+    x, y = ring * np.cos(turn), ring * np.sin(turn)
+    return float((a * b * c * np.sqrt((x / a) ** 2 + (y / b) ** 2 + (z[:, None] / c) ** 2)).mean() * 4 * np.pi)
+
+
+def test_an_ellipsoid_has_the_analytic_volume_and_area_and_even_triangles_that_look_outwards():
+    volume = 4 / 3 * np.pi * np.prod(AXES)
+    coarse, mesh = (shape_surface(AXES, edge_length_mm=edge_mm, noise_mm=0.0) for edge_mm in (2.0, 1.0))
+    assert is_closed(mesh)
+    assert euler_number(mesh) == 2
+    assert signed_volume(mesh) == pytest.approx(volume, rel=0.01)
+    assert area(mesh) == pytest.approx(ellipsoid_area(*AXES), rel=0.01)
+    assert (1 - signed_volume(coarse) / volume) / (1 - signed_volume(mesh) / volume) == pytest.approx(4.0, rel=0.25)
+    lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=-1)
+    assert lengths.mean() == pytest.approx(1.0, rel=0.1)
+    assert 0.2 < lengths.min() < lengths.max() < 2.2
+    assert np.linalg.norm(mesh.vertices / AXES, axis=1) == pytest.approx(1.0, abs=1e-12)
+    normals = unit(corners(mesh).mean(axis=1) / np.square(AXES))
+    assert np.einsum("ij,ij->i", normals, face_normals(mesh)).min() > 0.9
+
+
+def test_bumps_have_the_height_asked_for_and_the_pattern_of_their_seed_at_any_edge_length():
+    def heights(edge_mm, seed):
+        mesh = shape_surface((40.0, 40.0, 40.0), edge_length_mm=edge_mm, noise_mm=0.2, seed=seed)
+        return np.linalg.norm(mesh.vertices, axis=1) - 40.0, unit(mesh.vertices)
+
+    fine, directions = heights(3.0, 1)
+    assert np.sqrt((fine**2).mean()) == pytest.approx(0.2, rel=0.3)
+    assert np.array_equal(fine, heights(3.0, 1)[0])
+    assert not np.array_equal(fine, heights(3.0, 2)[0])
+    coarse, coarse_directions = heights(4.0, 1)
+    nearest = (directions @ coarse_directions.T).argmax(axis=1)
+    assert np.corrcoef(fine, coarse[nearest])[0, 1] > 0.8
+
+
+def test_edges_too_long_for_the_shape_are_refused_with_the_bound():
+    with pytest.raises(InputError, match=r"at most 2\.46 mm"):
+        shape_surface(AXES, edge_length_mm=2.5)
 
 
 def test_a_shape_is_left_as_it_is_and_cut_at_x_0():
-    slab = shape_surface("slab", (20.0, 16.0, 6.0), edge_length_mm=1.0, noise_mm=0.05)
-    surface = from_shape(slab, week=21.0)
-    assert np.array_equal(surface.whole.vertices, slab.vertices)
+    shape = shape_surface((10.0, 8.0, 9.0), edge_length_mm=1.0, noise_mm=0.05)
+    surface = from_shape(shape, week=21.0)
+    assert np.array_equal(surface.whole.vertices, shape.vertices)
     assert surface.fissure_x_mm == surface.report["fissure_x_mm"] == 0.0
     assert surface.pose.world.tolist() == np.eye(4).tolist()
     assert (surface.report["source"], surface.report["week"], surface.report["warnings"]) == ("shape", 21.0, [])
     assert corners(surface.left)[:, :, 0].mean(axis=1).max() < 0 < corners(surface.right)[:, :, 0].mean(axis=1).min()
-    assert area(surface.left) + area(surface.right) == pytest.approx(area(slab))
-    assert area(surface.left) == pytest.approx(area(slab) / 2, rel=0.02)
+    assert area(surface.left) + area(surface.right) == pytest.approx(area(shape))
+    assert area(surface.left) == pytest.approx(area(shape) / 2, rel=0.02)
 
 
 def test_a_sphere_is_measured_as_a_sphere():

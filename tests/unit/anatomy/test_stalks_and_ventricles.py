@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from odd_brains import with_fourth_ventricle
+from odd_brains import CEREBRUM, VENTRICLES, positions, small_hemisphere, with_fourth_ventricle
 from scipy import ndimage
 from shapes import phantom
 
@@ -13,7 +13,6 @@ from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
 from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.phantom.pathologies import CEREBRUM, VENTRICLES, positions, small_hemisphere
 from gyriflow.shipped import SHIPPED
 
 AFFINE = np.diag([0.8, 0.8, 0.8, 1.0])

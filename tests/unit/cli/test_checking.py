@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from configurations import LABELLED
 from shapes import hemisphere
 
 from gyriflow.cli.checking import coarse_cortices, input_problems, plan, work_of_study
@@ -55,7 +56,7 @@ def test_a_size_that_is_not_that_of_the_week_is_told(tmp_path, mm, doubted):
 
 
 def coarse(mesh, **folding):
-    brain = {"id": "a", "week": 23, "phantom": {}}
+    brain = {"id": "a", "week": 23, **LABELLED}
     return list(
         coarse_cortices(load({"brains": [brain], "start": "a", "mesh": mesh, "folding": {"end_week": 24} | folding}))
     )
@@ -71,7 +72,7 @@ def test_a_mesh_too_coarse_for_the_cortex_is_told_before_it_is_made():
 
 def test_a_look_leaves_nothing_behind(tmp_path):
     config = tmp_path / "a.yaml"
-    config.write_text("brains: [{id: a, week: 23, phantom: {}}]\nstart: a\nfolding: {end_week: 24}\n")
+    config.write_text("brains: [{id: a, week: 23, shape: {kind: sphere}}]\nstart: a\nfolding: {end_week: 24}\n")
     assert plan(config, tmp_path / "new" / "study", ["surface"])
     (said,) = work_of_study(config, tmp_path / "new" / "study", 1, ["calibrate"])
     assert said == "nothing to run: the configuration asks for no results of this stage"

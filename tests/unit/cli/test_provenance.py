@@ -1,6 +1,7 @@
 """Whose the results in a folder are: those of a study go on, those of another one are not mixed with them."""
 
 import pytest
+from configurations import LABELLED
 
 from gyriflow.cli.provenance import require_own_results
 from gyriflow.config import load
@@ -8,7 +9,7 @@ from gyriflow.errors import InputError
 
 
 def study(*ids, week=21):
-    brains = [{"id": name, "week": week, "phantom": {}} for name in ids]
+    brains = [{"id": name, "week": week, **LABELLED} for name in ids]
     return load({"brains": brains, "start": ids[0], "folding": {"end_week": 30}})
 
 

@@ -76,8 +76,8 @@ def test_a_folder_without_a_study_is_named(tmp_path):
 
 
 def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(study):
-    brain = "brains: [{id: a, week: 23, phantom: {}}]\nstart: a\nfolding: {end_week: 24}\nruns: {r: {}, later: {}}\n"
-    (study / "gyriflow.yaml").write_text(brain)
+    brain = "brains: [{id: a, week: 23, shape: {kind: sphere}}]\nstart: a\nfolding: {end_week: 24}\n"
+    (study / "gyriflow.yaml").write_text(brain + "runs: {r: {}, later: {}}\n")
     found = json.loads(as_json(status(study)))
     assert found["brains"][0] == {"brain": "a", "surface": "done", "mesh": "-", "metrics": "-"}
     assert [(row["run"], row["brain"], row["folding"]) for row in found["runs"]] == [

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from configurations import problems
+from configurations import LABELLED, problems
 
 from gyriflow.config import load
 from gyriflow.config.atlas import ATLASES, Atlas, retrieval_note, shipped_atlases
@@ -127,21 +127,20 @@ def test_a_population_of_a_brain_of_ones_own(tmp_path):
     brains = [
         {"id": "a", "week": 21, "pial": "a.stl", "population": "sheep"},
         {"id": "b", "week": 22, "pial": "b.stl"},
-        {"id": "c", "week": 22, "phantom": {}},
+        {"id": "c", "week": 22, "shape": {"kind": "sphere"}},
     ]
     raw = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
     config = load(raw, tmp_path)
     assert config.measured_name(["a"]) == "sheep"
-    assert config.measured_name(["a", "b", "c"]) == "sheep (21 GW) or real brain (22 GW) or phantom"
+    assert config.measured_name(["a", "b", "c"]) == "sheep (21 GW) or real brain (22 GW) or sphere"
     brains[2]["population"] = "sheep"
     assert problems(raw, tmp_path) == [
-        "brains[2].population: has no meaning with phantom; only with labels or segmentation or hemispheres or "
-        "hemisphere or pial"
+        "brains[2].population: has no meaning with shape; only with labels or hemispheres or hemisphere or pial"
     ]
 
 
 def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_path):
-    own = [{"id": "own", "week": 21, "phantom": {}}]
+    own = [{"id": "own", "week": 21, **LABELLED}]
     atlas = [{"name": "spina-bifida", "series": "unoperated", "weeks": [22, 21]}, "dhcp-surface"]
     config = load(study(atlas, "own", brains=own), tmp_path)
     dhcp = [f"dhcp-surface-{week}" for week in range(21, 37)]

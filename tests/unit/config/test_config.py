@@ -6,13 +6,13 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from configurations import phantoms, problems, refusal, study, touched
+from configurations import LABELLED, labelled, problems, refusal, study, touched
 
 from gyriflow.config import load
 from gyriflow.config.root import Config
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import output_weeks, parameters_from
-from gyriflow.report.style import PHANTOM, REAL_BRAIN
+from gyriflow.report.style import REAL_BRAIN
 
 
 def test_defaults_are_the_reference_values():
@@ -21,7 +21,7 @@ def test_defaults_are_the_reference_values():
     assert (run.thickness_mm, run.poisson_ratio, run.growth_rate_per_s, run.step_s) == (1.5, 0.45, 2e-7, 43200)
     assert config.folded == [("reference", "a")]
     assert config.weeks("reference", "a") == [21, 22, 23, 24]
-    assert [brain.source for brain in config.brains] == ["phantom", "phantom"]
+    assert [brain.source for brain in config.brains] == ["labels", "labels"]
 
 
 @pytest.mark.fault(27)
@@ -122,7 +122,7 @@ def test_starts_that_cannot_be_are_all_named():
         "w": {"thickness_mm": {"map": __file__, "surface": __file__}},
         "X": {},
     }
-    assert problems(study(start=["a", "B"], brains=[*phantoms(21, 22.5), *phantoms(23, names=["all"])])) == [
+    assert problems(study(start=["a", "B"], brains=[*labelled(21, 22.5), *labelled(23, names=["all"])])) == [
         "brains: the id all is reserved; choose another",
         "start: found 'B'; expected the id of a brain: a, b, all",
     ]
@@ -154,13 +154,13 @@ def test_negative_growth_only_where_it_is_allowed_by_name():
 @pytest.mark.fault(31)
 def test_a_brain_needs_exactly_one_source_of_its_own_id():
     brains = [
-        {"id": "a", "week": 21, "phantom": {}, "pial": __file__},
+        {"id": "a", "week": 21, **LABELLED, "pial": __file__},
         {"id": "a", "week": 22},
-        {"id": "study", "week": 23, "phantom": {}},
-        {"id": "A", "week": 23, "phantom": {}},
+        {"id": "study", "week": 23, **LABELLED},
+        {"id": "A", "week": 23, **LABELLED},
     ]
     both, none = problems(study(brains=brains))
-    assert both.startswith("brains[0]: found pial and phantom as its source")
+    assert both.startswith("brains[0]: found labels and pial as its source")
     assert none.startswith("brains[1]: found none as its source")
     del brains[0]["pial"]
     assert problems(study(brains=[brains[0], *brains[2:], brains[0]])) == [
@@ -171,10 +171,9 @@ def test_a_brain_needs_exactly_one_source_of_its_own_id():
 
 
 def test_an_unknown_start_and_a_week_of_no_fetus_are_refused():
-    brains = [{"id": "a", "week": 20, "phantom": {}}, {"id": "c", "week": 50, "pial": __file__}]
+    brains = [{"id": "c", "week": 50, "pial": __file__}]
     assert problems(study(brains=brains)) == [
-        "brains[0].week: found 20; a phantom's should be 21 to 36",
-        "brains[1].week: found 50; it should be less than or equal to 45",
+        "brains[0].week: found 50; it should be less than or equal to 45",
     ]
     assert problems(study(start="x")) == ["start: found 'x'; expected the id of a brain: a, b"]
 
@@ -208,10 +207,10 @@ def test_white_surfaces_are_files_beside_the_pial_ones(tmp_path):
     assert config.brains[1].white_files == {"whole": str(tmp_path / "white.stl")}
     assert config.brains[2].white_files == {}
     sides["white"]["right"] = "lost.gii"
-    brains[2] = {"id": "c", "week": 22, "phantom": {}, "white": "white.stl"}
+    brains[2] = {"id": "c", "week": 22, **LABELLED, "white": "white.stl"}
     assert problems(study(brains=brains), tmp_path) == [
         f"brains[0].hemispheres.white.right: no such file: {tmp_path / 'lost.gii'}",
-        "brains[2].white: has no meaning with phantom; only with pial",
+        "brains[2].white: has no meaning with labels; only with pial",
     ]
 
 
@@ -237,20 +236,17 @@ def test_a_validated_configuration_written_out_is_valid_again():
     ("shown", "name"),
     [
         (["real"], REAL_BRAIN),
-        (["p", "q"], PHANTOM),
-        (["real", "p"], "real brain or phantom"),
         ([], REAL_BRAIN),
         (["ball"], "sphere"),
-        (["ball", "slab"], "simple shape"),
-        (["ball", "p"], "phantom or sphere"),
-        (["real", "slab"], "real brain or slab"),
-        (["real", "ball", "p", "slab"], "real brain or phantom or simple shape"),
+        (["ball", "egg"], "simple shape"),
+        (["real", "egg"], "real brain or ellipsoid"),
+        (["real", "ball", "egg"], "real brain or simple shape"),
     ],
 )
 def test_only_real_brains_are_called_so(tmp_path, shown, name):
     touched(tmp_path, "a.stl")
-    brains = [*phantoms(22, 22, names="pq"), {"id": "real", "week": 22, "pial": "a.stl"}]
-    brains += [{"id": i, "week": 21, "shape": {"kind": kind}} for i, kind in (("ball", "sphere"), ("slab", "slab"))]
+    brains = [{"id": "real", "week": 22, "pial": "a.stl"}]
+    brains += [{"id": i, "week": 21, "shape": {"kind": kind}} for i, kind in (("ball", "sphere"), ("egg", "ellipsoid"))]
     assert load(study(brains, start="ball"), tmp_path).measured_name(shown) == name
 
 

@@ -5,6 +5,7 @@ from contextlib import suppress
 
 import pytest
 import yaml
+from configurations import LABELLED
 from fuzzing import BOUNDED, MANY, damaged, outcome
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.fault(28, 62)
 
 STUDY = {
     "brains": [
-        {"id": "a", "week": 21, "phantom": {"voxel_mm": 1.5}},
+        {"id": "a", "week": 21, **LABELLED},
         {"id": "b", "week": 22.5, "shape": {"kind": "sphere"}},
     ],
     "start": "a",

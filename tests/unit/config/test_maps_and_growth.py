@@ -1,14 +1,14 @@
 """Maps and estimated growth in a configuration: what the steps of the workflow are handed."""
 
 import pytest
-from configurations import problems
+from configurations import LABELLED, problems
 
 from gyriflow.config import load
 
 BRAINS = [
-    {"id": "a", "week": 21, "phantom": {}},
-    {"id": "b", "week": 22, "phantom": {}},
-    {"id": "c", "week": 22, "phantom": {}},
+    {"id": "a", "week": 21, **LABELLED},
+    {"id": "b", "week": 22, **LABELLED},
+    {"id": "c", "week": 22, **LABELLED},
 ]
 ESTIMATED = {"end_week": 24, "growth_rate_per_s": "estimated"}
 
@@ -61,7 +61,7 @@ def test_growth_is_estimated_from_all_brains_or_those_named(growth, brains):
 def both_kinds(tmp_path, weeks):
     """Returns a study with a phantom and a closed surface of each of some weeks, the phantoms first."""
     (tmp_path / "pial.surf.gii").touch()
-    made = [{"id": f"v{week}", "week": week, "phantom": {}} for week in weeks]
+    made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
     given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
     return {"brains": [*made, *given], "start": "s21", "folding": {"end_week": 24}}
 

@@ -1,7 +1,7 @@
 """A cohort's table becomes brains; rows that can't be used are problems, or left out with their cause."""
 
 import pytest
-from configurations import refusal, study
+from configurations import LABELLED, refusal, study
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
@@ -53,23 +53,6 @@ def test_values_for_all_rows_stand_in_the_configuration(folder):
     }
     (brain,) = load({"participants": section, "start": "sub-9", "folding": FOLDING}, folder).brains
     assert brain.labels == str(folder / "bids" / "sub-9_dseg.nii.gz")
-
-
-@pytest.mark.parametrize("column", ["segmentation.command", "segmentation.program"])
-def test_a_table_that_names_programs_is_refused(folder, column):
-    head = ("id", "week", "image", "scheme", column)
-    write(folder, head, ("sub-1", "24", "a.nii.gz", "feta-7", "n/a"))
-    with pytest.raises(
-        InputError, match=rf"participants\.tsv: names programs(.|\n)*found {column}(.|\n)*columns in the"
-    ):
-        config(folder, keep_going=True)
-
-
-def test_the_program_of_all_rows_stands_in_the_configuration(folder):
-    write(folder, ("id", "week", "image", "scheme"), ("sub-1", "24", "a.nii.gz", "feta-7"))
-    section = {"file": "bids/participants.tsv", "columns": {"segmentation.command": "model {image} {labels}"}}
-    (brain,) = config(folder, section).brains
-    assert brain.segmentation.command == "model {image} {labels}"
 
 
 def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(folder):
@@ -241,7 +224,7 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
         for side in ("left", "right")
         for week in (24, 25)
     ]
-    brains += [{"id": f"p{week}", "week": week, "phantom": {}} for week in (24, 25)]
+    brains += [{"id": f"p{week}", "week": week, **LABELLED} for week in (24, 25)]
     found = load({"brains": brains, "start": "left24", "folding": FOLDING}, folder / "bids")
     assert found.growth_series == {
         "left hemisphere, surface": ["left24", "left25"],

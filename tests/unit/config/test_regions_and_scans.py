@@ -1,11 +1,12 @@
 """Regions, norms and scans of one subject in a configuration."""
 
 import pytest
+from configurations import LABELLED
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
 
-BRAINS = [{"id": f"p{week}", "week": week, "phantom": {}} for week in (21, 22, 25)]
+BRAINS = [{"id": f"p{week}", "week": week, **LABELLED} for week in (21, 22, 25)]
 NAMES = {"names": {1: "frontal", 2: "frontal", 3: "parietal"}}
 
 
@@ -56,12 +57,12 @@ def test_unknown_brains_are_refused(volume):
 
 
 def test_scans_of_a_subject_by_week():
-    brains = [{"id": "b", "week": 24, "subject": "one", "phantom": {}}, *BRAINS]
-    brains += [{"id": "a", "week": 22.5, "subject": "one", "phantom": {}}]
-    brains += [{"id": "c", "week": 22.5, "subject": "two", "phantom": {}}]
+    brains = [{"id": "b", "week": 24, "subject": "one", **LABELLED}, *BRAINS]
+    brains += [{"id": "a", "week": 22.5, "subject": "one", **LABELLED}]
+    brains += [{"id": "c", "week": 22.5, "subject": "two", **LABELLED}]
     assert load(study(brains)).scans == {"one": ["a", "b"]}
     with pytest.raises(InputError, match="2 scans of the subject one are of week 24"):
-        load(study([*brains, {"id": "d", "week": 24, "subject": "one", "phantom": {}}]))
+        load(study([*brains, {"id": "d", "week": 24, "subject": "one", **LABELLED}]))
 
 
 def test_the_norm_is_of_all_measured_brains_of_one_kind():
@@ -73,7 +74,7 @@ def test_the_norm_is_of_real_brains_where_there_are_any_and_never_of_simple_shap
     (tmp_path / "a.stl").touch()
     real = [{"id": f"r{week}", "week": week, "pial": str(tmp_path / "a.stl")} for week in (21, 22)]
     shapes = [{"id": f"s{week}", "week": week, "shape": {"kind": "sphere"}} for week in (21, 22)]
-    assert load(study([*BRAINS, *real])).norm_reference == ["r21", "r22"]
+    assert load(study([*shapes, *real]) | {"start": "s21"}).norm_reference == ["r21", "r22"]
     assert load(study([*BRAINS, *real], norm_reference=["p22", "r21"])).norm_reference == ["p22", "r21"]
     assert load(study(shapes) | {"start": "s21"}).norm_reference == []
 

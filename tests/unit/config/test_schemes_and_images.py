@@ -2,7 +2,7 @@
 
 import configurations
 import pytest
-from configurations import problems, touched
+from configurations import LABELLED, problems, touched
 
 from gyriflow.config import load
 from gyriflow.io.schemes import SCHEMES
@@ -34,7 +34,7 @@ def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
         "brainstem": (),
         "known": {9: "outer CSF"},
     }
-    plain = load(study({"phantom": {}}))
+    plain = load(study(LABELLED))
     assert LabelScheme(**plain.scheme(plain.brains[0])) == SCHEMES["spina-bifida-atlas"]
 
 
@@ -69,7 +69,7 @@ def test_ventricles_grow_by_their_own_curve_only_where_labels_know_them(folder):
     following = {"folding": {"end_week": 22, "follow": {"ventricles_ml": {21: 3.0, 22: 3.2}}}}
     known = {"labels": "labels.nii.gz", "scheme": "mine"}
     load(study(known, schemes={"mine": MINE | {"ventricles": [1]}}, **following), folder)
-    load(study({"phantom": {}}, **following))
+    load(study(LABELLED, **following))
     needs = "folding.follow.ventricles_ml: needs a start brain whose labels know ventricles; "
     assert problems(study(known, schemes={"mine": MINE}, **following), folder) == [
         f"{needs}mine, the scheme of a, names none"
@@ -77,7 +77,7 @@ def test_ventricles_grow_by_their_own_curve_only_where_labels_know_them(folder):
     (folder / "a.stl").touch()
     assert problems(study({"pial": "a.stl"}, **following), folder) == [f"{needs}a has no labels"]
     # other brains may be without, and so may runs that do not ask
-    others = {"brains": [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 22, "pial": "a.stl"}]}
+    others = {"brains": [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22, "pial": "a.stl"}]}
     load(study({}, **others, **following), folder)
     load(study({"pial": "a.stl"}), folder)
 
@@ -87,39 +87,9 @@ def test_an_image_alone_is_refused_since_gyriflow_does_not_segment(folder):
     assert line.startswith("brains[0].image: gyriflow does not segment images; give a label volume under labels")
 
 
-def test_an_image_with_a_command_or_with_labels_is_a_brain(folder):
-    command = {"command": "segment {image} {labels}"}
-    made = load(study({"image": "t2w.nii.gz", "scheme": "feta-7", "segmentation": command}), folder).brains[0]
-    assert (made.source, made.files, made.image) == ("segmentation", [], str(folder / "t2w.nii.gz"))
+def test_an_image_with_labels_is_a_brain(folder):
     shown = load(study({"image": "t2w.nii.gz", "scheme": "feta-7", "labels": "labels.nii.gz"}), folder).brains[0]
     assert (shown.source, shown.files) == ("labels", [str(folder / "labels.nii.gz")])
-
-
-@pytest.mark.parametrize(
-    ("brain", "found"),
-    [
-        (
-            {"segmentation": {"command": "x {image} {labels}"}, "scheme": "binary"},
-            "brains[0].segmentation: has no image to work on",
-        ),
-        (
-            {"segmentation": {"command": "x {image}"}, "image": "t2w.nii.gz", "scheme": "binary"},
-            "brains[0].segmentation.command: lacks {labels}",
-        ),
-        (
-            {"segmentation": {"command": "x {image} {labels}"}, "image": "t2w.nii.gz"},
-            "brains[0].scheme: is missing; it says what the labels mean",
-        ),
-        ({"segmentation": {}, "image": "t2w.nii.gz", "scheme": "binary"}, "brains[0].segmentation.command: is missing"),
-        ({"phantom": {}, "image": "t2w.nii.gz"}, "brains[0].image: has no meaning with phantom"),
-        (
-            {"segmentation": {"command": "x {image} {labels}"}, "image": "t2w.nii.gz", "labels": "labels.nii.gz"},
-            "brains[0]: found labels and segmentation as its source",
-        ),
-    ],
-)
-def test_a_mistake_around_a_segmentation_is_named(folder, brain, found):
-    assert any(line.startswith(found) for line in problems(study(brain), folder))
 
 
 @pytest.mark.fault(15)

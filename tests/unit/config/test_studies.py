@@ -1,11 +1,12 @@
 """Studies and calibrations in a configuration: the runs that they make, and what is refused."""
 
 import pytest
+from configurations import LABELLED
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
 
-BRAINS = [{"id": "a", "week": 21, "phantom": {}}, {"id": "b", "week": 25, "phantom": {}}]
+BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 25, **LABELLED}]
 RUNS = {"reference": {"preset": "fetalfoldsim"}, "short": {"end_week": 22}}
 THICKNESS = {
     "base": "reference",
@@ -53,7 +54,7 @@ def test_equal_runs_are_solved_once():
 
 
 def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
-    brains = [*BRAINS, {"id": "c", "week": 24.5, "phantom": {}}]
+    brains = [*BRAINS, {"id": "c", "week": 24.5, **LABELLED}]
     studies = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
     study = config(brains=brains, studies=studies)
     assert study.run("thickness-1.5").end_week == 25

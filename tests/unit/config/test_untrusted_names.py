@@ -4,7 +4,7 @@ import os
 
 import pytest
 import yaml
-from configurations import phantoms, refusal, study
+from configurations import LABELLED, labelled, refusal, study
 
 from gyriflow.config.loading import load
 from gyriflow.errors import InputError
@@ -20,17 +20,17 @@ NAMES = [
 @pytest.mark.fault(56)
 @pytest.mark.parametrize("name", NAMES)
 def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
-    brain = {"id": name, "week": 21, "phantom": {}}
+    brain = {"id": name, "week": 21, **LABELLED}
     assert "brains[0].id" in refusal(study(brains=[brain], start=name))
     assert f"runs.{name}: " in refusal(study(runs={name: {}}))
     vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
-    later = phantoms(21, 22)
+    later = labelled(21, 22)
     assert "studies" in refusal(study(studies={name: vary}, brains=later))
 
 
 def test_the_study_without_such_a_name_is_valid():
     vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
-    later = phantoms(21, 22)
+    later = labelled(21, 22)
     assert load(study(studies={"a": vary}, runs={"größe": {}, "reference": {}}, brains=later))
 
 

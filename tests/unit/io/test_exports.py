@@ -13,7 +13,7 @@ from shapes import hemisphere, sphere
 from gyriflow.errors import InputError
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import transformed
-from gyriflow.io.exports import ExportedBrain, export_bids, export_plain, hand_over
+from gyriflow.io.exports import ExportedBrain, export_bids, hand_over
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import (
     read_surface,
@@ -211,16 +211,6 @@ def test_the_bids_validator_finds_no_error(tmp_path, brain):
     (folder / "sub-01" / "ses-1" / "anat" / "sub-01_ses-1_acq-x_pial.gii").write_text("")
     done = subprocess.run([VALIDATOR, folder, "--format", "json"], capture_output=True, text=True, check=False)
     assert "NOT_INCLUDED" in {issue["code"] for issue in json.loads(done.stdout)["issues"]["issues"]}
-
-
-def test_plain_names_are_those_of_the_results(tmp_path, brain):
-    folder = tmp_path / "plain"
-    export_plain(folder, [brain], TABLES)
-    place = folder / "case_1" / "real" / "week-22.43"
-    assert {path.name for path in place.iterdir()} == {
-        f"{side}.{end}" for side in ("left", "right") for end in ("pial.surf.gii", "shape.gii", "regions.label.gii")
-    }
-    assert (folder / "metrics_wide.csv").exists()
 
 
 def test_a_hemisphere_that_is_alone_and_maps_of_any_name_are_exported(tmp_path, brain):

@@ -47,7 +47,7 @@ def test_imports_are_found_at_the_top_and_in_functions(package, module, rooms):
 
 def test_modules_behind_a_program_are_followed_through_others(package, tmp_path):
     program = tmp_path / "measure.py"
-    program.write_text("from gyriflow.anatomy.labels import read")
+    program.write_text("from gyriflow.surface.labels import read")
     names = {path.relative_to(package).as_posix() for path in modules_behind(program)}
     assert names == {"__init__.py", "surface/__init__.py", "surface/labels.py", "surface/repair.py", "units.py"}
 

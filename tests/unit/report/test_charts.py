@@ -60,21 +60,21 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
     ]
 
 
-def test_phantom_is_called_synthetic_and_never_real():
+def test_a_shape_is_called_so_and_never_real():
     metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
-    phantom = {"measured": "phantom", "synthetic": True}
+    shape = {"measured": "sphere", "synthetic": True}
     spectra = pd.concat(spectrum_rows("thin", 22.0, {4: 0.1}))
-    for figure in (metrics_chart(metrics, **phantom), spectra_weeks_chart(spectra, **phantom)):
+    for figure in (metrics_chart(metrics, **shape), spectra_weeks_chart(spectra, **shape)):
         shown = words(figure)
-        assert any("synthetic phantom" in text for text in shown)
+        assert any("a simple shape" in text for text in shown)
         assert "real brain" not in shown
-    assert not any("synthetic" in text for text in words(metrics_chart(metrics)))
+    assert not any("shape" in text for text in words(metrics_chart(metrics)))
 
 
-def test_a_phantom_beside_real_brains_is_synthetic_and_they_are_not():
+def test_a_shape_beside_real_brains_is_called_so_and_they_are_not():
     metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
     shown = words(metrics_chart(metrics, measured="real brain", synthetic=True))
-    assert {"simulated from a synthetic phantom", "real brain"} <= shown
+    assert {"simulated from a simple shape", "real brain"} <= shown
     assert not any("not a real brain" in text for text in shown)
 
 

@@ -251,7 +251,7 @@ def test_the_methods_say_what_was_run():
         (PAGE / "methods.rst").read_text(),
         brains=[
             {"week": 21.0, "population": "spina bifida", "source": "labels", "synthetic": False},
-            {"week": 24.5, "population": None, "source": "phantom", "synthetic": True},
+            {"week": 24.5, "population": None, "source": "shape", "synthetic": True},
         ],
         runs=[{"run": "stiff", "start": "young", "parameters": parameters, "summary": summary}],
         software={"gyriflow": "0.1", "packages": packages},

@@ -105,15 +105,15 @@ def test_all_panels_have_one_scale_and_the_bar_its_length():
     assert length / bar.get_window_extent().width == pytest.approx(scales[0])
 
 
-def test_simulated_and_measured_brains_differ_in_colour_and_the_phantom_is_named():
+def test_simulated_and_measured_brains_differ_in_colour_and_a_shape_is_named():
     figure = runs_by_week(
-        {"simulated": {22.0: BRAIN}}, {22.0: BRAIN}, views=("left",), measured="phantom", synthetic=True
+        {"simulated": {22.0: BRAIN}}, {22.0: BRAIN}, views=("left",), measured="sphere", synthetic=True
     )
     simulated, measured = map(tone, (picture(figure, 0), picture(figure, 1)))
     assert simulated[2] > simulated[0]
     assert measured[0] > measured[2]
-    assert "phantom" in words(figure)
-    assert any("synthetic phantom" in text for text in words(figure))
+    assert "sphere" in words(figure)
+    assert any("a simple shape" in text for text in words(figure))
     assert "real brain" not in words(figure)
 
 

@@ -6,12 +6,13 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from configurations import LABELLED
 
 from gyriflow.config import load
 from gyriflow.study import Plan
 
 DRAW = Path(__file__).parents[3] / "workflow" / "scripts" / "draw.py"
-BRAINS = [{"id": name, "week": week, "phantom": {}} for name, week in (("a", 21), ("b", 22), ("c", 23))]
+BRAINS = [{"id": name, "week": week, **LABELLED} for name, week in (("a", 21), ("b", 22), ("c", 23))]
 STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}
 PLAN = Plan(load(STUDY | {"report": {"figures": "all"}}))
 PREPARING = {

@@ -39,7 +39,7 @@ def test_metrics_table_gives_the_difference_from_the_measured_brain():
     assert table.loc[("mean shape index", 22.0), "thin, difference (%)"] == "–"
     assert not table.index.get_level_values("metric").str.contains("curvature").any()
     assert not table.index.get_level_values("metric").str.contains("crossing").any()
-    assert "phantom" in metrics_table(metrics, measured="phantom")
+    assert "sphere" in metrics_table(metrics, measured="sphere")
 
 
 def test_metrics_table_without_measured_brains_has_no_differences():
@@ -88,7 +88,7 @@ def test_html_is_escaped_named_and_the_same_each_time():
     html = html_table(table, caption="x < y", synthetic=True)
     assert "a &amp; b" in html
     assert "run &lt;b&gt;" in html
-    assert "x &lt; y (synthetic phantom, not a real brain)" in html
+    assert "x &lt; y (a simple shape, not a real brain)" in html
     assert "0.3333<" in html
     assert html == html_table(table, caption="x < y", synthetic=True)
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from configurations import LABELLED
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
@@ -18,7 +19,7 @@ REGIONAL = FOLLOW | {"regional": 1.0}
 
 
 def brain(week, **given):
-    return {"id": f"b{week}", "week": week, **(given or {"phantom": {}})}
+    return {"id": f"b{week}", "week": week, **(given or LABELLED)}
 
 
 def labels(tmp_path, week, **given):
@@ -193,7 +194,8 @@ def test_runs_are_compared_with_the_population_and_the_sides_of_their_start_only
 
 
 def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_worth():
-    found = plan([brain(21), brain(22)])
+    shape = {"shape": {"kind": "sphere"}}
+    found = plan([brain(21, **shape), brain(22, **shape)])
     assert found.measuring.beside("reference", "b21") == {"21.00": "b21", "22.00": "b22"}
     assert found.validating.compared("reference", "b21") == {}
 

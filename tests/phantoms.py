@@ -1,7 +1,6 @@
 """A synthetic fetal brain as a label volume: plausible in size and outline, no anatomy of anyone.
 
-It serves the demo and the tests. Its folds are a random pattern that deepens with age; results on it say that the
-workflow runs, and nothing about real brains.
+Its folds are a random pattern that deepens with age.
 """
 
 from dataclasses import dataclass
@@ -10,15 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ..errors import InputError
-from ..parameters.synthetic import PHANTOM_WEEKS, PhantomSettings
-from ..units import ML_PER_MM3
+from gyriflow.units import ML_PER_MM3
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-DEFAULTS = PhantomSettings()
-FIRST_WEEK, LAST_WEEK = PHANTOM_WEEKS
+FIRST_WEEK, LAST_WEEK = 21.0, 36.0
 WHITE, VENTRICLES, CEREBELLUM, CSF, CORTEX, DEEP_GREY, BRAINSTEM, CALLOSUM = range(1, 9)
 
 # half lengths (left-right, anterior-posterior, inferior-superior) for an ellipsoid of half length one in y; the
@@ -40,10 +36,9 @@ SULCUS_WIDTH = 0.5
 
 @dataclass(frozen=True)
 class Shape:
-    """What a phantom's form depends on, in mm.
+    """What a phantom's form depends on, in mm; the ventricles' size is relative to the brain.
 
-    Half the cerebrum's length from front to back, depths of the folds that begin before week 21 and after week 27 and
-    of the Sylvian dent on each side, the width of the fissure, and the ventricles' size relative to the brain.
+    Folds begin before week 21, the late ones after week 27.
     """
 
     half_length: float
@@ -55,34 +50,19 @@ class Shape:
 
 
 def cerebral_volume_ml(week: float) -> float:
-    """Returns the volume that a phantom's cerebrum has at a gestational week, in mL.
-
-    V = 48 exp(0.160 t − 0.00264 t²), t = week − 21: it passes through 48 mL at 21 GW, as in the atlas of Fidon et al.
-    2021 (doi 10.5281/zenodo.5524312), and grows by 230 % from 25.4 to 36.6 GW, as Clouchoux et al. 2012
-    (doi 10.1016/j.ajog.2011.10.002) found for the cerebrum of 64 fetuses; the rate falls in between.
-    """
+    """Returns the volume of a phantom's cerebrum in mL: 48 at 21 GW, as in the atlas of the demo."""
     t = week - 21.0
     return float(48.0 * np.exp(0.160 * t - 0.00264 * t**2))
 
 
 def phantom_labels(
-    week: float,
-    *,
-    voxel_mm: float = DEFAULTS.voxel_mm,
-    seed: int = DEFAULTS.seed,
-    cortex_mm: float = DEFAULTS.cortex_mm,
+    week: float, *, voxel_mm: float = 0.8, seed: int = 0, cortex_mm: float = 2.0
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Returns the (i, j, k) labels of a synthetic brain and their (4, 4) affine to RAS+ mm.
+    """Returns the (i, j, k) labels of a synthetic brain of 21 to 36 GW and their (4, 4) affine to RAS+ mm.
 
-    Labels are those of the example atlas: 1 white matter, 2 ventricles, 3 cerebellum, 4 outer CSF, 5 cortex
-    (`cortex_mm` thick), 6 deep grey matter, 7 brainstem, 8 corpus callosum. The axes are stored in the order
-    posterior, inferior, right. The same seed gives the same folds at every week, the deeper the older.
-    InputError outside 21 to 36 GW.
+    Labels are those of the scheme spina-bifida-atlas. The axes are stored in the order posterior, inferior, right. The
+    same seed gives the same folds at every week, the deeper the older.
     """
-    if not FIRST_WEEK <= week <= LAST_WEEK:
-        raise InputError(
-            "no phantom of this week", found=f"week {week:g}", expected=f"{FIRST_WEEK:g} to {LAST_WEEK:g} GW"
-        )
     age = (week - FIRST_WEEK) / (LAST_WEEK - FIRST_WEEK)
     shape = Shape(
         half_length=28.0 * (cerebral_volume_ml(week) / 48.0) ** (1 / 3),

@@ -1,0 +1,76 @@
+"""Spheres and ellipsoids as closed surfaces in mm, RAS+ around the origin: what a folding model is tried on."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from ..errors import InputError
+from ..geometry.remeshing import remesh
+from ..geometry.triangles import TriangleMesh, unit
+from ..parameters.synthetic import ShapeSettings
+
+Floats = NDArray[np.float64]
+
+REMESHING_ROUNDS = 10
+# the edges of a finely sampled curved face are far less sharp
+SHARP_DEG = 45.0
+# bumps of all these wavelengths, so that folding finds its own among them
+WAVELENGTHS_MM = (8.0, 40.0)
+WAVES = 64
+
+
+def shape_surface(
+    semi_axes_mm: tuple[float, float, float],
+    *,
+    edge_length_mm: float,
+    noise_mm: float = ShapeSettings.model_fields["noise_mm"].default,
+    seed: int = ShapeSettings.model_fields["seed"].default,
+) -> TriangleMesh:
+    """Returns an ellipsoid as a closed, outward surface of even triangles, its vertices on the shape.
+
+    Smooth bumps along the normal, which folding needs to start from, have the root mean square height `noise_mm`; their
+    pattern follows from `seed`, not from the edge length. InputError where the edges are longer than half the smallest
+    radius of curvature.
+    """
+    size = np.array(semi_axes_mm, dtype=float)
+    longest = 0.5 * size.min() ** 2 / size.max()
+    if edge_length_mm > longest:
+        raise InputError(
+            "the edges are too long for the shape",
+            found=f"{edge_length_mm:g} mm",
+            expected=f"at most {longest:.3g} mm",
+            remedy="Set a smaller surface.edge_length_mm, or make the shape larger.",
+        )
+    points = size * _directions(int(np.ceil(np.pi * size.max() / edge_length_mm)))
+    mesh = remesh(TriangleMesh(points, _hull_faces(points)), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG)
+    vertices = mesh.vertices / np.linalg.norm(mesh.vertices / size, axis=1, keepdims=True)
+    heights = noise_mm * _pattern(vertices, seed)
+    return TriangleMesh(vertices + heights[:, None] * unit(vertices / size**2), mesh.faces)
+
+
+def _directions(count: int) -> Floats:
+    """Returns unit vectors all around, `count` steps from one axis to the next, the axes among them."""
+    i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
+    lattice = np.stack([i, j, count - i - j], axis=-1)[i + j <= count].astype(float)
+    signs = np.array([(x, y, z) for x in (1, -1) for y in (1, -1) for z in (1, -1)])
+    return unit(np.unique((lattice * signs[:, None]).reshape(-1, 3), axis=0))
+
+
+def _hull_faces(points: Floats) -> NDArray[np.int64]:
+    hull = ConvexHull(points)
+    faces = hull.simplices.astype(np.int64)
+    a, b, c = points[faces].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return faces
+
+
+def _pattern(points: Floats, seed: int) -> Floats:
+    """Returns a smooth random field of unit variance at (n, 3) points: a sum of plane waves of all directions."""
+    random = np.random.default_rng(seed)
+    waves = random.normal(size=(WAVES, 3))
+    shortest, longest = np.log(WAVELENGTHS_MM)
+    lengths = np.exp(random.uniform(shortest, longest, WAVES))
+    waves *= (2.0 * np.pi / lengths / np.linalg.norm(waves, axis=1))[:, None]
+    phases = random.uniform(0.0, 2.0 * np.pi, WAVES)
+    return np.asarray(np.sqrt(2.0 / WAVES) * np.cos(points @ waves.T + phases).sum(axis=1))

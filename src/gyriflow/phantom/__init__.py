@@ -1,1 +1,0 @@
-"""Synthetic fetal brains for the demo and the tests."""
