@@ -41,7 +41,6 @@ def study(edge_mm: float) -> dict[str, Any]:
             "core_edge_mm": 2 * edge_mm,
             "max_surface_distance_mm": 0.5,
             # a coarse mesh of a detailed surface has flat elements
-            "min_dihedral_deg": 0.1,
             "min_radius_ratio": 0.005,
         },
         "folding": {"preset": "fetalfoldsim", "end_week": 22, "step_s": 86400, "ranks": 1},

@@ -154,7 +154,7 @@ def coarse_cortices(config: Config) -> Iterator[str]:
     for run, brain in config.folded:
         thickness = config.run(run).thickness_mm
         # maps and measured thicknesses are known once the surface is made
-        if mesh.pial_faces or isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
+        if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
             continue
         through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, config.brain(brain).week)
         if through / mesh.surface_edge_mm < 0.99 * needed:

@@ -35,9 +35,9 @@ def linear_elements(week: float, mesh: MeshSettings) -> float:
     """Return how many linear elements a brain of a week has: cubes of the wanted edge below its surface and inside."""
     volume_ml = expected_volume_ml(week)
     volume, area = volume_ml / ML_PER_MM3, 9900 * (volume_ml / 51) ** 0.74
-    edge = (area / (0.433 * mesh.pial_faces)) ** 0.5 if mesh.pial_faces else mesh.surface_edge_mm
-    graded = (1 / edge**2 - 1 / mesh.core_edge_mm**2) / (2 * mesh.edge_growth)
-    cubes = area * (mesh.fine_depth_edges / edge**2 + max(graded, 0)) + volume / mesh.core_edge_mm**3
+    edge = mesh.surface_edge_mm
+    graded = 1 / edge**2 - 1 / mesh.core_edge_mm**2
+    cubes = area * (2.5 / edge**2 + max(graded, 0)) + volume / mesh.core_edge_mm**3
     return ELEMENTS_PER_CUBE[mesh.mesher] * cubes
 
 

@@ -52,35 +52,18 @@ class MeshSettings(Settings):
     """Distance between neighbouring nodes in the cortex of the start brain: a little less than half its
     thickness. It grows with the tissue. This is the edge length of linear elements and half that of quadratic
     ones. [mm]"""
-    pial_faces: int | None = Field(None, ge=100, le=2_000_000)
-    """About how many triangles between nodes the surface has, instead of `surface_edge_mm`."""
     core_edge_mm: float = Field(2.5, gt=0.1, le=20)
     """Distance between neighbouring nodes deep inside. [mm]"""
-    fine_depth_edges: float = Field(2.5, ge=0, le=20)
-    """Depth down to which nodes are as close as at the surface (`pytetwild`). [surface edges]"""
-    edge_growth: float = Field(0.5, gt=0, le=2)
-    """Increase of node distance with depth below that (`pytetwild`). [mm/mm]"""
     envelope_mm: float = Field(0.1, gt=0.001, le=2)
     """Largest distance of the mesh's surface from the pial surface (`pytetwild`). [mm]"""
     time_limit_s: float = Field(1800.0, gt=0)
     """Time after which the mesher is stopped. [s]"""
     min_radius_ratio: float = Field(0.02, ge=0, lt=1)
     """Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
-    min_dihedral_deg: float = Field(1.0, ge=0, lt=70)
-    """Least accepted dihedral angle of an element. [deg]"""
-    max_dihedral_deg: float = Field(178.0, gt=71, le=180)
-    """Largest accepted dihedral angle of an element. [deg]"""
-    min_volume_mm3: float = Field(1e-6, ge=0, lt=1)
-    """Least accepted volume of an element. [mm³]"""
-    min_jacobian_ratio: float = Field(0.1, ge=0, lt=1)
-    """Least accepted Jacobian determinant of a quadratic element over its mean: 1 straight, 0 folded over."""
     max_volume_change: float = Field(0.01, gt=0, lt=1)
     """Largest accepted relative difference of the mesh's volume from the pial surface's."""
     max_surface_distance_mm: float = Field(0.1, gt=0, le=5)
     """Distance from mesh to pial surface, and back, within which 99 % of either must lie. [mm]"""
-    min_gap_kept: float = Field(0.95, ge=0, le=1)
-    """Least accepted part of the fissure and other gaps under 3 mm, by the area of their walls, that stays open
-    to at least half its width."""
 
 
 Modes = Annotated[

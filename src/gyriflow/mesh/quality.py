@@ -28,14 +28,10 @@ OFF_MM = 1e-4
 STILL_OPEN = 0.5
 """A gap counts as kept where so much of its width is left."""
 SIDES_OF_ELEMENT = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-LIMITS = {
-    "min_radius_ratio": ("radius_ratio", "radius ratio"),
-    "min_dihedral_deg": ("min_dihedral_deg", "dihedral angle in degrees"),
-    "max_dihedral_deg": ("max_dihedral_deg", "dihedral angle in degrees"),
-    "min_volume_mm3": ("volume_mm3", "volume in mm3"),
-    "min_jacobian_ratio": ("jacobian_ratio", "ratio of Jacobians"),
-}
-"""Gates of elements: what of `element_quality` each holds, and its name."""
+MIN_JACOBIAN_RATIO = 0.1
+"""Least accepted Jacobian determinant of a quadratic element over its mean: 1 straight, 0 folded over."""
+MIN_GAP_KEPT = 0.95
+"""Least accepted part of the fissure and other gaps, by the area of their walls, that stays open."""
 OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
 
 
@@ -209,34 +205,38 @@ def refuse_bad_mesh(
     mesh: TetrahedralMesh,
     summary: Mapping[str, Any],
     path: str | PathLike[str] | None = None,
-    **gates: float,
+    *,
+    min_radius_ratio: float,
+    max_volume_change: float,
+    max_surface_distance_mm: float,
 ) -> None:
     """Raises MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
 
     For elements the message has the number of bad ones and the worst place. Faces of the mesh's surface that cross
     each other are always refused. `path` is for the message: where the mesh can be looked at.
-
-    The `gates` are min_radius_ratio, min_dihedral_deg, max_dihedral_deg, min_volume_mm3, min_jacobian_ratio,
-    max_volume_change, max_surface_distance_mm and min_gap_kept, all of them.
     """
     quality, faults = element_quality(mesh), []
-    for gate, (column, name) in LIMITS.items():
-        least, limit, values = gate.startswith("min"), gates[gate], quality[column].to_numpy()
-        bad, worst = (values < limit, values.argmin()) if least else (values > limit, values.argmax())
+    limits = {
+        "radius_ratio": ("radius ratio", min_radius_ratio),
+        "jacobian_ratio": ("ratio of Jacobians", MIN_JACOBIAN_RATIO),
+    }
+    for column, (name, least) in limits.items():
+        values = quality[column].to_numpy()
+        bad, worst = values < least, values.argmin()
         if bad.any():
             place = np.round(mesh.vertices[mesh.corners[worst]].mean(axis=0), 1).tolist()
             found = f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at {place} mm"
-            faults.append((found, f"{name} at {'least' if least else 'most'} {limit:g}"))
+            faults.append((found, f"{name} at least {least:g}"))
     change, distance = summary["volume_change"], summary["surface_distance_mm"]["hausdorff99"]
-    if abs(change) > gates["max_volume_change"]:
+    if abs(change) > max_volume_change:
         found = f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} % against the surface's"
-        faults.append((found, f"at most {100 * gates['max_volume_change']:g} % (mesh.max_volume_change)"))
-    if distance > gates["max_surface_distance_mm"]:
+        faults.append((found, f"at most {100 * max_volume_change:g} % (mesh.max_volume_change)"))
+    if distance > max_surface_distance_mm:
         found = f"a surface {distance:.3f} mm from the one that was filled (99 % of it is nearer)"
-        faults.append((found, f"at most {gates['max_surface_distance_mm']:g} mm (mesh.max_surface_distance_mm)"))
-    if summary["gap_kept"] is not None and summary["gap_kept"] < gates["min_gap_kept"]:
+        faults.append((found, f"at most {max_surface_distance_mm:g} mm (mesh.max_surface_distance_mm)"))
+    if summary["gap_kept"] is not None and summary["gap_kept"] < MIN_GAP_KEPT:
         found = f"narrow gaps, such as the fissure, open along {100 * summary['gap_kept']:.0f} % of their walls"
-        faults.append((found, f"at least {100 * gates['min_gap_kept']:g} % (mesh.min_gap_kept)"))
+        faults.append((found, f"at least {100 * MIN_GAP_KEPT:g} %"))
     if summary["crossing_faces"]:
         faults.append((f"{summary['crossing_faces']} faces of its surface that cross others", "none that cross"))
     if faults:

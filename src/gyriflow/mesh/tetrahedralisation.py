@@ -10,18 +10,17 @@ from scipy.spatial import cKDTree
 from ..errors import MeshError
 from ..geometry.matching import crossing_faces
 from ..geometry.remeshing import remesh, untangle
-from ..geometry.tetrahedra import PIECES_OF_ORDER, TetrahedralMesh, boundary_surface, grid, signed_volumes
-from ..geometry.triangles import TriangleMesh, area, edges, euler_number, face_components, is_closed, signed_volume
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, grid, signed_volumes
+from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
 from ..parameters.terms import Mesher
 from .meshers import run_mesher
 from .nodes import curve_edges, improve
 
 log = logging.getLogger(__name__)
-FACE_AREA = np.sqrt(3) / 4
-"""Area of an equilateral triangle, in edges squared."""
-NEAR = 0.02
-"""A remeshed surface has the number of faces that was asked for when it differs by this part."""
-ATTEMPTS = 4
+FINE_DEPTH_EDGES = 2.5
+"""Elements of fTetWild are as fine as at the surface down to so many edges of it ..."""
+EDGE_GROWTH = 0.5
+"""... and grow by this part of each mm below."""
 OTHER_VOLUME = 0.05
 """A mesh whose volume differs by more than this part is that of another shape; nearer ones are left to the gates."""
 REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
@@ -29,19 +28,19 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 
 
 def edge_length_at(
-    depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, fine_depth_edges: float, growth: float
+    depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> NDArray[np.float64]:
-    """Returns the wanted edge length in mm at depths in mm below the surface.
+    """Returns the wanted edge length in mm of elements of an order at depths in mm below the surface.
 
-    It is that of the surface down to `fine_depth_edges` of them, grows by `growth` per mm from there on, and ends at
-    that of the core.
+    It is that of the surface down to a depth, grows from there on, and ends at that of the core. With depth, nodes of
+    elements of both orders are as far apart.
     """
-    below = np.maximum(depth - fine_depth_edges * surface_edge_mm, 0.0)
-    return np.minimum(surface_edge_mm + growth * below, core_edge_mm)
+    below = np.maximum(depth - FINE_DEPTH_EDGES / order * surface_edge_mm, 0.0)
+    return np.minimum(surface_edge_mm + order * EDGE_GROWTH * below, core_edge_mm)
 
 
 def background_mesh(
-    surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, fine_depth_edges: float, growth: float
+    surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
     """Returns a regular tetrahedral grid around the surface and the wanted edge length in mm at its vertices."""
     spacing = max(2 * surface_edge_mm, 1.0)
@@ -49,7 +48,7 @@ def background_mesh(
     counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
     background = grid([start + spacing * np.arange(count) for start, count in zip(low, counts, strict=True)])
     depth = cKDTree(surface.vertices).query(background.vertices)[0]
-    return background, edge_length_at(depth, surface_edge_mm, core_edge_mm, fine_depth_edges, growth)
+    return background, edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
 
 
 def tetrahedralise(
@@ -60,21 +59,16 @@ def tetrahedralise(
     envelope_mm: float,
     time_limit_s: float,
     mesher: Mesher = "pytetwild",
-    pial_faces: int | None = None,
-    fine_depth_edges: float = 2.5,
-    edge_growth: float = 0.5,
     order: int = 1,
 ) -> TetrahedralMesh:
     """Returns a tetrahedral mesh of the inside of a closed, outward surface in mm, of one or more components.
 
     `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the surface and deep inside: the edge
     length of linear elements (`order` 1), half of that of quadratic ones (2), which are curved to follow the surface.
-    So both orders have about as many nodes. With `pial_faces`, about so many triangles between nodes make the surface,
-    and `surface_edge_mm` follows. The mesher is stopped after `time_limit_s`.
+    So both orders have about as many nodes. The mesher is stopped after `time_limit_s`.
 
-    "pytetwild" (fTetWild) makes a surface of its own within `envelope_mm`, and sizes elements by their depth: down to
-    `fine_depth_edges` surface edges they are as fine as at the surface, below they grow by `edge_growth` of each mm.
-    "tetgen" keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as their
+    "pytetwild" (fTetWild) makes a surface of its own within `envelope_mm`, and sizes elements by their depth. "tetgen"
+    keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as their
     quality allows, and the poor ones are improved.
 
     MeshError where the surface is open or inside out, the mesher fails or takes too long, or its mesh is not the inside
@@ -83,14 +77,13 @@ def tetrahedralise(
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
         raise MeshError("the surface to be filled must be closed and face outwards", remedy="Repair it first.")
-    faces = pial_faces // PIECES_OF_ORDER[order] if pial_faces else None
-    edge = float(np.sqrt(area(surface) / (FACE_AREA * faces))) if faces else order * surface_edge_mm
+    edge = order * surface_edge_mm
     core = max(order * core_edge_mm, edge)
     if mesher == "tetgen":
-        even = even_surface(surface, edge, faces)
+        even = even_surface(surface, edge)
         arrays: dict[str, Any] = {"vertices": even.vertices, "faces": even.faces, "volume": REGULAR_VOLUME * core**3}
     else:
-        background, lengths = background_mesh(surface, edge, core, fine_depth_edges / order, order * edge_growth)
+        background, lengths = background_mesh(surface, edge, core, order)
         arrays = {
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -107,17 +100,12 @@ def tetrahedralise(
     return curve_edges(mesh, surface) if order == 2 else mesh
 
 
-def even_surface(surface: TriangleMesh, edge_mm: float, faces: int | None) -> TriangleMesh:
-    """Returns a surface remeshed with even triangles, fit to be the boundary of a mesh as it is.
+def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
+    """Remesh a surface with even triangles, fit to be the boundary of a mesh as it is.
 
-    Its edges are `edge_mm` long, or such that it has about the given number of faces. MeshError where it cuts itself.
+    MeshError where it cuts itself.
     """
     even = remesh(surface, edge_mm)
-    for _ in range(ATTEMPTS if faces else 0):
-        if abs(len(even.faces) - faces) <= NEAR * faces:  # type: ignore[operator]
-            break
-        edge_mm *= float(np.sqrt(len(even.faces) / faces))  # type: ignore[operator]
-        even = remesh(surface, edge_mm)
     if crossing_faces(even):
         even = untangle(even)
     crossing = crossing_faces(even)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import jsonschema
@@ -9,6 +10,7 @@ import pytest
 from configurations import LABELLED, labelled, problems, refusal, study, touched
 
 from gyriflow.config import load
+from gyriflow.config.atlas import Atlas
 from gyriflow.config.root import Config
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import output_weeks, parameters_from
@@ -277,10 +279,17 @@ def test_the_schema_of_all_keys_is_current():
     )
 
 
+def test_the_page_of_keys_has_every_section():
+    listed = re.findall(r"^::: gyriflow\.\S+\.(\w+)$", (CONFIG.parent / "docs" / "keys.md").read_text(), re.MULTILINE)
+    sections = {*SCHEMA["$defs"], *Atlas.model_json_schema()["$defs"], "Atlas", "Compared"}
+    # runs have the keys of folding
+    assert sorted(listed) == sorted(sections - {"Run"})
+
+
 def test_every_key_is_described():
     sections = [SCHEMA, *SCHEMA["$defs"].values()]
     keys = [(name, key) for section in sections for name, key in section.get("properties", {}).items()]
-    assert [name for name, key in keys if not key.get("description")] == []
+    assert [name for name, key in keys if not {"description", "$ref"} & set(key)] == []
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from shapes import box_mesh, ellipsoid, moved, sphere
+from shapes import box_mesh, moved, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.matching import nearest_on
@@ -34,13 +34,8 @@ from gyriflow.mesh.tetrahedralisation import (
 REGULAR = TetrahedralMesh([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 1, 2, 3]])
 GATES = {
     "min_radius_ratio": 0.02,
-    "min_dihedral_deg": 1.0,
-    "max_dihedral_deg": 178.0,
-    "min_volume_mm3": 1e-6,
-    "min_jacobian_ratio": 0.1,
     "max_volume_change": 0.02,
     "max_surface_distance_mm": 0.1,
-    "min_gap_kept": 0.95,
 }
 SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
 SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "tetrahedralise.py"
@@ -50,8 +45,6 @@ STAND_INS = {
     "tetgen": ("igl/copyleft/tetgen.py", "tetrahedralize"),
 }
 MESHERS = list(STAND_INS)
-EGG = ellipsoid((9.0, 8.0, 6.0))
-"""A surface whose edges have no single length, so that remeshing can make any number of faces of it."""
 BALL = sphere(8.0, 3)
 
 
@@ -73,16 +66,15 @@ def summary_of(mesh):
 
 
 def test_a_good_mesh_passes_every_gate():
-    refuse_bad_mesh(REGULAR, summary_of(REGULAR), **(GATES | {"min_radius_ratio": 0.99, "min_dihedral_deg": 70.0}))
+    refuse_bad_mesh(REGULAR, summary_of(REGULAR), **(GATES | {"min_radius_ratio": 0.99}))
 
 
 def test_flat_elements_are_refused_with_their_place_and_all_gates_they_fail():
     flat = TetrahedralMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1e-3]], [[0, 1, 2, 3]])
     with pytest.raises(
-        MeshError, match=r"1 of 1 elements with radius ratio to 7\.1\d*e-06 at \[0\.3, 0\.3, 0\.0\].* to 179"
-    ) as error:
+        MeshError, match=r"1 of 1 elements with radius ratio to 7\.1\d*e-06 at \[0\.3, 0\.3, 0\.0\] mm.* at least 0\.02"
+    ):
         refuse_bad_mesh(flat, summary_of(flat), **GATES)
-    assert "dihedral angle in degrees at least 1" in str(error.value)
 
 
 def test_a_surface_that_left_the_given_one_is_refused():
@@ -108,15 +100,6 @@ def test_a_mesh_that_lost_or_won_volume_is_refused_with_the_share():
         refuse_bad_mesh(box, summary, **(GATES | {"max_volume_change": 0.08}))
 
 
-def test_tiny_elements_are_refused():
-    small = TetrahedralMesh(1e-3 * REGULAR.vertices, REGULAR.tets)
-    # the regular element in a cube with edges of 2e-3 mm has a third of its volume
-    with pytest.raises(
-        MeshError, match=r"1 of 1 elements with volume in mm3 to 2\.667e-09 .*; expected .*at least 1e-06"
-    ):
-        refuse_bad_mesh(small, summary_of(small), **GATES)
-
-
 def test_a_mesh_that_shuts_the_fissure_is_refused():
     def halves(gap):
         parts = [box_mesh((4, 6, 6), (4.0, 6.0, 6.0)) for _ in range(2)]
@@ -131,9 +114,7 @@ def test_a_mesh_that_shuts_the_fissure_is_refused():
     summary = quality_summary(shut, surface)
     assert summary["gap_kept"] == 0.0
     assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.1)
-    with pytest.raises(
-        MeshError, match=r"open along 0 % of their walls; expected at least 95 % \(mesh\.min_gap_kept\)"
-    ):
+    with pytest.raises(MeshError, match=r"open along 0 % of their walls; expected at least 95 %"):
         refuse_bad_mesh(shut, summary, **(GATES | {"max_surface_distance_mm": 0.2}))
     refuse_bad_mesh(halves(0.3), quality_summary(halves(0.3), surface), **GATES)
 
@@ -153,13 +134,14 @@ def test_the_summary_counts_every_element_once():
 
 
 def test_edge_lengths_grow_with_depth_and_end_at_that_of_the_core():
-    lengths = edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 0.8, 2.5, 2.5, 0.5)
+    lengths = edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 0.8, 2.5)
     np.testing.assert_allclose(lengths, [0.8, 0.8, 1.8, 2.5])
-    np.testing.assert_allclose(edge_length_at(np.array([0.0, 1.0]), 0.4, 2.5, 0.0, 0.6), [0.4, 1.0])
+    # nodes of quadratic elements are as far apart
+    np.testing.assert_allclose(edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 1.6, 5.0, 2), 2 * lengths)
 
 
 def test_the_background_covers_the_surface_with_positive_elements():
-    grid, lengths = background_mesh(BALL, 1.5, 3.0, 2.5, 0.5)
+    grid, lengths = background_mesh(BALL, 1.5, 3.0)
     assert (signed_volumes(grid) > 0).all()
     assert (grid.vertices.min(axis=0) < -8).all()
     assert (grid.vertices.max(axis=0) > 8).all()
@@ -267,7 +249,7 @@ def mesh_in(folder, mesher, gates=GATES):
     """Runs the workflow's script on a ball; returns the exit code and the files that it wrote for good."""
     write_surface(folder / "pial.surf.gii", BALL)
     outputs = {name: str(folder / file) for name, file in OUTPUTS.items()}
-    settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5, "pial_faces": None}
+    settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5}
     job = SimpleNamespace(
         input=[str(folder / "pial.surf.gii")],
         output=SimpleNamespace(**outputs),
@@ -310,7 +292,7 @@ def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_at
 
 @pytest.fixture(scope="module")
 def even():
-    return even_surface(BALL, 1.2, None)
+    return even_surface(BALL, 1.2)
 
 
 @pytest.fixture(scope="module")
@@ -340,18 +322,6 @@ def test_elements_of_tetgen_grow_inwards_up_to_the_core(filled):
     largest = 1.5**3 / (6 * np.sqrt(2))
     fine = tetrahedralise(BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2, "core_edge_mm": 1.5}))
     assert np.quantile(signed_volumes(fine), 0.99) <= largest < np.quantile(volumes, 0.7)
-
-
-@pytest.mark.parametrize("wanted", [1500, 4000])
-def test_tetgen_has_about_the_number_of_faces_asked_for(wanted):
-    mesh = tetrahedralise(EGG, mesher="tetgen", pial_faces=wanted, **SIZES)
-    assert len(boundary_surface(mesh)[0].faces) == pytest.approx(wanted, rel=0.03)
-
-
-@pytest.mark.slow
-def test_pytetwild_has_about_the_number_of_faces_asked_for():
-    mesh = tetrahedralise(EGG, mesher="pytetwild", pial_faces=2000, **(SIZES | {"envelope_mm": 0.3}))
-    assert len(boundary_surface(mesh)[0].faces) == pytest.approx(2000, rel=0.25)
 
 
 def test_a_narrow_gap_between_two_parts_stays_open():
