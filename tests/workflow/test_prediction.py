@@ -29,13 +29,7 @@ STUDY = {
     "folding": {"end_week": 23},
     "runs": {
         "expected": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1},
-        "open": {
-            "preset": "expected",
-            "contact": {"kind": "none"},
-            "ranks": 1,
-            "follow": {"loop": "open", "regional": 1, "directional": 1},
-            "end_week": 22.6,
-        },
+        "smooth": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1, "growth": {"smoothing_mm": 4}},
     },
 }
 
@@ -116,11 +110,11 @@ def test_a_surface_in_another_pose_is_carried_through_the_labels_of_an_atlas(wor
     name = workflow.write("study.yaml", STUDY | {"brains": brains, "start": "b21"})
     folder = workflow.directory / "results/brains"
     outcome = workflow.run(
-        "results/brains/b21/mesh/targets.another.h5", "--cores", "2", "--configfile", name, timeout_s=900
+        "results/brains/b21/mesh/targets.atlas.h5", "--cores", "2", "--configfile", name, timeout_s=900
     )
     assert outcome.returncode == 0, outcome.stdout[-1000:] + outcome.stderr[-3000:]
     boundary, used = boundary_surface(read_tetrahedral_mesh(folder / "b21/mesh/brain.xdmf"))
-    targets = read_targets(folder / "b21/mesh/targets.another.h5")
+    targets = read_targets(folder / "b21/mesh/targets.atlas.h5")
     real = read_surface(folder / "a23/surface/pial.surf.gii")
     ends = targets.surfaces["atlas"][2], targets.positions[2][used]
     atlas, target = (TriangleMesh(places, boundary.faces) for places in ends)

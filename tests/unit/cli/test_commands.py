@@ -78,7 +78,7 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted
     config = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
     assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
     assert config.starts("reference") == ["subject"]
-    assert config.run("reference").follow.growth_of == "another"
+    assert config.run("reference").growth.of == "atlas"
     assert Plan(config).expecting.chain("subject", "another")[1:] == [brain.id for brain in config.brains[1:]]
     asked = (tmp_path / "asked.txt").read_text()
     assert asked == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path}"

@@ -9,7 +9,6 @@ from gyriflow.compare.placement import correlation, drawn_patches, gain_interval
 from gyriflow.compare.shapes import Shape, ready
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import fit_onto
-from gyriflow.geometry.matching import spins, spun
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, signed_volume, transformed
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -168,22 +167,3 @@ def test_closest_points_find_the_motion_back():
 def test_open_or_turned_surfaces_are_refused():
     with pytest.raises(InputError, match="encloses no volume"):
         ready(flipped(REAL), REAL)
-
-
-def test_spins_rotate_a_map_and_keep_its_values():
-    height = SMOOTH.vertices[:, 2]
-    quarter = Rotation.from_rotvec([90, 0, 0], degrees=True).as_matrix()
-    moved = spun(SMOOTH.vertices, height, quarter)
-    # what was at the pole is where the turn leads the pole
-    assert moved == pytest.approx(SMOOTH.vertices @ (quarter @ [0, 0, 1]), abs=1.5)
-    assert moved.std() == pytest.approx(height.std(), rel=0.02)
-
-
-def test_spun_maps_of_hemispheres_stay_symmetric():
-    left = TriangleMesh(SMOOTH.vertices - [25, 0, 0], SMOOTH.faces)
-    points = np.concatenate([left.vertices, left.vertices * [-1, 1, 1]])
-    right = np.arange(len(points)) >= len(left.vertices)
-    values = field(SMOOTH.vertices / RADIUS, 5)
-    moved = spun(points, np.concatenate([values, values]), spins(1, 8)[0], right)
-    assert moved[~right] == pytest.approx(moved[right])
-    assert correlation(values, moved[right], np.ones(len(values))) < 0.5

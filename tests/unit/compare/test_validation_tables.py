@@ -18,10 +18,10 @@ REAL, START = bumpy(1), bumpy(2)
 SHAPES = {"real": shaped(REAL), "start": shaped(START), "adjacent": shaped(bumpy(1, height=0.8))}
 
 
-def row(week: float, *, seed: int = 0, grown: float = 1.0, run: str = "measured") -> dict:
+def row(week: float, *, grown: float = 1.0, run: str = "measured") -> dict:
     simulated = transformed(REAL, np.diag([grown] * 3 + [1.0]))
     return validation_row(
-        Comparison(run, "predicted", 21.0, week, seed),
+        Comparison(run, "predicted", 21.0, week),
         simulated=simulated,
         real_brain=REAL,
         curve=(area(REAL), signed_volume(REAL)),
@@ -32,7 +32,7 @@ def row(week: float, *, seed: int = 0, grown: float = 1.0, run: str = "measured"
 
 @pytest.fixture(scope="module")
 def table() -> pd.DataFrame:
-    rows = [row(23.0, grown=1.02), row(22.0), row(23.0, seed=1)]
+    rows = [row(23.0, grown=1.02), row(22.0)]
     rows.append(row(22.0, run="reference") | {"curve_area_cm2": np.nan, "area_error": np.nan, "volume_error": np.nan})
     return ordered(rows)
 
@@ -41,7 +41,6 @@ MOVES = pd.DataFrame(
     {
         "run": "measured",
         "start_week": 21.0,
-        "seed": 0,
         "from_week": [21.0, 22.0],
         "to_week": [22.0, 23.0],
         "displacement_r": [0.5, 0.8],
@@ -66,13 +65,12 @@ def test_a_row_holds_sizes_errors_placement_and_folds():
 
 
 def test_rows_are_ordered_and_named_first(table):
-    assert table.columns[:6].tolist() == ["run", "kind", "start_week", "week", "horizon", "seed"]
-    assert table.columns[6:9].tolist() == ["distance_mm", "distance95_mm", "cortex_dice"]
-    assert table[["run", "seed", "week"]].to_numpy().tolist() == [
-        ["measured", 0, 22.0],
-        ["measured", 0, 23.0],
-        ["measured", 1, 23.0],
-        ["reference", 0, 22.0],
+    assert table.columns[:5].tolist() == ["run", "kind", "start_week", "week", "horizon"]
+    assert table.columns[5:8].tolist() == ["distance_mm", "distance95_mm", "cortex_dice"]
+    assert table[["run", "week"]].to_numpy().tolist() == [
+        ["measured", 22.0],
+        ["measured", 23.0],
+        ["reference", 22.0],
     ]
 
 

@@ -1,4 +1,4 @@
-"""Maps and estimated growth in a configuration: what the steps of the workflow are handed."""
+"""Maps and growth in a configuration: what the steps of the workflow are handed."""
 
 import pytest
 from configurations import LABELLED, problems
@@ -10,7 +10,7 @@ BRAINS = [
     {"id": "b", "week": 22, **LABELLED},
     {"id": "c", "week": 22, **LABELLED},
 ]
-ESTIMATED = {"end_week": 24, "growth_rate_per_s": "estimated"}
+FOLDING = {"end_week": 24}
 
 
 def study(folding, **others):
@@ -25,7 +25,6 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
         "growth_rate_per_s": {"map": "left.gii", "surface": "left.surf.gii", "weeks": {30: 0.5, 21: 1}},
         "shear_modulus_core_pa": {"map": "soft.nii.gz"},
         "radial_growth_rate_per_s": {"weeks": {25: 1e-7}},
-        "core_growth_rate_per_s": "estimated",
     }
     config = load(study(mapped, runs={"mapped": {}, "plain": dict.fromkeys(mapped, 1e-8)}), tmp_path)
     settings = config.parameters("mapped")
@@ -34,7 +33,6 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
         "growth_rate_per_s": {"weeks": {21.0: 1.0, 30.0: 0.5}, "map": "growth_rate_per_s"},
         "shear_modulus_core_pa": {"map": "shear_modulus_core_pa"},
         "radial_growth_rate_per_s": {"weeks": {25.0: 1e-7}},
-        "core_growth_rate_per_s": "estimated",
     }
     assert list(settings["growth_rate_per_s"]["weeks"]) == [21.0, 30.0]
     assert "ranks" not in settings
@@ -101,28 +99,21 @@ def test_series_may_be_named(tmp_path):
             {"brains": {"one": ["v21", "s21"], "two": ["v21", "v22"]}},
             ["growth.brains.one: found brains of 1 week; a growth rate needs two or more"],
         ),
-        (
-            {"brains": {"one": ["v21", "v22"], "two": ["v21", "v22"]}},
-            [
-                "folding.growth_rate_per_s: can't be estimated: the start brain s21 is in none of the series one, two; "
-                "name one under growth.estimated_from"
-            ],
-        ),
         ({"estimated_from": "volumes"}, ["growth.estimated_from: found 'volumes'; the series are surface, volume"]),
         ({"brains": {"one": "v21"}}, ["growth.brains.one: found 'v21'; it should be a valid tuple"]),
     ],
 )
 def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
-    assert problems(both_kinds(tmp_path, (21, 22)) | {"growth": growth, "folding": ESTIMATED}, tmp_path) == found
+    assert problems(both_kinds(tmp_path, (21, 22)) | {"growth": growth, "folding": FOLDING}, tmp_path) == found
 
 
 @pytest.mark.parametrize(
     ("growth", "settings", "found"),
     [
-        ({}, ESTIMATED, []),
-        ({"brains": ["a", "c"]}, ESTIMATED, []),
-        (None, ESTIMATED, []),
-        ({"brains": ["a", "d"]}, ESTIMATED, ["growth.brains: found d; expected ids of brains: a, b, c"]),
+        ({}, FOLDING, []),
+        ({"brains": ["a", "c"]}, FOLDING, []),
+        (None, FOLDING, []),
+        ({"brains": ["a", "d"]}, FOLDING, ["growth.brains: found d; expected ids of brains: a, b, c"]),
         (
             {"brains": ["b", "c"]},
             {"end_week": 24},
@@ -135,40 +126,38 @@ def test_brains_that_give_no_growth_rate_are_refused(growth, settings, found):
     assert problems({"brains": BRAINS, "start": "a", "growth": growth, "folding": settings}) == found
 
 
-def test_an_estimate_without_two_weeks_is_refused_where_it_stands():
-    reason = "can't be estimated: found brains of 1 week; a growth rate needs two or more"
-    alone = {"brains": BRAINS[:1], "start": "a", "folding": {"end_week": 24}}
-    estimated = {"growth_rate_per_s": "estimated"}
-    assert problems(alone | {"runs": {"x": estimated, "y": estimated}}) == [f"folding.growth_rate_per_s: {reason}"]
-    assert problems(alone | {"runs": {"x": estimated, "y": {}}}) == [f"runs.x.growth_rate_per_s: {reason}"]
+CURVE = {21: 99, 30: 252}
 
 
 @pytest.mark.parametrize(
-    ("follow", "told"),
+    ("growth", "told"),
     [
-        ({"growth_of": "another"}, ""),
-        ({"growth_of": "another", "known_until_gw": 22}, "known_until_gw: has no meaning with growth of another"),
-        ({"growth_of": "another", "ventricles_ml": "measured"}, "follow.ventricles_ml: is measured on the start's own"),
-        ({"growth_of": "another", "area_cm2": {21: 99, 30: 252}}, ""),
-        ({"loop": "closed", "area_cm2": {21: 99, 30: 252}}, "area_cm2: has no meaning where growth leads to whole"),
-        ({"loop": "closed", "known_until_gw": 22}, "known_until_gw: has no meaning where growth leads to whole shapes"),
-        ({"loop": "closed", "growth_of": "another"}, ""),
-        ({"loop": "open", "known_until_gw": 22}, ""),
+        ("shapes", ""),
+        ({"model": "shapes", "of": "atlas"}, ""),
+        ({"model": "sizes", "area_cm2": CURVE}, ""),
+        ({"area_cm2": CURVE}, "growth.area_cm2: has no meaning with the model rates"),
+        ({"model": "shapes", "area_cm2": CURVE}, "growth.area_cm2: has no meaning with the model shapes"),
+        ({"model": "sizes", "of": "atlas"}, "growth.of: has no meaning with the model sizes"),
+        ({"model": "shapes", "of": "atlas", "thickness_mm": "measured"}, "unknown to a prediction"),
+        ("shape", "folding.growth.model: found 'shape'"),
     ],
 )
-def test_growth_towards_shapes_knows_whole_shapes(follow, told):
-    found = problems(study({"follow": follow}))
-    assert not found if not told else [line for line in found if told in line]
+def test_a_growth_model_has_its_own_keys(growth, told):
+    found = problems(study({"growth": growth}))
+    assert not found if not told else any(told in line for line in found)
 
 
-def test_sizes_by_hand_are_refused_in_studies_of_growth_towards_shapes_too():
-    table = {"follow": {"area_cm2": {21: 99, 30: 252}}}
-    vary = {"base": "reference", "compare_week": 22, "vary": {"follow.loop": ["open", "closed"]}}
-    (found,) = problems(study(table, studies={"loops": vary}))
-    assert "has no meaning where growth leads to whole shapes: set it to measured" in found
+def test_rates_are_refused_with_another_model():
+    (found,) = problems(study({"growth": "sizes", "growth_rate_per_s": 1e-7}))
+    assert found == "folding.growth_rate_per_s: has no meaning with the growth model sizes"
 
 
-def test_what_is_expected_is_a_preset():
-    folding = load(study({"preset": "expected"})).run("reference")
-    assert (folding.follow.loop, folding.follow.growth_of) == ("closed", "another")
-    assert folding.shear_modulus_cortex_pa == folding.shear_modulus_core_pa
+def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
+    runs = {"smooth": {"growth": {"smoothing_mm": 3}}, "sizes": {"growth": "sizes"}, "same": {"growth": "shapes"}}
+    config = load(study({"preset": "expected", "growth": {"smoothing_mm": 2}}, runs=runs))
+    found = {name: config.run(name).growth for name in runs}
+    assert [(growth.model, growth.of, growth.smoothing_mm) for growth in found.values()] == [
+        ("shapes", "atlas", 3),
+        ("sizes", "self", 1.5),
+        ("shapes", "atlas", 2),
+    ]

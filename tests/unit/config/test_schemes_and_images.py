@@ -65,23 +65,6 @@ def test_all_mistakes_in_schemes_are_named_at_once(folder):
     ]
 
 
-def test_ventricles_grow_by_their_own_curve_only_where_labels_know_them(folder):
-    following = {"folding": {"end_week": 22, "follow": {"ventricles_ml": {21: 3.0, 22: 3.2}}}}
-    known = {"labels": "labels.nii.gz", "scheme": "mine"}
-    load(study(known, schemes={"mine": MINE | {"ventricles": [1]}}, **following), folder)
-    load(study(LABELLED, **following))
-    needs = "folding.follow.ventricles_ml: needs a start brain whose labels know ventricles; "
-    assert problems(study(known, schemes={"mine": MINE}, **following), folder) == [
-        f"{needs}mine, the scheme of a, names none"
-    ]
-    (folder / "a.stl").touch()
-    assert problems(study({"pial": "a.stl"}, **following), folder) == [f"{needs}a has no labels"]
-    # other brains may be without, and so may runs that do not ask
-    others = {"brains": [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22, "pial": "a.stl"}]}
-    load(study({}, **others, **following), folder)
-    load(study({"pial": "a.stl"}), folder)
-
-
 def test_an_image_alone_is_refused_since_gyriflow_does_not_segment(folder):
     (line,) = problems(study({"image": "t2w.nii.gz"}), folder)
     assert line.startswith("brains[0].image: gyriflow does not segment images; give a label volume under labels")

@@ -127,7 +127,7 @@ def test_a_calibration_knows_its_runs_beforehand():
         ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm: found -1"),
         ({"parameters": {"poisson": [0, 0.4]}}, "no such key"),
         ({"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}}, "growth_rate_per_s is no curve in the base run"),
-        ({"parameters": {"follow.area_cm2.amplitude": [0.5, 2]}}, "the base run follows no curve"),
+        ({"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}, "the base run follows no curve"),
         ({"parameters": {"stiffness_ratio": [0, 2]}}, "above 0"),
         ({"rounds": 8}, "at most 40"),
         ({"score": {}}, "calibrate.score: found nothing"),
@@ -141,9 +141,9 @@ def test_what_is_wrong_with_a_calibration_is_said(change, said):
 
 
 def test_curves_of_the_base_run_may_be_scaled():
-    runs = {"reference": {"growth_rate_per_s": {"weeks": {21: 1e-7, 25: 2e-7}}}, "led": {"follow": {}}}
+    runs = {"reference": {"growth_rate_per_s": {"weeks": {21: 1e-7, 25: 2e-7}}}, "led": {"growth": "sizes"}}
     config(runs=runs, calibrate=CALIBRATION | {"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}})
-    led = {"base": "led", "parameters": {"follow.area_cm2.amplitude": [0.5, 2]}}
+    led = {"base": "led", "parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}
     config(runs=runs, calibrate=CALIBRATION | led)
     # growth towards shapes follows none
     closed = {"led": {"preset": "measured"}, "reference": {}}

@@ -11,11 +11,9 @@ from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 from gyriflow.mesh.maps import (
     move_to_mesh,
     require_within,
-    ventricle_map,
     vertex_map_on_mesh,
     volume_map_on_mesh,
 )
-from gyriflow.parameters.folding import VENTRICLES
 
 RADIUS = 20.0
 SLOPE = np.array([0.3, -0.7, 0.2])
@@ -184,20 +182,3 @@ def test_values_that_a_parameter_cannot_have_are_refused_with_their_count():
     ) as caught:
         require_within(np.array([0.0, 1.5, 1500.0]), bounds, "thickness.shape.gii")
     assert all(words in str(caught.value) for words in ("thickness.shape.gii", "medial wall"))
-
-
-def test_ventricles_are_where_the_labels_have_them(ball):
-    points = ball.vertices
-    low = points.min(axis=0) - 2
-    affine = np.diag([0.5, 0.5, 0.5, 1.0])
-    affine[:3, 3] = low
-    shape = np.ceil((np.ptp(points, axis=0) + 4) / 0.5).astype(int) + 1
-    places = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) * 0.5 + low
-    inside = np.linalg.norm(places, axis=-1) < 0.5 * RADIUS
-    labels = np.where(inside, 7, 1)
-    found = ventricle_map(points, labels, affine, (7, 8), "labels.nii.gz")[VENTRICLES]
-    depth = np.linalg.norm(points, axis=1)
-    assert (found[depth < 0.5 * RADIUS - 1] == 1).all()
-    assert (found[depth > 0.5 * RADIUS + 1] == 0).all()
-    with pytest.raises(InputError, match="know no ventricles"):
-        ventricle_map(points, labels, affine, (2,), "labels.nii.gz")

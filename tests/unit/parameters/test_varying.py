@@ -41,11 +41,6 @@ def test_what_is_no_number_curve_or_map_is_refused(given):
         value(given)
 
 
-def test_an_estimate_is_no_parameter_of_a_run():
-    with pytest.raises(InputError, match="growth_rate_per_s: found 'estimated'"):
-        parameters_from(RUN | {"growth_rate_per_s": "estimated"})
-
-
 def test_thickness_grows_with_time():
     p = parameters_from(RUN | {"thickness_mm": 1.5, "thickness_growth_mm_per_gw": 0.05})
     assert [p.thickness_at(week, {}) for week in (21.0, 31.0)] == pytest.approx([1.5, 2.0])

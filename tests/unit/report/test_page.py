@@ -242,7 +242,12 @@ def test_the_methods_say_what_was_run():
     packages = dict.fromkeys(("scikit-image", "fenics-dolfinx", "petsc4py", "lapy", "snakemake"), "9.9")
     parameters = {
         **{"start_week": 21.0, "step_s": 43200.0, "material": "neo-hookean", "shear_modulus_cortex_pa": 1500.0},
-        **{"shear_modulus_core_pa": {"map": "core"}, "poisson_ratio": 0.45, "thickness_mm": 1.5, "follow": None},
+        **{
+            "shear_modulus_core_pa": {"map": "core"},
+            "poisson_ratio": 0.45,
+            "thickness_mm": 1.5,
+            "growth": {"model": "rates"},
+        },
         **{"growth_rate_per_s": 2e-7, "core_growth_rate_per_s": 0.0, "stress_memory_gw": 0.0},
         "contact": {"kind": "global"},
     }

@@ -13,7 +13,6 @@ from gyriflow.report.scores import (
     nearest_chart,
     onset_chart,
     prediction_chart,
-    smoothing_chart,
     validation_chart,
 )
 
@@ -75,15 +74,6 @@ def test_what_registration_gives_is_seen_with_a_single_week_too():
     axes = validation_chart(gains(["measured"], [23]), gains(["registration"], [23])).axes[0]
     ends = [segment[:, 0] for lines in axes.collections for segment in lines.get_segments() if np.ptp(segment[:, 0])]
     np.testing.assert_allclose(ends, [[22.75, 23.25]])
-
-
-def test_gain_stands_over_its_smoothing_length_and_uniform_growth_beyond():
-    lengths = {"a": 3.0, "b": 6.0, "c": math.inf}
-    axes = smoothing_chart(gains([*lengths]), gains(["registration"]), smoothing_mm=lengths).axes[0]
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["3", "6", "uniform"]
-    line = next(line for line in axes.lines if line.get_marker() == "o")
-    np.testing.assert_allclose(line.get_ydata(), [0.01, 0.02, 0.03])
-    assert line.get_xdata()[-1] == pytest.approx(1.6 * 6)
 
 
 def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():

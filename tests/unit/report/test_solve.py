@@ -50,18 +50,15 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
 
 
-def test_series_have_bars_on_one_scale_and_their_differences_a_panel():
+def test_series_have_bars_on_one_scale_():
     areas = pd.concat([AREAS.assign(series="surface"), AREAS.assign(area_cm2=2 * AREAS["area_cm2"])])
     rates = pd.concat([RATES.assign(series="surface", rate_per_s=[3e-7, 1e-7]), RATES])
-    agreement = RATES.assign(reference="surface", difference_per_s=[-1.8e-7, 0.4e-7])
-    figure = growth_chart(areas, rates, agreement, folding_rate_per_s=2e-7)
-    area_axes, _, surface_axes, volume_axes, difference_axes = figure.axes
+    figure = growth_chart(areas, rates, folding_rate_per_s=2e-7)
+    area_axes, _, surface_axes, volume_axes = figure.axes
     assert [line_of(area_axes, series)[:, 1].tolist() for series in ("surface", "volume")] == [
         [100, 115, 130],
         [200, 230, 260],
     ]
-    assert [bar.get_height() for bar in difference_axes.patches] == pytest.approx([-1.8, 0.4])
-    assert "volume − surface: mean −0.70, mean size 1.10" in words(figure)
     assert [bar.get_height() for bar in surface_axes.patches] == pytest.approx([3.0, 1.0])
     assert [bar.get_height() for bar in volume_axes.patches] == pytest.approx([1.2, -0.3])
     assert surface_axes.get_ylim() == volume_axes.get_ylim()
@@ -70,20 +67,11 @@ def test_series_have_bars_on_one_scale_and_their_differences_a_panel():
     # a series is of one colour in all panels, and not that of the folding
     folding = next(line.get_color() for line in surface_axes.lines if str(line.get_label()).startswith("folding"))
     surface, volume = (
-        {bar.get_facecolor() for axes in panels for bar in axes.patches}
-        for panels in ([surface_axes], [volume_axes, difference_axes])
+        {bar.get_facecolor() for axes in panels for bar in axes.patches} for panels in ([surface_axes], [volume_axes])
     )
     assert len(surface) == len(volume) == 1
     assert surface != volume
     assert not any(same_color(colour, folding) for colour in surface | volume)
-
-
-def test_series_without_common_weeks_have_no_panel_of_differences():
-    other = RATES.assign(series="surface", from_week=[30.0, 31.0], to_week=[31.0, 32.0])
-    areas = pd.concat([AREAS, AREAS.assign(series="surface", week=AREAS["week"] + 9)])
-    figure = growth_chart(areas, pd.concat([RATES, other]), RATES.iloc[:0])
-    assert not any("difference" in text for text in words(figure))
-    assert len([axes for axes in figure.axes if axes.patches]) == 2
 
 
 def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():

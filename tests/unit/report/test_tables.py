@@ -71,16 +71,16 @@ def test_runs_table_puts_what_differs_first():
 
 
 def test_parameters_that_one_run_lacks_and_another_leaves_off_are_no_difference_and_powers_are_raised():
-    follow = {"follow": {"noise": 0, "rotated": False, "smoothing_mm": 1.5}, "growth_rate_per_s": 2e-7}
-    table = runs_table({"reference": {"follow": None, "growth_rate_per_s": 2e-7}, "measured": follow})
-    assert table.index.tolist() == ["follow smoothing (mm)", "growth rate (s⁻¹)"]
+    growth = {"growth": {"thickness_mm": None, "smoothing_mm": 1.5}, "growth_rate_per_s": 2e-7}
+    table = runs_table({"reference": {"growth": {}, "growth_rate_per_s": 2e-7}, "measured": growth})
+    assert table.index.tolist() == ["growth smoothing (mm)", "growth rate (s⁻¹)"]
     assert table.loc["growth rate (s⁻¹)", "measured"] == "2·10⁻⁷"
 
 
 def test_a_curve_is_told_by_its_ends():
-    curve = {"follow": {"area_cm2": {"21.0": 89.9166, "23.0": 100.0, "25.25": 143.2723}}}
-    table = runs_table({"reference": {"follow": None}, "measured": curve})
-    assert table.loc["follow area (cm²)", "measured"] == "89.92 at 21.0 GW to 143.3 at 25.25 GW"
+    curve = {"growth": {"area_cm2": {"21.0": 89.9166, "23.0": 100.0, "25.25": 143.2723}}}
+    table = runs_table({"reference": {"growth": {}}, "measured": curve})
+    assert table.loc["growth area (cm²)", "measured"] == "89.92 at 21.0 GW to 143.3 at 25.25 GW"
 
 
 def test_html_is_escaped_named_and_the_same_each_time():

@@ -3,7 +3,6 @@
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 from configurations import LABELLED
 
@@ -11,11 +10,10 @@ from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.study import Plan
-from gyriflow.study.paths import CURVES, FOLDING, GROWTH, MEASURES, PARAMETERS, READY, THICKNESS, job_files, one_of
+from gyriflow.study.paths import CURVES, FOLDING, MEASURES, PARAMETERS, READY, THICKNESS, job_files, one_of
 
 CURVE = {21: 99, 24: 150}
-FOLLOW = {"area_cm2": CURVE, "volume_ml": CURVE}
-REGIONAL = FOLLOW | {"regional": 1.0}
+SIZES = {"model": "sizes", "area_cm2": CURVE, "volume_ml": CURVE}
 
 
 def brain(week, **given):
@@ -84,38 +82,11 @@ def test_every_run_folds_its_starts():
 def test_a_start_is_carried_to_one_brain_a_week_up_to_the_first_past_the_end(real, tmp_path):
     twin = labels(tmp_path, 23, population=None) | {"id": "twin"}
     late = labels(tmp_path, 27), labels(tmp_path, 30)
-    chains = plan([*real[:3], twin, *late], runs={"a": {"follow": REGIONAL}}).chains
+    chains = plan([*real[:3], twin, *late], runs={"a": {"growth": "shapes"}}).chains
     assert chains.later("b21") == ["b21", "b22", "b23", "b27"]
-    assert chains.weeks("b21") == [21, 22, 23, 27]
+    assert chains.later_weeks("b21") == [21, 22, 23, 27]
     assert chains.correspondences_later("b21")[0] == "results/study/registration/b21/b22.h5"
-    assert chains.carried == chains.with_chain == ["b21"]
-    assert chains.carried_mesh("a", "b21") == "results/brains/b21/mesh/carried.h5"
-
-
-def test_a_start_knows_earlier_brains_only_where_a_run_predicts_from_them(real):
-    predicts = {"follow": REGIONAL | {"known_until_gw": 22}}
-    chains = plan(real, start="b22", runs={"a": predicts}).chains
-    assert (chains.earlier("b22"), chains.later("b22")) == (["b21", "b22"], ["b22", "b23", "b24"])
-    assert chains.chain("b22") == ["b21", "b22", "b23", "b24"]
-    assert chains.known_until_gw == [22]
-    explains = plan(real, start="b22", runs={"a": {"follow": REGIONAL}}).chains
-    assert explains.chain("b22") == ["b22", "b23", "b24"]
-
-
-def test_a_mesh_is_carried_with_the_smoothing_that_its_runs_ask_for(real):
-    runs = {
-        "uniform": {"follow": FOLLOW | {"smoothing_mm": 9}},
-        "near": {"follow": REGIONAL | {"smoothing_mm": 3}},
-        "far": {"follow": REGIONAL | {"smoothing_mm": 7}},
-    }
-    chains = plan(real, runs=runs).chains
-    assert chains.smoothing_mm("b21") == [3, 7]
-    assert not chains.with_strain("b21")
-    assert chains.regional_weeks("uniform", "b21") == []
-    runs["far"]["follow"] |= {"directional": 0.5}
-    assert plan(real, runs=runs).chains.with_strain("b21")
-    lengths = {"base": "near", "vary": {"follow.smoothing_mm": [2.0, 3.0]}, "compare_week": 24}
-    assert plan(real, runs=runs, studies={"lengths": lengths}).chains.smoothing_mm("b21") == [2, 3, 7]
+    assert chains.carried == ["b21"]
 
 
 def test_surfaces_are_registered_by_a_mask(tmp_path):
@@ -136,14 +107,12 @@ def test_one_brain_alone_has_no_growth_and_nothing_to_be_compared_with():
 def test_measured_growth_is_waited_for_by_the_runs_that_use_it(real):
     runs = {
         "plain": {},
-        "estimated": {"growth_rate_per_s": "estimated"},
-        "given": {"follow": FOLLOW},
-        "measured": {"follow": FOLLOW | {"volume_ml": "measured"}},
+        "given": {"growth": SIZES},
+        "measured": {"growth": SIZES | {"volume_ml": "measured"}},
     }
     found = plan(real, runs=runs).runs
-    assert [found.rates(run) for run in runs] == [[], GROWTH["rates"], [], []]
-    assert [found.curves(run) for run in runs] == [[], [], [], CURVES["curves"]]
-    assert [found.estimated_from(run, "b21") for run in runs] == [None, "volume", None, "volume"]
+    assert [found.curves(run) for run in runs] == [[], [], CURVES["curves"]]
+    assert [found.estimated_from(run, "b21") for run in runs] == [None, None, "volume"]
 
 
 def test_maps_are_made_for_the_runs_that_have_any(tmp_path):
@@ -155,17 +124,15 @@ def test_maps_are_made_for_the_runs_that_have_any(tmp_path):
         "plain": {},
         "thick": {"thickness_mm": {"map": pair, "surface": pair}},
         "soft": soft,
-        "local": {"follow": REGIONAL},
-        "ventricles": {"follow": FOLLOW | {"ventricles_ml": CURVE}},
+        "local": {"growth": "shapes"},
     }
     search = {"base": "soft", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
     found = plan([labels(tmp_path, 21), labels(tmp_path, 24)], runs=runs, calibrate=search).runs
-    assert found.with_maps == ["thick", "soft", "local", "ventricles"]
+    assert found.with_maps == ["thick", "soft", "local"]
     assert found.map_files("thick") == [*pair, *pair]
     assert found.maps("plain", "b21") == []
     # runs of the calibration have the maps of its base
     assert found.maps("calibration-00", "b21") == "results/runs/soft/b21/folding/maps.h5"
-    assert found.ventricle_labels("ventricles", "b21") == str(tmp_path / "labels.nii.gz")
 
 
 def test_later_scans_of_the_subject_come_first(tmp_path):
@@ -203,29 +170,27 @@ def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_wor
 def test_a_week_is_explained_by_growth_that_knows_it_and_else_predicted(real):
     runs = {
         "plain": {},
-        "given": {"follow": FOLLOW},
-        "estimated": {"growth_rate_per_s": "estimated"},
-        "known": {"follow": REGIONAL | {"known_until_gw": 23}},
+        "given": {"growth": SIZES},
+        "sizes": {"growth": "sizes"},
+        "shapes": {"growth": "shapes"},
     }
     kinds = plan(real, runs=runs).validating.kinds
     assert {run: list(kinds(run, "b21").values()) for run in runs} == {
         "plain": ["predicted"] * 3,
         "given": ["predicted"] * 3,
-        "estimated": ["explained"] * 3,
-        "known": ["explained", "explained", "predicted"],
+        "sizes": ["explained"] * 3,
+        "shapes": ["explained"] * 3,
     }
 
 
 def test_displacements_are_a_consistency_check_where_growth_is_of_the_same_registration(real):
     runs = {
         "plain": {},
-        "uniform": {"follow": FOLLOW},
+        "uniform": {"growth": SIZES},
         "closed": {"preset": "measured"},
-        "regional": {"follow": REGIONAL},
-        "known": {"follow": REGIONAL | {"known_until_gw": 23}},
     }
-    until = plan(real, runs=runs).validating.registered_until
-    assert [until(run, "b21") for run in runs] == [-np.inf, -np.inf, np.inf, np.inf, 23]
+    registered = plan(real, runs=runs).validating.registered
+    assert [registered(run, "b21") for run in runs] == [False, False, True]
 
 
 def test_tables_of_validation_are_joined_from_the_runs_that_are_compared(real):
@@ -241,26 +206,6 @@ def test_what_registration_alone_is_worth_is_asked_at_compared_weeks(real):
     assert validating.ceiling("b21")["real"] == [
         READY["real"].format(brain="b21", week=week) for week in ("23.00", "24.00")
     ]
-
-
-def test_runs_that_differ_in_smoothing_alone_are_compared_by_it(real):
-    runs = {
-        "plain": {},
-        "near": {"follow": REGIONAL | {"smoothing_mm": 3}},
-        "far": {"follow": REGIONAL | {"smoothing_mm": 7}},
-        "uniform": {"follow": FOLLOW},
-        "thick": {"follow": REGIONAL, "thickness_mm": 3},
-    }
-    assert plan(real, runs=runs).validating.smoothing_mm == {"near": 3, "far": 7, "uniform": float("inf")}
-
-
-def test_runs_of_one_model_differ_in_start_end_and_what_is_known(real):
-    runs = {
-        "early": {"follow": REGIONAL},
-        "known": {"follow": REGIONAL | {"known_until_gw": 22}, "start": "b22", "end_week": 23},
-        "thick": {"follow": REGIONAL, "thickness_mm": 3},
-    }
-    assert plan(real, runs=runs).validating.models == {"early": "early", "known": "early", "thick": "thick"}
 
 
 def test_a_study_is_compared_at_its_week_and_its_members_are_measured_there(real):
@@ -390,23 +335,23 @@ def of_two(tmp_path, *own_weeks, atlas=(21, 22, 23, 24, 25), population="own"):
 def test_a_brain_is_expected_from_the_atlas_week_before_it_to_the_first_past_the_end(tmp_path, week, weeks, chain):
     found = plan(of_two(tmp_path, week, atlas=weeks), **EXPECTED).expecting
     start = f"own{week}"
-    assert found.chain(start, "another") == [start, *chain]
-    assert found.weeks(start, "another") == [float(name[1:]) for name in chain]
+    assert found.chain(start, "atlas") == [start, *chain]
+    assert found.weeks(start, "atlas") == [float(name[1:]) for name in chain]
     files = [f"results/study/registration/{one}/{two}.h5" for one, two in pairwise([start, *chain])]
-    assert found.correspondences(start, "another") == files
-    assert found.targets("a", start) == f"results/brains/{start}/mesh/targets.another.h5"
+    assert found.correspondences(start, "atlas") == files
+    assert found.targets("a", start) == f"results/brains/{start}/mesh/targets.atlas.h5"
 
 
 def test_a_closed_loop_of_its_own_goes_through_the_later_brains_of_its_series(real):
-    runs = {"open": {"follow": FOLLOW}, "own": {"preset": "measured"}}
+    runs = {"open": {"growth": SIZES}, "own": {"preset": "measured"}}
     found = plan(real, runs=runs)
-    assert found.expecting.chain("b21", "own") == ["b21", "b22", "b23", "b24"]
-    assert [found.expecting.targets(run, "b21") for run in runs] == [[], "results/brains/b21/mesh/targets.own.h5"]
+    assert found.expecting.chain("b21", "self") == ["b21", "b22", "b23", "b24"]
+    assert [found.expecting.targets(run, "b21") for run in runs] == [[], "results/brains/b21/mesh/targets.self.h5"]
     assert set(found.validating.kinds("own", "b21").values()) == {"explained"}
     assert found.validating.foretold == found.validating.tables["prediction"] == []
     assert "results/study/figures/prediction.png" not in found.figures.target("validate")
     # sizes come from the shapes, and growth from no carried mesh
-    assert found.runs.curves("own") == found.chains.carried_mesh("own", "b21") == []
+    assert found.runs.curves("own") == []
 
 
 def unled(found):
@@ -429,18 +374,18 @@ def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_th
         assert "from 22 to 24 GW" in said
     named = plan(both, growth={"estimated_from": "third"}, **EXPECTED)
     assert unled(named) == {}
-    assert named.expecting.chain("own22", "another") == ["own22", "third22", "third24"]
+    assert named.expecting.chain("own22", "atlas") == ["own22", "third22", "third24"]
 
 
 def test_a_start_before_all_weeks_of_the_atlas_is_led_by_two(tmp_path):
     found = plan(of_two(tmp_path, 20.5), folding={"end_week": 21}, **EXPECTED)
-    assert found.expecting.chain("own20.5", "another") == ["own20.5", "b21", "b22"]
+    assert found.expecting.chain("own20.5", "atlas") == ["own20.5", "b21", "b22"]
 
 
 def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(tmp_path):
     brains, own = of_two(tmp_path, 22, 23, 24), {"runs": {"a": {"preset": "measured"}}}
     found = plan(brains, growth={"estimated_from": "atlas"}, **own)
-    assert found.expecting.chain("own22", "own") == ["own22", "own23", "own24"]
+    assert found.expecting.chain("own22", "self") == ["own22", "own23", "own24"]
     assert found.chains.carried == ["own22"]
     assert unled(found) == {}
     alone = unled(plan(of_two(tmp_path, 22), growth={"estimated_from": "atlas"}, **own))["own22"]
@@ -457,11 +402,11 @@ def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(tmp_pat
     study = {"studies": {"late": later | {"vary": {"thickness_mm": [1.0, 2.0]}}}}
     search = {"calibrate": later | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}}
     assert unled(plan(brains, **runs)) == {}
-    whose = "own" if preset == "measured" else "another"
+    whose = "self" if preset == "measured" else "atlas"
     for more in (study, search):
         assert plan(brains, **runs, **more).config.last_week("own22") == 26
-        assert plan(brains, **runs, **more).expecting.weeks("own22", "own")[-1] == 26
-        if whose == "another":
+        assert plan(brains, **runs, **more).expecting.weeks("own22", "self")[-1] == 26
+        if whose == "atlas":
             # its atlas ends at 25 GW
             assert "from 22 to 26 GW" in unled(plan(brains, **runs, **more))["own22"]
 
@@ -484,9 +429,9 @@ def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(tmp_path)
     own = (22.4, 23, 23.4, 23.7, 23.701, 26)
     found = plan(of_two(tmp_path, *own), **EXPECTED)
     assert found.config.weeks("a", "own22.4") == pytest.approx([22.4, 23, 23.4, 23.701, 24])
-    assert found.expecting.weeks("own22.4", "another") == [22, 23, 24]
-    assert found.expecting.further_weeks("own22.4", "another") == [23.4, 23.701]
-    assert found.expecting.further_weeks("own22.4", "own") == []
+    assert found.expecting.weeks("own22.4", "atlas") == [22, 23, 24]
+    assert found.expecting.further_weeks("own22.4", "atlas") == [23.4, 23.701]
+    assert found.expecting.further_weeks("own22.4", "self") == []
     assert found.validating.compared("a", "own22.4") == {"23.00": "own23", "23.40": "own23.4", "23.70": "own23.7"}
     files = found.validating.prediction("a", "own22.4")
     assert [len(files[name]) for name in ("simulated", "real", "whole", "atlas")] == [3, 3, 3, 3]
@@ -503,27 +448,12 @@ def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_the
     surface = {"pial": str(tmp_path / "pial.gii"), "population": "own"}
     start = brain(22, **surface) | {"id": "own22"}
     found = plan([start, *of_two(tmp_path)], **EXPECTED)
-    assert found.expecting.posed("own22", "another") == [[True, False], [False, False], [False, False]]
+    assert found.expecting.posed("own22", "atlas") == [[True, False], [False, False], [False, False]]
     # matched vertices say where they are in the world
     matched = [brain(week, pial=str(tmp_path / "pial.gii"), population="atlas") for week in (22, 24)]
     mixed = plan([labels(tmp_path, 22, population="own") | {"id": "own22"}, *matched], **EXPECTED)
     object.__setattr__(mixed.chains, "matched_series", {"atlas": {"b22", "b24"}})
-    assert mixed.expecting.posed("own22", "another") == [[False, True], [False, False]]
-
-
-def test_another_growth_with_an_open_loop_is_measured_on_the_shapes_that_are_expected(tmp_path):
-    local = {"growth_of": "another", "regional": 1, "directional": 1}
-    found = plan(of_two(tmp_path, 22, 23, 24), runs={"a": {"follow": local}, "own": {"follow": REGIONAL}})
-    assert found.expecting.targets("a", "own22") == "results/brains/own22/mesh/targets.another.h5"
-    assert found.expecting.targets("own", "own22") == []
-    assert set(found.validating.kinds("a", "own22").values()) == {"predicted"}
-    assert found.validating.foretold == [("a", "own22")]
-    assert found.runs.maps("a", "own22") == "results/runs/a/own22/folding/maps.h5"
-    # nothing of it comes from the start's own later brains
-    assert found.runs.curves("a") == found.chains.carried_mesh("a", "own22") == []
-    assert found.chains.regional_weeks("a", "own22") == []
-    assert not found.chains.with_strain("own22")
-    assert "own22" in unled(plan(of_two(tmp_path, 22, atlas=(21, 23)), runs={"a": {"follow": local}}))
+    assert mixed.expecting.posed("own22", "atlas") == [[False, True], [False, False]]
 
 
 def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read(tmp_path):
