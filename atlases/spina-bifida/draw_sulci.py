@@ -1,6 +1,6 @@
-"""Draws the named sulci of `atlases/spina-bifida/sulci.yaml` on their brain: one JSON line.
+"""Draw the named sulci of `sulci.yaml` on their brain: one JSON line.
 
-    ./run python benchmarks/draw_sulci.py [--write]
+    ./run python atlases/spina-bifida/draw_sulci.py [--write]
 
 With `--write` the label volume is written anew. The JSON has for each hemisphere and sulcus the length of its line, its
 area, its mean curvature (1/mm, below 0 in a valley) and its mean depth below the hull.
@@ -8,6 +8,7 @@ area, its mean curvature (1/mm, below 0 in a valley) and its mean depth below th
 
 import argparse
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from gyriflow.anatomy.pial import from_labels
-from gyriflow.config.atlas import ATLASES
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import Floats, Ints, TriangleMesh, edges, vertex_areas
 from gyriflow.io.schemes import SCHEMES
@@ -25,7 +25,7 @@ from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.gyrification import convex_hull, sulcal_depth
 
-FOLDER = ATLASES / "spina-bifida"
+FOLDER = Path(__file__).parent
 SEEN_MM = 1.5
 """How far from a point of a line, as seen from the side, its place on the surface may be."""
 STEEPNESS = 20.0
@@ -36,7 +36,7 @@ NEAR_MM = 3.0
 
 
 def drawn_line(mesh: TriangleMesh, bend: Floats, line: dict[str, Any], outwards: float) -> tuple[Ints, float]:
-    """Returns the vertices along the most concave way through the points of a line, and its length in mm.
+    """Return the vertices along the most concave way through the points of a line, and its length in mm.
 
     `outwards` is the sign of x on the hemisphere's lateral side.
     """
@@ -48,17 +48,17 @@ def drawn_line(mesh: TriangleMesh, bend: Floats, line: dict[str, Any], outwards:
         stops.append(int(nearest[np.argmin(bend[nearest])]))
     cost = _ways(mesh, np.exp(STEEPNESS * np.clip(bend, -0.1, 0.1)))
     _, before = dijkstra(cost, directed=False, indices=stops[:-1], return_predecessors=True)
-    found = [stops[0]]
+    path = [stops[0]]
     for row, stop in enumerate(stops[1:]):
         way = [stop]
         while way[-1] != stops[row]:
             way.append(int(before[row, way[-1]]))
-        found += way[-2::-1]
-    return np.array(found), float(np.linalg.norm(np.diff(mesh.vertices[found], axis=0), axis=1).sum())
+        path += way[-2::-1]
+    return np.array(path), float(np.linalg.norm(np.diff(mesh.vertices[path], axis=0), axis=1).sum())
 
 
 def draw(mesh: TriangleMesh, drawing: dict[str, Any]) -> tuple[Ints, list[dict[str, Any]]]:
-    """Returns the (n,) number of the sulcus at each vertex of a hemisphere, 0 for none, and a row about each sulcus."""
+    """Return the (n,) number of the sulcus at each vertex of a hemisphere, 0 for none, and a row about each sulcus."""
     bend = curvature(mesh, radius_mm=drawing["radius_mm"]).mean
     depth, areas = sulcal_depth(mesh, convex_hull(mesh)), vertex_areas(mesh)
     outwards = 1.0 if mesh.vertices[:, 0].mean() > 0 else -1.0
@@ -85,7 +85,7 @@ def draw(mesh: TriangleMesh, drawing: dict[str, Any]) -> tuple[Ints, list[dict[s
 
 
 def _ways(mesh: TriangleMesh, cost: Floats) -> sparse.csr_array:
-    """Returns the lengths of edges times the mean cost of their ends, as a graph."""
+    """Make a graph of the edges: their lengths times the mean cost of their ends."""
     pairs, _ = edges(mesh)
     first, second = pairs.T
     weights = np.linalg.norm(mesh.vertices[first] - mesh.vertices[second], axis=1) * (cost[first] + cost[second]) / 2
@@ -109,8 +109,8 @@ def main() -> None:
         index = np.indices(volume.labels.shape).reshape(3, -1).T
         centres = transform_points(index, volume.affine)
         near = cKDTree(points).query(centres, distance_upper_bound=NEAR_MM)[1]
-        found = np.append(labels, 0)[near].reshape(volume.labels.shape).astype(np.int32)
-        write_label_volume(FOLDER / drawing["volume"], LabelVolume(found, volume.affine))
+        sulci = np.append(labels, 0)[near].reshape(volume.labels.shape).astype(np.int32)
+        write_label_volume(FOLDER / drawing["volume"], LabelVolume(sulci, volume.affine))
     print(json.dumps({side: rows for side, (_, rows) in drawn.items()}))
 
 

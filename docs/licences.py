@@ -1,6 +1,6 @@
 """The licences that the packages of the environment state: PyPI packages with all they need, and Debian's libraries.
 
-    ./run python benchmarks/licences.py [--doc FOLDER]
+    ./run python docs/licences.py [--doc FOLDER]
 
 prints two tables and, as its last line, a JSON object with the number of packages by kind of licence. Debian packages
 are those of FOLDER, in which each has its `copyright` file (default /usr/share/doc, which images have; the tree that
