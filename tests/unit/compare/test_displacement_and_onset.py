@@ -32,9 +32,9 @@ def test_displacement_agrees_whatever_pose_the_run_is_in():
     weeks = [21, 22, 24]
     measured = np.stack([stretched(week) for week in weeks])
     simulated = np.stack([stretched(week) @ TURN.T + [5, week, 0] for week in weeks])
-    table = displacement_table(weeks, simulated, measured, FACES, registered=True)
+    table = displacement_table(weeks, simulated, measured, FACES)
     assert table["from_week"].tolist() == [21, 22]
-    assert table["test"].tolist() == ["consistency"] * 2
+    assert table["test"].tolist() == ["comparison", "comparison"]
     assert table["displacement_r"].tolist() == pytest.approx([1.0, 1.0])
     assert table["displacement_slope"].tolist() == pytest.approx([1.0, 1.0], abs=1e-6)
     assert table["rms_mm"].tolist() == pytest.approx(table["measured_rms_mm"].tolist())
