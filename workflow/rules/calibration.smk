@@ -2,9 +2,12 @@
 #
 # How many runs there are is known beforehand, their parameters are not: those of a round stand in a table that its runs
 # read. What is there is not made again, so that an interrupted calibration goes on.
+CALIBRATED = study.calibration
+
+
 rule calibration_design:
     input:
-        scores=lambda wildcards: PLAN.calibrating.scores_before(int(wildcards.round)),
+        scores=lambda wildcards: CALIBRATED.scores_before(int(wildcards.round)),
     output:
         f"{CALIBRATION}/round-{{round}}.csv",
     wildcard_constraints:
@@ -12,19 +15,21 @@ rule calibration_design:
     params:
         bounds=lambda wildcards: CONFIG.calibrate.parameters,
         seed=lambda wildcards: CONFIG.calibrate.seed,
-        runs=lambda wildcards: PLAN.calibrating.of_round(int(wildcards.round)),
+        runs=lambda wildcards: CALIBRATED.runs_of(int(wildcards.round)),
     script:
         "../scripts/calibration_design.py"
 
 
 rule calibration_parameters:
     input:
-        design=of(PLAN.calibrating.design),
-        base=of(PLAN.calibrating.base_parameters),
+        design=lambda wildcards: CALIBRATED.design(wildcards.run),
+        base=lambda wildcards: PARAMETERS.format(
+            run=CONFIG.calibrate.base, brain=wildcards.brain
+        ),
     output:
         PARAMETERS,
     wildcard_constraints:
-        run=one_of(PLAN.runs.calibrated),
+        run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:
         week=lambda wildcards: CONFIG.calibrate.compare_week,
     script:
@@ -35,30 +40,35 @@ def calibrated_surfaces(wildcards):
     """Returns the surfaces of a run of the calibration, those of the brains where it has come to the week."""
     week = CONFIG.calibrate.compare_week
     return [
-        folded_of()["whole"].format(run=wildcards.run, brain=brain, week=week_tag(week))
-        for brain in PLAN.calibrating.brains
-        if reaches(wildcards.run, brain, week)
+        study.simulations[wildcards.run, base.start.id].at(week).parts["whole"]
+        for base in CALIBRATED.base
+        if reaches(wildcards.run, base.start.id, week)
     ]
 
 
 rule calibration_score:
     input:
         simulated=calibrated_surfaces,
-        real=lambda wildcards: sum(PLAN.calibrating.real.values(), []),
-        summaries=of(PLAN.calibrating.summaries),
-        design=of(PLAN.calibrating.design),
+        real=lambda wildcards: [
+            real.pial for brains in CALIBRATED.real.values() for real in brains
+        ],
+        summaries=lambda wildcards: [
+            FOLDING["summary"].format(run=wildcards.run, brain=base.start.id)
+            for base in CALIBRATED.base
+        ],
+        design=lambda wildcards: CALIBRATED.design(wildcards.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
     wildcard_constraints:
-        run=one_of(PLAN.runs.calibrated),
+        run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     resources:
         mem_mb=4000,
         runtime=30,
     params:
         # how many of the real brains belong to each of the simulated ones
-        compared=lambda wildcards: list(map(len, PLAN.calibrating.real.values())),
+        compared=lambda wildcards: list(map(len, CALIBRATED.real.values())),
         weights=lambda wildcards: CONFIG.calibrate.score,
-        round=lambda wildcards: PLAN.runs.calibrated[wildcards.run],
+        round=lambda wildcards: CALIBRATED.rounds[wildcards.run],
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/calibration_score.py"
@@ -66,7 +76,7 @@ rule calibration_score:
 
 rule calibration_tables:
     input:
-        scores=PLAN.calibrating.scores_before(len(PLAN.runs.calibrated) + 1),
+        scores=CALIBRATED.scores_before(len(CALIBRATED.rounds)) if CALIBRATED else [],
     output:
         runs=f"{CALIBRATION}/runs.csv",
         optimum=f"{CALIBRATION}/optimum.csv",
@@ -79,5 +89,5 @@ rule calibration_tables:
 
 rule calibrate:
     input:
-        rules.calibration_tables.output if CONFIG.calibrate else [],
+        rules.calibration_tables.output if CALIBRATED else [],
         PLAN.figures.target("calibrate"),

@@ -1,10 +1,10 @@
 # What all rules share: the validated configuration, names, and where results lie.
-from inspect import signature
+from operator import attrgetter
 
 from gyriflow.errors import GyriflowError
 from gyriflow.parameters.measures import SHAPE_MEASURES
 from gyriflow.parameters.terms import SIDES
-from gyriflow.study import Plan
+from gyriflow.study import Plan, resolve
 from gyriflow.study.paths import *
 from gyriflow.cli.launch import hold_lock, keeps_going, refused_brains, runs_nothing
 from gyriflow.cli.provenance import input_contents, require_own_results
@@ -19,11 +19,10 @@ shell.prefix(
 )
 
 
-def validated_config():
-    """Returns the configuration as models, the plan without refused brains, what the input files hold, and why brains
-    cannot be folded.
+def validated_study():
+    """Return the study without refused brains, and what the input files hold.
 
-    Ends with a message and exit code 2 where it is not valid.
+    Ends with a message and exit code 2 where the configuration is not valid.
     """
     from gyriflow.config import load
     from gyriflow.io.yaml_files import read_keys
@@ -36,42 +35,37 @@ def validated_config():
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
         found = load(config, base, keep_going=keeps_going())
-        # without the brains that an earlier pass of this call has refused, others may lead nowhere: these are left out
-        plan = Plan(found.without(refused_brains()))
-        unled = plan.expecting.unled()
-        if unled and not refused_brains():
-            raise next(iter(unled.values()))
+        study = resolve(found, refused_brains())
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             require_own_results(Path.cwd(), files, found, record=not runs_nothing())
         record = workflow.is_main_process and not runs_nothing()
-        return found, plan, input_contents(Path.cwd(), found, record), unled
+        return study, input_contents(Path.cwd(), found, record)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
 
 
-WHOLE_CONFIG, PLAN, CONTENTS, UNLED = validated_config()
-if UNLED:
-    PLAN = Plan(PLAN.config.without((), unfolded=UNLED))
-CONFIG = PLAN.config
+study, CONTENTS = validated_study()
+CONFIG = study.config
+PLAN = Plan(CONFIG.without(refused_brains(), unfolded=study.unreachable))
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
 REFUSED = {
     brain: cause
     for brain, cause in refused_brains().items()
-    if brain in [known.id for known in WHOLE_CONFIG.brains]
+    if brain in [known.id for known in CONFIG.brains]
 }
 if REFUSED and workflow.is_main_process:
     # each has told its cause
-    rest = "finishing the study without" if CONFIG.brains else "no brain is left"
+    rest = "finishing the study without" if study.brains else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
-if REFUSED and not CONFIG.brains:
+if REFUSED and not study.brains:
     sys.exit(0)
 if workflow.is_main_process:
-    for cause in UNLED.values():
+    for cause in study.unreachable.values():
         print(f"gyriflow: not folded: {cause}", file=sys.stderr)
-    for row in WHOLE_CONFIG.left_out.values():
+    for row in CONFIG.left_out.values():
         print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 
 # held as long as this process lives: how `gyriflow.cli.launch` tells a live run from one that was interrupted
@@ -79,22 +73,25 @@ if workflow.is_main_process and not runs_nothing():
     LOCK = hold_lock(Path.cwd())
 
 
-def of(tell):
-    """Returns an input function: what a function says of the wildcards that its arguments are called by."""
-    names = signature(tell).parameters
-    return lambda wildcards: tell(**{name: getattr(wildcards, name) for name in names})
+def from_brain(attribute):
+    """Return an input function: an attribute of the brain that the wildcards name."""
+    return lambda wildcards: attrgetter(attribute)(study.brains[wildcards.brain])
 
 
-def of_brain(*names):
-    """Returns by name input functions: what the configuration says of a brain."""
-    return {
-        name: lambda wildcards, name=name: getattr(CONFIG.brain(wildcards.brain), name)
-        for name in names
-    }
+def from_simulation(attribute):
+    """Return an input function: an attribute of the run from a brain that the wildcards name."""
+    return lambda wildcards: attrgetter(attribute)(
+        study.simulations[wildcards.run, wildcards.brain]
+    )
+
+
+def brains_with(condition):
+    """Return a pattern for the ids of the brains that meet a condition."""
+    return one_of(brain.id for brain in study.brains.values() if condition(brain))
 
 
 wildcard_constraints:
-    brain=one_of(PLAN.brains.ids),
-    run=one_of([*CONFIG.runs, *PLAN.runs.members]),
+    brain=one_of(study.brains),
+    run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

@@ -44,6 +44,6 @@ rule influence_figures:
 rule paper:
     input:
         FIGURES.target("paper"),
-        rules.growth_rates.output if PLAN.chains.grown else [],
+        rules.growth_rates.output if study.growing else [],
         rules.replication.output,
         rules.studies.input,

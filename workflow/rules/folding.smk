@@ -2,43 +2,48 @@
 from gyriflow.io.files import read_json
 from gyriflow.cli.cost import job_limits
 
+# runs of a calibration have their parameters from its rounds, and their maps from its base
+with_parameters = {
+    one.run: one for one in study.simulations.values() if one.base == one.run
+}
+
 
 rule parameters:
     input:
         surface=PIAL["report"],
-        curves=of(PLAN.runs.curves),
-        targets=of(PLAN.expecting.targets),
+        curves=from_simulation("curves"),
+        targets=from_simulation("targets"),
     output:
         PARAMETERS,
     wildcard_constraints:
-        run=one_of([*CONFIG.runs, *CONFIG.study_runs]),
+        run=one_of(with_parameters),
     params:
-        settings=of(CONFIG.parameters),
-        weeks=of(CONFIG.weeks),
-        estimated_from=of(PLAN.runs.estimated_from),
+        settings=from_simulation("parameters"),
+        weeks=from_simulation("weeks"),
+        series=from_simulation("followed_series"),
     script:
         "../scripts/parameters.py"
 
 
 rule parameter_maps:
     input:
-        of(PLAN.runs.map_files),
+        from_simulation("map_files"),
         mesh=MESH["mesh"],
         data=MESH["data"],
         surface=PIAL["report"],
-        targets=of(PLAN.expecting.targets),
+        targets=from_simulation("targets"),
     output:
         MAPS,
     wildcard_constraints:
-        run=one_of(PLAN.runs.with_maps),
+        run=one_of(run for run, one in with_parameters.items() if one.maps),
     resources:
         mem_mb=4000,
         runtime=15,
     params:
-        **of_brain("affine_from"),
-        maps=of(CONFIG.maps),
-        bounds=of(PLAN.runs.map_bounds),
         # volumes of maps are read like those of the brain
+        affine_from=from_brain("given.affine_from"),
+        maps=from_simulation("map_sources"),
+        bounds=from_simulation("map_bounds"),
     script:
         "../scripts/parameter_maps.py"
 
@@ -48,10 +53,10 @@ rule regions:
         mesh=MESH["mesh"],
         data=MESH["data"],
         params=PARAMETERS,
-        maps=of(PLAN.runs.maps),
+        maps=from_simulation("maps"),
         # the hemispheres of the folded brain are those of the measured one
         sides=lambda wildcards: [
-            PIAL[side] for side in CONFIG.brain(wildcards.brain).sides
+            PIAL[side] for side in study.brains[wildcards.brain].sides
         ],
     output:
         **REGIONS,
@@ -66,7 +71,7 @@ SOLVED_FROM = {
     "mesh": MESH["mesh"],
     "data": MESH["data"],
     "params": PARAMETERS,
-    "maps": of(PLAN.runs.maps),
+    "maps": from_simulation("maps"),
     # that rule refuses impossible zones, before the ranks start
     "regions": REGIONS["mesh"],
 }
@@ -85,12 +90,18 @@ SOLVE = (
 FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
 
 
+def limits(wildcards):
+    """Return the memory in MiB and the minutes that a folding may take."""
+    simulation = study.simulations[wildcards.run, wildcards.brain]
+    return job_limits(simulation, CONFIG.mesh)
+
+
 # what both rules of a folding ask of a cluster
 LIMITED = {
     "mpi": "mpiexec",
-    "tasks": of(PLAN.runs.ranks),
-    "mem_mb": lambda wildcards: job_limits(wildcards.run, wildcards.brain, CONFIG)[0],
-    "runtime": lambda wildcards: job_limits(wildcards.run, wildcards.brain, CONFIG)[1],
+    "tasks": from_simulation("settings.ranks"),
+    "mem_mb": lambda wildcards: limits(wildcards)[0],
+    "runtime": lambda wildcards: limits(wildcards)[1],
 }
 
 
@@ -111,7 +122,7 @@ rule simulate:
         run=one_of(CONFIG.runs),
     # the runs that all else is compared with, and the longest: members of studies fill the cores beside them
     priority: 1
-    threads: of(PLAN.runs.ranks)
+    threads: from_simulation("settings.ranks")
     resources:
         **LIMITED,
     params:
@@ -134,8 +145,8 @@ checkpoint simulate_member:
     benchmark:
         f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
-        run=one_of(PLAN.runs.members),
-    threads: of(PLAN.runs.ranks)
+        run=one_of(study.may_diverge),
+    threads: from_simulation("settings.ranks")
     resources:
         **LIMITED,
     params:
@@ -154,35 +165,29 @@ def reaches(run, brain, week):
     return week_tag(week) in map(week_tag, read_json(summary)["weeks"])
 
 
-rule folded_surface:
-    input:
-        frames=FOLDING["frames"],
-        regions=REGIONS["mesh"],
-        data=REGIONS["data"],
-    output:
-        **folded_of(*SIDES),
-    wildcard_constraints:
-        brain=one_of(PLAN.brains.with_sides(*SIDES)),
-    script:
-        "../scripts/folded_surface.py"
+# brains of one hemisphere have fewer files
+for name, sides in {
+    "folded_surface": SIDES,
+    "folded_left": ("left",),
+    "folded_right": ("right",),
+}.items():
 
-
-# from hemispheres that are alone
-use rule folded_surface as folded_left with:
-    output:
-        **folded_of("left"),
-    wildcard_constraints:
-        brain=one_of(PLAN.brains.with_sides("left")),
-
-
-use rule folded_surface as folded_right with:
-    output:
-        **folded_of("right"),
-    wildcard_constraints:
-        brain=one_of(PLAN.brains.with_sides("right")),
+    rule:
+        name:
+            name
+        input:
+            frames=FOLDING["frames"],
+            regions=REGIONS["mesh"],
+            data=REGIONS["data"],
+        output:
+            **folded_of(*sides),
+        wildcard_constraints:
+            brain=brains_with(lambda brain: brain.sides == sides),
+        script:
+            "../scripts/folded_surface.py"
 
 
 rule folding:
     input:
-        PLAN.runs.of(*FOLDING.values()),
-        PLAN.measuring.folded_surfaces,
+        study.files(*FOLDING.values()),
+        study.folded_surfaces,

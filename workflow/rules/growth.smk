@@ -1,16 +1,16 @@
 # Growth rates of the cortex, from the areas of the brains' pial surfaces over the weeks.
 rule growth_rates:
     input:
-        whole=expand(PIAL["whole"], brain=PLAN.chains.grown),
-        reports=expand(PIAL["report"], brain=PLAN.chains.grown),
-        thickness=expand(THICKNESS["report"], brain=PLAN.chains.with_thickness),
+        whole=[brain.pial for _, brain in study.growing],
+        reports=[brain.report for _, brain in study.growing],
+        thickness=expand(THICKNESS["report"], brain=study.with_thickness_curve),
     output:
         **GROWTH,
     params:
-        series=[series for series, _ in PLAN.chains.series],
-        brains=PLAN.chains.grown,
-        with_thickness=PLAN.chains.with_thickness,
-        weeks=[CONFIG.brain(brain).week for brain in PLAN.chains.grown],
+        series=[series for series, _ in study.growing],
+        brains=[brain.id for _, brain in study.growing],
+        with_thickness=study.with_thickness_curve,
+        weeks=[brain.week for _, brain in study.growing],
     script:
         "../scripts/growth_rates.py"
 
@@ -28,5 +28,5 @@ rule growth_curves:
 
 rule growth:
     input:
-        rules.growth_rates.output if PLAN.chains.grown else [],
+        rules.growth_rates.output if study.growing else [],
         PLAN.figures.target("growth"),

@@ -1,5 +1,9 @@
 # The brains that runs start from as tetrahedral meshes.
-MESH_GATES = PLAN.figures.gates
+MESH_GATES = {
+    key: value
+    for key, value in CONFIG.mesh.model_dump().items()
+    if key.startswith(("min_", "max_"))
+}
 
 
 rule tetrahedralise:
@@ -21,4 +25,4 @@ rule tetrahedralise:
 
 rule mesh:
     input:
-        expand(list(MESH.values()), brain=CONFIG.start_brains),
+        expand(list(MESH.values()), brain=[start.id for start in study.starts]),

@@ -1,92 +1,72 @@
 # Metrics of brains, measured and simulated: one rule, so that both go through the same code with the same settings.
-rule measure:
-    input:
-        unpack(lambda wildcards: PLAN.measuring.at(wildcards.where).parts),
-        thickness=lambda wildcards: PLAN.measuring.at(wildcards.where).thickness,
-        report=lambda wildcards: PLAN.measuring.at(wildcards.where).report,
-    output:
-        **MEASURES,
-        **maps_of(*SIDES),
-    wildcard_constraints:
-        where=one_of(PLAN.measuring.of_sides(*SIDES)),
-    resources:
-        mem_mb=4000,
-        runtime=60,
-    params:
-        labels=lambda wildcards: PLAN.measuring.at(wildcards.where).labels,
-        settings=CONFIG.metrics.model_dump(
-            include={
-                "curvature_radius_mm",
-                "spangy_proxy",
-                "spangy_modes",
-            }
-        ),
-    script:
-        "../scripts/measure.py"
+#
+# Brains of one hemisphere have fewer files, and rules of their own with the same script.
+PARTS_OF_BRAINS = {"": SIDES, "_left": ("left",), "_right": ("right",)}
 
 
-# of hemispheres that are alone
-use rule measure as measure_left with:
-    output:
-        **MEASURES,
-        **maps_of("left"),
-    wildcard_constraints:
-        where=one_of(PLAN.measuring.of_sides("left")),
+def from_place(attribute):
+    """Return an input function: an attribute of what is measured in the folder that the wildcards name."""
+    return lambda wildcards: getattr(study.places[wildcards.where], attribute)
 
 
-use rule measure as measure_right with:
-    output:
-        **MEASURES,
-        **maps_of("right"),
-    wildcard_constraints:
-        where=one_of(PLAN.measuring.of_sides("right")),
+for suffix, sides in PARTS_OF_BRAINS.items():
 
+    rule:
+        name:
+            f"measure{suffix}"
+        input:
+            unpack(from_place("parts")),
+            thickness=from_place("thickness"),
+            report=from_place("report"),
+        output:
+            **MEASURES,
+            **maps_of(*sides),
+        wildcard_constraints:
+            where=one_of(
+                where for where, row in study.places.items() if row.sides == sides
+            ),
+        resources:
+            mem_mb=4000,
+            runtime=60,
+        params:
+            labels=from_place("labels"),
+            settings=CONFIG.metrics.model_dump(
+                include={"curvature_radius_mm", "spangy_proxy", "spangy_modes"}
+            ),
+        script:
+            "../scripts/measure.py"
 
-rule white:
-    input:
-        unpack(lambda wildcards: PLAN.measuring.of_brain(wildcards.brain).parts),
-        report=PIAL["report"],
-        source=lambda wildcards: list(
-            PLAN.measuring.white_source(wildcards.brain).values()
-        ),
-    output:
-        **white_of(*SIDES),
-    wildcard_constraints:
-        brain=one_of(PLAN.measuring.with_white(*SIDES)),
-    resources:
-        mem_mb=4000,
-        runtime=60,
-    params:
-        **of_brain("affine_from"),
-        labels=lambda wildcards: PLAN.measuring.of_brain(wildcards.brain).labels,
-        scheme=of(PLAN.brains.scheme),
-        # exchanged files are the same inputs to Snakemake
-        source=of(PLAN.measuring.white_source),
-        surface=CONFIG.surface.model_dump(
-            include={
+    rule:
+        name:
+            f"white{suffix}"
+        input:
+            unpack(from_brain("measured.parts")),
+            report=PIAL["report"],
+            source=lambda wildcards: list(
+                study.brains[wildcards.brain].white_from.values()
+            ),
+        output:
+            **white_of(*sides),
+        wildcard_constraints:
+            brain=brains_with(lambda brain: brain.white_from and brain.sides == sides),
+        resources:
+            mem_mb=4000,
+            runtime=60,
+        params:
+            affine_from=from_brain("given.affine_from"),
+            labels=from_brain("measured.labels"),
+            scheme=from_brain("scheme"),
+            # exchanged files are the same inputs to Snakemake
+            source=from_brain("white_from"),
+            surface=surface_settings(
                 "smoothing_voxels",
                 "edge_length_mm",
                 "smoothing_iterations",
                 "max_hole_mm",
-            }
-        ),
-        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
-    script:
-        "../scripts/white.py"
-
-
-use rule white as white_left with:
-    output:
-        **white_of("left"),
-    wildcard_constraints:
-        brain=one_of(PLAN.measuring.with_white("left")),
-
-
-use rule white as white_right with:
-    output:
-        **white_of("right"),
-    wildcard_constraints:
-        brain=one_of(PLAN.measuring.with_white("right")),
+            ),
+            curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+        script:
+            "../scripts/white.py"
 
 
 rule displacement:
@@ -102,11 +82,18 @@ rule displacement:
 
 rule similarity:
     input:
-        unpack(of(PLAN.measuring.similarity)),
+        simulated=lambda wildcards: list(
+            study.simulations[wildcards.run, wildcards.brain]
+            .at(float(wildcards.week))
+            .parts.values()
+        ),
+        real=lambda wildcards: list(
+            study.brains[wildcards.measured].measured.parts.values()
+        ),
     output:
         SIMILARITY,
     wildcard_constraints:
-        measured=one_of(PLAN.brains.ids),
+        measured=one_of(study.brains),
     resources:
         runtime=20,
     params:
@@ -116,24 +103,23 @@ rule similarity:
             "week": float(wildcards.week),
             "real": wildcards.measured,
         },
-        parts=lambda wildcards: ["whole", *CONFIG.brain(wildcards.brain).sides],
+        parts=lambda wildcards: ["whole", *study.brains[wildcards.brain].sides],
     script:
         "../scripts/similarity.py"
 
 
 rule label_volumes:
     input:
-        labels=of(PLAN.brains.label_volume),
+        labels=from_brain("label_volume"),
         norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
     output:
         **VOLUMES,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.with_volumes),
+        brain=brains_with(lambda brain: brain.given.has_labels),
     params:
-        **of_brain("affine_from", "sides"),
-        labels=lambda wildcards: PLAN.measuring.at(
-            f"brains/{wildcards.brain}/metrics"
-        ).labels,
-        scheme=of(PLAN.brains.scheme),
+        affine_from=from_brain("given.affine_from"),
+        sides=from_brain("sides"),
+        labels=from_brain("measured.labels"),
+        scheme=from_brain("scheme"),
     script:
         "../scripts/label_volumes.py"

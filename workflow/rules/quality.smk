@@ -1,19 +1,24 @@
 # Quality control before the solve: a page and a verdict for each brain, and the warnings of all steps.
-REPORTING = PLAN.reporting(WHOLE_CONFIG)
+from gyriflow.study import reporting
 
 
 rule quality_page:
     input:
-        unpack(of(REPORTING.looked_at)),
+        unpack(lambda wildcards: reporting.quality_files(study.brains[wildcards.brain])),
     output:
         png=f"{BRAIN}/figures/quality.png",
         pdf=f"{BRAIN}/figures/quality.pdf",
         row=f"{BRAIN}/quality.json",
     params:
-        **of_brain("week", "synthetic", "white_files", "affine_from"),
-        labels=of(REPORTING.labels),
-        scheme=of(PLAN.brains.scheme),
-        logs=of(REPORTING.logs),
+        week=from_brain("week"),
+        synthetic=from_brain("given.synthetic"),
+        white_files=from_brain("given.white_files"),
+        affine_from=from_brain("given.affine_from"),
+        labels=lambda wildcards: reporting.quality_labels(
+            study.brains[wildcards.brain].given
+        ),
+        scheme=from_brain("scheme"),
+        logs=lambda wildcards: reporting.surface_logs(study.brains[wildcards.brain]),
         dpi=CONFIG.report.dpi,
     script:
         "../scripts/quality_page.py"
@@ -21,12 +26,12 @@ rule quality_page:
 
 rule quality_table:
     input:
-        expand(rules.quality_page.output.row, brain=PLAN.brains.ids),
+        expand(rules.quality_page.output.row, brain=study.brains),
     output:
         f"{STUDY}/quality.csv",
     params:
-        refused=REPORTING.refused(REFUSED),
-        order=[*(brain.id for brain in WHOLE_CONFIG.brains), *WHOLE_CONFIG.left_out],
+        refused=reporting.refused_rows(study, REFUSED),
+        order=[*(brain.id for brain in CONFIG.brains), *CONFIG.left_out],
     script:
         "../scripts/quality_table.py"
 
@@ -40,13 +45,13 @@ rule study_warnings:
     output:
         f"{STUDY}/warnings.csv",
     params:
-        brains=[brain.id for brain in WHOLE_CONFIG.brains],
-        folded=PLAN.runs.folded,
+        brains=[brain.id for brain in CONFIG.brains],
+        folded=study.pairs,
     script:
         "../scripts/study_warnings.py"
 
 
 rule quality:
     input:
-        expand(list(rules.quality_page.output), brain=PLAN.brains.ids),
+        expand(list(rules.quality_page.output), brain=study.brains),
         rules.quality_table.output,

@@ -12,9 +12,9 @@ rule given_regions:
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
-        brain=one_of(PLAN.measuring.given),
+        brain=brains_with(lambda brain: brain.regions_from == "given"),
     params:
-        **of_brain("affine_from"),
+        affine_from=from_brain("given.affine_from"),
         names=lambda wildcards: CONFIG.metrics.regions[wildcards.brain].names,
     script:
         "../scripts/given_regions.py"
@@ -22,27 +22,23 @@ rule given_regions:
 
 rule carried_regions:
     input:
-        unpack(of(PLAN.chains.given_regions)),
+        unpack(lambda wildcards: study.region_inputs(wildcards.brain)),
         left=PIAL["left"],
         right=PIAL["right"],
         report=PIAL["report"],
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
-        brain=one_of(
-            brain
-            for brain in PLAN.measuring.regioned
-            if brain not in [*PLAN.measuring.given, *PLAN.measuring.named]
-        ),
+        brain=brains_with(lambda brain: brain.regions_from == "carried"),
     params:
-        posed=of(PLAN.chains.posed),
+        posed=lambda wildcards: study.posed_regions(wildcards.brain),
     script:
         "../scripts/carried_regions.py"
 
 
 rule named_sulci:
     input:
-        volume=of(PLAN.brains.registered_volume),
+        volume=from_brain("registered_volume"),
         left=PIAL["left"],
         right=PIAL["right"],
         report=PIAL["report"],
@@ -51,12 +47,13 @@ rule named_sulci:
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
-        brain=one_of(PLAN.measuring.named),
+        brain=brains_with(lambda brain: brain.regions_from == "named"),
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        own=of(PLAN.chains.named),
+        read=from_brain("registered"),
+        posed=lambda wildcards: not study.brains[wildcards.brain].given.has_labels,
     script:
         "../scripts/named_sulci.py"
 
@@ -70,41 +67,39 @@ rule simulated_regions:
     output:
         **region_files(f"{RUN}/metrics"),
     wildcard_constraints:
-        brain=one_of(PLAN.measuring.regioned),
+        brain=brains_with(lambda brain: brain.has_regions),
     script:
         "../scripts/simulated_regions.py"
 
 
 rule region_metrics:
     input:
-        unpack(lambda wildcards: PLAN.measuring.at(wildcards.where).regions),
-        unpack(lambda wildcards: PLAN.measuring.at(wildcards.where).parts),
+        unpack(from_place("regions")),
+        unpack(from_place("parts")),
         left_maps=maps_of("left")["left"],
         right_maps=maps_of("right")["right"],
     output:
         "results/{where}/regions.csv",
     wildcard_constraints:
-        where=one_of(brain.where for brain in PLAN.measuring.with_regions),
+        where=one_of(where for where, row in study.places.items() if row.regions),
     params:
-        labels=lambda wildcards: PLAN.measuring.at(wildcards.where).labels,
+        labels=from_place("labels"),
     script:
         "../scripts/region_metrics.py"
 
 
 rule template_maps:
     input:
-        unpack(of(PLAN.measuring.template_files)),
-        correspondence=lambda wildcards: PLAN.chains.to_template(
-            PLAN.measuring.at(wildcards.where).subject
-        ),
+        unpack(lambda wildcards: study.template_inputs(wildcards.where, wildcards.side)),
         maps="results/{where}/{side}.shape.gii",
     output:
         TEMPLATE_MAPS,
     wildcard_constraints:
-        where=one_of(brain.where for brain in PLAN.measuring.every),
+        where=one_of(study.measured),
     params:
-        posed=lambda wildcards: PLAN.chains.in_pose(
-            CONFIG.metrics.template, PLAN.measuring.at(wildcards.where).subject
+        posed=lambda wildcards: study.series.posed(
+            study.brains[CONFIG.metrics.template],
+            study.brains[study.places[wildcards.where].subject],
         ),
     script:
         "../scripts/template_maps.py"

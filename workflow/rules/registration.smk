@@ -1,6 +1,6 @@
 # Correspondence between brains of successive weeks: where each point of a start brain goes in the real ones.
 if workflow.is_main_process:
-    for series, cause in PLAN.chains.unmatched_starts.items():
+    for series, cause in study.unmatched_starts.items():
         print(
             f"gyriflow: no local growth from the surfaces of {series}: {cause}",
             file=sys.stderr,
@@ -20,18 +20,21 @@ rule surface_mask:
 
 rule register:
     input:
-        earlier=lambda wildcards: PLAN.brains.registered_volume(wildcards.earlier),
-        later=lambda wildcards: PLAN.brains.registered_volume(wildcards.later),
+        earlier=lambda wildcards: study.brains[wildcards.earlier].registered_volume,
+        later=lambda wildcards: study.brains[wildcards.later].registered_volume,
     output:
         REGISTERED,
     wildcard_constraints:
-        earlier=one_of(PLAN.brains.ids),
-        later=one_of(PLAN.brains.ids),
+        earlier=one_of(study.brains),
+        later=one_of(study.brains),
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        brains=of(PLAN.chains.registered),
+        brains=lambda wildcards: [
+            study.brains[name].registered
+            for name in (wildcards.earlier, wildcards.later)
+        ],
     script:
         "../scripts/register.py"
 
@@ -39,14 +42,14 @@ rule register:
 # the surfaces as they are given, with all their vertices, in the pose of the mesh
 rule matched_surface:
     input:
-        lambda wildcards: CONFIG.brain(wildcards.brain).files,
+        from_brain("given.files"),
         report=PIAL["report"],
     output:
         MATCHED_SURFACE,
     wildcard_constraints:
-        brain=one_of(sorted(set().union(*PLAN.chains.matched_series.values()))),
+        brain=one_of(sorted(set().union(*study.series.matched.values()))),
     params:
-        **of_brain("files"),
+        files=from_brain("given.files"),
     script:
         "../scripts/matched_surface.py"
 
@@ -60,10 +63,17 @@ rule match_surfaces:
     output:
         MATCHED,
     wildcard_constraints:
-        earlier=one_of(PLAN.brains.ids),
-        later=one_of(PLAN.brains.ids),
+        earlier=one_of(study.brains),
+        later=one_of(study.brains),
     script:
         "../scripts/match_surfaces.py"
+
+
+def from_chain(attribute):
+    """Return an input function: an attribute of the brains behind the growth of the start that the wildcards name."""
+    return lambda wildcards: getattr(
+        study.chains[wildcards.brain, wildcards.origin], attribute
+    )
 
 
 # the shapes that the mesh of a start brain is to have in later weeks, for runs that grow towards them
@@ -72,21 +82,21 @@ rule targets:
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
-        correspondences=of(PLAN.expecting.correspondences),
-        surfaces=of(PLAN.expecting.surfaces),
-        reports=of(PLAN.expecting.reports),
+        correspondences=from_chain("correspondences"),
+        surfaces=from_chain("surfaces"),
+        reports=from_chain("reports"),
     output:
         TARGETS,
     wildcard_constraints:
-        whose="self|atlas",
+        origin="self|atlas",
     resources:
         mem_mb=8000,
         runtime=30,
     params:
-        start_week=lambda wildcards: CONFIG.brain(wildcards.brain).week,
-        weeks=of(PLAN.expecting.weeks),
-        further_weeks=of(PLAN.expecting.further_weeks),
-        posed=of(PLAN.expecting.posed),
+        start_week=from_brain("week"),
+        weeks=from_chain("later_weeks"),
+        further_weeks=from_chain("further_weeks"),
+        posed=from_chain("posed"),
     script:
         "../scripts/targets.py"
 
@@ -96,15 +106,15 @@ rule carried_mesh:
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
-        later=of(PLAN.chains.correspondences_later),
+        later=lambda wildcards: study.chains[wildcards.brain, "self"].correspondences,
     output:
         CARRIED_MESH,
     wildcard_constraints:
-        brain=one_of(PLAN.chains.carried),
+        brain=one_of(study.carried),
     resources:
         mem_mb=8000,
         runtime=30,
     params:
-        weeks=of(PLAN.chains.later_weeks),
+        weeks=lambda wildcards: study.chains[wildcards.brain, "self"].weeks,
     script:
         "../scripts/carried_mesh.py"

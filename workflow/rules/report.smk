@@ -24,7 +24,7 @@ rule study_resources:
             if job.benchmark
         },
         power=CONFIG.report.power,
-        folded=PLAN.runs.folded,
+        folded=study.pairs,
     script:
         "../scripts/study_resources.py"
 
@@ -35,7 +35,7 @@ rule report_provenance:
     output:
         "results/report/provenance.json",
     params:
-        files=REPORTING.files,
+        files=reporting.input_files(study),
         paths=CONFIG.report.paths,
     script:
         "../scripts/report_provenance.py"
@@ -43,15 +43,15 @@ rule report_provenance:
 
 rule methods:
     input:
-        params=PLAN.runs.of(PARAMETERS),
-        summaries=PLAN.runs.of(FOLDING["summary"]),
+        params=study.files(PARAMETERS),
+        summaries=study.files(FOLDING["summary"]),
         provenance=rules.report_provenance.output[0],
         template=f"{PAGE}/methods.rst",
     output:
         "results/report/methods.rst",
     params:
-        folded=PLAN.runs.folded,
-        used=REPORTING.method,
+        folded=study.pairs,
+        used=reporting.method(study),
     script:
         "../scripts/methods.py"
 
@@ -62,11 +62,11 @@ rule html_report:
         rules.metrics.input,
         rules.influence_figures.input,
         FIGURES.target("report", "quality"),
-        surfaces=expand(PIAL["report"], brain=PLAN.brains.ids),
+        surfaces=expand(PIAL["report"], brain=study.brains),
         runs=rules.study_runs.output.csv,
         quality=rules.quality_table.output[0],
         warnings=rules.study_warnings.output[0],
-        validation=f"{STUDY}/validation.csv" if PLAN.validating.pairs else [],
+        validation=f"{STUDY}/validation.csv" if study.validated else [],
         provenance=rules.report_provenance.output[0],
         methods=rules.methods.output[0],
         view=FIGURES.target("view")[0],
@@ -84,9 +84,9 @@ rule html_report:
         entries=FIGURES.entries(),
         first=FIGURES.first,
         picture_bytes=PICTURE_BYTES,
-        brains=REPORTING.described,
-        surfaced=PLAN.brains.ids,
-        config=REPORTING.used,
+        brains=reporting.described_brains(study),
+        surfaced=list(study.brains),
+        config=reporting.used_settings(study),
         paths=CONFIG.report.paths,
     script:
         "../scripts/html_report.py"
@@ -99,15 +99,15 @@ rule provenance:
         rules.quality_table.output,
     output:
         study=f"{STUDY}/provenance.json",
-        brains=expand(f"{BRAIN}/provenance.json", brain=PLAN.brains.ids),
-        runs=PLAN.runs.of(f"{RUN}/provenance.json"),
+        brains=expand(f"{BRAIN}/provenance.json", brain=study.brains),
+        runs=study.files(f"{RUN}/provenance.json"),
     params:
-        config=REPORTING.used,
+        config=reporting.used_settings(study),
         brains=[
-            brain.model_dump(mode="json", exclude_defaults=True)
-            for brain in CONFIG.brains
+            brain.given.model_dump(mode="json", exclude_defaults=True)
+            for brain in study.brains.values()
         ],
-        folded=PLAN.runs.folded,
+        folded=study.pairs,
     script:
         "../scripts/provenance.py"
 
@@ -117,7 +117,7 @@ rule report_config:
     output:
         "results/report/config.yaml",
     params:
-        config=REPORTING.used,
+        config=reporting.used_settings(study),
     script:
         "../scripts/report_config.py"
 

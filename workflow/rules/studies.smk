@@ -7,9 +7,12 @@ PUBLISHED = f"{workflow.basedir}/workflow/published/fetalfoldsim.yaml"
 
 def tables_of_member(wildcards):
     """Returns the tables of a run at the week of comparison and of the real brains, none where it has not come there."""
-    week = PLAN.studying.week(wildcards.study)
-    reached = reaches(wildcards.run, wildcards.brain, week)
-    return of(PLAN.studying.tables)(wildcards) if reached else {}
+    run, brain, compared = (
+        wildcards.run,
+        wildcards.brain,
+        study.comparisons[wildcards.study],
+    )
+    return compared.tables(run, brain) if reaches(run, brain, compared.week) else {}
 
 
 rule compare_member:
@@ -20,27 +23,30 @@ rule compare_member:
     output:
         COMPARED_MEMBER,
     wildcard_constraints:
-        study=one_of(CONFIG.studies),
+        study=one_of(study.comparisons),
     params:
-        real=of(PLAN.studying.populations),
-        population=of(PLAN.brains.population),
+        real=lambda wildcards: {
+            real.id: real.population
+            for real in study.comparisons[wildcards.study].real[wildcards.brain]
+        },
+        population=from_brain("population"),
     script:
         "../scripts/compare_member.py"
 
 
 rule study_tables:
     input:
-        unpack(of(PLAN.studying.inputs)),
+        unpack(lambda wildcards: study.comparisons[wildcards.study].inputs),
         published=PUBLISHED,
     output:
         members=f"{STUDY}/{{study}}/members.csv",
         comparison=f"{STUDY}/{{study}}/comparison.csv",
         nearest=f"{STUDY}/{{study}}/nearest.csv",
     wildcard_constraints:
-        study=one_of(CONFIG.studies),
+        study=one_of(study.comparisons),
     params:
-        members=of(PLAN.studying.rows),
-        week=of(PLAN.studying.week),
+        members=lambda wildcards: study.comparisons[wildcards.study].rows,
+        week=lambda wildcards: study.comparisons[wildcards.study].week,
     script:
         "../scripts/study_tables.py"
 
@@ -49,21 +55,22 @@ rule study_tables:
 rule replication:
     input:
         **{
-            name: expand(f"{STUDY}/{{study}}/{name}.csv", study=CONFIG.studies)
+            name: expand(f"{STUDY}/{{study}}/{name}.csv", study=study.comparisons)
             for name in ("members", "comparison", "nearest")
         },
         published=PUBLISHED,
-        displacement=PLAN.runs.of(DISPLACEMENT)[:1],
-        summary=PLAN.runs.of(FOLDING["summary"])[:1],
+        displacement=study.files(DISPLACEMENT)[:1],
+        summary=study.files(FOLDING["summary"])[:1],
     output:
         csv=f"{STUDY}/replication.csv",
         page=f"{STUDY}/replication.html",
     params:
         studies={
-            name: {"varied": list(study.vary), "week": study.compare_week}
-            for name, study in CONFIG.studies.items()
+            name: {"varied": list(asked.vary), "week": asked.compare_week}
+            for name, asked in CONFIG.studies.items()
+            if name in study.comparisons
         },
-        run=PLAN.runs.folded[0],
+        run=next(iter(study.pairs), None),
         power=CONFIG.report.power,
     script:
         "../scripts/replication.py"
@@ -71,4 +78,4 @@ rule replication:
 
 rule studies:
     input:
-        expand(list(rules.study_tables.output), study=CONFIG.studies),
+        expand(list(rules.study_tables.output), study=study.comparisons),

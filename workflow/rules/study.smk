@@ -1,6 +1,6 @@
 # What compares the runs of a study with each other and with the measured brains.
 # the tables of a study, and the files that each is joined from
-JOINED = {**PLAN.measuring.tables, **PLAN.validating.tables}
+JOINED = {**study.tables, **study.validation_tables}
 # the tables that hold metrics, of whole hemispheres and of regions
 METRIC_TABLES = [
     f"{STUDY}/{table}.csv" for table in ("metrics", "regions") if JOINED[table]
@@ -45,7 +45,7 @@ rule centiles:
         curves=f"{STUDY}/norm_curves.csv",
         centiles=f"{STUDY}/centiles.csv",
     params:
-        reference=CONFIG.norm_reference,
+        reference=study.norm_reference,
     script:
         "../scripts/centiles.py"
 
@@ -58,13 +58,13 @@ rule group_tables:
         wide=f"{STUDY}/metrics_wide.csv",
         change=f"{STUDY}/change.csv",
     params:
-        scans=CONFIG.scans,
-        covariates={brain.id: brain.covariates for brain in CONFIG.brains},
+        scans=study.scans,
+        covariates={brain.id: brain.given.covariates for brain in study.brains.values()},
     script:
         "../scripts/group_tables.py"
 
 
-EXPORTED = PLAN.measuring.exported
+EXPORTED = study.exported
 
 
 # a target of its own: what a study is handed on as
@@ -98,30 +98,30 @@ rule export:
 
 rule study_runs:
     input:
-        params=PLAN.runs.of(PARAMETERS),
-        summaries=PLAN.runs.of(FOLDING["summary"]),
-        zones=PLAN.runs.of(FOLDING["zones"]),
-        steps=PLAN.runs.of(FOLDING["steps"]),
+        params=study.files(PARAMETERS),
+        summaries=study.files(FOLDING["summary"]),
+        zones=study.files(FOLDING["zones"]),
+        steps=study.files(FOLDING["steps"]),
     output:
         csv=f"{STUDY}/runs.csv",
         table=f"{STUDY}/runs.html",
     params:
-        folded=PLAN.runs.folded,
+        folded=study.pairs,
     script:
         "../scripts/study_runs.py"
 
 
 rule metrics:
     input:
-        [f"{brain.folder}/metrics.csv" for brain in PLAN.measuring.real],
+        [f"{brain.measured.folder}/metrics.csv" for brain in study.brains.values()],
         rules.study_runs.output,
         expand(
             rules.study_table.output,
-            table=[name for name, files in PLAN.measuring.tables.items() if files],
+            table=[name for name, files in study.tables.items() if files],
         ),
         rules.spectral_distance.output,
         rules.asymmetry.output,
         rules.centiles.output,
         rules.group_tables.output,
         rules.validate.input,
-        rules.folding_agreement.output if PLAN.validating.pairs else [],
+        rules.folding_agreement.output if study.validated else [],

@@ -7,8 +7,8 @@ LIMITS = CONFIG.surface.model_dump(include={"max_hemisphere_ratio", "max_asymmet
 
 def surface_memory(wildcards):
     """Returns the memory in MiB that the labels of a brain may need, foreseen from their header."""
-    brain = wildcards.brain
-    return surface_memory_mib(PLAN.brains.label_volume(brain), PLAN.brains.week(brain))
+    brain = study.brains[wildcards.brain]
+    return surface_memory_mib(brain.label_volume, brain.week)
 
 
 def surface_settings(*names):
@@ -18,18 +18,19 @@ def surface_settings(*names):
 
 rule pial_from_labels:
     input:
-        labels=of(PLAN.brains.label_volume),
+        labels=from_brain("label_volume"),
     output:
         **PIAL,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.from_source("labels")),
+        brain=brains_with(lambda brain: brain.given.source == "labels"),
     resources:
         mem_mb=surface_memory,
         runtime=30,
     params:
-        **of_brain("week", "affine_from"),
-        known=of(PLAN.brains.known_files),
-        scheme=of(PLAN.brains.scheme),
+        week=from_brain("week"),
+        affine_from=from_brain("given.affine_from"),
+        known=from_brain("checksums"),
+        scheme=from_brain("scheme"),
         settings=surface_settings(
             "smoothing_voxels", "edge_length_mm", "smoothing_iterations", "fissure_mm"
         ),
@@ -39,29 +40,32 @@ rule pial_from_labels:
 
 rule cortical_thickness:
     input:
-        labels=of(PLAN.brains.label_volume),
+        labels=from_brain("label_volume"),
         surface=PIAL["whole"],
         report=PIAL["report"],
     output:
         **THICKNESS,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.with_cortex),
+        brain=brains_with(lambda brain: brain.thickness_from == "labels"),
     resources:
         mem_mb=surface_memory,
         runtime=30,
     params:
-        **of_brain("affine_from"),
-        scheme=of(PLAN.brains.scheme),
+        affine_from=from_brain("given.affine_from"),
+        scheme=from_brain("scheme"),
         settings=surface_settings("smoothing_voxels"),
     script:
         "../scripts/cortical_thickness.py"
 
 
+POSED = [brain for brain in study.brains.values() if brain.to_pose]
+
+
 rule poses:
     input:
-        [path for brain in PLAN.brains.to_pose for path in brain.files],
+        [path for brain in POSED for path in brain.given.files],
     output:
-        [POSE.format(brain=brain.id) for brain in PLAN.brains.to_pose],
+        [brain.pose for brain in POSED],
     resources:
         runtime=30,
     params:
@@ -73,19 +77,20 @@ rule poses:
 
 rule pial_from_hemispheres:
     input:
-        left=lambda wildcards: CONFIG.brain(wildcards.brain).hemispheres.left,
-        right=lambda wildcards: CONFIG.brain(wildcards.brain).hemispheres.right,
-        pose=of(PLAN.brains.pose),
+        left=from_brain("given.hemispheres.left"),
+        right=from_brain("given.hemispheres.right"),
+        pose=from_brain("pose"),
     output:
         **PIAL,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.from_source("hemispheres")),
+        brain=brains_with(lambda brain: brain.given.source == "hemispheres"),
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        **of_brain("week", "coordinates"),
-        known=of(PLAN.brains.known_files),
+        week=from_brain("week"),
+        coordinates=from_brain("given.coordinates"),
+        known=from_brain("checksums"),
         settings=surface_settings(
             "gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"
         ),
@@ -96,17 +101,18 @@ rule pial_from_hemispheres:
 
 rule pial_from_surface:
     input:
-        lambda wildcards: CONFIG.brain(wildcards.brain).pial,
+        from_brain("given.pial"),
     output:
         **PIAL,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.from_source("pial")),
+        brain=brains_with(lambda brain: brain.given.source == "pial"),
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        **of_brain("week", "coordinates"),
-        known=of(PLAN.brains.known_files),
+        week=from_brain("week"),
+        coordinates=from_brain("given.coordinates"),
+        known=from_brain("checksums"),
         settings=surface_settings(
             "edge_length_mm", "smoothing_iterations", "max_hole_mm"
         ),
@@ -115,48 +121,47 @@ rule pial_from_surface:
 
 
 # of a hemisphere that is alone, from its surface or its labels
-rule pial_from_left_hemisphere:
-    input:
-        lambda wildcards: CONFIG.brain(wildcards.brain).hemisphere.file,
-    output:
-        **pial_of("left"),
-    wildcard_constraints:
-        brain=one_of(PLAN.brains.with_sides("left")),
-    resources:
-        mem_mb=4000,
-        runtime=30,
-    params:
-        **of_brain("week", "coordinates", "affine_from"),
-        side=lambda wildcards: CONFIG.brain(wildcards.brain).sides[0],
-        scheme=of(PLAN.brains.scheme),
-        settings=surface_settings("edge_length_mm", "smoothing_iterations"),
-        of_labels=surface_settings("smoothing_voxels"),
-        of_surfaces=surface_settings("max_hole_mm"),
-    script:
-        "../scripts/pial_from_hemisphere.py"
+for side in SIDES:
 
-
-use rule pial_from_left_hemisphere as pial_from_right_hemisphere with:
-    output:
-        **pial_of("right"),
-    wildcard_constraints:
-        brain=one_of(PLAN.brains.with_sides("right")),
+    rule:
+        name:
+            f"pial_from_{side}_hemisphere"
+        input:
+            from_brain("given.hemisphere.file"),
+        output:
+            **pial_of(side),
+        wildcard_constraints:
+            brain=brains_with(lambda brain: brain.sides == (side,)),
+        resources:
+            mem_mb=4000,
+            runtime=30,
+        params:
+            week=from_brain("week"),
+            coordinates=from_brain("given.coordinates"),
+            affine_from=from_brain("given.affine_from"),
+            side=side,
+            scheme=from_brain("scheme"),
+            settings=surface_settings("edge_length_mm", "smoothing_iterations"),
+            of_labels=surface_settings("smoothing_voxels"),
+            of_surfaces=surface_settings("max_hole_mm"),
+        script:
+            "../scripts/pial_from_hemisphere.py"
 
 
 rule thickness_from_white:
     input:
-        unpack(lambda wildcards: CONFIG.brain(wildcards.brain).white_files),
+        unpack(from_brain("given.white_files")),
         surface=PIAL["whole"],
         report=PIAL["report"],
     output:
         **THICKNESS,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.with_white),
+        brain=brains_with(lambda brain: brain.thickness_from == "white"),
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        white=lambda wildcards: CONFIG.brain(wildcards.brain).white_files,
+        white=from_brain("given.white_files"),
     script:
         "../scripts/thickness_from_white.py"
 
@@ -167,13 +172,13 @@ rule pial_from_shape:
     output:
         **PIAL,
     wildcard_constraints:
-        brain=one_of(PLAN.brains.from_source("shape")),
+        brain=brains_with(lambda brain: brain.given.source == "shape"),
     params:
-        **of_brain("week"),
+        week=from_brain("week"),
     script:
         "../scripts/pial_from_shape.py"
 
 
 rule surface:
     input:
-        PLAN.brains.surfaces,
+        study.surfaces,

@@ -1,13 +1,15 @@
 # What simulations are worth: each simulated brain beside the real one of its week, with the scaled start as baseline.
 rule ready_surfaces:
     input:
-        real=of(PLAN.validating.real_surface),
-        adjacent=of(PLAN.validating.adjacent_surface),
+        real=lambda wildcards: study.references[wildcards.brain, wildcards.week][0].pial,
+        adjacent=lambda wildcards: study.references[wildcards.brain, wildcards.week][
+            1
+        ].pial,
         start=PIAL["whole"],
     output:
         **READY,
     wildcard_constraints:
-        brain=one_of(PLAN.validating.starts),
+        brain=one_of({one.start.id for one in study.validated}),
     resources:
         mem_mb=4000,
         runtime=30,
@@ -19,19 +21,24 @@ rule ready_surfaces:
 
 rule validation:
     input:
-        unpack(of(PLAN.validating.validated)),
+        unpack(from_simulation("validation_files")),
         params=PARAMETERS,
         # what the errors of runs that follow no curve are errors against
-        curves=of(PLAN.validating.curves),
+        curves=lambda wildcards: (
+            CURVES["curves"]
+            if study.simulations[wildcards.run, wildcards.brain].series
+            else []
+        ),
     output:
         VALIDATION,
     resources:
         mem_mb=4000,
         runtime=60,
     params:
-        start_week=of(PLAN.brains.week),
-        series=of(CONFIG.estimated_from),
-        kinds=of(PLAN.validating.kinds),
+        start_week=from_brain("week"),
+        series=from_simulation("series"),
+        weeks=from_simulation("real_weeks"),
+        kind=from_simulation("kind"),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
         mirrored_patches=CONFIG.metrics.mirrored_patches,
     script:
@@ -40,36 +47,51 @@ rule validation:
 
 rule prediction:
     input:
-        unpack(of(PLAN.validating.prediction)),
+        unpack(from_simulation("validation_files")),
+        atlas=lambda wildcards: study.chains[wildcards.brain, "atlas"].surfaces,
         mesh=MESH["mesh"],
         data=MESH["data"],
-        targets=TARGETS.format(brain="{brain}", whose="atlas"),
+        targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         PREDICTION,
     resources:
         mem_mb=4000,
         runtime=60,
     params:
-        start_week=of(PLAN.brains.week),
-        weeks=lambda wildcards: list(PLAN.validating.compared(**wildcards)),
-        atlas_weeks=lambda wildcards: PLAN.expecting.weeks(wildcards.brain, "atlas"),
-        of_atlas=of(PLAN.validating.predicts),
+        start_week=from_brain("week"),
+        weeks=lambda wildcards: list(
+            study.simulations[wildcards.run, wildcards.brain].real
+        ),
+        atlas_weeks=lambda wildcards: study.chains[wildcards.brain, "atlas"].later_weeks,
+        of_atlas=from_simulation("from_others_only"),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/prediction.py"
 
 
+def deviation_labels(wildcards):
+    """Return the first columns of the table of deviations."""
+    run, start, week = wildcards.run, wildcards.brain, wildcards.week
+    real = study.simulations[run, start].real[week]
+    names = {"run": run, "start": start, "week": real.week}
+    return names | {"real": real.id, "subject": real.subject}
+
+
 rule deviation:
     input:
-        unpack(of(PLAN.validating.deviation)),
+        unpack(
+            lambda wildcards: study.simulations[
+                wildcards.run, wildcards.brain
+            ].deviation_files(wildcards.week)
+        ),
     output:
         **DEVIATION,
     resources:
         mem_mb=4000,
         runtime=30,
     params:
-        **of_brain("sides"),
-        labels=of(PLAN.validating.deviating),
+        sides=from_brain("sides"),
+        labels=deviation_labels,
     script:
         "../scripts/deviation.py"
 
@@ -85,7 +107,7 @@ rule deviation_scores:
 
 rule registration_ceiling:
     input:
-        unpack(of(PLAN.validating.ceiling)),
+        unpack(lambda wildcards: study.ceiling_files(wildcards.brain)),
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
@@ -93,13 +115,13 @@ rule registration_ceiling:
     output:
         CEILING,
     wildcard_constraints:
-        brain=one_of(PLAN.chains.carried),
+        brain=one_of(study.carried),
     resources:
         mem_mb=4000,
         runtime=60,
     params:
-        start_week=of(PLAN.brains.week),
-        weeks=of(PLAN.validating.ceiling_weeks),
+        start_week=from_brain("week"),
+        weeks=lambda wildcards: study.ceiling_weeks(wildcards.brain),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
         mirrored_patches=CONFIG.metrics.mirrored_patches,
     script:
@@ -113,13 +135,13 @@ rule displacement_agreement:
     output:
         AGREEMENT,
     wildcard_constraints:
-        brain=one_of(PLAN.chains.carried),
+        brain=one_of(study.carried),
     params:
         labels=lambda wildcards: {
             "run": wildcards.run,
-            "start_week": CONFIG.brain(wildcards.brain).week,
+            "start_week": study.brains[wildcards.brain].week,
         },
-        registered=of(PLAN.validating.registered),
+        registered=from_simulation("follows_registration"),
     script:
         "../scripts/displacement_agreement.py"
 
@@ -127,18 +149,18 @@ rule displacement_agreement:
 # the weeks in which sulci begin, in a simulated brain and in the real ones that follow its start
 rule onset:
     input:
-        unpack(of(PLAN.validating.onset)),
+        unpack(lambda wildcards: study.onset_files(wildcards.run, wildcards.brain)),
     output:
         ONSET,
     wildcard_constraints:
-        brain=one_of(PLAN.chains.carried),
+        brain=one_of(study.carried),
     params:
-        **of_brain("sides"),
+        sides=from_brain("sides"),
         radius_mm=CONFIG.metrics.curvature_radius_mm,
         run=lambda wildcards: wildcards.run,
         subject=lambda wildcards: wildcards.brain,
-        run_weeks=of(CONFIG.weeks),
-        real_weeks=of(PLAN.chains.later_weeks),
+        run_weeks=from_simulation("weeks"),
+        real_weeks=lambda wildcards: study.chains[wildcards.brain, "self"].weeks,
     script:
         "../scripts/onset.py"
 
@@ -150,7 +172,11 @@ rule folding_agreement:
     output:
         f"{STUDY}/folding_agreement.csv",
     params:
-        pairs=PLAN.validating.week_pairs,
+        pairs=[
+            (one.run, one.start.id, float(week), real.id)
+            for one in study.validated
+            for week, real in one.real.items()
+        ],
     script:
         "../scripts/folding_agreement.py"
 
@@ -159,8 +185,8 @@ rule validate:
     input:
         [
             f"{STUDY}/{name}.csv"
-            for name, files in PLAN.validating.tables.items()
+            for name, files in study.validation_tables.items()
             if files
         ],
-        rules.deviation_scores.output if PLAN.validating.expected else [],
+        rules.deviation_scores.output if study.expected else [],
         PLAN.figures.target("validate"),

@@ -16,20 +16,20 @@ from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.parameters.terms import SIDES, STRUCTURES
 from gyriflow.step import step
 
-files, own = snakemake.input, snakemake.params.own
+files, read = snakemake.input, snakemake.params.read
 with step(snakemake.log[0], files.volume):
     drawing, drawn = read_yaml(files.drawing), read_label_volume(files.drawn)
     names = {number: sulcus["name"] for number, sulcus in enumerate(drawing["sulci"], start=1)}
     brains = []
     for path, affine_from, scheme in (
-        (files.volume, own["affine_from"], LabelScheme(**own["scheme"])),
+        (files.volume, read["affine_from"], LabelScheme(**read["scheme"])),
         (Path(files.drawing).parent / drawing["labels"], "auto", SCHEMES[drawing["scheme"]]),
     ):
         volume = read_label_volume(path, affine_from=affine_from)
         parts = {"cerebrum": scheme.cerebrum, "cortex": scheme.cortex}
         brains.append(channels(volume.labels, volume.affine, **parts, voxel_mm=PLACES_MM))
     between = find_places(*brains, threads=snakemake.threads)
-    back = np.eye(4) if own["posed"] else read_pose(files.report).inverse
+    back = np.eye(4) if snakemake.params.posed else read_pose(files.report).inverse
     for side in SIDES:
         points = transform_points(read_surface(files[side]).vertices, back)
         labels = np.full(len(points), NO_REGION)

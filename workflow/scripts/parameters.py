@@ -18,7 +18,7 @@ with step(snakemake.log[0]):
     if growth["model"] != "rates":
         curves = read_table(files.curves) if files.curves else None
         shrink = settings["allow_negative_growth"] or bool(files.targets)
-        sizes = followed_sizes(growth, curves, snakemake.params.estimated_from, weeks, shrink)
+        sizes = followed_sizes(growth, curves, snakemake.params.series, weeks, shrink)
         settings["growth"] = growth | sizes
         if THICKNESS in sizes:
             settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}

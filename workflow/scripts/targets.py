@@ -25,7 +25,7 @@ with step(snakemake.log[0]):
         )
         for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
     ]
-    if snakemake.wildcards.whose == "self":
+    if snakemake.wildcards.origin == "self":
         weeks, positions, others = [params.start_week, *params.weeks], carry_sharply(mesh, pairs, surfaces), {}
     else:
         known = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)

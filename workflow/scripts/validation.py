@@ -15,7 +15,7 @@ files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 with step(snakemake.log[0]):
     rows, growth = [], read_yaml(files.params)["growth"]
     curves = curves_of_run(growth, read_table(files.curves) if files.curves else None, params.series)
-    for number, (week, kind) in enumerate(params.kinds.items()):
+    for number, week in enumerate(params.weeks):
         simulated, real = read_surface(files.simulated[number]), read_surface(files.whole[number])
         aim = [float(value(curve, week)) for curve in curves]
         aim = (aim[0] / CM2_PER_MM2, aim[1] / ML_PER_MM3) if aim else None
@@ -25,7 +25,7 @@ with step(snakemake.log[0]):
         for name in ("real", "start", "adjacent"):
             maps = read_vertex_maps(files[f"{name}_maps"][number])
             shapes[name] = Shape(read_surface(files[name][number]), **maps)
-        comparison = Comparison(names.run, kind, params.start_week, week)
+        comparison = Comparison(names.run, params.kind, params.start_week, week)
         rows.append(
             validation_row(
                 comparison, simulated=simulated, real_brain=real, curve=aim, mirrored=params.mirrored_patches, **shapes

@@ -26,6 +26,8 @@ from ..io.yaml_files import read_keys
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import ELEMENTS_NEEDED
 from ..parameters.varying import Varying, curve_at
+from ..study import resolve
+from ..study.study import Study
 from .cost import ERROR, LEAST_SURFACE_MIB, SECONDS_PER_JOB, folding_needs, surface_memory_mib
 from .launch import main as launch
 from .status import as_duration
@@ -79,17 +81,18 @@ def check_study(
     with all its problems.
     """
     config = load(read_keys(path), path.resolve().parent)
-    yield f"{path}: {_contents(config)}", False
+    study = resolve(config)
+    yield f"{path}: {_contents(study)}", False
     problems = list(input_problems(config)) if read_files else []
     yield from ((f"  {line}", bad) for line, bad in problems)
-    yield from ((f"  warning: {line}", False) for line in coarse_cortices(config))
+    yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     bad = any(bad for _, bad in problems)
     if read_files and not bad:
         yield "  input files: all can be read and fit their schemes", False
     if missing := sum(len(atlas.missing) for atlas in config.atlases):
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
     if not bad:
-        yield from _work(plan(path, directory, ["--cores", str(cores), *stages]), config, directory, cores, price)
+        yield from _work(plan(path, directory, ["--cores", str(cores), *stages]), study, directory, cores, price)
 
 
 def work_of_study(
@@ -100,7 +103,8 @@ def work_of_study(
     With `show`, Snakemake lists every job on the terminal first.
     """
     jobs = plan(path, directory, further, show=show)
-    for line, _ in _work(jobs, load(read_keys(path), path.resolve().parent), directory, cores, None):
+    study = resolve(load(read_keys(path), path.resolve().parent))
+    for line, _ in _work(jobs, study, directory, cores, None):
         yield line
 
 
@@ -135,32 +139,34 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
     return jobs
 
 
-def _contents(config: Config) -> str:
-    """Return how many brains and simulations a configuration has, and the names of its runs or of the first ones."""
-    names = [*list(config.runs)[:NAMED_RUNS], *(["…"] if len(config.runs) > NAMED_RUNS else [])]
-    brains, folded = len(config.brains), len(config.folded)
+def _contents(study: Study) -> str:
+    """Return how many brains and simulations a study has, and the names of its runs or of the first ones."""
+    runs = list(study.config.runs)
+    names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
+    brains, folded = len(study.brains), len(study.folded)
     parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
     parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})"]
-    parts += [f"{len(members)} of study {name}" for name, members in config.members.items()]
-    if config.calibrate is not None:
-        parts.append(f"{len(config.calibrate.runs)} of the calibration")
+    parts += [f"{len(compared.members)} of study {name}" for name, compared in study.comparisons.items()]
+    if study.calibration is not None:
+        parts.append(f"{len(study.calibration.rounds)} of the calibration")
     return ", ".join(parts)
 
 
-def coarse_cortices(config: Config) -> Iterator[str]:
+def coarse_cortices(study: Study) -> Iterator[str]:
     """Yield for each run, before anything is solved, whether its mesh is too coarse for its cortex at the start."""
-    mesh = config.mesh
+    mesh = study.config.mesh
     needed = ELEMENTS_NEEDED[mesh.order]
-    for run, brain in config.folded:
-        thickness = config.run(run).thickness_mm
+    for one in study.folded:
+        thickness = one.settings.thickness_mm
         # maps and measured thicknesses are known once the surface is made
         if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
             continue
-        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, config.brain(brain).week)
-        if through / mesh.surface_edge_mm < 0.99 * needed:
+        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, one.start.week)
+        if (elements := through / mesh.surface_edge_mm) < 0.99 * needed:
+            enough_mm = math.floor(100 * through / needed) / 100
             yield (
-                f"run {run} from {brain}: about {through / mesh.surface_edge_mm:.1f} elements through the cortex, "
-                f"{needed:g} are needed: mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g} would do"
+                f"run {one.run} from {one.start.id}: about {elements:.1f} elements through the cortex, "
+                f"{needed:g} are needed: mesh.surface_edge_mm: {enough_mm:g} would do"
             )
 
 
@@ -212,7 +218,7 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
 
 
 def _work(
-    jobs: Sequence[PlannedJob], config: Config, directory: Path, cores: int, price: float | None
+    jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int, price: float | None
 ) -> Iterator[tuple[str, bool]]:
     """Yield what will run, by rule, and what it will take of time, memory and disk."""
     making = [job for job in jobs if job.output]
@@ -228,7 +234,7 @@ def _work(
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{why}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     foldings = [
-        (job, folding_needs(job.wildcards["run"], job.wildcards["brain"], config))
+        (job, folding_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
         for job in making
         if job.rule in FOLDINGS
     ]

@@ -4,11 +4,11 @@ from math import ceil
 from typing import NamedTuple
 
 from ..anatomy.plausible import expected_volume_ml
-from ..config.root import Config
 from ..config.stages import MeshSettings
 from ..errors import InputError
 from ..folding.predicted_memory import predicted_memory_mib
 from ..io.volumes import voxels_of
+from ..study.records import Simulation
 from ..units import ML_PER_MM3, SECONDS_PER_GW
 
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
@@ -41,25 +41,22 @@ def linear_elements(week: float, mesh: MeshSettings) -> float:
     return ELEMENTS_PER_CUBE[mesh.mesher] * cubes
 
 
-def folding_needs(name: str, brain: str, config: Config) -> Needs:
-    """Return what the folding of a run from a brain takes; one of a calibration ends at the week of comparison."""
-    calibrated = config.calibrate is not None and name in config.calibrate.runs
-    run = config.run(config.calibrate.base if calibrated and config.calibrate else name)
-    end = config.calibrate.compare_week if calibrated and config.calibrate else run.end_week
-    week, order = config.brain(brain).week, config.mesh.order
-    elements = linear_elements(week, config.mesh)
-    steps = max((end - week) * SECONDS_PER_GW / run.step_s, 1.0)
+def folding_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
+    """Return what a folding takes."""
+    run, week, order = simulation.settings, simulation.start.week, mesh.order
+    elements = linear_elements(week, mesh)
+    steps = max((run.end_week - week) * SECONDS_PER_GW / run.step_s, 1.0)
     memory = predicted_memory_mib(round(elements / (8 if order == 2 else 1)), run.ranks, run.contact.kind, order)
-    weeks = (end - week) / run.output_every_gw + 1
+    weeks = (run.end_week - week) / run.output_every_gw + 1
     # positions and fields of each week, by a quarter as many nodes
     disk = weeks * elements / 4 * (24 + 12 * len(run.fields)) / 2**20
     return Needs(SECONDS_PER_ELEMENT_AND_STEP[order] * elements * steps, memory, disk)
 
 
-def job_limits(run: str, brain: str, config: Config) -> tuple[int, int]:
+def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:
     """Return the memory in MiB and the minutes that the job of a folding may take on a cluster."""
-    needs = folding_needs(run, brain, config)
-    minutes = ERROR * needs.seconds / config.run(run).ranks / 60
+    needs = folding_needs(simulation, mesh)
+    minutes = ERROR * needs.seconds / simulation.settings.ranks / 60
     return max(ceil(ERROR * needs.memory_mib), LEAST_MIB), max(ceil(minutes), LEAST_MINUTES)
 
 

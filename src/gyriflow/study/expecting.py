@@ -32,7 +32,7 @@ class Expecting:
     def targets(self, run: str, brain: str) -> str | list[str]:
         """Returns the file with the shapes that give a run from a brain its growth, none where sizes or rates do."""
         base = self.runs.base(run)
-        return TARGETS.format(brain=brain, whose=self.whose(base)) if self.runs.grows_by(base) == "shapes" else []
+        return TARGETS.format(brain=brain, origin=self.whose(base)) if self.runs.grows_by(base) == "shapes" else []
 
     def unled(self) -> dict[str, InputError]:
         """Returns by start brain why no brains lead a run that grows towards shapes to its end.

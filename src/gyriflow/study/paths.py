@@ -73,7 +73,7 @@ MESH = {
     "quality": f"{BRAIN}/mesh/quality.json",
 }
 CARRIED_MESH = f"{BRAIN}/mesh/carried.h5"
-TARGETS = f"{BRAIN}/mesh/targets.{{whose}}.h5"
+TARGETS = f"{BRAIN}/mesh/targets.{{origin}}.h5"
 
 GROWTH = {name: f"{STUDY}/growth/{name}.csv" for name in ("areas", "rates")}
 CURVES = {"curves": f"{STUDY}/growth/curves.csv", "errors": f"{STUDY}/growth/curve_errors.csv"}

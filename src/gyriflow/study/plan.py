@@ -9,7 +9,6 @@ from .chains import Chains
 from .expecting import Expecting
 from .figures import Figures
 from .measuring import Measuring
-from .reporting import Reporting
 from .runs import Runs
 from .studying import Calibrating, Studying
 from .validating import Validating
@@ -66,7 +65,3 @@ class Plan:
         """The figures and tables that are drawn."""
         parts = (self.brains, self.runs, self.chains, self.measuring, self.validating, self.studying)
         return Figures(self.config, *parts)
-
-    def reporting(self, whole: Config) -> Reporting:
-        """Returns the words on the configuration, of which `whole` has the refused brains, too."""
-        return Reporting(self.config, self.brains, whole)

@@ -221,6 +221,20 @@ class Chain:
         """The brains that follow the start."""
         return self.brains[1:]
 
+    @property
+    def later_weeks(self) -> list[float]:
+        return self.weeks[1:]
+
+    @property
+    def surfaces(self) -> list[str]:
+        """The pial surfaces of the brains that follow the start."""
+        return [brain.pial for brain in self.later]
+
+    @property
+    def reports(self) -> list[str]:
+        """The reports of these surfaces, with their poses."""
+        return [brain.report for brain in self.later]
+
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
@@ -287,9 +301,19 @@ class Simulation:
         return {self.week_tags[0]: self.start, **{week: brains[0] for week, brains in self.compared.items()}}
 
     @property
+    def real_weeks(self) -> list[float]:
+        """The weeks that have a real brain."""
+        return [float(week) for week in self.real]
+
+    @property
+    def follows_registration(self) -> bool:
+        """Whether it grows along the registrations of the brains that it is compared with."""
+        return self.shapes is not None and not self.from_others_only
+
+    @property
     def targets(self) -> str | list[str]:
         """The file with the shapes that the run grows towards."""
-        return TARGETS.format(brain=self.start.id, whose=self.shapes) if self.shapes else []
+        return TARGETS.format(brain=self.start.id, origin=self.shapes) if self.shapes else []
 
     @property
     def map_sources(self) -> dict[str, dict[str, list[str]]]:

@@ -1,11 +1,12 @@
-"""What the report and the tables of quality say of a configuration, besides its figures."""
+"""What the report and the tables of quality say of a study's brains, besides its figures."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
-from ..config.root import Config
-from .brains import Brains
-from .paths import BRAIN, PIAL, THICKNESS
+from ..config.brains import Brain as GivenBrain
+from .paths import BRAIN, THICKNESS
+from .records import Brain
+from .study import Study
 
 # the step that makes the surface, by the source of a brain, as its log is called
 _PIAL_STEPS = {
@@ -17,91 +18,81 @@ _PIAL_STEPS = {
 }
 
 
-@dataclass(frozen=True)
-class Reporting:
-    """The words on brains, files and settings of a configuration; `whole` has its refused brains, too."""
+def used_settings(study: Study) -> dict[str, Any]:
+    """Return the configuration; the brains of the atlas are among the brains by now."""
+    return study.config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
 
-    config: Config
-    brains: Brains
-    whole: Config
 
-    @property
-    def used(self) -> dict[str, Any]:
-        """The configuration; the brains of the atlas are among the brains by now."""
-        return self.whole.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
+def described_brains(study: Study) -> list[dict[str, Any]]:
+    """Return what the configuration says of each brain, refused ones too, with its licence where it is of an atlas."""
+    licences = {
+        used.atlas.brain_id(file.series, file.week): used.atlas.licence.name
+        for used in study.config.atlases
+        for file in used.files
+    }
+    keys = ("id", "week", "population", "source", "synthetic")
+    return [
+        {**{key: getattr(brain, key) for key in keys}, "licence": licences.get(brain.id)}
+        for brain in study.config.brains
+    ]
 
-    @property
-    def described(self) -> list[dict[str, Any]]:
-        """What the configuration says of each brain, with its licence where it is of an atlas."""
-        licences = {
-            used.atlas.brain_id(file.series, file.week): used.atlas.licence.name
-            for used in self.config.atlases
-            for file in used.files
-        }
-        keys = ("id", "week", "population", "source", "synthetic")
-        return [
-            {**{key: getattr(brain, key) for key in keys}, "licence": licences.get(brain.id)}
-            for brain in self.whole.brains
-        ]
 
-    @property
-    def files(self) -> list[tuple[str, str, str]]:
-        """Brain, what it is and path of all files that brains are made from."""
-        return [
-            (brain.id, what, path)
-            for brain in self.config.brains
-            for what, paths in (
-                (brain.source, brain.files),
-                ("image", [brain.image] if brain.image else []),
-                ("white", list(brain.white_files.values())),
-            )
-            for path in paths
-        ]
+def input_files(study: Study) -> list[tuple[str, str, str]]:
+    """Return brain, what it is and path of all files that brains are made from."""
+    return [
+        (brain.id, what, path)
+        for brain in study.brains.values()
+        for what, paths in (
+            (brain.given.source, brain.given.files),
+            ("image", [brain.given.image] if brain.given.image else []),
+            ("white", list(brain.given.white_files.values())),
+        )
+        for path in paths
+    ]
 
-    @property
-    def method(self) -> dict[str, Any]:
-        """What the text of the methods says of the configuration: its brains, and settings by section."""
-        named = {
-            **{"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}},
-            "metrics": {"curvature_radius_mm", "spangy_proxy"},
-        }
-        used = self.config.model_dump(mode="json", include=named)
-        return {"brains": [brain for brain in self.described if brain["id"] in self.brains.ids], **used}
 
-    def labels(self, brain: str) -> dict[str, Any]:
-        """Returns what the table of quality says of a brain before it is looked at."""
-        settings = self.whole.brain(brain)
-        return {
-            "subject": brain,
-            **{key: getattr(settings, key) for key in ("week", "population", "source")},
-            "sides": " ".join(settings.sides),
-            "page": f"{BRAIN}/figures/quality.png".format(brain=brain),
-        }
+def method(study: Study) -> dict[str, Any]:
+    """Return what the text of the methods says of the configuration: its brains, and settings by section."""
+    named = {
+        **{"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}},
+        "metrics": {"curvature_radius_mm", "spangy_proxy"},
+    }
+    brains = [brain for brain in described_brains(study) if brain["id"] in study.brains]
+    return {"brains": brains, **study.config.model_dump(mode="json", include=named)}
 
-    def refused(self, causes: dict[str, str]) -> list[dict[str, Any]]:
-        """Returns the rows of that table for brains that were refused, or left out of the list of participants."""
-        rows = [self.labels(brain) | {"cause": cause, "page": None} for brain, cause in causes.items()]
-        return rows + [{"subject": row, **said} for row, said in self.whole.left_out.items()]
 
-    def looked_at(self, brain: str) -> dict[str, Any]:
-        """Returns the files that the page of a brain's quality shows."""
-        settings = self.config.brain(brain)
-        known = brain in self.brains.with_thickness
-        return {
-            "surface": PIAL["whole"].format(brain=brain),
-            "report": PIAL["report"].format(brain=brain),
-            "labels": self.brains.label_volume(brain) if settings.has_labels else [],
-            "image": settings.image or [],
-            "white": list(settings.white_files.values()),
-            "thickness": THICKNESS["measured"].format(brain=brain) if known else [],
-            "measured": THICKNESS["report"].format(brain=brain) if known else [],
-        }
+def quality_labels(brain: GivenBrain) -> dict[str, Any]:
+    """Return what the table of quality says of a brain before it is looked at."""
+    return {
+        "subject": brain.id,
+        **{key: getattr(brain, key) for key in ("week", "population", "source")},
+        "sides": " ".join(brain.sides),
+        "page": f"{BRAIN}/figures/quality.png".format(brain=brain.id),
+    }
 
-    def logs(self, brain: str) -> list[str]:
-        """Returns the logs of the steps that have made a brain's surface and thickness."""
-        settings = self.config.brain(brain)
-        surface = _PIAL_STEPS[settings.source].format(side=settings.sides[0])
-        return [
-            f"results/brains/{brain}/logs/{name}.log"
-            for name in (surface, "cortical_thickness", "thickness_from_white")
-        ]
+
+def refused_rows(study: Study, causes: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Return the rows of that table for brains that were refused, or left out of the list of participants."""
+    rows = [quality_labels(study.config.brain(brain)) | {"cause": why, "page": None} for brain, why in causes.items()]
+    return rows + [{"subject": row, **values} for row, values in study.config.left_out.items()]
+
+
+def quality_files(brain: Brain) -> dict[str, Any]:
+    """Return the files that the page of a brain's quality shows."""
+    return {
+        "surface": brain.pial,
+        "report": brain.report,
+        "labels": brain.label_volume if brain.given.has_labels else [],
+        "image": brain.given.image or [],
+        "white": list(brain.given.white_files.values()),
+        "thickness": brain.measured.thickness,
+        "measured": THICKNESS["report"].format(brain=brain.id) if brain.thickness_from else [],
+    }
+
+
+def surface_logs(brain: Brain) -> list[str]:
+    """Return the logs of the steps that have made a brain's surface and thickness."""
+    surface = _PIAL_STEPS[brain.given.source].format(side=brain.sides[0])
+    return [
+        f"results/brains/{brain.id}/logs/{name}.log" for name in (surface, "cortical_thickness", "thickness_from_white")
+    ]

@@ -153,6 +153,18 @@ class Study:
             for week in one.week_tags
         ]
 
+    @property
+    def with_thickness_curve(self) -> list[str]:
+        """The ids of the brains whose cortical thickness gives a curve, where some run follows it."""
+        followed = any(run.growth.thickness_mm == "measured" for run in self.config.runs.values())
+        return [brain.id for _, brain in self.growing if followed and brain.thickness_from]
+
+    @property
+    def unmatched_starts(self) -> dict[str, str]:
+        """Why the surfaces of a growth series with a start brain are not matched, by the series' name."""
+        starts = set(self.starts)
+        return {name: why for name, why in self.series.unmatched.items() if starts & set(self.series.brains[name])}
+
     def files(self, *patterns: str) -> list[str]:
         """Return the files of patterns for every run and each brain that it folds."""
         return [one.file(pattern) for one in self.folded for pattern in patterns]
@@ -250,6 +262,10 @@ class Study:
             **surfaces,
             "correspondence": self.series.correspondence(given, self.brains[brain]),
         }
+
+    def posed_regions(self, brain: str) -> list[bool]:
+        """Return for the brain of the regions and the one that gets them whether they correspond in their poses."""
+        return self.series.posed(self.regions_of(self.brains[brain]), self.brains[brain])
 
     def regions_of(self, brain: Brain) -> Brain:
         """Return the brain with given regions that is nearest in week."""

@@ -9,6 +9,7 @@ from gyriflow.cli.checking import coarse_cortices, input_problems, plan, work_of
 from gyriflow.config import load
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
+from gyriflow.study import resolve
 
 
 def problems(folder, **keys):
@@ -58,7 +59,9 @@ def test_a_size_that_is_not_that_of_the_week_is_told(tmp_path, mm, doubted):
 def coarse(mesh, **folding):
     brain = {"id": "a", "week": 23, **LABELLED}
     return list(
-        coarse_cortices(load({"brains": [brain], "start": "a", "mesh": mesh, "folding": {"end_week": 24} | folding}))
+        coarse_cortices(
+            resolve(load({"brains": [brain], "start": "a", "mesh": mesh, "folding": {"end_week": 24} | folding}))
+        )
     )
 
 

@@ -15,6 +15,7 @@ from gyriflow.cli.cost import (
 )
 from gyriflow.config import load
 from gyriflow.config.stages import MeshSettings
+from gyriflow.study import resolve
 
 STUDY = {
     "brains": [{"id": "a", "week": 21, "shape": {"kind": "sphere", "radius_mm": 20}}],
@@ -33,6 +34,12 @@ def test_a_mesh_has_about_as_many_elements_as_those_that_were_made(week, mesher,
     assert elements / 1.5 < linear_elements(week, mesh) < 1.5 * elements
 
 
+def reference(raw):
+    """Return the simulation of the run `reference` and the settings of its mesh."""
+    study = resolve(load(raw))
+    return study.simulations["reference", "a"], study.config.mesh
+
+
 @pytest.mark.parametrize(
     ("elements", "steps", "seconds"),
     # reference and measured of the demo, of a coarse prediction, and of a brain over nine weeks
@@ -46,7 +53,7 @@ def test_a_folding_takes_as_long_as_measured_ones_within_the_error(elements, ste
 def test_a_folding_takes_as_long_as_it_has_elements_and_steps():
     def seconds(mesh=(), **folding):
         study = STUDY | {"folding": STUDY["folding"] | folding, "mesh": STUDY["mesh"] | dict(mesh)}
-        return folding_needs("reference", "a", load(study)).seconds
+        return folding_needs(*reference(study)).seconds
 
     assert seconds(end_week=29) == pytest.approx(2 * seconds())
     assert seconds(step_s=43200) == pytest.approx(2 * seconds())
@@ -64,18 +71,19 @@ def test_runs_of_studies_and_calibrations_cost_what_runs_do():
             "score": {"size": 1.0}, "first_runs": 3,
         },
     }  # fmt: skip
-    config = load(study)
-    usual = folding_needs("reference", "a", config)
-    assert {folding_needs(run, "a", config) for run in config.study_runs} == {usual}
-    assert folding_needs(next(iter(config.calibrate.runs)), "a", config).seconds == pytest.approx(usual.seconds / 2)
+    resolved = resolve(load(study))
+    usual, *others, calibrated = (folding_needs(one, resolved.config.mesh) for one in resolved.simulations.values())
+    assert usual in others
+    assert calibrated.seconds == pytest.approx(usual.seconds / 2)
 
 
 def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
     # a small one has what every job needs
-    assert job_limits("reference", "a", load(STUDY)) == (2000, 60)
-    config = load(STUDY | {"folding": {"end_week": 40, "step_s": 600, "ranks": 2}})
-    needs = folding_needs("reference", "a", config)
-    assert job_limits("reference", "a", config) == pytest.approx((2 * needs.memory_mib, needs.seconds / 60), abs=1)
+    asked = reference(STUDY)
+    assert job_limits(*asked) == (2000, 60)
+    asked = reference(STUDY | {"folding": {"end_week": 40, "step_s": 600, "ranks": 2}})
+    needs = folding_needs(*asked)
+    assert job_limits(*asked) == pytest.approx((2 * needs.memory_mib, needs.seconds / 60), abs=1)
 
 
 def test_the_memory_of_a_surface_follows_the_header(tmp_path):
