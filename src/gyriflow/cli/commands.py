@@ -126,8 +126,8 @@ def main() -> None:
 def init(folder: Path, output: Path | None, force: bool, quick: bool) -> None:
     """Write a configuration from the files of a FOLDER.
 
-    It knows tissue label volumes (its scheme is found from the labels), pairs of hemisphere surfaces, files named as in
-    the dHCP, CRL and spina bifida atlases, and ages from participants.tsv or from names such as week21, GA21, 25w.
+    It knows tissue label volumes (their scheme is found from the labels), hemisphere surfaces, and ages from
+    participants.tsv or from names such as week21 or GA21.
     """
     from .beginning import write_configuration
 

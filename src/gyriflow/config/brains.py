@@ -15,7 +15,7 @@ from ..parameters.settings import InputFile, Problem, Settings, beside, check, l
 from ..parameters.synthetic import ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
 from ..parameters.varying import Week
-from .scans import AGE, AGES, IDS, NOTHING, SESSION, SURE_AGES, Scan, read_scans
+from .scans import AGE, IDS, NOTHING, SESSION, UNIT_OF_AGE, Scan, read_scans
 
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """The keys of which a brain has exactly one."""
@@ -205,11 +205,11 @@ ALMOST = 0.85
 class ParticipantsSettings(Settings):
     """A table with a brain in each row. `participants: FILE` is short for a section.
 
-    Columns are `participant_id` (or `id`); the gestational age, `gestational_age` (or `week`, another usual name, or
-    one that the table's sidecar describes so), as `24.3`, `24+2` or `24w2d`; and keys of brains, inner ones with a dot
-    (`hemispheres.left`). Instead of keys, `files` may name labels, a pial surface, or left and right surfaces with a
-    semicolon between; with `side`, one hemisphere. `n/a` is no value. Other columns are covariates. A participant with
-    a `sub-01/sub-01_sessions.tsv` beside the table has a brain for each of its sessions, with that one's age.
+    Columns are `participant_id` (or `id`); the gestational age, `gestational_age` or `week`, as `24.3`, `24+2` or
+    `24w2d` (or `age_weeks`, `age_days`, or `age` with its unit in the sidecar); and keys of brains, inner ones with a
+    dot (`hemispheres.left`). Instead of keys, `files` may name labels, a pial surface, or left and right surfaces with
+    a semicolon between; with `side`, one hemisphere. `n/a` is no value. Other columns are covariates. A participant
+    with a `sub-01/sub-01_sessions.tsv` beside the table has a brain for each of its sessions, with that one's age.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
@@ -260,14 +260,14 @@ def participants_brains(
 
 def covariates(scan: Scan) -> dict[str, dict[str, str]]:
     """Returns the key `covariates` of a scan's brain: the columns of its table that mean nothing else."""
-    known = {*IDS, SESSION, *FILES, SIDE, *COLUMNS, scan.age_column.lower()}
-    found = {key: value for key, value in scan.values.items() if key.lower() not in known and value not in NOTHING}
+    known = {*IDS, SESSION, *FILES, SIDE, *COLUMNS, scan.age_column}
+    found = {key: value for key, value in scan.values.items() if key not in known and value not in NOTHING}
     return {"covariates": found} if found else {}
 
 
 def _require_known_columns(path: Path, columns: list[str]) -> None:
-    known = {*IDS, SESSION, *SURE_AGES, AGE, *FILES, SIDE, *COLUMNS}
-    for column in {name for name in columns if name.lower() not in AGES} - known:
+    known = {*IDS, SESSION, *UNIT_OF_AGE, AGE, *FILES, SIDE, *COLUMNS}
+    for column in set(columns) - known:
         nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
         if nearest:
             raise InputError(

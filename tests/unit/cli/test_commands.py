@@ -10,7 +10,7 @@ from gyriflow.cli import beginning, launch
 from gyriflow.cli.commands import main
 from gyriflow.config import load
 from gyriflow.shipped import SHIPPED
-from gyriflow.study import Plan
+from gyriflow.study import resolve
 
 
 @pytest.fixture
@@ -77,9 +77,9 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted
     assert "brains are of spina bifida aperta, not normal ones" in done.output
     config = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
     assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
-    assert config.starts("reference") == ["subject"]
-    assert config.run("reference").growth.of == "atlas"
-    assert Plan(config).expecting.chain("subject", "another")[1:] == [brain.id for brain in config.brains[1:]]
+    study = resolve(config)
+    assert [(simulation.start.id, simulation.shapes) for simulation in study.folded] == [("subject", "atlas")]
+    assert [brain.id for brain in study.chains["subject", "atlas"].later] == [brain.id for brain in config.brains[1:]]
     asked = (tmp_path / "asked.txt").read_text()
     assert asked == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path}"
     # the same call goes on, another one replaces nothing

@@ -1,13 +1,16 @@
 """Which files are recognised as brains: names of atlases, sides, ages, label schemes, participants."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
 
 from gyriflow.cli import launch
-from gyriflow.cli.beginning import UNSET, fitting_scheme, participants, recognise, week_in, write_configuration
+from gyriflow.cli.beginning import write_configuration
 from gyriflow.cli.commands import main
+from gyriflow.cli.recognition import UNSET, fitting_scheme, recognise
 from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import read_label_volume
@@ -17,45 +20,14 @@ ATLAS = SHIPPED / "atlases" / "spina-bifida"
 LABELS = ATLAS / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
 
 
-@pytest.mark.parametrize(
-    ("name", "week"),
-    [
-        ("week21_labels.nii.gz", 21),
-        ("fetal.week36.left.pial.surf.gii", 36),
-        ("tissue-t21.00_dhcp-19.nii.gz", 21),
-        ("STA30_tissue.nii.gz", 30),
-        ("HarvardSTA25_Study1", 25),
-        ("fetal_SB_atlas_GA27_operated", 27),
-        ("sub-01_ga-26.4_dseg.nii.gz", 26.4),
-        ("brain_24w.nii.gz", 24),
-        ("case_33GW_seg.nii.gz", 33),
-        ("sub-21_dseg.nii.gz", None),
-        ("week99.nii.gz", None),
-        ("T2w.nii.gz", None),
-        ("GestationalAge24_seg", 24),
-        ("sub-01_EGA25_seg", 25),
-        # numbers of subjects after words that end as a name of an age does
-        ("patient23_seg.nii.gz", None),
-        ("subject-24", None),
-        ("fet_30_labels.nii.gz", None),
-        ("infant-31_seg.nii.gz", None),
-        ("image24_seg.nii.gz", None),
-        ("dataset_21", None),
-        ("PATIENT23", None),
-    ],
-)
-def test_ages_are_read_from_names(name, week):
-    assert week_in(name) == week
-
-
 def test_the_scheme_is_found_from_the_labels():
     labels = read_label_volume(LABELS).labels
-    assert fitting_scheme(labels)[0] == "spina-bifida-atlas"
+    assert fitting_scheme(labels) == "spina-bifida-atlas"
     # the same brain with the numbers of FeTA
     feta = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])[labels]
-    assert fitting_scheme(feta)[0] == "feta-7"
-    assert fitting_scheme((labels > 0).astype(np.int32))[0] == "binary"
-    assert fitting_scheme(labels + 200 * (labels > 0)) == (None, [])
+    assert fitting_scheme(feta) == "feta-7"
+    assert fitting_scheme((labels > 0).astype(np.int32)) == "binary"
+    assert fitting_scheme(labels + 200 * (labels > 0)) is None
 
 
 def touched(folder, *names):
@@ -71,8 +43,7 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
         )
     touched(tmp_path, "fetal.week23.left.pial.surf.gii")
     touched(tmp_path, *(f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white")))
-    (tmp_path / "participants.tsv").write_text("participant_id\tsex\tga\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
-    assert {scan.id: scan.week for scan in participants(tmp_path)[0]} == {"sub-07": 27.3, "sub-08": None}
+    (tmp_path / "participants.tsv").write_text("participant_id\tsex\tweek\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
     first, alone, second = (brain.entry for brain in recognise(tmp_path))
     assert first == {
         "id": "fetal.week22",
@@ -86,6 +57,14 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     assert alone["hemisphere"] == {"file": "fetal.week23.left.pial.surf.gii", "side": "left"}
     assert (second["id"], second["week"], second["covariates"]) == ("sub-07", 27.3, {"sex": "F"})
     assert second["hemispheres"]["white"] == {"left": "sub-07/surf/lh.white", "right": "sub-07/surf/rh.white"}
+
+
+def test_an_age_is_read_from_a_name_that_says_week_or_ga(tmp_path):
+    names = ("week21_dseg", "sub-01_ga-26.4_dseg", "sub-21_dseg", "image24_dseg", "AGA23_dseg")
+    for name in names:
+        (tmp_path / f"{name}.nii.gz").write_bytes(LABELS.read_bytes())
+    weeks = {Path(brain.entry["labels"]).name.split(".nii")[0]: brain.entry["week"] for brain in recognise(tmp_path)}
+    assert weeks == {**dict.fromkeys(names, UNSET), "week21_dseg": 21.0, "sub-01_ga-26.4_dseg": 26.4}
 
 
 def test_a_configuration_is_written_that_is_valid(tmp_path):
@@ -133,7 +112,7 @@ def bids_folder(folder):
     (folder / "sub-02").mkdir()
     for name, ages in (("sub-01", ("21w2d", "24+3")), ("sub-02", ("22.1", "25"))):
         rows = "".join(f"ses-{number}\t{age}\t3.0\n" for number, age in enumerate(ages, 1))
-        (folder / name / f"{name}_sessions.tsv").write_text("session_id\tga\ttesla\n" + rows)
+        (folder / name / f"{name}_sessions.tsv").write_text("session_id\tgestational_age\ttesla\n" + rows)
 
 
 def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
@@ -158,7 +137,10 @@ def test_an_ambiguous_age_is_asked_for_by_file_and_column(tmp_path):
     (tmp_path / "participants.tsv").write_text("participant_id\tage\nsub-01\t31\n")
     first, second = recognise(tmp_path)
     assert first.entry["week"] == UNSET
-    assert f"week: {tmp_path}/participants.tsv: has a column age that may be" in first.notes[0]
+    assert (
+        f"week: {tmp_path}/participants.tsv: has no column of gestational ages; found participant_id, age"
+        in first.notes[0]
+    )
     assert second.entry["id"] == "sub-01-2"
     assert "2 files are of sub-01: keep one" in second.notes
 

@@ -30,7 +30,7 @@ def config(folder, participants="bids/participants.tsv", **more):
 def test_rows_are_brains_whatever_their_files_are_of(folder):
     write(
         folder,
-        ("participant_id", "sex", "age", "files", "side", "scheme", "population"),
+        ("participant_id", "sex", "week", "files", "side", "scheme", "population"),
         ("sub-1", "F", "24.5", "a.nii.gz", "n/a", "feta-7", "n/a"),
         ("sub-2", "M", "25", "rh.surf.gii; lh.surf.gii", "n/a", "n/a", "twins"),
         ("sub-3", "M", "25", "a.nii.gz", "left", "feta-7", "n/a"),
@@ -72,7 +72,7 @@ def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(fold
     assert [brain.id for brain in found.brains] == ["sub-1"]
     causes = {name: row["cause"] for name, row in found.left_out.items()}
     assert list(causes) == ["sub-2", "sub-3", "sub-4", "sub-5"]
-    assert "not days or years" in causes["sub-3"]
+    assert "found 170; expected gestational weeks" in causes["sub-3"]
     assert "no such file" in causes["sub-4"]
     assert "found no data" in causes["sub-5"]
     write(folder, head, ("sub-1", "n/a", "a.nii.gz", "feta-7"))
@@ -83,9 +83,9 @@ def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(fold
 @pytest.mark.parametrize(
     ("head", "said"),
     [
-        (("subject", "age", "labels"), "has no column of ids; found subject, age, labels"),
+        (("subject", "week", "labels"), "has no column of ids; found subject, week, labels"),
         (("id", "months", "labels"), "has no column of gestational ages"),
-        (("id", "age", "label", "scheme"), "has a column that seems mistyped; found label; expected labels"),
+        (("id", "week", "label", "scheme"), "has a column that seems mistyped; found label; expected labels"),
     ],
 )
 def test_tables_without_what_is_needed_are_refused(folder, head, said):
@@ -94,56 +94,33 @@ def test_tables_without_what_is_needed_are_refused(folder, head, said):
         config(folder)
 
 
-@pytest.mark.parametrize("name", ["ga", "GA_weeks", "scan_age", "gestational_age_weeks", "Gestational_Age", "Age"])
-def test_the_age_is_found_by_any_of_its_names(folder, name):
-    write(folder, ("id", name, "labels", "scheme"), ("sub-1", "24.3", "a.nii.gz", "feta-7"))
-    assert config(folder).brains[0].week == 24.3
-
-
-@pytest.mark.parametrize("name", ["ga", "GA_weeks", "scan_age", "gestational_age_weeks", "Gestational_Age"])
-def test_the_mothers_age_is_not_taken_for_the_gestational_age(folder, name):
-    head, row = ("id", "age", name, "labels", "scheme"), ("a.nii.gz", "feta-7")
-    write(folder, head, ("sub-1", "31", "24.3", *row))
-    with pytest.raises(InputError, match=rf"participants\.tsv: has several columns(.|\n)*found {name} and age"):
-        config(folder)
-    # two that say the same leave no doubt
-    write(folder, head, ("sub-1", "24.30", "24.3", *row), ("sub-2", "n/a", "n/a", *row))
-    assert [brain.week for brain in config(folder, keep_going=True).brains] == [24.3]
-
-
-def test_the_column_called_gestational_age_is_believed(folder):
-    head = ("id", "age", "ga", "gestational_age", "labels", "scheme")
-    write(folder, head, ("sub-1", "31", "38", "24.3", "a.nii.gz", "feta-7"))
-    assert config(folder).brains[0].week == 24.3
-
-
 @pytest.mark.parametrize(
-    ("text", "week"),
-    [("24.3", 24.3), ("24+3", 24.43), ("25w2d", 25.29), ("25 weeks 2 days", 25.29), ("24w", 24), ("170d", 24.29)],
+    ("column", "text", "week"),
+    [
+        ("week", "24.3", 24.3),
+        ("gestational_age", "24+3", 24.43),
+        ("age_weeks", "25w2d", 25.29),
+        ("gestational_age_days", "170", 24.29),
+    ],
 )
-def test_ages_are_read_as_they_are_written(folder, text, week):
-    write(folder, ("id", "ga", "labels", "scheme"), ("sub-1", text, "a.nii.gz", "feta-7"))
+def test_ages_are_read_as_they_are_written(folder, column, text, week):
+    # the mother's age, which names no unit, is none of the brain's
+    write(folder, ("id", "age", column, "labels", "scheme"), ("sub-1", "31", text, "a.nii.gz", "feta-7"))
     assert config(folder).brains[0].week == week
 
 
-def test_a_sidecar_names_the_column_and_its_unit(folder):
-    head, row = ("id", "age", "pma", "ga_birth", "labels", "scheme"), ("a.nii.gz", "feta-7")
-    write(folder, head, ("sub-1", "31", "170", "39", *row))
-    sidecar = folder / "bids" / "participants.json"
-    sidecar.write_text(
-        '{"pma": {"Description": "Gestational age at scan", "Units": "days"},'
-        ' "ga_birth": {"Description": "Gestational age at birth", "Units": "weeks"}}'
-    )
-    (brain,) = config(folder).brains
-    assert (brain.week, brain.covariates) == (24.29, {"age": "31", "ga_birth": "39"})
-    sidecar.write_text('{"age": {"Units": "years"}}')
-    with pytest.raises(InputError, match=r"has no column of gestational ages(.|\n)*age in other units"):
+def test_an_age_has_its_unit_in_the_sidecar_or_is_refused_by_file_and_column(folder):
+    write(folder, ("id", "age", "labels", "scheme"), ("sub-1", "170", "a.nii.gz", "feta-7"))
+    with pytest.raises(InputError, match=r"participants\.tsv: has no column of gestational ages(.|\n)*found id, age"):
         config(folder)
-
-
-def test_whole_numbers_called_age_may_be_the_mothers(folder):
-    write(folder, ("id", "age", "labels", "scheme"), ("sub-1", "31", "a.nii.gz", "feta-7"))
-    with pytest.raises(InputError, match=r"participants\.tsv: has a column age that may be(.|\n)*Units"):
+    sidecar = folder / "bids" / "participants.json"
+    sidecar.write_text('{"age": {"Units": "days"}}')
+    assert config(folder).brains[0].week == 24.29
+    sidecar.write_text('{"age": {"Units": "years"}}')
+    with pytest.raises(InputError, match="has no column of gestational ages"):
+        config(folder)
+    write(folder, ("id", "week", "labels", "scheme"), ("sub-1", "24 weeks", "a.nii.gz", "feta-7"))
+    with pytest.raises(InputError, match=r"participants\.tsv: sub-1: week: found 24 weeks; expected the gestational"):
         config(folder)
 
 
@@ -169,15 +146,6 @@ def test_a_participant_has_a_brain_for_each_session(folder):
         ("sub-2_ses-2", 23.5, "sub-2"),
     ]
     assert found.scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
-
-
-def test_sessions_of_all_may_stand_in_one_table(folder):
-    write(folder, ("participant_id", "gestational_age"), ("sub-1", "30"), ("sub-2", "23"))
-    rows = ("participant_id\tsession_id\tga", "sub-1\t1\t21", "sub-1\t2\t24+1")
-    (folder / "bids" / "sessions.tsv").write_text("\n".join(rows) + "\n")
-    section = {"file": "bids/participants.tsv", "columns": {"labels": "a.nii.gz", "scheme": "feta-7"}}
-    found = load({"participants": section, "start": "sub-2", "folding": FOLDING}, folder)
-    assert {brain.id: brain.week for brain in found.brains} == {"sub-1_ses-1": 21, "sub-1_ses-2": 24.14, "sub-2": 23}
 
 
 def test_rows_of_one_id_are_problems_where_one_cannot_be_used(folder):

@@ -185,7 +185,7 @@ def test_maps_in_hdf5(tmp_path, wholes, data):
     tried(tmp_path, "a.h5", data.draw(damaged(wholes["a.h5"], 200)), read_maps)
 
 
-TABLE = b"participant_id\tage\tfiles\nsub-01\t24.5\ta.nii.gz\nsub-02\tn/a\tb.nii.gz\n"
+TABLE = b"participant_id\tweek\tfiles\nsub-01\t24.5\ta.nii.gz\nsub-02\tn/a\tb.nii.gz\n"
 
 
 @pytest.mark.parametrize("read", [read_tab_separated, read_table, read_text])

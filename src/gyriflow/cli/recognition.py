@@ -1,0 +1,177 @@
+"""Which files of a folder are brains, by their names, the labels in them, and the table of participants."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from ..anatomy.labels import cerebrum_mask, require_cortex_outside
+from ..config.brains import covariates
+from ..config.scans import Scan, read_scans
+from ..errors import InputError
+from ..io.files import files_in, read_json
+from ..io.schemes import SCHEMES
+from ..io.volumes import read_label_volume
+
+VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
+SURFACES = (".gii", ".vtk", ".stl", ".ply", ".obj")
+FREESURFER = re.compile(r"[lr]h\.(?:pial|white)")
+LABELS = re.compile(r"label|seg|parcellation|tissue", re.IGNORECASE)
+SIDES = re.compile(r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L)|(right|rh|hemi-R))(?=[._-])", re.IGNORECASE)
+KINDS = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
+WEEK = re.compile(r"(?<![A-Za-z])(?:week|ga)[-_]?(\d{2}(?:\.\d+)?)(?!\d)", re.IGNORECASE)
+SUFFIXES = re.compile(
+    r"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|nii|gz|mgz|mgh|gii|vtk|stl|ply|obj)(?=[._-]|$)",
+    re.IGNORECASE,
+)
+SUBJECT_AND_SESSION = re.compile(r"(?<![A-Za-z0-9])(sub-[A-Za-z0-9]+)(?:[_/](?:.*[_/])?(ses-[A-Za-z0-9]+))?")
+"""The entities of BIDS in a path."""
+HIDDEN = ("results", "resources", "derivatives-gyriflow")
+UNSET = "CHOOSE"
+"""Stands where the files do not tell: `gyriflow check` then asks for it."""
+
+
+@dataclass
+class Recognised:
+    """A brain: its entry of `brains`, and what is to be filled in."""
+
+    entry: dict[str, Any]
+    notes: list[str] = field(default_factory=list)
+
+
+def recognise(folder: Path, pattern: str = "*") -> list[Recognised]:
+    """Return the brains of a folder and those in it, the youngest first, from files whose paths match a pattern.
+
+    Data sets that gyriflow itself has made are left out. InputError where there are none.
+    """
+    files = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
+    own = [file.parent for file in files if file.name == "dataset_description.json" and _is_own(folder / file)]
+    files = [file for file in files if fnmatch(str(file), pattern) and not any(map(file.is_relative_to, own))]
+    try:
+        scans, no_ages = read_scans(folder / "participants.tsv"), "not told by its name"
+    except InputError as error:
+        scans, no_ages = [], str(error) if (folder / "participants.tsv").is_file() else "not told by its name"
+    brains = [*_hemispheres(files, scans), *_volumes(folder, files, scans)]
+    if not brains:
+        raise InputError(
+            "no brain was recognised", path=folder, found=f"{len(files)} files",
+            expected="tissue label volumes (.nii.gz), or pairs of surfaces with left and right in their names",
+        )  # fmt: skip
+    seen: Counter[str] = Counter()
+    counts = Counter(brain.entry["id"] for brain in brains)
+    for brain in brains:
+        name = brain.entry["id"]
+        seen[name] += 1
+        if brain.entry["week"] == UNSET and not brain.notes:
+            brain.notes.append(f"week: {no_ages}")
+        # several files of one scan are no scans of several weeks
+        if counts[name] > 1:
+            brain.entry.pop("subject", None)
+            brain.notes.append(f"{counts[name]} files are of {name}: keep one")
+        if seen[name] > 1:
+            brain.entry["id"] = f"{name}-{seen[name]}"
+        if brain.entry.get("scheme") == UNSET:
+            brain.notes.append("scheme: none of the shipped ones fits, or several do")
+    return sorted(brains, key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
+
+
+def fitting_scheme(labels: np.ndarray) -> str | None:
+    """Return the label scheme that a volume's labels fit, or None where none does or several cannot be told apart.
+
+    A scheme fits where it knows all labels and what it calls cortex lies around what it calls the cerebrum; of several
+    that do, the one with most cortex outside is taken if it stands out, or else the one whose labels are all there.
+    """
+    # the air around the head tells nothing, and is most of the volume
+    for box in ndimage.find_objects((labels != 0).astype(np.int8)):
+        labels = np.ascontiguousarray(labels[box])
+    present = set(np.unique(labels).tolist()) - {0}
+    if present == {1}:
+        return "binary"
+    outside, complete = {}, {}
+    for name, scheme in SCHEMES.items():
+        if scheme.cortex:
+            try:
+                cerebrum_mask(labels, scheme)
+                outside[name] = require_cortex_outside(labels, scheme)
+            except InputError:
+                continue
+            complete[name] = len(present & set(scheme.labels)) / len(scheme.labels)
+    alike = [name for name in outside if outside[name] > max(outside.values()) - 0.02]
+    best = [name for name in alike if complete[name] == max(complete[other] for other in alike)]
+    return best[0] if len(best) == 1 else None
+
+
+def _is_own(description: Path) -> bool:
+    described = read_json(description)
+    tools = described.get("GeneratedBy") if isinstance(described, dict) else None
+    return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in tools or ())
+
+
+def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
+    """Yield the brains with pial surfaces: of both sides, with their white ones if they are there, or of one side."""
+    surfaces: dict[tuple[str, str], dict[str, Path]] = {}
+    for file in files:
+        kind, side = KINDS.search(file.name), SIDES.search(file.name)
+        if kind and side and (file.name.lower().endswith(SURFACES) or FREESURFER.fullmatch(file.name)):
+            rest = str(file.parent / KINDS.sub("", SIDES.sub("", file.name)))
+            sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
+            sides["left" if side[1] else "right"] = file
+    for (rest, kind), sides in surfaces.items():
+        if kind == "white":
+            continue
+        pair: dict[str, Any] = {side: str(sides[side]) for side in ("left", "right") if side in sides}
+        side, file = next(iter(pair.items()))
+        white = surfaces.get((rest, "white"), {})
+        if len(pair) == 2 and len(white) == 2:
+            pair["white"] = {side: str(white[side]) for side in ("left", "right")}
+        source = {"hemispheres": pair} if len(sides) == 2 else {"hemisphere": {"file": file, "side": side}}
+        yield _recognised(Path(file), scans, source)
+
+
+def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
+    """Yield the brains with label volumes, each with the only T2-weighted volume of its folder."""
+    volumes = [file for file in files if file.name.lower().endswith(VOLUMES)]
+    for file in volumes:
+        if LABELS.search(file.name):
+            try:
+                labels = read_label_volume(folder / file).labels
+            except InputError:
+                continue
+            images = [str(other) for other in volumes if other.parent == file.parent and "_T2w." in other.name]
+            image = {"image": images[0]} if len(images) == 1 else {}
+            yield _recognised(file, scans, {"labels": str(file), "scheme": fitting_scheme(labels) or UNSET} | image)
+
+
+def _recognised(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Recognised:
+    """Return the brain of a file: of the scan that its path names, or of the age in its name or that of a folder."""
+    entities = SUBJECT_AND_SESSION.search(file.as_posix())
+    named = [scan for scan in scans if _names(file, scan.subject or scan.id) and _names(file, scan.session)]
+    # a participant's row holds for its sessions too, but the session's own comes first
+    scan = max(named, key=lambda scan: scan.session is not None, default=None)
+    weeks = [match[1] for part in reversed(file.parts) if (match := WEEK.search(part))]
+    week = float(weeks[0]) if weeks and scan is None else UNSET
+    if scan is not None and scan.week is not None:
+        week = scan.week
+    entry = {"id": _id(file), "week": week} | ({"subject": entities[1]} if entities and entities[2] else {})
+    further = covariates(scan) if scan else {}
+    return Recognised(entry | further | source, [f"week: {scan.cause}"] if scan and scan.cause else [])
+
+
+def _names(file: Path, part: str | None) -> bool:
+    return part is None or bool(re.search(rf"(?<![A-Za-z0-9]){re.escape(part)}(?![A-Za-z0-9])", file.as_posix()))
+
+
+def _id(file: Path) -> str:
+    """Return an id for a file's brain: its participant and session, or its name without what says what it holds."""
+    if entities := SUBJECT_AND_SESSION.search(file.as_posix()):
+        return "_".join(filter(None, entities.groups()))
+    name = SUFFIXES.sub("", KINDS.sub("", SIDES.sub("", file.name)))
+    if len(file.parts) > 1 and not re.search(r"\d", name):
+        name = file.parts[-2]
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"
