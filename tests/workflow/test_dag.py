@@ -176,7 +176,7 @@ FIGURES = {
         ("report", {"core_power_w": 15.0}, RESOURCES),
         # a setting for another kind of input, and the number of ranks, which changes no result: the report alone,
         # as it shows the configuration
-        ("surface", {"gap_mm": 1.0}, REPORT),
+        ("surface", {"max_hole_mm": 1.0}, REPORT),
         ("folding", {"ranks": 1}, REPORT),
     ],
 )

@@ -31,7 +31,7 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         params:
             labels=from_place("labels"),
             settings=CONFIG.metrics.model_dump(
-                include={"curvature_radius_mm", "spangy_proxy", "spangy_modes"}
+                include={"curvature_radius_mm", "spangy_modes"}
             ),
         script:
             "../scripts/measure.py"

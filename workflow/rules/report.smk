@@ -36,7 +36,6 @@ rule report_provenance:
         "results/report/provenance.json",
     params:
         files=reporting.input_files(study),
-        paths=CONFIG.report.paths,
     script:
         "../scripts/report_provenance.py"
 
@@ -87,7 +86,6 @@ rule html_report:
         brains=reporting.described_brains(study),
         surfaced=list(study.brains),
         config=reporting.used_settings(study),
-        paths=CONFIG.report.paths,
     script:
         "../scripts/html_report.py"
 

@@ -92,7 +92,7 @@ rule pial_from_hemispheres:
         coordinates=from_brain("given.coordinates"),
         known=from_brain("checksums"),
         settings=surface_settings(
-            "gap_mm", "edge_length_mm", "smoothing_iterations", "max_hole_mm"
+            "edge_length_mm", "smoothing_iterations", "max_hole_mm"
         ),
         limits=LIMITS,
     script:

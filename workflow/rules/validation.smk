@@ -40,7 +40,6 @@ rule validation:
         weeks=from_simulation("real_weeks"),
         kind=from_simulation("kind"),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
-        mirrored_patches=CONFIG.metrics.mirrored_patches,
     script:
         "../scripts/validation.py"
 
@@ -123,7 +122,6 @@ rule registration_ceiling:
         start_week=from_brain("week"),
         weeks=lambda wildcards: study.ceiling_weeks(wildcards.brain),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
-        mirrored_patches=CONFIG.metrics.mirrored_patches,
     script:
         "../scripts/registration_ceiling.py"
 

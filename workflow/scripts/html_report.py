@@ -28,7 +28,7 @@ with step(snakemake.log[0]):
         runs=read_table(files.runs),
         provenance=read_json(files.provenance),
         methods=read_text(files.methods),
-        configuration=yaml_text(params.config if params.paths else hide_paths(params.config)),
+        configuration=yaml_text(hide_paths(params.config)),
         **{name: read_table(files[name]) for name in ("validation", "quality", "warnings") if files.get(name)},
     )
     view = read_json(files.view)

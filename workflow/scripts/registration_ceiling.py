@@ -29,9 +29,5 @@ with step(snakemake.log[0]):
             maps = read_vertex_maps(files[f"{name}_maps"][number])
             shapes[name] = Shape(read_surface(files[name][number]), **maps)
         comparison = Comparison("registration", "explained", params.start_week, week)
-        rows.append(
-            validation_row(
-                comparison, simulated=moved, real_brain=real, curve=None, mirrored=params.mirrored_patches, **shapes
-            )
-        )
+        rows.append(validation_row(comparison, simulated=moved, real_brain=real, curve=None, **shapes))
     write_table(snakemake.output[0], ordered(rows))

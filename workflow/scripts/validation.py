@@ -26,9 +26,5 @@ with step(snakemake.log[0]):
             maps = read_vertex_maps(files[f"{name}_maps"][number])
             shapes[name] = Shape(read_surface(files[name][number]), **maps)
         comparison = Comparison(names.run, params.kind, params.start_week, week)
-        rows.append(
-            validation_row(
-                comparison, simulated=simulated, real_brain=real, curve=aim, mirrored=params.mirrored_patches, **shapes
-            )
-        )
+        rows.append(validation_row(comparison, simulated=simulated, real_brain=real, curve=aim, **shapes))
     write_table(snakemake.output[0], ordered(rows))

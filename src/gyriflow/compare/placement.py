@@ -48,7 +48,6 @@ def placement(
     *,
     horizon: float,
     seed: int,
-    mirrored: bool = False,
 ) -> dict[str, float | bool]:
     """Returns how well the folds of a run are placed in a week, all shapes ready and laid onto the real brain.
 
@@ -70,7 +69,7 @@ def placement(
         values[name] = {measure: values_at(match, getattr(shape, measure)) for measure in MEASURES}
         if name == "run":
             row["matched_share"] = float(np.average(match.agrees, weights=areas))
-    patch, drawn = drawn_patches(real, mirrored=mirrored)
+    patch, drawn = drawn_patches(real)
     row |= drawn
     for measure in MEASURES:
         truth = getattr(real, measure)

@@ -61,7 +61,6 @@ def validation_row(
     real: Shape,
     start: Shape,
     adjacent: Shape | None,
-    mirrored: bool = False,
 ) -> dict[str, Any]:
     """Returns a row of validation.csv.
 
@@ -84,7 +83,7 @@ def validation_row(
     for name, unit, aim in (("area", "cm2", wanted[0]), ("volume", "ml", wanted[1])):
         row[f"{name}_error"] = row[f"{name}_{unit}"] / aim - 1
         row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"real_{name}_{unit}"] - 1
-    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=0, mirrored=mirrored)
+    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=0)
     return row | against_real(run, real)
 
 

@@ -172,10 +172,6 @@ def metrics(config: Config) -> Iterator[Problem]:
         yield Problem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
     if given.named_sulci and given.regions:
         yield Problem("found true beside regions; expected one of the two", ("metrics", "named_sulci"))
-    halves = [brain for brain in config.start_brains if len(config.brain(brain).sides) == 1]
-    if given.mirrored_patches and halves:
-        text = f"found true; {', '.join(halves)} has one hemisphere, and so no mirror image: leave it out"
-        yield Problem(text, ("metrics", "mirrored_patches"))
     scans = Counter((brain.subject, brain.week) for brain in config.brains if brain.subject is not None)
     for (subject, week), count in scans.items():
         if count > 1:

@@ -53,7 +53,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
-        "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5, "gap_mm": 2.5},
+        "contact": {"kind": "planes", "gap_mm": 2.5},
         "no_growth": {"kind": "ellipsoid", "shift_y": 0.05, "shift_z": -0.15, "semi_axes": [0.35, 0.40, 0.50]},
     },
     # growth that takes the brain to its measured shapes

@@ -9,10 +9,8 @@ from ..parameters.terms import (
     CURVATURE_RADIUS_MM,
     MOST_HOLE_MM,
     SPANGY_MODES,
-    SPANGY_PROXY,
     LastBand,
     Mesher,
-    SpangyProxy,
 )
 from .brains import GivenRegions
 
@@ -35,8 +33,6 @@ class SurfaceSettings(Settings):
     max_asymmetry: float = Field(0.02, gt=0, le=0.5)
     """Largest accepted mean distance of two hemisphere surfaces from their mirror image, over the brain's
     length."""
-    gap_mm: float = Field(0.5, ge=0, le=5)
-    """Gap kept between two hemisphere surfaces that would touch. [mm]"""
 
 
 class MeshSettings(Settings):
@@ -77,14 +73,9 @@ class MetricsSettings(Settings):
 
     curvature_radius_mm: float = Field(CURVATURE_RADIUS_MM, ge=0.5, le=20)
     """Radius of the neighbourhood in which curvature is fitted: at least two edges of the surfaces. [mm]"""
-    spangy_proxy: SpangyProxy = SPANGY_PROXY
-    """The map whose spectrum is analysed."""
     spangy_modes: Modes = SPANGY_MODES
     """Number of eigenmodes, 2 to 20000; or the last complete band, `B4`, `B5` or `B6`, each with four times as
     many modes as the one before."""
-    mirrored_patches: bool = False
-    """Intervals draw patches of the surface together with their mirror images even in brains that differ from
-    their mirror image; where both are within half a voxel they always do."""
     norm_reference: tuple[str, ...] | None = None
     """Ids of the measured brains that others are compared with in tables of centiles. `null`: all real ones (of
     several populations, the start brain's). Brains with other hemispheres than
@@ -108,8 +99,6 @@ class ReportSettings(Settings):
     """Whether figures of the zones and the solver, and all maps are drawn, too."""
     dpi: int = Field(300, ge=50, le=1200)
     """Resolution of PNG figures; journals ask for 300 to 600. [dots per inch]"""
-    paths: bool = False
-    """Whether the report shows paths of files, which may hold names. It never shows headers of images."""
     core_power_w: float = Field(12.0, gt=0, le=1000)
     """Power of a busy core, for the estimate of energy: the processor's over its cores. [W]"""
     carbon_intensity_g_per_kwh: float = Field(475.0, ge=0, le=5000)

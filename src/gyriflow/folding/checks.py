@@ -58,7 +58,7 @@ def zone_warnings(report: dict) -> list[str]:
     if share > MUCH_BETWEEN_PLANES:
         warnings.append(
             f"{share:.0%} of the pial area lies between the contact planes and feels no contact, so the hemispheres "
-            "may cross: lower folding.contact.gap_mm below twice the fissure's width, or raise surface.gap_mm"
+            "may cross: lower folding.contact.gap_mm below twice the fissure's width"
         )
     return warnings
 

@@ -73,11 +73,10 @@ class ContactSettings:
 
 
 def contact_settings(parameters: FoldingParameters, maps: Maps) -> ContactSettings:
-    """Returns the settings of a run: as given, or from the stiffest cortex."""
+    """Returns the settings of a run, with the stiffness that belongs to the stiffest cortex."""
     p = parameters
     stiffest = value_range(p.shear_modulus_cortex_pa, maps, p.start_week, p.end_week)[1]
-    given = p.contact.stiffness_pa
-    return ContactSettings(given or STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm, adaptive=not given)
+    return ContactSettings(STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm, adaptive=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,6 +37,8 @@ from .stress import left_stretch, packed, relaxed, unpacked, unstretched
 from .zones import Zones
 
 Floats = NDArray[np.float64]
+PENALTY_PA_PER_M = 5.0e5
+"""Pressure per depth of penetration at the planes of contact (the paper)."""
 STEPS_BEFORE_GROWING = 4
 """Accepted steps after which a halved time step is doubled again."""
 
@@ -81,7 +83,7 @@ class Folding:
             self.domain,
             zones,
             MATERIALS[p.material](p.poisson_ratio),
-            penalty_pa_per_m=p.contact.penalty_pa_per_m if p.contact.kind == "planes" else 0.0,
+            penalty_pa_per_m=PENALTY_PA_PER_M if p.contact.kind == "planes" else 0.0,
             quadrature_degree=quadrature_degree,
             remembers_stress=p.stress_memory_gw > 0,
         )

@@ -22,8 +22,6 @@ from ..geometry.triangles import Floats, TriangleMesh, area, mean_edge_length, s
 from ..parameters.terms import (
     CURVATURE_RADIUS_MM,
     SPANGY_MODES,
-    SPANGY_PROXY,
-    SpangyProxy,
 )
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import (
@@ -65,12 +63,10 @@ LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "
 class Settings:
     """How hemispheres are measured; the names and values of the configuration's `metrics`.
 
-    See `curvature.curvature` and `spangy.modes_of`. The proxy is "shape_index" as in the paper, or "mean_curvature" as
-    in Germanaud et al. 2012.
+    See `curvature.curvature` and `spangy.modes_of`.
     """
 
     curvature_radius_mm: float = CURVATURE_RADIUS_MM
-    spangy_proxy: SpangyProxy = SPANGY_PROXY
     spangy_modes: SpangyModes = SPANGY_MODES
 
 
@@ -143,8 +139,7 @@ def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, 
     modes, reach = modes_of(settings.spangy_modes, stiffness, mass, first)
     weyl = weyl_number(area(mesh), first)
     # near a cut the proxy is continued from beyond
-    proxy = bend.shape_index if settings.spangy_proxy == "shape_index" else bend.mean
-    values = continue_smoothly(proxy, bend.reliable, stiffness)
+    values = continue_smoothly(bend.shape_index, bend.reliable, stiffness)
     return Hemisphere(
         **vars(folds),
         name=name,
@@ -217,19 +212,18 @@ def thickness_rows(values: Floats, areas: Floats) -> list[Row]:
     ]
 
 
-def spectrum_rows(side: Hemisphere, proxy: SpangyProxy) -> list[Row]:
+def spectrum_rows(side: Hemisphere) -> list[Row]:
     """Returns the rows of a hemisphere's spectrum.
 
     A band that is cut off has NaN, and relative powers are NaN where a band that they are shares of is cut off:
     `spectra` has all values with their flags.
     """
-    unit = "mm2" if proxy == "shape_index" else "1"
     bands = side.spectrum.bands
     power = bands["power"].where(bands["complete"])
     share = bands["relative_power"].where(bands["complete"] & bands["denominator_complete"])
     rows: list[Row] = []
     for band in bands["band"]:
-        rows.append((f"spangy_B{band}_power", float(power[band]), unit))
+        rows.append((f"spangy_B{band}_power", float(power[band]), "mm2"))
         if band > 0:
             rows.append((f"spangy_B{band}_relative_power", float(share[band]), "1"))
     return [
@@ -340,7 +334,7 @@ def measure_brain(
     known = label_volumes_ml or {}
     rows += [("whole", metric, known[name], "mL") for metric, name in LABEL_VOLUMES.items() if name in known]
     for side in sides:
-        own = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side, chosen.spangy_proxy)
+        own = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side)
         rows += [(side.name, *row) for row in own]
     spectra = pd.concat([side.spectrum.bands for side in sides], keys=list(meshes), names=["hemisphere", None])
     coefficients = {

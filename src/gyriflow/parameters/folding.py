@@ -60,10 +60,6 @@ class Contact(Settings):
     distance_mm: float | None = Field(None, gt=0, le=5)
     """With `global`, distance at which contact begins; `null`: a fifth of the surface's mean edge, at most the
     smallest gap at the start. [mm]"""
-    stiffness_pa: float | None = Field(None, gt=0, le=1e9)
-    """With `global`, stiffness of the barrier; `null`: a tenth of the cortex's largest shear modulus. [Pa]"""
-    penalty_pa_per_m: float = Field(5.0e5, gt=0, le=1e9)
-    """With `planes`, pressure per depth of penetration. [Pa/m]"""
     gap_mm: float = Field(2.5, gt=0, le=20)
     """Width of the fissure, unless `none`. Planes are a quarter of it from the middle; nothing grows between
     them. [mm]"""

@@ -65,14 +65,11 @@ LONGEST_NAME = 100
 
 # metrics
 
-SpangyProxy = Literal["shape_index", "mean_curvature"]
-"""The map whose spectrum is analysed."""
 LastBand = Literal["B4", "B5", "B6"]
 """The last complete band of eigenmodes."""
 
 CURVATURE_RADIUS_MM = 3.0
 """At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
-SPANGY_PROXY: SpangyProxy = "shape_index"
 SPANGY_MODES: LastBand = "B5"
 
 FOLD_BANDS = (4, 5, 6)

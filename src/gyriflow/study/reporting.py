@@ -55,7 +55,7 @@ def method(study: Study) -> dict[str, Any]:
     """Return what the text of the methods says of the configuration: its brains, and settings by section."""
     named = {
         **{"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}},
-        "metrics": {"curvature_radius_mm", "spangy_proxy"},
+        "metrics": {"curvature_radius_mm"},
     }
     brains = [brain for brain in described_brains(study) if brain["id"] in study.brains]
     return {"brains": brains, **study.config.model_dump(mode="json", include=named)}

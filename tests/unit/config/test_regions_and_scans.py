@@ -93,11 +93,3 @@ def test_named_sulci_stand_in_for_regions_only_where_none_are_given(volume):
     assert load(study(named_sulci=True)).metrics.named_sulci
     with pytest.raises(InputError, match=r"metrics.named_sulci: found true beside regions"):
         load(study(named_sulci=True, regions={"p21": {"volume": volume, **NAMES}}))
-
-
-def test_one_hemisphere_has_no_mirrored_patches(volume):
-    half = [{"id": "half", "week": 21, "hemisphere": {"file": volume, "side": "left"}, "scheme": "feta-7"}]
-    data = study(half, mirrored_patches=True) | {"start": "half"}
-    with pytest.raises(InputError, match=r"metrics.mirrored_patches: found true; half has one hemisphere"):
-        load(data)
-    assert load(study(mirrored_patches=True)).metrics.mirrored_patches

@@ -262,7 +262,7 @@ def test_the_methods_say_what_was_run():
         software={"gyriflow": "0.1", "packages": packages},
         surface={"edge_length_mm": 0.8},
         mesh={"order": 2, "mesher": "tetgen"},
-        metrics={"curvature_radius_mm": 3.0, "spangy_proxy": "shape_index"},
+        metrics={"curvature_radius_mm": 3.0},
     )
     assert (
         "2 brains of 21 to 24.5 weeks of gestation (GW) (spina bifida) were processed with gyriflow 0.1. Pial" in text
