@@ -61,7 +61,6 @@ OPENING_FUNCTIONS = {
     "nibabel": {"load", "save"},
     "trimesh": {"load", "load_mesh"},
     "pyvista": {"read", "save_meshio", "get_reader"},
-    "meshio": {"read", "write"},
     "h5py": {"File"},
     "shutil": {"copy", "copyfile", "move"},
 }

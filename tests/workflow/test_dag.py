@@ -125,22 +125,25 @@ CONFIGURATION = {"report_config": 1}
 SHAPE = NEW_RESULTS | {
     "metrics_figure": 1, "spectra_figure": 1, "spectral_distance": 1, "asymmetry": 1, "centiles": 1,
     "group_tables": 1, "report_provenance": 1, "view_surfaces": 1, "metrics_table": 1, "methods": 1,
+    "folding_agreement": 1, "validation_figure": 1,
 }  # fmt: skip
 ONE_RUN = SHAPE | {
     "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "displacement": 1,
-    "similarity": 1, "study_table": 4, "study_runs": 1, "weekly_figure": 1, "displacement_maps": 1, "shape_maps": 1,
-    "displacement_figure": 1, "outlines_figure": 1,
+    "similarity": 1, "study_table": 7, "study_runs": 1, "weekly_figure": 1, "displacement_maps": 1, "shape_maps": 1,
+    "displacement_figure": 1, "outlines_figure": 1, "displacement_agreement": 1, "onset": 1, "onset_figure": 1,
+    "validation": 1,
 }  # fmt: skip
 OF_THE_STUDY = {
     *SHAPE, "study_table", "study_runs", "displacement_figure", "weekly_figure", "displacement_maps", "shape_maps",
-    "outlines_figure",
+    "outlines_figure", "onset_figure",
 }  # fmt: skip
 BOTH_RUNS = {rule: count if rule in OF_THE_STUDY else 2 * count for rule, count in ONE_RUN.items()}
-MESH = {"tetrahedralise": 1}
+CARRIED = {"carried_mesh": 1, "registration_ceiling": 1, "study_table": 8}
+MESH = CARRIED | {"tetrahedralise": 1, "mesh_quality": 1}
 FIGURES = {
     "metrics_figure": 1, "spectra_figure": 1, "displacement_figure": 1, "growth_figure": 1, "weekly_figure": 1,
     "displacement_maps": 1, "shape_maps": 1, "quality_page": 2, "quality_table": 1,
-    "outlines_figure": 1,
+    "outlines_figure": 1, "onset_figure": 1, "validation_figure": 1, "methods": 1, "report_provenance": 1,
 }  # fmt: skip
 
 
@@ -152,7 +155,9 @@ FIGURES = {
         (
             "metrics",
             {"curvature_radius_mm": 4.0},
-            SHAPE | {"measure": 6, "study_table": 2, "shape_maps": 1},
+            SHAPE
+            | {"measure": 6, "study_table": 5, "shape_maps": 1, "onset": 2, "onset_figure": 1, "validation": 2}
+            | {"ready_surfaces": 1, "registration_ceiling": 1},
         ),
         ("runs", {"thick": {"thickness_mm": 3.5}}, ONE_RUN),
         ("folding", {"growth_rate_per_s": 1e-7}, BOTH_RUNS | {"growth_figure": 1}),
@@ -166,8 +171,11 @@ FIGURES = {
                 "pial_from_labels": 2,
                 "cortical_thickness": 2,
                 "measure": 6,
+                "growth_curves": 1,
                 "growth_rates": 1,
                 "growth_figure": 1,
+                "named_sulci": 1,
+                "ready_surfaces": 1,
                 "quality_page": 2,
                 "quality_table": 1,
             },

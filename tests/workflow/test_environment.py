@@ -41,7 +41,7 @@ def test_dolfinx_runs_on_three_ranks():
 
 
 # in processes of their own: what is missing (libGL, EGL) may end in a crash
-@pytest.mark.parametrize("package", ["pymeshlab", "pytetwild", "igl", "pyvista", "lapy", "trimesh", "skimage"])
+@pytest.mark.parametrize("package", ["pymeshlab", "pytetwild", "igl", "pyvista", "trimesh", "skimage"])
 def test_package_imports(package):
     assert python(f"import {package}; print({package}.__name__)") == package
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from .conftest import SMALL_STUDY, labelled
-from .test_dag import BOTH_RUNS, CONFIGURATION, NEW_RESULTS, ONE_RUN, RESOURCES, SHAPE
+from .test_dag import BOTH_RUNS, CARRIED, CONFIGURATION, NEW_RESULTS, ONE_RUN, RESOURCES, SHAPE
 
 pytestmark = pytest.mark.slow
 
@@ -32,11 +32,11 @@ def changed_files(root, *names, content=OTHER):
 
 
 # what is made of the surface of a measured brain that starts no run: its own, and what compares others with it
-OF_THE_OTHER_BRAIN = SHAPE | {
-    "cortical_thickness": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 5,
-    "similarity": 2,
-    "weekly_figure": 1, "shape_maps": 1, "pial_from_labels": 1, "label_volumes": 1,
-    "quality_page": 1, "quality_table": 1, "outlines_figure": 1,
+OF_THE_OTHER_BRAIN = SHAPE | CARRIED | {
+    "cortical_thickness": 1, "growth_curves": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 9,
+    "similarity": 2, "displacement_agreement": 2, "onset": 2, "onset_figure": 1, "validation": 2, "register": 1,
+    "weekly_figure": 1, "shape_maps": 1, "pial_from_labels": 1, "label_volumes": 1, "named_sulci": 1,
+    "quality_page": 1, "quality_table": 1, "outlines_figure": 1, "ready_surfaces": 1,
 }  # fmt: skip
 # a table of the study is shown by the report
 NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "methods": 1}
@@ -90,8 +90,10 @@ def with_later_end(study):
         (
             with_brain,
             SHAPE
-            | {"pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 4}
+            | {"pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 5}
             | {
+                "validation": 2,
+                "growth_curves": 1,
                 "growth_rates": 1,
                 "growth_figure": 1,
                 "label_volumes": 1,

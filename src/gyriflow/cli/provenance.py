@@ -16,7 +16,7 @@ from ..version import commit, version
 
 PACKAGES = (
     *("fenics-dolfinx", "fenics-basix", "fenics-ffcx", "fenics-ufl", "petsc4py", "slepc4py", "mpi4py", "numpy"),
-    *("scipy", "snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk", "lapy"),
+    *("scipy", "snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk"),
     *("pandas", "picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
 )
 """Packages whose versions are recorded: those that results depend on."""

@@ -32,7 +32,7 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
         yield
     except InputError:
         raise
-    except (Exception, SystemExit) as error:  # readers raise whatever a file leads them into; meshio ends the program
+    except Exception as error:  # readers raise whatever a file leads them into
         reason = "no such file" if isinstance(error, FileNotFoundError) else error
         # of a pair of files the one that is not there
         path = getattr(error, "filename", None) or path

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from .files import AnyPath, new_hdf5, reading, reading_hdf5, write_text
+from .files import AnyPath, new_hdf5, reading_hdf5, require_finite, write_text
 
 XDMF_NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
 XDMF_ATTRIBUTE = {1: "Scalar", 3: "Vector", 9: "Tensor"}
 XDMF_TOPOLOGY = {3: "Triangle", 4: "Tetrahedron", 10: "Tet_10"}
-# what a tetrahedron becomes by corners 1 and 2 changing places
-TURNED = {4: [0, 2, 1, 3], 10: [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]}
 
 
 def data_item(values: NDArray, where: str) -> str:
@@ -86,33 +84,17 @@ def write_tetrahedral_mesh(
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
-    """Returns the tetrahedra of an XDMF file (or any file that meshio reads), every volume made positive.
+    """Read the mesh that `write_tetrahedral_mesh` has written to `path`, from the .h5 beside it.
 
-    They are quadratic where the file has tetrahedra of ten nodes. InputError where the file cannot be read, holds no
-    tetrahedra, points that are not numbers, or flat elements.
+    InputError where the file cannot be read, or holds points that are not numbers, or flat or inverted elements.
     """
-    points, tets = _content(Path(path))
-    wrong = int((~np.isfinite(points)).any(axis=1).sum())
-    if wrong:
-        raise InputError("has points that are not numbers", path=path, found=f"{wrong} of {len(points)}")
-    used, local = np.unique(tets, return_inverse=True)
-    mesh = TetrahedralMesh(points[used], local.reshape(tets.shape))
-    volumes = signed_volumes(mesh)
-    if not volumes.all():
-        raise InputError("has elements without volume", path=path, found=f"{int((volumes == 0).sum())}")
-    turned = np.where((volumes < 0)[:, None], mesh.tets[:, TURNED[mesh.tets.shape[1]]], mesh.tets)
-    return TetrahedralMesh(mesh.vertices, turned)
-
-
-def _content(path: Path) -> tuple[NDArray[np.float64], NDArray]:
-    import meshio
-
-    with reading(path, "a tetrahedral mesh", "XDMF with its .h5 beside it", None):
-        read = meshio.read(path)
-        cells = read.cells_dict
-    if not {"tetra10", "tetra"} & set(cells):
-        raise InputError("holds no tetrahedra", path=path, found=sorted(cells) or "no cells")
-    return np.asarray(read.points, dtype=float), cells["tetra10" if "tetra10" in cells else "tetra"]
+    data = Path(path).with_suffix(".h5")
+    with reading_hdf5(data, "a tetrahedral mesh", "XDMF with its .h5 beside it") as file:
+        mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
+    require_finite(mesh.vertices, data, "coordinates", "points")
+    if wrong := int((signed_volumes(mesh) <= 0).sum()):
+        raise InputError("has elements without a positive volume", path=data, found=wrong, expected="none")
+    return mesh
 
 
 # --- a run's mesh with its regions ------------------------------------------------------------------------------

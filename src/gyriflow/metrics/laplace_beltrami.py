@@ -1,18 +1,18 @@
 """Modes of the Laplace-Beltrami operator of a triangle surface, K φ = λ M φ, with a count that none is missing."""
 
-import logging
 from dataclasses import dataclass
 from typing import Any
 
+import igl
 import numpy as np
-from lapy import Solver, TriaMesh
 from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from ..errors import MeshError, SolverError
+from ..geometry.diffusion import stiffness_matrix
 from ..geometry.triangles import Floats, TriangleMesh
 
-TOLERANCE = 1e-8
+TOLERANCE = 1e-11
 """Of the residual of a mode, relative to its eigenvalue."""
 
 MODES_PER_SLICE = 100
@@ -40,16 +40,16 @@ class Modes:
 
 
 def laplacian(mesh: TriangleMesh) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
-    """Returns the (n, n) stiffness K (no unit) and mass M (mm²) of linear finite elements (lapy).
+    """Returns the (n, n) stiffness K (no unit) and mass M (mm²) of linear finite elements.
 
     The boundary of an open surface is free (Neumann). MeshError where a vertex has no face.
     """
     unused = len(mesh.vertices) - len(np.unique(mesh.faces))
     if unused:
         raise MeshError("vertices without a face have no Laplacian", found=unused, expected=0)
-    logging.getLogger("lapy").setLevel(logging.WARNING)  # it reports each assembly
-    solver = Solver(TriaMesh(mesh.vertices, mesh.faces), lump=False)
-    return sparse.csc_matrix(solver.stiffness), sparse.csc_matrix(solver.mass)
+    stiffness = stiffness_matrix(mesh.vertices, mesh.faces)
+    mass = igl.massmatrix(mesh.vertices, mesh.faces, igl.MASSMATRIX_TYPE_FULL)
+    return sparse.csc_matrix(stiffness), sparse.csc_matrix(mass)
 
 
 def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int) -> Modes:

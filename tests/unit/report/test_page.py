@@ -239,7 +239,7 @@ def test_the_body_of_a_written_page_is_read_back(tmp_path):
 
 
 def test_the_methods_say_what_was_run():
-    packages = dict.fromkeys(("scikit-image", "fenics-dolfinx", "petsc4py", "lapy", "snakemake"), "9.9")
+    packages = dict.fromkeys(("scikit-image", "fenics-dolfinx", "petsc4py", "snakemake"), "9.9")
     parameters = {
         **{"start_week": 21.0, "step_s": 43200.0, "material": "neo-hookean", "shear_modulus_cortex_pa": 1500.0},
         **{
