@@ -124,7 +124,7 @@ def test_damaged_text(tmp_path, content):
 @given(
     content=st.one_of(
         damaged(b"participant_id\tgestational_age\tfiles\tscheme\nsub-01\t24.5\ta.nii.gz\tfeta-7\nsub-02\tn/a\tb\tx\n"),
-        st.text("\t\n\r\"' ;abid.0159/-$()éü\u2028", max_size=60).map(lambda text: ("id\tweek\tpial" + text).encode()),
+        st.text("\t\n\r\"' ;abid.0159/-$()éü\u2028", max_size=60).map(lambda text: f"id\tweek\tpial\n{text}".encode()),
     )
 )
 def test_damaged_tables_of_participants(tmp_path, content):
