@@ -61,9 +61,6 @@ rule calibration_score:
         f"{CALIBRATION}/scores/{{run}}.csv",
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
-    resources:
-        mem_mb=4000,
-        runtime=30,
     params:
         # how many of the real brains belong to each of the simulated ones
         compared=lambda wildcards: list(map(len, CALIBRATED.real.values())),

@@ -36,9 +36,6 @@ rule parameter_maps:
         MAPS,
     wildcard_constraints:
         run=one_of(run for run, one in with_parameters.items() if one.maps),
-    resources:
-        mem_mb=4000,
-        runtime=15,
     params:
         # volumes of maps are read like those of the brain
         affine_from=from_brain("given.affine_from"),
@@ -60,9 +57,6 @@ rule regions:
         ],
     output:
         **REGIONS,
-    resources:
-        mem_mb=4000,
-        runtime=15,
     script:
         "../scripts/regions.py"
 

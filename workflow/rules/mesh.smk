@@ -13,7 +13,6 @@ rule tetrahedralise:
         **MESH,
     resources:
         mem_mb=6000,
-        runtime=60,
     params:
         settings=CONFIG.mesh.model_dump(exclude={*MESH_GATES}),
         gates=MESH_GATES,

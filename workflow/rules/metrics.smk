@@ -25,9 +25,6 @@ for suffix, sides in PARTS_OF_BRAINS.items():
             where=one_of(
                 where for where, row in study.places.items() if row.sides == sides
             ),
-        resources:
-            mem_mb=4000,
-            runtime=60,
         params:
             labels=from_place("labels"),
             settings=CONFIG.metrics.model_dump(
@@ -49,9 +46,6 @@ for suffix, sides in PARTS_OF_BRAINS.items():
             **white_of(*sides),
         wildcard_constraints:
             brain=brains_with(lambda brain: brain.white_from and brain.sides == sides),
-        resources:
-            mem_mb=4000,
-            runtime=60,
         params:
             affine_from=from_brain("given.affine_from"),
             labels=from_brain("measured.labels"),
@@ -94,8 +88,6 @@ rule similarity:
         SIMILARITY,
     wildcard_constraints:
         measured=one_of(study.brains),
-    resources:
-        runtime=20,
     params:
         labels=lambda wildcards: {
             "subject": wildcards.brain,

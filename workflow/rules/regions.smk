@@ -48,9 +48,6 @@ rule named_sulci:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.regions_from == "named"),
-    resources:
-        mem_mb=4000,
-        runtime=30,
     params:
         read=from_brain("registered"),
         posed=lambda wildcards: not study.brains[wildcards.brain].given.has_labels,

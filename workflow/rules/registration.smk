@@ -27,9 +27,6 @@ rule register:
     wildcard_constraints:
         earlier=one_of(study.brains),
         later=one_of(study.brains),
-    resources:
-        mem_mb=4000,
-        runtime=30,
     params:
         brains=lambda wildcards: [
             study.brains[name].registered
@@ -91,7 +88,6 @@ rule targets:
         origin="self|atlas",
     resources:
         mem_mb=8000,
-        runtime=30,
     params:
         start_week=from_brain("week"),
         weeks=from_chain("later_weeks"),
@@ -113,7 +109,6 @@ rule carried_mesh:
         brain=one_of(study.carried),
     resources:
         mem_mb=8000,
-        runtime=30,
     params:
         weeks=lambda wildcards: study.chains[wildcards.brain, "self"].weeks,
     script:

@@ -22,9 +22,6 @@ rule atlas_file:
         f"{STUDY}/logs/atlas_file/{{file}}.log",
     wildcard_constraints:
         file=one_of(ATLAS_FILES),
-    resources:
-        mem_mb=500,
-        runtime=60,
     params:
         url=lambda wildcards: ATLAS_FILES[wildcards.file].url,
         sha256=lambda wildcards: ATLAS_FILES[wildcards.file].record.sha256,

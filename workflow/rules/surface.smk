@@ -6,36 +6,68 @@ LIMITS = CONFIG.surface.model_dump(include={"max_hemisphere_ratio", "max_asymmet
 
 
 def surface_memory(wildcards):
-    """Returns the memory in MiB that the labels of a brain may need, foreseen from their header."""
+    """Return the memory in MiB that a brain's surface may need, of labels foreseen from their header."""
     brain = study.brains[wildcards.brain]
-    return surface_memory_mib(brain.label_volume, brain.week)
+    labelled = brain.given.has_labels
+    return surface_memory_mib(brain.label_volume, brain.week) if labelled else 4000
 
 
 def surface_settings(*names):
-    """Returns the surface settings that one kind of data needs."""
+    """Return the surface settings that one kind of data needs."""
     return CONFIG.surface.model_dump(include=set(names))
 
 
-rule pial_from_labels:
-    input:
-        labels=from_brain("label_volume"),
-    output:
-        **PIAL,
-    wildcard_constraints:
-        brain=brains_with(lambda brain: brain.given.source == "labels"),
-    resources:
-        mem_mb=surface_memory,
-        runtime=30,
-    params:
-        week=from_brain("week"),
-        affine_from=from_brain("given.affine_from"),
-        known=from_brain("checksums"),
-        scheme=from_brain("scheme"),
-        settings=surface_settings(
-            "smoothing_voxels", "edge_length_mm", "smoothing_iterations", "fissure_mm"
-        ),
-    script:
-        "../scripts/pial_from_labels.py"
+def pial_settings(wildcards):
+    """Return the surface settings that the data of a brain needs."""
+    given = study.brains[wildcards.brain].given
+    if given.source == "shape":
+        return {}
+    names = ["edge_length_mm", "smoothing_iterations"]
+    if given.has_labels:
+        names += ["smoothing_voxels"] + (
+            ["fissure_mm"] if given.hemisphere is None else []
+        )
+    else:
+        names += ["max_hole_mm"] + (["gap_mm"] if given.source == "hemispheres" else [])
+    return surface_settings(*names)
+
+
+# by the name of the rule, the source of the brains and the hemispheres that they have
+for name, source, sides in (
+    ("pial_from_labels", "labels", SIDES),
+    ("pial_from_hemispheres", "hemispheres", SIDES),
+    ("pial_from_surface", "pial", SIDES),
+    ("pial_from_shape", "shape", SIDES),
+    ("pial_from_left_hemisphere", "hemisphere", ("left",)),
+    ("pial_from_right_hemisphere", "hemisphere", ("right",)),
+):
+
+    rule:
+        name:
+            name
+        input:
+            files=SHAPE if source == "shape" else from_brain("given.files"),
+            pose=from_brain("pose"),
+        output:
+            **pial_of(*sides),
+        wildcard_constraints:
+            brain=brains_with(
+                lambda brain: brain.given.source == source and brain.sides == sides
+            ),
+        resources:
+            mem_mb=surface_memory,
+        params:
+            source=source,
+            week=from_brain("week"),
+            side=sides[0] if len(sides) == 1 else None,
+            coordinates=from_brain("given.coordinates"),
+            affine_from=from_brain("given.affine_from"),
+            scheme=from_brain("scheme"),
+            checksums=from_brain("checksums"),
+            settings=pial_settings,
+            limits=LIMITS,
+        script:
+            "../scripts/pial.py"
 
 
 rule cortical_thickness:
@@ -49,7 +81,6 @@ rule cortical_thickness:
         brain=brains_with(lambda brain: brain.thickness_from == "labels"),
     resources:
         mem_mb=surface_memory,
-        runtime=30,
     params:
         affine_from=from_brain("given.affine_from"),
         scheme=from_brain("scheme"),
@@ -66,86 +97,11 @@ rule poses:
         [path for brain in POSED for path in brain.given.files],
     output:
         [brain.pose for brain in POSED],
-    resources:
-        runtime=30,
     params:
         max_hole_mm=CONFIG.surface.max_hole_mm,
         limits=LIMITS,
     script:
         "../scripts/poses.py"
-
-
-rule pial_from_hemispheres:
-    input:
-        left=from_brain("given.hemispheres.left"),
-        right=from_brain("given.hemispheres.right"),
-        pose=from_brain("pose"),
-    output:
-        **PIAL,
-    wildcard_constraints:
-        brain=brains_with(lambda brain: brain.given.source == "hemispheres"),
-    resources:
-        mem_mb=4000,
-        runtime=30,
-    params:
-        week=from_brain("week"),
-        coordinates=from_brain("given.coordinates"),
-        known=from_brain("checksums"),
-        settings=surface_settings(
-            "edge_length_mm", "smoothing_iterations", "max_hole_mm"
-        ),
-        limits=LIMITS,
-    script:
-        "../scripts/pial_from_hemispheres.py"
-
-
-rule pial_from_surface:
-    input:
-        from_brain("given.pial"),
-    output:
-        **PIAL,
-    wildcard_constraints:
-        brain=brains_with(lambda brain: brain.given.source == "pial"),
-    resources:
-        mem_mb=4000,
-        runtime=30,
-    params:
-        week=from_brain("week"),
-        coordinates=from_brain("given.coordinates"),
-        known=from_brain("checksums"),
-        settings=surface_settings(
-            "edge_length_mm", "smoothing_iterations", "max_hole_mm"
-        ),
-    script:
-        "../scripts/pial_from_surface.py"
-
-
-# of a hemisphere that is alone, from its surface or its labels
-for side in SIDES:
-
-    rule:
-        name:
-            f"pial_from_{side}_hemisphere"
-        input:
-            from_brain("given.hemisphere.file"),
-        output:
-            **pial_of(side),
-        wildcard_constraints:
-            brain=brains_with(lambda brain: brain.sides == (side,)),
-        resources:
-            mem_mb=4000,
-            runtime=30,
-        params:
-            week=from_brain("week"),
-            coordinates=from_brain("given.coordinates"),
-            affine_from=from_brain("given.affine_from"),
-            side=side,
-            scheme=from_brain("scheme"),
-            settings=surface_settings("edge_length_mm", "smoothing_iterations"),
-            of_labels=surface_settings("smoothing_voxels"),
-            of_surfaces=surface_settings("max_hole_mm"),
-        script:
-            "../scripts/pial_from_hemisphere.py"
 
 
 rule thickness_from_white:
@@ -157,26 +113,10 @@ rule thickness_from_white:
         **THICKNESS,
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.thickness_from == "white"),
-    resources:
-        mem_mb=4000,
-        runtime=30,
     params:
         white=from_brain("given.white_files"),
     script:
         "../scripts/thickness_from_white.py"
-
-
-rule pial_from_shape:
-    input:
-        SHAPE,
-    output:
-        **PIAL,
-    wildcard_constraints:
-        brain=brains_with(lambda brain: brain.given.source == "shape"),
-    params:
-        week=from_brain("week"),
-    script:
-        "../scripts/pial_from_shape.py"
 
 
 rule surface:

@@ -10,9 +10,6 @@ rule ready_surfaces:
         **READY,
     wildcard_constraints:
         brain=one_of({one.start.id for one in study.validated}),
-    resources:
-        mem_mb=4000,
-        runtime=30,
     params:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -31,9 +28,6 @@ rule validation:
         ),
     output:
         VALIDATION,
-    resources:
-        mem_mb=4000,
-        runtime=60,
     params:
         start_week=from_brain("week"),
         series=from_simulation("series"),
@@ -53,9 +47,6 @@ rule prediction:
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         PREDICTION,
-    resources:
-        mem_mb=4000,
-        runtime=60,
     params:
         start_week=from_brain("week"),
         weeks=lambda wildcards: list(
@@ -85,9 +76,6 @@ rule deviation:
         ),
     output:
         **DEVIATION,
-    resources:
-        mem_mb=4000,
-        runtime=30,
     params:
         sides=from_brain("sides"),
         labels=deviation_labels,
@@ -115,9 +103,6 @@ rule registration_ceiling:
         CEILING,
     wildcard_constraints:
         brain=one_of(study.carried),
-    resources:
-        mem_mb=4000,
-        runtime=60,
     params:
         start_week=from_brain("week"),
         weeks=lambda wildcards: study.ceiling_weeks(wildcards.brain),

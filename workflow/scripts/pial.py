@@ -1,0 +1,34 @@
+"""The clean pial surface of a brain and of its hemispheres in RAS+ mm, from what the brain is given as."""
+
+from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, from_surface
+from gyriflow.anatomy.plausible import Limits
+from gyriflow.io.downloads import require_checksums
+from gyriflow.io.files import write_json
+from gyriflow.io.poses import read_pose
+from gyriflow.io.surfaces import read_one_hemisphere, read_surface, write_brain
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.parameters.terms import SIDES
+from gyriflow.step import step
+
+output, params = snakemake.output, snakemake.params
+files = [snakemake.input.files] if isinstance(snakemake.input.files, str) else list(snakemake.input.files)
+settings = {"week": params.week, **params.settings}
+with step(snakemake.log[0], *files):
+    require_checksums(params.checksums)
+    if params.scheme:
+        volume = read_label_volume(files[0], affine_from=params.affine_from, cropped=True)
+        scheme = LabelScheme(**params.scheme)
+        surface = from_labels(volume.labels, volume.affine, scheme, params.side, **settings)
+    elif params.source == "hemispheres":
+        pair = map(read_one_hemisphere, files, SIDES)
+        pose = read_pose(snakemake.input.pose) if snakemake.input.pose else None
+        settings |= {"coordinates": params.coordinates, "limits": Limits(**params.limits)}
+        surface = from_hemispheres(*pair, pose, **settings)
+    elif params.source == "shape":
+        surface = from_shape(read_surface(files[0]), **settings)
+    else:
+        mesh = read_one_hemisphere(files[0], params.side) if params.side else read_surface(files[0])
+        surface = from_surface(mesh, params.side, coordinates=params.coordinates, **settings)
+    write_brain(output, surface.whole, surface.left, surface.right)
+    write_json(output.report, surface.report)
