@@ -10,7 +10,7 @@ SMOOTHING_MM = 3.0
 
 
 def deviation_maps(expected: TriangleMesh, real: TriangleMesh) -> dict[str, Floats]:
-    """Returns distance_mm and log_area at the (n,) vertices of the expected surface.
+    """Return distance_mm and log_area at the (n,) vertices of the expected surface.
 
     The distance is along the normal, positive where the real brain lies outside; the other is the logarithm of the real
     over the expected area.

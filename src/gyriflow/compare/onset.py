@@ -34,7 +34,7 @@ BOTTOM, CROWN = 0.9, 0.1
 
 
 def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> Ints:
-    """Returns the (n,) number of the sulcus at each vertex of a hemisphere, 1 for the largest, 0 outside of sulci.
+    """Number the sulci of a hemisphere at its (n,) vertices, 1 for the largest, 0 outside of sulci.
 
     A sulcus is a connected valley (mean curvature below 0, positive on gyri) deeper than `DEEP_MM` below the hull, of
     `LEAST_REGION_MM2` or more. Valleys of the medial wall and the Sylvian fissure are among them.
@@ -54,13 +54,7 @@ def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats)
 
 
 def regions_on(mesh: TriangleMesh, carried: Floats, target: TriangleMesh, regions: NDArray[np.integer]) -> Ints:
-    """Returns the (n,) regions of a surface whose vertices were carried to a later brain that has regions.
-
-    Parameters
-    ----------
-    carried
-        (n, 3) positions of its vertices in the space of the `target`.
-    """
+    """Return the (n,) regions of a surface whose vertices were `carried`, (n, 3), into the space of the `target`."""
     match = match_points(carried, vertex_normals(TriangleMesh(carried, mesh.faces)), target)
     return labels_at(match, regions)
 
@@ -68,7 +62,7 @@ def regions_on(mesh: TriangleMesh, carried: Floats, target: TriangleMesh, region
 def relief(
     mesh: TriangleMesh, depth_mm: Floats, regions: NDArray[np.integer], names: Mapping[int, str]
 ) -> pd.DataFrame:
-    """Returns how deep regions are below their neighbouring crowns: columns region, bottom_mm, crown_mm, relief_mm.
+    """Tell how deep regions are below their neighbouring crowns: columns region, bottom_mm, crown_mm, relief_mm.
 
     The (n,) depth of the vertices is below the hull or envelope; their (n,) region labels are each the place of a
     sulcus, carried along from an atlas. Labels with names count; a region without vertices has NaN.
@@ -89,7 +83,7 @@ def relief(
 
 
 def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
-    """Returns the week in which each region's sulcus appears, from tables of `relief` by week.
+    """Find the week in which each region's sulcus appears, from tables of `relief` by week.
 
     The first time that the relief reaches 2 mm, linear between weeks. Columns region, there_at_start, onset_week (NaN
     where it was there at the start or never comes), first_relief_mm, last_relief_mm.
@@ -97,16 +91,14 @@ def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
     weeks, rows = sorted(reliefs), []
     for name, table in pd.concat([reliefs[week] for week in weeks]).groupby("region", sort=False):
         depths = table["relief_mm"].to_numpy(dtype=float)
-        there = bool(depths[0] >= DEEP_MM)
         reached = np.flatnonzero(depths >= DEEP_MM)
         week = np.nan
-        if not there and len(reached):
-            after = int(reached[0])
-            before = after - 1
+        if len(reached) and reached[0] > 0:
+            before, after = reached[0] - 1, reached[0]
             part = (DEEP_MM - depths[before]) / (depths[after] - depths[before])
             # where the depth of the week before is not known, the week itself
             week = weeks[before] + part * (weeks[after] - weeks[before]) if np.isfinite(part) else weeks[after]
-        rows.append((name, there, week, depths[0], depths[-1]))
+        rows.append((name, bool(depths[0] >= DEEP_MM), week, depths[0], depths[-1]))
     return pd.DataFrame(rows, columns=["region", "there_at_start", "onset_week", "first_relief_mm", "last_relief_mm"])
 
 
@@ -117,7 +109,7 @@ def named(
     names: Mapping[int, str],
     side: str,
 ) -> tuple[Ints, dict[int, str]]:
-    """Returns the sulci of a hemisphere by the regions of the cortex that they lie in, and their names.
+    """Part the sulci of a hemisphere by the regions of the cortex that they lie in, and their names.
 
     A connected valley that reaches through several regions is parted between those that have `LEAST_REGION_MM2` or
     more of it; what is left of it goes to the largest part, and so does what is in no region, unless that is more
@@ -136,25 +128,25 @@ def named(
     for number in range(1, int(sulci.max()) + 1):
         inside = sulci == number
         sizes = np.bincount(labels[inside], areas[inside], minlength=int(labels.max()) + 1)
-        own = [int(label) for label in np.flatnonzero(sizes >= LEAST_REGION_MM2)]
+        kept = [int(label) for label in np.flatnonzero(sizes >= LEAST_REGION_MM2)]
         # the rim of a sulcus is often in no region
         if sizes[0] <= sizes.sum() / 2:
-            own = [label for label in own if label > 0]
-        own = own or [int(np.argmax(sizes))]
-        largest = max(own, key=lambda label: sizes[label])
-        of_part = np.where(np.isin(labels, own), labels, largest)
-        parts += [(number, label, inside & (of_part == label)) for label in own]
+            kept = [label for label in kept if label > 0]
+        kept = kept or [int(np.argmax(sizes))]
+        largest = max(kept, key=lambda label: sizes[label])
+        part = np.where(np.isin(labels, kept), labels, largest)
+        parts += [(number, label, inside & (part == label)) for label in kept]
     parts.sort(key=lambda part: -areas[part[2]].sum())
-    found, count = np.zeros(len(sulci), dtype=np.int64), Counter[int]()
-    called: dict[int, str] = {}
+    numbers, count = np.zeros(len(sulci), dtype=np.int64), Counter[int]()
+    named: dict[int, str] = {}
     for place, (number, label, vertices) in enumerate(parts, start=1):
-        found[vertices] = place
+        numbers[vertices] = place
         count[label] += 1
         again = f" {count[label]}" if count[label] > 1 else ""
         name = f"{side} {names[label]}{again}" if label in names else f"{side} {number}"
         # a region may be called by a number too
-        called[place] = f"{name} ({place})" if name in called.values() else name
-    return found, called
+        named[place] = f"{name} ({place})" if name in named.values() else name
+    return numbers, named
 
 
 def _quantile(values: Floats, weights: Floats, share: float) -> float:

@@ -17,27 +17,37 @@ PATCH_MM = 20.0
 SYMMETRIC_MM = 0.4
 """Mean distance of a brain from its mirror image below which its sides are one observation: half a voxel of atlases."""
 
+SKILLED_FROM = 1.5
+"""Weeks: before, the adjacent brain is the start itself."""
+
 DRAWS = 2000
 INTERVAL = (0.025, 0.975)
 
 
 def correlation(one: Floats, other: Floats, weights: Floats) -> float:
-    """Returns the weighted Pearson correlation of (n,) values; NaN where one of them is constant."""
+    """Return the weighted Pearson correlation of (n,) values; NaN where one of them is constant."""
     return float(_correlations(_products(one, other, weights).sum(axis=0)[None])[0])
 
 
-SKILLED_FROM = 1.5
-"""Weeks: before, the adjacent brain is the start itself."""
-
-
 def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
-    """Returns (r − r_start)/(r_adjacent − r_start) from two weeks after the start on; NaN before.
+    """Return (r − r_start)/(r_adjacent − r_start) from two weeks after the start on; NaN before.
 
     1 is as good as the real brain of the week before, 0 as the start brain scaled up. After one week the adjacent brain
     is the start itself. NaN also where the adjacent week is no better than the start.
     """
     room = r_adjacent - r_start
     return float((r - r_start) / room) if horizon > SKILLED_FROM and room > 0 else float("nan")
+
+
+def values_on(real: Shape, other: Shape) -> tuple[dict[str, Floats], float]:
+    """Take the measures of another shape at the vertices of the real one, both laid onto each other.
+
+    To each vertex belongs the nearest point of the other whose normal agrees. Returns (n,) values by measure, and the
+    part of the real area for which there is such a point.
+    """
+    match = match_points(real.mesh.vertices, vertex_normals(real.mesh), other.mesh)
+    values = {measure: values_at(match, getattr(other, measure)) for measure in MEASURES}
+    return values, float(np.average(match.agrees, weights=real.areas))
 
 
 def placement(
@@ -49,53 +59,54 @@ def placement(
     horizon: float,
     seed: int,
 ) -> dict[str, float | bool]:
-    """Returns how well the folds of a run are placed in a week, all shapes ready and laid onto the real brain.
+    """Tell how well the folds of a run are placed in a week, all shapes ready and laid onto the real brain.
 
-    To each vertex of the real surface belongs the nearest point of the other whose normal agrees; correlations are
-    weighted by area, over the whole surface. For each of `MEASURES`: r_…, r_start_…, r_adjacent_…, gain_… (r − r_start)
-    with its 95 % interval gain_low_…, gain_high_… from patches drawn with replacement (Efron and Tibshirani 1993), and
-    skill_…. matched_share is the part of the real surface's area for which an agreeing point of the run was found.
-    asymmetry_mm and mirrored_patches are those of `drawn_patches`.
+    Correlations are those of `values_on`, weighted by area over the whole surface. For each of `MEASURES`: r_…,
+    r_start_…, r_adjacent_…, gain_… (r − r_start) with its 95 % interval gain_low_…, gain_high_… from patches drawn with
+    replacement (Efron and Tibshirani 1993), and skill_…. matched_share is the part of the real surface's area for which
+    an agreeing point of the run was found. asymmetry_mm and mirrored_patches are those of `drawn_patches`.
 
     `start` is the start brain scaled up: no folding at all; `adjacent` the real brain of the week before, if there is
     one. The horizon is in weeks since the start, the seed that of the bootstrap.
     """
-    others = {"run": run, "start": start} | ({"adjacent": adjacent} if adjacent is not None else {})
-    normals, areas = vertex_normals(real.mesh), real.areas
-    values: dict[str, dict[str, Floats]] = {}
-    row: dict[str, float | bool] = {}
-    for name, shape in others.items():
-        match = match_points(real.mesh.vertices, normals, shape.mesh)
-        values[name] = {measure: values_at(match, getattr(shape, measure)) for measure in MEASURES}
-        if name == "run":
-            row["matched_share"] = float(np.average(match.agrees, weights=areas))
+    on_run, share = values_on(real, run)
+    on_start, _ = values_on(real, start)
+    on_adjacent, _ = values_on(real, adjacent) if adjacent else ({}, 0.0)
     patch, drawn = drawn_patches(real)
-    row |= drawn
+    row = {"matched_share": share} | drawn
+    areas = real.areas
     for measure in MEASURES:
         truth = getattr(real, measure)
-        found = {name: correlation(truth, value[measure], areas) for name, value in values.items()}
-        low, high = gain_interval(truth, values["run"][measure], values["start"][measure], areas, patch, seed=seed)
-        r, r_start, r_adjacent = found["run"], found["start"], found.get("adjacent", np.nan)
-        numbers = {"r": r, "r_start": r_start, "r_adjacent": r_adjacent, "gain": r - r_start, "gain_low": low}
-        numbers |= {"gain_high": high, "skill": skill(r, r_start, r_adjacent, horizon)}
-        row |= {f"{name}_{measure}": number for name, number in numbers.items()}
+        r = correlation(truth, on_run[measure], areas)
+        r_start = correlation(truth, on_start[measure], areas)
+        r_adjacent = correlation(truth, on_adjacent[measure], areas) if adjacent else np.nan
+        low, high = gain_interval(truth, on_run[measure], on_start[measure], areas, patch, seed=seed)
+        row |= {
+            f"r_{measure}": r,
+            f"r_start_{measure}": r_start,
+            f"r_adjacent_{measure}": r_adjacent,
+            f"gain_{measure}": r - r_start,
+            f"gain_low_{measure}": low,
+            f"gain_high_{measure}": high,
+            f"skill_{measure}": skill(r, r_start, r_adjacent, horizon),
+        }
     return row
 
 
 def drawn_patches(real: Shape, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
-    """Returns for each vertex the number of the patch that is drawn with it, and how patches were made.
+    """Return for each vertex the number of the patch that is drawn with it, and how patches were made.
 
     asymmetry_mm is the mean distance of the brain from its mirror image. Where it is below `SYMMETRIC_MM`, or where
     `mirrored` asks for it, a patch is drawn together with its mirror image: mirrored_patches is true.
     """
-    there, asymmetry_mm = mirror_places(real.mesh, real.areas)
+    image, asymmetry_mm = mirror_places(real.mesh, real.areas)
     together = mirrored or asymmetry_mm < SYMMETRIC_MM
-    patch = patches(real.mesh.vertices, real.areas, PATCH_MM, there if together else None)
+    patch = patches(real.mesh.vertices, real.areas, PATCH_MM, image if together else None)
     return patch, {"asymmetry_mm": asymmetry_mm, "mirrored_patches": together}
 
 
 def mirror_places(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
-    """Returns where the mirror image of each vertex lies, (n, 3), and the mean distance of the two surfaces in mm.
+    """Return where the mirror image of each vertex lies, (n, 3), and the mean distance of the two surfaces in mm.
 
     The image, mirrored along x (left to right), is laid onto the surface rigidly.
     """
@@ -105,7 +116,7 @@ def mirror_places(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
 
 
 def patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | None = None) -> Ints:
-    """Returns for each of (n,) vertices the number of its patch, about `edge_mm` wide, the same in every call.
+    """Number the patches, about `edge_mm` wide, of (n,) vertices; the same in every call.
 
     Patches are nearest to seeds that are spread by farthest points. With the (n, 3) places of the vertices' mirror
     images, a patch and its mirror image have one number.
@@ -125,15 +136,15 @@ def patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | No
 def gain_interval(
     truth: Floats, run: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer], *, seed: int
 ) -> tuple[float, float]:
-    """Returns the 95 % interval of r(run) − r(start) when whole patches of the surface are drawn with replacement."""
+    """Return the 95 % interval of r(run) − r(start) when whole patches of the surface are drawn with replacement."""
     drawn = draw_patches(patch, seed=seed)
-    gains = np.subtract(*(drawn_correlations(truth, other, areas, patch, drawn) for other in (run, start)))
-    low, high = np.nanquantile(gains, INTERVAL)
+    r_run, r_start = (drawn_correlations(truth, values, areas, patch, drawn) for values in (run, start))
+    low, high = np.nanquantile(r_run - r_start, INTERVAL)
     return float(low), float(high)
 
 
 def draw_patches(patch: NDArray[np.integer], *, seed: int) -> Ints:
-    """Returns how often each of p patches is drawn, (DRAWS, p), with replacement."""
+    """Draw patches with replacement: how often each of p is drawn, (DRAWS, p)."""
     count = int(patch.max()) + 1
     return np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=DRAWS)
 
@@ -141,23 +152,18 @@ def draw_patches(patch: NDArray[np.integer], *, seed: int) -> Ints:
 def drawn_correlations(
     truth: Floats, other: Floats, areas: Floats, patch: NDArray[np.integer], drawn: NDArray[np.integer]
 ) -> Floats:
-    """Returns the (DRAWS,) correlations of values at vertices over the patches that are drawn."""
-    return _correlations(drawn @ _patch_sums(truth, other, areas, patch))
+    """Return the (DRAWS,) correlations of values at vertices over the patches that are drawn."""
+    columns = _products(truth, other, areas).T
+    return _correlations(drawn @ np.stack([np.bincount(patch, column) for column in columns], axis=1))
 
 
 def _products(one: Floats, other: Floats, weights: Floats) -> Floats:
     return weights[:, None] * np.stack([np.ones_like(one), one, other, one * one, other * other, one * other], axis=1)
 
 
-def _patch_sums(one: Floats, other: Floats, weights: Floats, patch: NDArray[np.integer]) -> Floats:
-    """Returns the (p, 6) sums of each patch that a correlation is made of."""
-    columns = _products(one, other, weights).T
-    return np.stack([np.bincount(patch, column) for column in columns], axis=1)
-
-
 def _correlations(sums: Floats) -> Floats:
+    """Correlate by the (k, 6) sums of `_products`; NaN where values are constant to rounding."""
     weight, x, y, xx, yy, xy = sums.T
-    spreads = [(square * weight - mean * mean, square * weight) for mean, square in ((x, xx), (y, yy))]
-    valid = np.logical_and(*(spread > 1e-12 * size for spread, size in spreads))
-    product = np.where(valid, spreads[0][0] * spreads[1][0], 1.0)
-    return np.where(valid, (xy * weight - x * y) / np.sqrt(product), np.nan)
+    spread_x, spread_y = xx * weight - x * x, yy * weight - y * y
+    valid = (spread_x > 1e-12 * xx * weight) & (spread_y > 1e-12 * yy * weight)
+    return np.where(valid, (xy * weight - x * y) / np.sqrt(np.where(valid, spread_x * spread_y, 1.0)), np.nan)

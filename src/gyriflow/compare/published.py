@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..parameters.terms import FOLD_BANDS
 from .members import MODES
 
 
 def comparison_caption(study: str, week: float, comparison: pd.DataFrame) -> str:
-    """Returns what a reader has to know of a comparison: week, real brains, and whether they are another population.
+    """Say what a reader has to know of a comparison: week, real brains, and whether they are another population.
 
     The comparison has the columns real, real_population, same_population.
     """
@@ -29,16 +30,16 @@ def comparison_caption(study: str, week: float, comparison: pd.DataFrame) -> str
 def with_published_nearest(
     nearest: pd.DataFrame, published: Mapping[str, Any], varied: Sequence[str], week: float
 ) -> pd.DataFrame:
-    """Returns the table of the nearest runs with what the paper finds nearest by the same measure (NaN: not reported).
+    """Add to the nearest runs what the paper finds nearest by the same measure, in column paper (NaN: not reported).
 
     The paper's brains are others (a normal atlas), and its spectra are cut at Weyl's number.
     """
-    found = {
+    reported = {
         entry["measure"]: entry["value"]
         for entry in published["nearest"]
         if [entry["parameter"]] == list(varied) and entry["week"] == week
     }
-    values = [found.get(measure.removesuffix("_weyl"), float("nan")) for measure in nearest["measure"]]
+    values = [reported.get(measure.removesuffix("_weyl"), float("nan")) for measure in nearest["measure"]]
     place = nearest.columns.get_loc("run")
     return pd.concat([nearest.iloc[:, :place], pd.DataFrame({"paper": values}), nearest.iloc[:, place:]], axis=1)
 
@@ -76,40 +77,45 @@ def replication(
     the verdict is `NOT_RUN`. Bands are cut at Weyl's number, here each surface's own and in the paper the largest of
     all compared, and stand in whole beside it.
     """
-    rows = [*_displacements(published["displacement"], displacement), *_modes(published["weyl_number"], studies)]
-    for entry in [*published["nearest"], *published["findings"]]:
-        of_it = _studies_of(entry, studies)
-        if "finding" in entry:
-            result, paper = entry["finding"], "stated"
-            here, verdict = _finding(entry["check"], of_it[0]) if of_it else ("–", NOT_RUN)
-        else:
-            result = f"nearest {entry['parameter']} by {entry['measure']}, {entry['week']} GW"
-            paper = f"{entry['value']:g}"
-            here, verdict = _nearest(entry, of_it[0].nearest) if of_it else ("–", NOT_RUN)
-        rows.append((result, entry["place"], paper, here, verdict))
+    modes = published["weyl_number"]
+    rows = [*_displacements(published["displacement"], displacement), *_modes(modes, _study_of(modes, studies))]
+    for entry in published["nearest"]:
+        study = _study_of(entry, studies)
+        here, verdict = _nearest(entry, study.nearest) if study else ("–", NOT_RUN)
+        result = f"nearest {entry['parameter']} by {entry['measure']}, {entry['week']} GW"
+        rows.append((result, entry["place"], f"{entry['value']:g}", here, verdict))
+    for entry in published["findings"]:
+        study = _study_of(entry, studies)
+        here, verdict = _finding(entry["check"], study) if study else ("–", NOT_RUN)
+        rows.append((entry["finding"], entry["place"], "stated", here, verdict))
     rows += _costs(published["cost"], summary, **power)
     return pd.DataFrame(rows, columns=["result", "place", "paper", "here", "verdict"])
 
 
+def _study_of(entry: Mapping[str, Any], studies: Sequence[StudyTables]) -> StudyTables | None:
+    """Find the study that varies what an entry of the paper is of, at its week."""
+    for study in studies:
+        if list(study.varied) == [entry["parameter"]] and study.week == entry["week"]:
+            return study
+    return None
+
+
 def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> Iterator[tuple[str, ...]]:
-    own = published["rows"][0]
+    simulated = published["rows"][0]
     table = displacement.set_index(["nodes", "from_week"])
     for column, name in (("max_mm", "largest"), ("mean_mm", "mean")):
-        for week, paper in zip(published["from_weeks"], own[column], strict=True):
-            found = [float(table[column].get((nodes, float(week)), "nan")) for nodes in ("all", "pial")]
-            text, verdict = "–", NOT_RUN
-            if np.isfinite(found[0]):
-                text = f"all nodes {found[0]:.2f}, surface {found[1]:.2f}"
-                away = [value / paper - 1 for value in found]
+        for week, paper in zip(published["from_weeks"], simulated[column], strict=True):
+            values = [float(table[column].get((nodes, float(week)), "nan")) for nodes in ("all", "pial")]
+            here, verdict = "–", NOT_RUN
+            if np.isfinite(values[0]):
+                here = f"all nodes {values[0]:.2f}, surface {values[1]:.2f}"
+                away = [value / paper - 1 for value in values]
                 verdict = AGREES if min(map(abs, away)) <= CLOSE else "{:+.0%}, {:+.0%}".format(*away)
-            yield f"{name} displacement, {week}-{week + 1} GW (mm)", published["place"], f"{paper:.2f}", text, verdict
+            yield f"{name} displacement, {week}-{week + 1} GW (mm)", published["place"], f"{paper:.2f}", here, verdict
 
 
 def _costs(
-    published: Mapping[str, Any],
-    summary: Mapping[str, Any],
-    core_power_w: float,
-    carbon_intensity_g_per_kwh: float,
+    published: Mapping[str, Any], summary: Mapping[str, Any], core_power_w: float, carbon_intensity_g_per_kwh: float
 ) -> Iterator[tuple[str, ...]]:
     """Yield time, energy and emissions of a gestational week."""
     weeks = (summary["reached_week"] - summary["weeks"][0]) or np.nan
@@ -121,26 +127,19 @@ def _costs(
         yield f"{entry['quantity']} a gestational week", published["place"], paper, f"{value:.3g} ({of_run})", NOT_ALIKE
 
 
-def _modes(published: Mapping[str, Any], studies: Sequence[StudyTables]) -> Iterator[tuple[str, ...]]:
-    """Yields for each hemisphere how many modes the paper takes, and Weyl's numbers of the surfaces compared here."""
-    tables = [one.comparison for one in _studies_of(published, studies)]
+def _modes(published: Mapping[str, Any], study: StudyTables | None) -> Iterator[tuple[str, ...]]:
+    """Yield for each hemisphere how many modes the paper takes, and Weyl's numbers of the surfaces compared here."""
     for side in ("right", "left"):
-        numbers = np.array([])
-        for table in tables:
-            rows = table[(table["measure"] == MODES) & (table["hemisphere"] == side)]
-            numbers = rows[["value", "real_value"]].to_numpy(dtype=float)
-        text, verdict = "–", NOT_RUN
-        if numbers.size:
-            away = numbers.max() / published[side] - 1
-            text = f"each its own, {numbers.min():.0f} to {numbers.max():.0f}"
-            verdict = AGREES if abs(away) <= CLOSE else f"{away:+.0%}"
+        here, verdict = "–", NOT_RUN
+        if study:
+            of_side = (study.comparison["measure"] == MODES) & (study.comparison["hemisphere"] == side)
+            numbers = study.comparison.loc[of_side, ["value", "real_value"]].to_numpy(dtype=float)
+            if numbers.size:
+                away = numbers.max() / published[side] - 1
+                here = f"each its own, {numbers.min():.0f} to {numbers.max():.0f}"
+                verdict = AGREES if abs(away) <= CLOSE else f"{away:+.0%}"
         paper = f"{published[side]}, the largest of all"
-        yield f"modes of the spectra, {side}", published["place"], paper, text, verdict
-
-
-def _studies_of(entry: Mapping[str, Any], studies: Sequence[StudyTables]) -> list[StudyTables]:
-    """Returns the studies that vary what an entry of the paper is of, at its week."""
-    return [one for one in studies if list(one.varied) == [entry["parameter"]] and one.week == entry["week"]]
+        yield f"modes of the spectra, {side}", published["place"], paper, here, verdict
 
 
 def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]:
@@ -150,40 +149,39 @@ def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]
             flag = "" if row["flag"] == "ok" else f" ({row['flag']})"
             texts.append(f"{row['hemisphere']}, {how}: {row[entry['parameter']]:g}{flag}")
             same.append(row[entry["parameter"]] == entry["value"])
-    return "; ".join(texts) or "–", _verdict(sum(same), len(same))
+    return "; ".join(texts) or "–", _verdict(pd.Series(same))
 
 
 def _finding(check: str, study: StudyTables) -> tuple[str, str]:
-    """Returns what is found of a check in words, and the verdict."""
+    """Return what is found here in words, and the verdict."""
     if check == "all_come":
-        fine = study.members["outcome"].eq("finished")
-        return f"{fine.sum()} of {len(fine)} runs", _verdict(fine.sum(), len(fine))
-    cut, whole = (_shares(study.comparison, end) for end in ("_weyl", ""))
-    cut = cut[cut["B4"].notna()]
+        holds = study.members["outcome"].eq("finished")
+        return f"{holds.sum()} of {len(holds)} runs", _verdict(holds)
+    shares = _shares(study.comparison, "_weyl")
+    shares = shares[shares["B4"].notna()]
     if check == "most_B4":
-        fine = cut["B4"] > cut[["B5", "B6"]].max(axis=1)
+        holds = shares["B4"] > shares[["B5", "B6"]].max(axis=1)
     elif check == "little_B6":
         # without a mode there is nothing
-        fine = cut["B6"].fillna(0) < WEAK
+        holds = shares["B6"].fillna(0) < WEAK
     elif check == "right_B4":
-        sides = cut.pivot_table("B4", "brain", "hemisphere").reindex(columns=["right", "left"])
-        fine = (sides["right"] - sides["left"]).dropna() > 0
+        sides = shares.pivot_table("B4", "brain", "hemisphere").reindex(columns=["right", "left"])
+        holds = (sides["right"] - sides["left"]).dropna() > 0
     else:
-        real = cut.index.get_level_values("brain").str.startswith(REAL)
-        least = cut.loc[real, "B5"].groupby("hemisphere").min()
-        fine = least > cut.loc[~real, "B5"].groupby("hemisphere").max()
-    text, verdict = f"{fine.sum()} of {len(fine)} cases", _verdict(fine.sum(), len(fine))
-    if check == "little_B6" and whole["B6"].max() >= WEAK:
-        return (
-            f"{text} when cut; in whole bands {whole['B6'].min():.2f} to {whole['B6'].max():.2f}",
-            f"{verdict}, by the cut alone",
-        )
+        real = shares.index.get_level_values("brain").str.startswith(REAL)
+        least = shares.loc[real, "B5"].groupby("hemisphere").min()
+        holds = least > shares.loc[~real, "B5"].groupby("hemisphere").max()
+    text, verdict = f"{holds.sum()} of {len(holds)} cases", _verdict(holds)
+    whole = _shares(study.comparison, "")["B6"]
+    if check == "little_B6" and whole.max() >= WEAK:
+        text = f"{text} when cut; in whole bands {whole.min():.2f} to {whole.max():.2f}"
+        return text, f"{verdict}, by the cut alone"
     return text, verdict
 
 
 def _shares(comparison: pd.DataFrame, end: str) -> pd.DataFrame:
-    """Returns the relative powers B4 to B6 of the simulated and the real hemispheres, by brain and hemisphere."""
-    bands = {f"relative_power_B{band}{end}": f"B{band}" for band in (4, 5, 6)}
+    """Tabulate the relative powers B4 to B6 of the simulated and the real hemispheres, by brain and hemisphere."""
+    bands = {f"relative_power_B{band}{end}": f"B{band}" for band in FOLD_BANDS}
     rows = comparison[comparison["measure"].isin(bands)]
     simulated, real = rows.assign(brain=rows["run"]), rows.assign(brain=REAL + rows["real"], value=rows["real_value"])
     both = pd.concat([simulated, real]).replace({"measure": bands})
@@ -191,5 +189,7 @@ def _shares(comparison: pd.DataFrame, end: str) -> pd.DataFrame:
     return table.reindex(columns=list(bands.values()))
 
 
-def _verdict(fine: int, of: int) -> str:
-    return NOT_RUN if of == 0 else AGREES if fine == of else "in part" if fine else "otherwise"
+def _verdict(holds: pd.Series) -> str:
+    if holds.empty:
+        return NOT_RUN
+    return AGREES if holds.all() else "in part" if holds.any() else "otherwise"

@@ -13,13 +13,7 @@ from ..errors import InputError
 from ..geometry.alignment import fit_onto
 from ..geometry.matching import surface_mask
 from ..geometry.remeshing import remesh
-from ..geometry.triangles import (
-    Floats,
-    TriangleMesh,
-    signed_volume,
-    transformed,
-    vertex_areas,
-)
+from ..geometry.triangles import Floats, TriangleMesh, signed_volume, transformed, vertex_areas
 
 EDGE_MM = 1.0
 """Edges that surfaces are compared with, after both have the real brain's volume."""
@@ -51,15 +45,14 @@ class Shape:
 
     def __post_init__(self) -> None:
         for name in ("mean_curvature", "shape_index"):
-            values = np.asarray(getattr(self, name), dtype=float)
-            if values.shape != (len(self.mesh.vertices),):
-                raise ValueError(f"{name} of shape {values.shape} for {len(self.mesh.vertices)} vertices")
+            values = getattr(self, name)
+            if np.shape(values) != (len(self.mesh.vertices),):
+                raise ValueError(f"{name} of shape {np.shape(values)} for {len(self.mesh.vertices)} vertices")
         clipped = np.clip(self.mean_curvature, -LARGEST_CURVATURE, LARGEST_CURVATURE)
         object.__setattr__(self, "mean_curvature", clipped)
 
     @property
     def areas(self) -> Floats:
-        """The (n,) areas in mm² that belong to the vertices."""
         return vertex_areas(self.mesh)
 
     @property
@@ -69,7 +62,7 @@ class Shape:
 
 
 def ready(mesh: TriangleMesh, real: TriangleMesh) -> TriangleMesh:
-    """Returns a closed surface scaled to the volume of the real brain, remeshed and laid onto it rigidly.
+    """Scale a closed surface to the volume of the real brain, remesh it and lay it onto that rigidly.
 
     The real brain itself is only remeshed. InputError where a surface encloses no volume.
     """
@@ -88,7 +81,7 @@ def ready(mesh: TriangleMesh, real: TriangleMesh) -> TriangleMesh:
 
 
 def against_real(run: Shape, real: Shape) -> dict[str, float]:
-    """Returns how the folds of a run differ from the real ones, wherever they are.
+    """Return how the folds of a run differ from the real ones, wherever they are.
 
     curvature_rms_ratio is the run's over the real one; curvature_distance_per_mm the mean difference of mean curvature
     between the two distributions by area (Wasserstein's first distance).
@@ -98,9 +91,9 @@ def against_real(run: Shape, real: Shape) -> dict[str, float]:
 
 
 def cortex_dice(one: TriangleMesh, other: TriangleMesh) -> float:
-    """Returns the Dice overlap of the outermost `CORTEX_MM` of two closed surfaces, as they lie to each other in mm."""
-    box = np.concatenate([one.vertices, other.vertices])
-    box = np.stack([box.min(axis=0), box.max(axis=0)])
+    """Return the Dice overlap of the outermost `CORTEX_MM` of two closed surfaces, as they lie to each other in mm."""
+    points = np.concatenate([one.vertices, other.vertices])
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
     ribbons = []
     for mesh in (one, other):
         inside = surface_mask(mesh, VOXEL_MM, box)[0] > 0

@@ -22,6 +22,7 @@ from ..geometry.triangles import (
     transformed,
     vertex_areas,
 )
+from ..parameters.terms import MEASURED
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .placement import placement
 from .prediction import apart, distances
@@ -62,7 +63,7 @@ def validation_row(
     start: Shape,
     adjacent: Shape | None,
 ) -> dict[str, Any]:
-    """Returns a row of validation.csv.
+    """Return a row of validation.csv.
 
     Columns: run, kind, start_week, week, horizon; distance_mm and distance95_mm of `prediction.distances` and
     `cortex_dice`, both of the surfaces as they are, laid onto each other rigidly; area_cm2, volume_ml and the same with
@@ -88,7 +89,7 @@ def validation_row(
 
 
 def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
-    """Returns rows of `validation_row` as a table, what is compared first, by run, start and week."""
+    """Make a table of rows of `validation_row`, what is compared first, by run, start and week."""
     first = ["run", "kind", "start_week", "week", "horizon", "distance_mm", "distance95_mm", "cortex_dice"]
     table = pd.DataFrame(rows)
     return table[[*first, *table.columns.difference(first, sort=False)]].sort_values(
@@ -106,22 +107,22 @@ def _sizes(mesh: TriangleMesh) -> dict[str, float]:
 
 
 def vector_agreement(one: Floats, measured: Floats, weights: Floats) -> tuple[float, float]:
-    """Returns correlation and slope of (n, 3) vectors against measured ones.
+    """Return correlation and slope of (n, 3) vectors against measured ones.
 
     r = Σ w u·v/√(Σ w u² Σ w v²) and slope Σ w u·v/Σ w v²: 1 and 1 where they are equal. NaN where nothing moves.
     """
-    both, own, other = (
-        float(np.einsum("i,ij,ij->", weights, *pair)) for pair in ((one, measured), (one, one), (measured, measured))
+    product, square, measured_square = (
+        float(weights @ (u * v).sum(axis=1)) for u, v in ((one, measured), (one, one), (measured, measured))
     )
-    if own <= 0 or other <= 0:
+    if square <= 0 or measured_square <= 0:
         return float("nan"), float("nan")
-    return both / np.sqrt(own * other), both / other
+    return product / np.sqrt(square * measured_square), product / measured_square
 
 
 def displacement_table(
     weeks: Sequence[float], simulated: Floats, measured: Floats, faces: Ints, *, registered: bool = False
 ) -> pd.DataFrame:
-    """Returns how the displacement of the pial vertices agrees with the measured one, a row per interval of weeks.
+    """Tell how the displacement of the pial vertices agrees with the measured one, a row per interval of weeks.
 
     The rigid part of each interval is removed from both, and the simulated vectors are turned as the simulated brain
     lies to the measured one. Beside it stands uniform scaling: all vertices of the measured surface moved away from its
@@ -149,31 +150,37 @@ def displacement_table(
     pieces = [np.unique(faces[component == number]) for number in range(component.max() + 1)]
     rows = []
     for number in range(len(weeks) - 1):
-        shape = TriangleMesh(measured[number], faces)
+        shape, later = (TriangleMesh(measured[index], faces) for index in (number, number + 1))
         weights = vertex_areas(shape)
-        grown = signed_volume(TriangleMesh(measured[number + 1], faces)) / signed_volume(shape)
-        own, real, scaling = (np.zeros_like(shape.vertices) for _ in range(3))
+        scale = np.cbrt(signed_volume(later) / signed_volume(shape)) - 1
+        moved, moved_really, scaled = (np.zeros_like(shape.vertices) for _ in range(3))
         for piece in pieces:
-            (first, then), (was, became) = (
-                (places[number, piece], places[number + 1, piece]) for places in (simulated, measured)
-            )
-            turn = rigid_fit(first, was, weights[piece])[:3, :3]
-            own[piece] = without_rigid_motion(first, then, weights[piece]) @ turn.T
-            real[piece] = without_rigid_motion(was, became, weights[piece])
-            scaling[piece] = (np.cbrt(grown) - 1) * (was - np.average(was, axis=0, weights=weights[piece]))
-        r, slope = vector_agreement(own, real, weights)
-        r_scaling, slope_scaling = vector_agreement(scaling, real, weights)
-        sizes = [float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights))) for vectors in (own, real)]
-        test = "consistency" if registered else "comparison"
-        rows.append((weeks[number], weeks[number + 1], test, r, slope, r_scaling, slope_scaling, *sizes))
-    columns = ["displacement_r", "displacement_slope", "displacement_r_scaling", "displacement_slope_scaling"]
-    return pd.DataFrame(rows, columns=["from_week", "to_week", "test", *columns, "rms_mm", "measured_rms_mm"])
+            first, then = simulated[number : number + 2, piece]
+            real_first, real_then = measured[number : number + 2, piece]
+            by_area = weights[piece]
+            turn = rigid_fit(first, real_first, by_area)[:3, :3]
+            moved[piece] = without_rigid_motion(first, then, by_area) @ turn.T
+            moved_really[piece] = without_rigid_motion(real_first, real_then, by_area)
+            scaled[piece] = scale * (real_first - np.average(real_first, axis=0, weights=by_area))
+        r, slope = vector_agreement(moved, moved_really, weights)
+        r_scaling, slope_scaling = vector_agreement(scaled, moved_really, weights)
+        row = {"from_week": weeks[number], "to_week": weeks[number + 1]}
+        row |= {"test": "consistency" if registered else "comparison"}
+        row |= {"displacement_r": r, "displacement_slope": slope}
+        row |= {"displacement_r_scaling": r_scaling, "displacement_slope_scaling": slope_scaling}
+        row |= {"rms_mm": _rms(moved, weights), "measured_rms_mm": _rms(moved_really, weights)}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _rms(vectors: Floats, weights: Floats) -> float:
+    return float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights)))
 
 
 def folding_agreement(
     metrics: pd.DataFrame, spectra: pd.DataFrame, pairs: Sequence[tuple[str, str, float, str]]
 ) -> pd.DataFrame:
-    """Returns metrics of simulated brains beside those of the real ones, a row per brain, week, hemisphere and metric.
+    """Join metrics of simulated brains with those of the real ones, a row per brain, week, hemisphere and metric.
 
     Metrics have the columns subject, run ("real" for real brains), week, hemisphere, metric, value; spectra subject,
     run, week, hemisphere, band, relative_power; pairs are (run, start brain, week, real brain). Columns run, subject,
@@ -183,10 +190,10 @@ def folding_agreement(
     shares = spectra.dropna(subset="relative_power")
     shares = shares.assign(metric=BAND + shares["band"].astype(str), value=shares["relative_power"])
     keys = ["run", "subject", "week", "hemisphere", "metric", "value"]
-    both = pd.concat([table[keys] for table in (metrics[metrics["metric"].isin(AGREEMENT)], shares)])
-    wanted = pd.DataFrame(pairs, columns=["run", "subject", "week", "real"])
-    real = both[both["run"] == "real"].drop(columns=["run", "week"])
+    both = pd.concat([metrics.loc[metrics["metric"].isin(AGREEMENT), keys], shares[keys]])
+    real = both[both["run"] == MEASURED].drop(columns=["run", "week"])
     real = real.rename(columns={"subject": "real", "value": "real_value"})
-    table = wanted.merge(both, on=["run", "subject", "week"]).merge(real, on=["real", "hemisphere", "metric"])
+    table = pd.DataFrame(pairs, columns=["run", "subject", "week", "real"])
+    table = table.merge(both, on=["run", "subject", "week"]).merge(real, on=["real", "hemisphere", "metric"])
     table = table.assign(difference=table["value"] - table["real_value"])
     return table[["run", "subject", "week", "real", "hemisphere", "metric", "value", "real_value", "difference"]]

@@ -7,13 +7,10 @@ import numpy as np
 import pandas as pd
 
 from ..geometry.triangles import Floats, Ints
-from ..parameters.terms import SIDES
+from ..parameters.terms import MEASURED, SIDES
 
 BRAIN = ["subject", "run", "week"]
 """The columns that name a brain."""
-
-MEASURED = "real"
-"""The run of measured brains."""
 
 OF_THE_ANALYSIS = (
     *("crossing_faces", "curvature_radius", "curvature_wavelength", "spangy_modes", "spangy_captured_share"),

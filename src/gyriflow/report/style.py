@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..parameters.terms import run_names
+from ..parameters.terms import MEASURED, run_names
 
 SINGLE_COLUMN_IN = 3.5
 """Width of one column of a journal page, in inches."""
@@ -37,8 +37,6 @@ MAGNITUDES = "YlGnBu"
 NEUTRAL_COLOUR = "#D9D9D9"
 """Tissue without a value: outside, not measured, or exactly zero where only what is above counts."""
 
-MEASURED = "real"
-"""The run name of measured brains."""
 REAL_BRAIN, SIMPLE_SHAPE = "real brain", "simple shape"
 """What brains that were not simulated are called where their population is not known."""
 SYNTHETIC_NAMES = frozenset((SIMPLE_SHAPE, "sphere", "ellipsoid"))

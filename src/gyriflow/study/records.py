@@ -9,7 +9,7 @@ from ..config.brains import Brain as GivenBrain
 from ..config.runs import Run
 from ..io.schemes import SCHEMES
 from ..parameters.folding import VARYING
-from ..parameters.terms import Side
+from ..parameters.terms import MEASURED, Side
 from ..parameters.varying import Varying, bounds_of, files_of
 from ..units import week_tag
 from .paths import (
@@ -29,9 +29,6 @@ from .paths import (
     surfaces_in,
     white_of,
 )
-
-MEASURED = "real"
-"""The run of measured brains."""
 
 Origin = Literal["self", "atlas"]
 """Whose growth a run has: that of the start's own series, or of another population."""
