@@ -39,8 +39,8 @@ def towards(targets, **changes):
     alike = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0, "step_s": DAY_S}
     sizes = {"area_cm2": {21.0: 1.0, 23.0: 1.0}, "volume_ml": {21.0: 1.0, 23.0: 1.0}}
     names = {week: f"target_{week:05.2f}" for week in targets}
-    follow = {"loop": "closed", "smoothing_mm": 1.5} | sizes
-    parameters = parameters_from(known | settings | alike | {"follow": follow, "targets": names} | changes)
+    growth = {"model": "shapes"} | sizes
+    parameters = parameters_from(known | settings | alike | {"growth": growth, "targets": names} | changes)
     maps = {
         f"{names[week]}_{axis}": places
         for week, at in targets.items()

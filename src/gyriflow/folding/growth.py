@@ -32,6 +32,10 @@ class Size:
     area_mm2: float
     volume_mm3: float
 
+    def rates_to(self, after: "Size", step_s: float) -> Floats:
+        """Returns the (2,) rates in 1/s of the logarithms of area and volume that lead to another size in a step."""
+        return np.log([after.area_mm2 / self.area_mm2, after.volume_mm3 / self.volume_mm3]) / step_s
+
 
 @dataclass(frozen=True, eq=False)
 class GrowthInputs:
@@ -107,10 +111,6 @@ class Growth(ABC):
 
     def logarithm(self) -> Floats | None:
         """Returns ln G (6, n) at all vertices, None where growth is by the rates of the parameters."""
-        return None
-
-    def again(self, after: Size) -> "Growth | None":
-        """Returns how a step that has led to a size is to be done again, None where it need not or cannot be."""
         return None
 
     def learnt(self, after: Size) -> tuple[float, ...] | None:

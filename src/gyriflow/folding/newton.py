@@ -62,17 +62,6 @@ class StepCount:
     residual: float = np.inf
     converged: bool = False
 
-    @classmethod
-    def of_all(cls, counts: Sequence["StepCount"]) -> "StepCount":
-        """Returns what several solves took together."""
-        return cls(
-            sum(count.newton for count in counts),
-            sum(count.krylov for count in counts),
-            max(count.rung for count in counts),
-            max(count.residual for count in counts),
-            all(count.converged for count in counts),
-        )
-
 
 @dataclass(frozen=True)
 class Iterate:

@@ -66,7 +66,7 @@ def run(
         state = State.at_start(start, parameters.step_s)
         state = save(weeks[0], state)
     first, resumed, diverged = len(state.rows), time.monotonic(), None
-    for before, week in pairwise(weeks):
+    for week in weeks[1:]:
         until = seconds_to(week, parameters)
         while state.time_s < until * (1 - 1e-12) and diverged is None:
             try:
@@ -80,9 +80,8 @@ def run(
             if arrived:
                 state = save(week, state)
             if comm.rank == 0:
-                if arrived:
-                    for missed in missed_curves([row for row in state.rows if row["week"] > before + 1e-9]):
-                        warn(missed)
+                if arrived and (missed := missed_curves(state.rows[-1])):
+                    warn(missed)
                 write_checkpoint(folder / "state.h5", key, state)
                 row, end_week = state.rows[-1], parameters.end_week
                 rate = (time.monotonic() - resumed) / (len(state.rows) - first)

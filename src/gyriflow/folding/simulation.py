@@ -176,18 +176,10 @@ class Folding:
         return tissue, growth
 
     def _grow(self, tissue: Tissue, growth: Growth, state: State, step_s: float) -> tuple[Floats, StepCount]:
-        """Solves a step, again while its growth asks for it; returns its (n, 3) displacement in m and what it took."""
-        guesses, counts = [self.domain.local(guess) for guess in state.predicted(step_s)], []
-        while True:
-            counts.append(self.solver.solve(*guesses))
-            guesses = [self.problem.displacement.copy()]
-            u = self.domain.gathered(guesses[0][: self.domain.owned])
-            again = growth.again(self.inputs.size((state.positions + u) * MM_PER_M))
-            if again is None:
-                self.growth, self.fields.step_s = growth, step_s
-                return u, StepCount.of_all(counts)
-            growth = again
-            self.problem.set_growth(growth.inverse(tissue))
+        """Solves a step; returns its (n, 3) displacement in m and what it took."""
+        count = self.solver.solve(*[self.domain.local(guess) for guess in state.predicted(step_s)])
+        self.growth, self.fields.step_s = growth, step_s
+        return self.domain.gathered(self.problem.displacement[: self.domain.owned]), count
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats:
         """Returns the (c, q, 3, 3) stretch of local elements that is left for a step."""
