@@ -52,9 +52,7 @@ rule regions:
         params=PARAMETERS,
         maps=from_simulation("maps"),
         # the hemispheres of the folded brain are those of the measured one
-        sides=lambda wildcards: [
-            PIAL[side] for side in study.brains[wildcards.brain].sides
-        ],
+        sides=lambda w: [PIAL[side] for side in study.brains[w.brain].sides],
     output:
         **REGIONS,
     script:
@@ -94,8 +92,8 @@ def limits(wildcards):
 LIMITED = {
     "mpi": "mpiexec",
     "tasks": from_simulation("settings.ranks"),
-    "mem_mb": lambda wildcards: limits(wildcards)[0],
-    "runtime": lambda wildcards: limits(wildcards)[1],
+    "mem_mb": lambda w: limits(w)[0],
+    "runtime": lambda w: limits(w)[1],
 }
 
 

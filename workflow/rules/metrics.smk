@@ -39,9 +39,7 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         input:
             unpack(from_brain("measured.parts")),
             report=PIAL["report"],
-            source=lambda wildcards: list(
-                study.brains[wildcards.brain].white_from.values()
-            ),
+            source=lambda w: list(study.brains[w.brain].white_from.values()),
         output:
             **white_of(*sides),
         wildcard_constraints:
@@ -69,33 +67,29 @@ rule displacement:
     output:
         DISPLACEMENT,
     params:
-        labels=lambda wildcards: {"subject": wildcards.brain, "run": wildcards.run},
+        labels=lambda w: {"subject": w.brain, "run": w.run},
     script:
         "../scripts/displacement.py"
 
 
 rule similarity:
     input:
-        simulated=lambda wildcards: list(
-            study.simulations[wildcards.run, wildcards.brain]
-            .at(float(wildcards.week))
-            .parts.values()
+        simulated=lambda w: list(
+            study.simulations[w.run, w.brain].at(float(w.week)).parts.values()
         ),
-        real=lambda wildcards: list(
-            study.brains[wildcards.measured].measured.parts.values()
-        ),
+        real=lambda w: list(study.brains[w.measured].measured.parts.values()),
     output:
         SIMILARITY,
     wildcard_constraints:
         measured=one_of(study.brains),
     params:
-        labels=lambda wildcards: {
-            "subject": wildcards.brain,
-            "run": wildcards.run,
-            "week": float(wildcards.week),
-            "real": wildcards.measured,
+        labels=lambda w: {
+            "subject": w.brain,
+            "run": w.run,
+            "week": float(w.week),
+            "real": w.measured,
         },
-        parts=lambda wildcards: ["whole", *study.brains[wildcards.brain].sides],
+        parts=lambda w: ["whole", *study.brains[w.brain].sides],
     script:
         "../scripts/similarity.py"
 

@@ -4,7 +4,7 @@ from gyriflow.study import reporting
 
 rule quality_page:
     input:
-        unpack(lambda wildcards: reporting.quality_files(study.brains[wildcards.brain])),
+        unpack(lambda w: reporting.quality_files(study.brains[w.brain])),
     output:
         png=f"{BRAIN}/figures/quality.png",
         pdf=f"{BRAIN}/figures/quality.pdf",
@@ -14,11 +14,9 @@ rule quality_page:
         synthetic=from_brain("given.synthetic"),
         white_files=from_brain("given.white_files"),
         affine_from=from_brain("given.affine_from"),
-        labels=lambda wildcards: reporting.quality_labels(
-            study.brains[wildcards.brain].given
-        ),
+        labels=lambda w: reporting.quality_labels(study.brains[w.brain].given),
         scheme=from_brain("scheme"),
-        logs=lambda wildcards: reporting.surface_logs(study.brains[wildcards.brain]),
+        logs=lambda w: reporting.surface_logs(study.brains[w.brain]),
         dpi=CONFIG.report.dpi,
     script:
         "../scripts/quality_page.py"

@@ -5,7 +5,7 @@ from gyriflow.config.atlas import SULCI
 
 rule given_regions:
     input:
-        unpack(lambda wildcards: CONFIG.metrics.regions[wildcards.brain].files),
+        unpack(lambda w: CONFIG.metrics.regions[w.brain].files),
         left=PIAL["left"],
         right=PIAL["right"],
         report=PIAL["report"],
@@ -15,14 +15,14 @@ rule given_regions:
         brain=brains_with(lambda brain: brain.regions_from == "given"),
     params:
         affine_from=from_brain("given.affine_from"),
-        names=lambda wildcards: CONFIG.metrics.regions[wildcards.brain].names,
+        names=lambda w: CONFIG.metrics.regions[w.brain].names,
     script:
         "../scripts/given_regions.py"
 
 
 rule carried_regions:
     input:
-        unpack(lambda wildcards: study.region_inputs(wildcards.brain)),
+        unpack(lambda w: study.region_inputs(w.brain)),
         left=PIAL["left"],
         right=PIAL["right"],
         report=PIAL["report"],
@@ -31,7 +31,7 @@ rule carried_regions:
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.regions_from == "carried"),
     params:
-        posed=lambda wildcards: study.posed_regions(wildcards.brain),
+        posed=lambda w: study.posed_regions(w.brain),
     script:
         "../scripts/carried_regions.py"
 
@@ -50,7 +50,7 @@ rule named_sulci:
         brain=brains_with(lambda brain: brain.regions_from == "named"),
     params:
         read=from_brain("registered"),
-        posed=lambda wildcards: not study.brains[wildcards.brain].given.has_labels,
+        posed=lambda w: not study.brains[w.brain].given.has_labels,
     script:
         "../scripts/named_sulci.py"
 
@@ -87,16 +87,16 @@ rule region_metrics:
 
 rule template_maps:
     input:
-        unpack(lambda wildcards: study.template_inputs(wildcards.where, wildcards.side)),
+        unpack(lambda w: study.template_inputs(w.where, w.side)),
         maps="results/{where}/{side}.shape.gii",
     output:
         TEMPLATE_MAPS,
     wildcard_constraints:
         where=one_of(study.measured),
     params:
-        posed=lambda wildcards: study.series.posed(
+        posed=lambda w: study.series.posed(
             study.brains[CONFIG.metrics.template],
-            study.brains[study.places[wildcards.where].subject],
+            study.brains[study.places[w.where].subject],
         ),
     script:
         "../scripts/template_maps.py"

@@ -20,17 +20,16 @@ rule surface_mask:
 
 rule register:
     input:
-        earlier=lambda wildcards: study.brains[wildcards.earlier].registered_volume,
-        later=lambda wildcards: study.brains[wildcards.later].registered_volume,
+        earlier=lambda w: study.brains[w.earlier].registered_volume,
+        later=lambda w: study.brains[w.later].registered_volume,
     output:
         REGISTERED,
     wildcard_constraints:
         earlier=one_of(study.brains),
         later=one_of(study.brains),
     params:
-        brains=lambda wildcards: [
-            study.brains[name].registered
-            for name in (wildcards.earlier, wildcards.later)
+        brains=lambda w: [
+            study.brains[name].registered for name in (w.earlier, w.later)
         ],
     script:
         "../scripts/register.py"
@@ -102,7 +101,7 @@ rule carried_mesh:
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
-        later=lambda wildcards: study.chains[wildcards.brain, "self"].correspondences,
+        later=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
         CARRIED_MESH,
     wildcard_constraints:
@@ -110,6 +109,6 @@ rule carried_mesh:
     resources:
         mem_mb=8000,
     params:
-        weeks=lambda wildcards: study.chains[wildcards.brain, "self"].weeks,
+        weeks=lambda w: study.chains[w.brain, "self"].weeks,
     script:
         "../scripts/carried_mesh.py"

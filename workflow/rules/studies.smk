@@ -25,9 +25,9 @@ rule compare_member:
     wildcard_constraints:
         study=one_of(study.comparisons),
     params:
-        real=lambda wildcards: {
+        real=lambda w: {
             real.id: real.population
-            for real in study.comparisons[wildcards.study].real[wildcards.brain]
+            for real in study.comparisons[w.study].real[w.brain]
         },
         population=from_brain("population"),
     script:
@@ -36,7 +36,7 @@ rule compare_member:
 
 rule study_tables:
     input:
-        unpack(lambda wildcards: study.comparisons[wildcards.study].inputs),
+        unpack(lambda w: study.comparisons[w.study].inputs),
         published=PUBLISHED,
     output:
         members=f"{STUDY}/{{study}}/members.csv",
@@ -45,8 +45,8 @@ rule study_tables:
     wildcard_constraints:
         study=one_of(study.comparisons),
     params:
-        members=lambda wildcards: study.comparisons[wildcards.study].rows,
-        week=lambda wildcards: study.comparisons[wildcards.study].week,
+        members=lambda w: study.comparisons[w.study].rows,
+        week=lambda w: study.comparisons[w.study].week,
     script:
         "../scripts/study_tables.py"
 

@@ -9,7 +9,7 @@ METRIC_TABLES = [
 
 rule study_table:
     input:
-        lambda wildcards: JOINED[wildcards.table],
+        lambda w: JOINED[w.table],
     output:
         f"{STUDY}/{{table}}.csv",
     wildcard_constraints:
