@@ -23,9 +23,9 @@ def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
     assert outcome.returncode == 2
     said = message(outcome)
     assert "the configuration has 3 problems" in said
-    assert "folding.poisson_ratio: found 0.5; it should be less than 0.5" in said
+    assert "folding.poisson_ratio: Input should be less than 0.5; found 0.5" in said
     assert "folding.thicknes_mm: unknown key; did you mean thickness_mm?" in said
-    assert "folding.end_week: found 50; it should be less than or equal to 45" in said
+    assert "folding.end_week: Input should be less than or equal to 45; found 50" in said
 
 
 @pytest.mark.fault(31)

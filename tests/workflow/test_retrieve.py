@@ -95,7 +95,7 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
 @pytest.mark.promise(7)
 def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
     raw = study(workflow.directory, server.url)
-    raw["atlas"] = {"file": "atlas.yaml", "folder": "mine"}
+    raw["atlas"] = {"name": "atlas.yaml", "folder": "mine"}
     name = workflow.write("study.yaml", raw)
     own = workflow.directory / "mine" / "old" / "w21" / "labels.nii.gz"
     own.parent.mkdir(parents=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from ..config.atlas import Atlas, AtlasSettings, atlas_sections
+from ..config.atlas import Atlas, AtlasSettings
 from ..errors import InputError
 from ..io.files import write_text
 from ..io.volumes import read_label_volume
@@ -99,7 +99,7 @@ def write_prediction(
     if scheme is None:
         raise InputError("has labels that fit no scheme, or several", path=labels, remedy="Name it: --scheme")
     entry = {"id": SUBJECT, "week": weeks[0], "population": SUBJECT, "labels": str(labels.resolve()), "scheme": scheme}
-    settings = validated(AtlasSettings, atlas_sections(atlas or SHIPPED_ATLAS)[0][1], "--atlas")
+    settings = validated(AtlasSettings, atlas or SHIPPED_ATLAS, "--atlas")
     series = _growing(Atlas(**read_keys(settings.description)), weeks, accepted)
     section = settings.model_dump(exclude_defaults=True) | series | ({"accept_licence": True} if accepted else {})
     brains = [entry | ({"image": str(image.resolve())} if image else {})]

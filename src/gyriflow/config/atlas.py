@@ -1,7 +1,7 @@
 """Atlases: what an `atlas.yaml` says, and how a study uses one: series and weeks, places of files, brains."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,28 +10,28 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from ..parameters.settings import Key, Settings, located, nearest, refused
+from ..parameters.settings import Problem, Settings, located, nearest, refused
 from ..parameters.terms import AffineSource, Coordinates
 from ..parameters.varying import Week
 from ..shipped import SHIPPED
 
 ATLASES = SHIPPED / "atlases"
+"""Folder of the atlases that come with gyriflow, each in a folder of its own."""
 SULCI = ATLASES / "spina-bifida"
 """The folder of the brain that named sulci are drawn on: how in `sulci.yaml`, by voxel in `sulci.nii.gz`."""
-"""Folder of the atlases that come with gyriflow, each in a folder of its own."""
+DOWNLOADS = Path("resources", "atlases")
+"""Folder in the working directory for the files of atlases whose section names no other."""
 
 FileKey = Literal["labels", "image", "left", "right", "pial"]
-
 SOURCES_OF_SERIES = ({"labels"}, {"left", "right"}, {"pial"})
 """The keys of files that give a surface, of which a series has one set; `image` goes with labels."""
-
 WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
 """How a week may be written in a file's name, as `05.2f`."""
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 
 
 def _names_weeks(pattern: str) -> bool:
-    """Returns whether the fields of a pattern are weeks, as plain numbers: what fills them out cannot be a path."""
+    """Return whether the fields of a pattern are weeks, as plain numbers: what fills them out cannot be a path."""
     try:
         fields = [(name, kind, flag) for _, name, kind, flag in Formatter().parse(pattern) if name is not None]
     except ValueError:
@@ -39,6 +39,12 @@ def _names_weeks(pattern: str) -> bool:
     return bool(fields) and all(
         name == "week" and flag is None and re.fullmatch(WEEK_FORMAT, kind or "") for name, kind, flag in fields
     )
+
+
+def _require_weeks_once(weeks: Iterable[Any]) -> None:
+    listed = [str(week) for week in weeks]
+    if not listed or len(set(listed)) < len(listed):
+        raise ValueError("should name one week or more, each once")
 
 
 class AtlasLicence(Settings):
@@ -64,12 +70,6 @@ class AtlasReference(Settings):
     url: str | None = None
     """Page of the atlas."""
 
-    @property
-    def text(self) -> str:
-        """The citation with its DOI or page."""
-        place = f"doi {self.doi}" if self.doi else self.url
-        return f"{self.citation}, {place}" if place else self.citation
-
 
 class AtlasFileRecord(Settings):
     """Size and checksum of a file."""
@@ -94,50 +94,37 @@ class AtlasSeries(Settings):
     matched: bool = False
     """Whether surfaces of all weeks have the same vertices; believed until the files are there."""
     files: dict[FileKey, str]
-    """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week:
-    `labels` and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one."""
+    """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week: `labels`
+    and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one."""
     weeks: dict[Week, dict[FileKey, AtlasFileRecord]]
     """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files. [GW]"""
 
     @field_validator("weeks", mode="before")
     @classmethod
     def _weeks_without_records(cls, value: Any) -> Any:
+        if isinstance(value, list | dict):
+            _require_weeks_once(value)
         if isinstance(value, list):
-            if len({str(week) for week in value}) < len(value):
-                raise ValueError("name each week once")
             return {week: {} for week in value}
-        if isinstance(value, dict):
-            return {week: records or {} for week, records in value.items()}
-        return value
-
-    @field_validator("weeks")
-    @classmethod
-    def _some_weeks(cls, weeks: dict[float, Any]) -> dict[float, Any]:
-        if not weeks:
-            raise ValueError("have one week or more")
-        return weeks
+        return {week: records or {} for week, records in value.items()} if isinstance(value, dict) else value
 
     @field_validator("files")
     @classmethod
     def _paths_with_week(cls, files: dict[FileKey, str]) -> dict[FileKey, str]:
         if set(files) - {"image"} not in SOURCES_OF_SERIES or ("image" in files and "labels" not in files):
-            raise ValueError("have labels (and perhaps image), or left and right, or pial")
+            raise ValueError("should have labels (and perhaps image), or left and right, or pial")
         for pattern in files.values():
             if Path(pattern).is_absolute() or ".." in Path(pattern).parts or "\\" in pattern:
-                raise ValueError("be paths below the folder of the atlas")
+                raise ValueError("should be paths below the folder of the atlas")
             if not _names_weeks(pattern):
-                raise ValueError("have {week} in each path, for the gestational week")
+                raise ValueError("should have {week} in each path, for the gestational week")
         return files
 
-    @model_validator(mode="after")
-    def _keys_of_labels(self) -> "AtlasSeries":
-        if "labels" in self.files and self.scheme is None:
-            raise ValueError("have a `scheme`, which says what the labels mean")
-        if "labels" not in self.files and self.scheme is not None:
-            raise ValueError("have no `scheme` where it has no labels")
+    def problems(self) -> Iterator[Problem]:
+        if ("labels" in self.files) != (self.scheme is not None):
+            yield Problem("is needed with labels, whose meaning it is, and with nothing else", ("scheme",))
         if self.matched and "labels" in self.files:
-            raise ValueError("have no `matched` with labels, which have no vertices")
-        return self
+            yield Problem("has no meaning with labels, which have no vertices", ("matched",))
 
     @property
     def needed(self) -> list[FileKey]:
@@ -164,34 +151,29 @@ class Atlas(Settings):
     """Populations by name, each a series over the weeks."""
 
     def brain_id(self, series: str, week: float) -> str:
-        """Returns the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas has one series."""
+        """Return the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas has one series."""
         return "-".join([self.name, *([series] if len(self.series) > 1 else []), f"{week:g}"])
 
 
 def shipped_atlases() -> list[str]:
-    """Returns the names of the atlases that come with gyriflow."""
+    """Return the names of the atlases that come with gyriflow."""
     return sorted(path.parent.name for path in ATLASES.glob("*/atlas.yaml"))
 
 
 # in a study
 
-DOWNLOADS = Path("resources", "atlases")
-"""Folder in the working directory for the files of atlases whose section names no other."""
-
 
 class AtlasSettings(Settings):
     """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` if it has one series).
 
-    `atlas: NAME` and `atlas: FILE.yaml` are short for a section; several atlases are a list. Missing files are fetched
-    when a stage needs them, or by `./run snakemake --cores 1 retrieve`. An existing file is never replaced.
+    `atlas: NAME` is short for a section; several atlases are a list. Missing files are fetched when a stage needs
+    them, or by `./run snakemake --cores 1 retrieve`. An existing file is never replaced.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
 
-    name: str | None = None
-    """An atlas that comes with gyriflow: the name of a folder in `atlases`."""
-    file: str | None = None
-    """Instead, the `atlas.yaml` of your own atlas."""
+    name: str
+    """An atlas that comes with gyriflow, the name of a folder in `atlases`; or the `atlas.yaml` of your own."""
     series: str | tuple[str, ...] | None = None
     """Series to use; `null`: all."""
     weeks: tuple[Week, ...] | None = None
@@ -201,61 +183,49 @@ class AtlasSettings(Settings):
     folder: str | None = None
     """Folder where files are found by name, at any depth, and missing ones are put; `null`:
     `resources/atlases/NAME` in the working directory."""
-    url: str | None = None
+    url: str | None = Field(None, pattern="^https?://")
     """A mirror with the same paths."""
     accept_licence: bool = False
     """Whether you accept the licence, where the `atlas.yaml` asks for it."""
 
     @model_validator(mode="before")
     @classmethod
-    def _short_form(cls, value: Any) -> Any:
-        if isinstance(value, str):
-            return {"file" if value.endswith((".yaml", ".yml")) else "name": value}
-        return value
-
-    @model_validator(mode="after")
-    def _name_or_file(self) -> "AtlasSettings":
-        if (self.name is None) == (self.file is None):
-            raise ValueError("have either a `name` or a `file`")
-        return self
+    def _name_alone(cls, value: Any) -> Any:
+        return {"name": value} if isinstance(value, str) else value
 
     @field_validator("name")
     @classmethod
-    def _known_name(cls, name: str | None) -> str | None:
-        if name is not None and name not in (known := shipped_atlases()):
-            raise refused(f"found {name!r}; {nearest(name, known)} An atlas.yaml of your own goes under file")
+    def _known_name(cls, name: str) -> str:
+        if not name.endswith((".yaml", ".yml")) and name not in (shipped := shipped_atlases()):
+            raise refused(f"found {name!r}; {nearest(name, shipped)} An atlas of your own is an atlas.yaml")
         return name
 
     @field_validator("weeks")
     @classmethod
     def _some_weeks_once(cls, weeks: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if weeks is not None and not weeks:
-            raise ValueError("have one week or more")
-        if weeks is not None and len(set(weeks)) < len(weeks):
-            raise ValueError("name each week once")
+        if weeks is not None:
+            _require_weeks_once(weeks)
         return weeks
-
-    @field_validator("url")
-    @classmethod
-    def _web_address(cls, url: str | None) -> str | None:
-        if url is not None and not url.startswith(("http://", "https://")):
-            raise ValueError("begin with https:// or http://")
-        return url
 
     @property
     def description(self) -> Path:
         """The `atlas.yaml`."""
-        return Path(self.file) if self.file is not None else ATLASES / str(self.name) / "atlas.yaml"
+        return Path(self.name) if self.name.endswith((".yaml", ".yml")) else ATLASES / self.name / "atlas.yaml"
 
     def located(self, base_dir: Path) -> "AtlasSettings":
-        """Returns the section with `file` and `folder` as absolute paths."""
-        paths = {key: path for key in ("file", "folder") if (path := getattr(self, key)) is not None}
-        return self.model_copy(update={key: str(located(base_dir, path)) for key, path in paths.items()})
+        """Return the section with absolute paths."""
+        paths = {} if self.folder is None else {"folder": str(located(base_dir, self.folder))}
+        if self.description == Path(self.name):
+            paths["name"] = str(located(base_dir, self.name))
+        return self.model_copy(update=paths)
 
 
 @dataclass(frozen=True)
 class AtlasFile:
-    """A file of an atlas: its week and key, its place, its address and its record."""
+    """A file of an atlas: its week and key, its place, its address and its record.
+
+    `copies` are the files of that name: none if it is missing, several if it is ambiguous.
+    """
 
     series: str
     week: float
@@ -264,7 +234,6 @@ class AtlasFile:
     url: str | None
     record: AtlasFileRecord
     copies: tuple[Path, ...]
-    """The files of that name: none if it is missing, several if it is ambiguous."""
 
 
 @dataclass(frozen=True)
@@ -303,35 +272,28 @@ class UsedAtlas:
 
     def _files_of(self, name: str) -> Iterator[AtlasFile]:
         series = self.atlas.series[name]
-        keys = list(series.files) if self.settings.images else series.needed
+        root = (self.settings.url or self.atlas.url or "").rstrip("/")
         for week in self._weeks_of(name):
-            for key in keys:
+            for key in series.files if self.settings.images else series.needed:
                 path = series.files[key].format(week=int(week) if week == int(week) else week)
-                root = (self.settings.url or self.atlas.url or "").rstrip("/")
                 copies = self._in_folder[series.files[key]].get(week) or self._shipped(path)
-                yield AtlasFile(
-                    series=name,
-                    week=week,
-                    key=key,
-                    path=copies[0] if copies else self.folder / path,
-                    # what is not published has no address
-                    url=f"{root}/{path}" if root and week in series.weeks else None,
-                    record=series.weeks.get(week, {}).get(key, AtlasFileRecord()),
-                    copies=tuple(copies),
-                )
+                # what is not published has no address
+                url = f"{root}/{path}" if root and week in series.weeks else None
+                record = series.weeks.get(week, {}).get(key, AtlasFileRecord())
+                place = copies[0] if copies else self.folder / path
+                yield AtlasFile(name, week, key, place, url, record, tuple(copies))
 
     def _weeks_of(self, name: str) -> list[float]:
-        """Returns the weeks of a series that are used: published ones, and others of which the folder has files."""
-        published = set(self.atlas.series[name].weeks)
+        """Return the weeks of a series that are used: published ones, and others of which the folder has files."""
         if self.settings.weeks is None:
-            return sorted(published)
-        known = published | self.present_weeks(name)
-        return [week for week in sorted(self.settings.weeks) if week in known]
+            return sorted(self.atlas.series[name].weeks)
+        return [week for week in sorted(self.settings.weeks) if week in self.known_weeks(name)]
 
-    def present_weeks(self, name: str) -> set[float]:
-        """Returns the weeks of which the folder has all that a brain needs."""
+    def known_weeks(self, name: str) -> set[float]:
+        """Return the weeks of a series that are published, or of which the folder has all that a brain needs."""
         series = self.atlas.series[name]
-        return set.intersection(*(set(self._in_folder[series.files[key]]) for key in series.needed))
+        present = [set(self._in_folder[series.files[key]]) for key in series.needed]
+        return set(series.weeks) | set.intersection(*present)
 
     @cached_property
     def _in_folder(self) -> dict[str, dict[float, list[Path]]]:
@@ -340,35 +302,28 @@ class UsedAtlas:
         return {pattern: self._copies(pattern) for pattern in patterns}
 
     def _copies(self, pattern: str) -> dict[float, list[Path]]:
-        """Returns the files of a pattern anywhere in the folder by week; the path from the week on has to match."""
+        """Return the files of a pattern anywhere in the folder by week; the path from the week on has to match."""
         parts = pattern.split("/")
         tail = "/".join(parts[max(number for number, part in enumerate(parts) if "{week" in part) :])
         pieces = list(Formatter().parse(tail))
         name = "".join(re.escape(text) + (r"(\d+(?:\.\d+)?)" if field else "") for text, field, *_ in pieces)
-        found: dict[float, list[Path]] = {}
+        copies: dict[float, list[Path]] = {}
         for path in sorted(self.folder.rglob("".join(text + ("*" if field else "") for text, field, *_ in pieces))):
             match = re.fullmatch(f"(?:.*/)?{name}", path.as_posix())
             if match and path.is_file():
-                found.setdefault(float(match[1]), []).append(path)
-        return found
+                copies.setdefault(float(match[1]), []).append(path)
+        return copies
 
     def _shipped(self, path: str) -> list[Path]:
-        """Returns the file that comes with the atlas, if it does."""
+        """Return the file that comes with the atlas, if it does."""
         if self.atlas.folder is None:
             return []
         place = (self.settings.description.parent / self.atlas.folder / path).resolve()
         return [place] if place.is_file() else []
 
 
-def atlas_sections(raw: Any) -> list[tuple[Key, Any]]:
-    """Returns the entries of `atlas` as given (raw) with the keys that lead to them."""
-    if isinstance(raw, list):
-        return [(("atlas", number), entry) for number, entry in enumerate(raw)]
-    return [] if raw is None else [(("atlas",), raw)]
-
-
 def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
-    """Returns the entries of `brains` that an atlas stands for, whether their files are there or to be fetched."""
+    """Return the entries of `brains` that an atlas stands for, whether their files are there or to be fetched."""
     entries: dict[str, dict[str, Any]] = {}
     for file in used.files:
         series, name = used.atlas.series[file.series], used.atlas.brain_id(file.series, file.week)
@@ -384,58 +339,51 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
     return list(entries.values())
 
 
-def atlas_problems(used: UsedAtlas) -> Iterator[str]:
-    """Yields what is wrong between a section, its atlas and its folder, each with its key in front."""
-    atlas, settings = used.atlas, used.settings
-    unknown = [name for name in used.series if name not in atlas.series]
-    if unknown:
-        yield f"series: found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}"
+def atlas_problems(used: UsedAtlas) -> Iterator[Problem]:
+    """Yield what is wrong between a section, its atlas and its folder."""
+    atlas, settings, licence = used.atlas, used.settings, used.atlas.licence
+    if unknown := [name for name in used.series if name not in atlas.series]:
+        yield Problem(f"found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}", ("series",))
         return
     if used.folder.exists() and not used.folder.is_dir():
-        yield f"folder: {used.folder} is a file; it should be a folder"
+        yield Problem(f"{used.folder} is a file; expected a folder", ("folder",))
         return
-    licence = atlas.licence
     if licence.accept and not settings.accept_licence:
-        yield (
-            f"accept_licence: found false; the licence of {atlas.name} ({licence.name}"
-            + (f", {licence.url}" if licence.url else "")
-            + f") is to be accepted: {licence.terms} Write `accept_licence: true` if you do"
+        name = ", ".join(filter(None, (licence.name, licence.url)))
+        text = f"found false; true accepts the licence of {atlas.name} ({name}): {licence.terms}"
+        yield Problem(text, ("accept_licence",))
+    known = set.union(*map(used.known_weeks, used.series))
+    if unknown_weeks := sorted(set(settings.weeks or ()) - known):
+        of = atlas.name if settings.series is None else f"{atlas.name} ({', '.join(used.series)})"
+        text = (
+            f"{of} has no files of {_listed(unknown_weeks)}; it has {_listed(sorted(known))}. A week is never rounded"
         )
-    yield from _week_problems(used)
+        yield Problem(text, ("weeks",))
     for file in used.files:
         if len(file.copies) > 1:
-            yield f"folder: found {' and '.join(map(str, file.copies))}; keep one of them"
+            yield Problem(f"found {' and '.join(map(str, file.copies))}; keep one of them", ("folder",))
         elif not file.copies and file.url is None:
-            yield f"weeks: {file.path} is missing and cannot be fetched, as {atlas.name} has no url for it"
-
-
-def _week_problems(used: UsedAtlas) -> Iterator[str]:
-    """Yields the weeks that none of the series has."""
-    have = {week for name in used.series for week in (*used.atlas.series[name].weeks, *used.present_weeks(name))}
-    lacking = [week for week in sorted(used.settings.weeks or ()) if week not in have]
-    if lacking:
-        weeks = f"week{'s' if len(lacking) > 1 else ''} {_as_text(lacking)}"
-        chosen = "" if used.settings.series is None else f" ({', '.join(used.series)})"
-        yield (
-            f"weeks: {used.atlas.name}{chosen} has no files of {weeks}; it has {_as_text(sorted(have))}. A week is "
-            "never rounded"
-        )
+            yield Problem(
+                f"{file.path} is missing and cannot be fetched, as {atlas.name} has no url for it", ("weeks",)
+            )
 
 
 def retrieval_note(used: UsedAtlas) -> str:
-    """Returns the note that is shown before missing files of an atlas are fetched: size, reference and licence."""
+    """Return the note that is shown before missing files of an atlas are fetched: size, reference and licence."""
     atlas, sizes = used.atlas, [file.record.bytes for file in used.missing]
     size = f" ({sum(size or 0 for size in sizes) / 1e6:.1f} MB)" if all(sizes) else ""
     checks = "" if all(file.record.sha256 for file in used.missing) else "; no checksums are known"
     count = f"{len(sizes)} file{'s' if len(sizes) > 1 else ''}"
     lines = [f"{atlas.name}: {count}{size} to fetch into {used.folder} where a stage needs them{checks}"]
-    lines += [f"cite: {atlas.reference.text}"] if atlas.reference else []
+    if atlas.reference is not None:
+        place = f"doi {atlas.reference.doi}" if atlas.reference.doi else atlas.reference.url
+        lines.append("cite: " + ", ".join(filter(None, (atlas.reference.citation, place))))
     address = f" ({atlas.licence.url})" if atlas.licence.url else ""
     return "\n  ".join([*lines, f"licence: {atlas.licence.name}{address}. {atlas.licence.terms}"])
 
 
-def _as_text(weeks: list[float]) -> str:
-    """Returns weeks as text, three or more in a row as a range: "21-29, 30.5"."""
+def _listed(weeks: list[float]) -> str:
+    """Return weeks as text, three or more in a row as a range: "21-29, 30.5"."""
     rows: list[list[float]] = []
     for week in weeks:
         if rows and week == rows[-1][-1] + 1:

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from ..errors import InputError
 from ..parameters.schemes import Label
-from ..parameters.settings import InputFile, Problem, Settings, beside, check, located
+from ..parameters.settings import InputFile, Problem, Settings, beside, located
 from ..parameters.synthetic import ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
 from ..parameters.varying import Week
@@ -23,11 +23,14 @@ SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
 """How the names of volumes end."""
 
+HEMISPHERE_LABELS, HEMISPHERE_SURFACE = "labels of a hemisphere", "a hemisphere's surface"
+OF_LABELS = ("labels", HEMISPHERE_LABELS)
+OF_SURFACES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
 MEANINGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("scheme", "image", "affine_from"), ("labels", "hemisphere")),
-    "coordinates": ("hemispheres", "hemisphere", "pial"),
-    "white": ("pial",),
-    "population": tuple(source for source in SOURCES if source != "shape"),
+    **dict.fromkeys(("scheme", "image", "affine_from"), OF_LABELS),
+    "coordinates": OF_SURFACES,
+    "white": ("pial", HEMISPHERE_SURFACE),
+    "population": (*OF_LABELS, *OF_SURFACES),
 }
 """Keys that make sense only with some sources."""
 
@@ -60,8 +63,6 @@ class OneHemisphere(Settings):
     hemisphere."""
     side: Side
     """Which hemisphere it is."""
-    white: InputFile | None = None
-    """White surface in the same coordinates, for the cortical thickness."""
 
 
 class Brain(Settings):
@@ -94,7 +95,7 @@ class Brain(Settings):
     pial: InputFile | None = None
     """Closed surface of the whole brain."""
     white: InputFile | None = None
-    """White surface of `pial`, for the cortical thickness."""
+    """White surface of `pial` or `hemisphere`, in the same coordinates, for the cortical thickness."""
     coordinates: Coordinates = "auto"
     """Axes of surface files; `auto` finds any pose."""
     shape: ShapeSettings | None = None
@@ -142,44 +143,31 @@ class Brain(Settings):
     @property
     def white_files(self) -> dict[str, str]:
         """The white surfaces by what they are of: left, right, whole."""
-        if self.hemisphere is not None:
-            return {} if self.hemisphere.white is None else {"whole": self.hemisphere.white}
         pair = self.hemispheres.white if self.hemispheres else None
         sides = {} if pair is None else {"left": pair.left, "right": pair.right}
         return sides if self.white is None else {"whole": self.white}
 
-    @check
-    def _keys_go_with_the_source(self) -> Iterator[Problem]:
+    @property
+    def _kind(self) -> str:
+        """The source, with what it is where that may be either."""
+        if self.hemisphere is None:
+            return self.source
+        volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
+        return HEMISPHERE_LABELS if volume else HEMISPHERE_SURFACE
+
+    def problems(self) -> Iterator[Problem]:
         given = [key for key in SOURCES if self.gives(key)]
         if not given and self.image is not None:
-            yield Problem(
-                "gyriflow does not segment images; give a label volume under labels",
-                ("image",),
-            )
+            yield Problem("gyriflow does not segment images; give a label volume under labels", ("image",))
         elif len(given) != 1:
-            found = " and ".join(given) or "none"
-            yield Problem(f"found {found} as its source; expected exactly one of {', '.join(SOURCES)}")
+            text = f"found {' and '.join(given) or 'none'} as its source; expected exactly one of {', '.join(SOURCES)}"
+            yield Problem(text)
         else:
-            for key, sources in MEANINGS.items():
-                if key in self.model_fields_set and given[0] not in sources:
-                    yield Problem(f"has no meaning with {given[0]}; only with {' or '.join(sources)}", (key,))
-        if self.labels is not None and self.scheme is None:
-            yield Problem("is missing; it says what the labels mean", ("scheme",))
-
-    @check
-    def _a_hemisphere_is_labels_or_surface(self) -> Iterator[Problem]:
-        if self.hemisphere is None:
-            return
-        volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
-        if volume and self.scheme is None:
-            yield Problem("is missing; it says what the labels of the hemisphere mean", ("scheme",))
-        if volume and "coordinates" in self.model_fields_set:
-            yield Problem("has no meaning with a label volume, whose affine says them", ("coordinates",))
-        if volume and self.hemisphere.white is not None:
-            yield Problem("has no meaning with a label volume", ("hemisphere", "white"))
-        for key in () if volume else ("scheme", "image", "affine_from"):
-            if key in self.model_fields_set:
-                yield Problem("has no meaning with a surface; only with labels", (key,))
+            for key, kinds in MEANINGS.items():
+                if key in self.model_fields_set and self._kind not in kinds:
+                    yield Problem(f"has no meaning with {self._kind}; only with {' or '.join(kinds)}", (key,))
+            if self._kind in OF_LABELS and self.scheme is None:
+                yield Problem("is missing; it says what the labels mean", ("scheme",))
 
 
 # tables of brains
@@ -197,7 +185,7 @@ COLUMNS = (
     *(column for columns in NESTED.values() for column in columns),
 )
 """The columns that are keys of brains; any others are covariates."""
-PATHS = ("labels", "image", "pial", "white", *NESTED["hemispheres"], "hemisphere.file", "hemisphere.white")
+PATHS = ("labels", "image", "pial", "white", *NESTED["hemispheres"], "hemisphere.file")
 ALMOST = 0.85
 """How like the name of a key an unknown column has to be to be taken for a mistyped one."""
 
@@ -349,8 +337,7 @@ class GivenRegions(Settings):
     """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name are one region,
     unnamed ones none. Needed with a volume; else the label files' names count."""
 
-    @check
-    def _one_source(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         sides = [side for side in SIDES if self.gives(side)]
         if (self.volume is not None) == bool(sides):
             found = "both" if sides else "neither"

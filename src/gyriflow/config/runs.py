@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from ..parameters.folding import FoldingSettings
 from ..parameters.growth import SIZES
-from ..parameters.settings import Problem, Settings, check
+from ..parameters.settings import Problem, Settings
 from ..parameters.terms import SCORES, Score
 from .brains import Brain
 
@@ -78,9 +78,8 @@ class Run(FoldingSettings):
     start: Start | None = None
     """Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the study's `start`."""
 
-    # not of parameters, which hold the sizes of the shapes
-    @check
-    def _shapes_have_their_own_sizes(self) -> Iterator[Problem]:
+    # unlike `folding`, it may have rates that its growth model does not use; parameters hold the sizes of the shapes
+    def problems(self) -> Iterator[Problem]:
         for key in SIZES:
             if self.growth.model == "shapes" and getattr(self.growth, key) != "measured":
                 yield Problem("has no meaning with the model shapes; expected sizes", ("growth", key))
@@ -230,8 +229,7 @@ class Calibration(Compared):
     seed: int = Field(0, ge=0)
     """Seed of the sequence and of the Gaussian process."""
 
-    @check
-    def _few_bounded_and_scored(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         if not 1 <= len(self.parameters) <= MOST_PARAMETERS:
             yield Problem(f"found {len(self.parameters)}; expected 1 to {MOST_PARAMETERS}", ("parameters",))
         if (total := len(self.runs)) > MOST_RUNS:

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, fi
 
 from ..errors import InputError
 from .growth import Growth
-from .settings import Problem, Settings, check, line, validated
+from .settings import Problem, Settings, line, validated
 from .terms import FieldName, MaterialName, MedialWall, Side
 from .varying import (
     Floats,
@@ -36,7 +36,7 @@ def _memory(value: Any) -> float:
     except (TypeError, ValueError):
         time = -1.0
     if not time >= 0 or isinstance(value, bool):
-        raise ValueError("be 0 or more, or 'infinite'")
+        raise ValueError("should be 0 or more, or 'infinite'")
     return time
 
 
@@ -151,10 +151,9 @@ class FoldingSettings(Settings):
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
 
-    @check
-    def _rates_belong_to_their_model(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
-            if self.growth.model != "rates" and self.gives(key) and type(self) is FoldingSettings:
+            if self.growth.model != "rates" and self.gives(key):
                 yield Problem(f"has no meaning with the growth model {self.growth.model}", (key,))
 
     @field_validator("*")
@@ -204,8 +203,7 @@ class FoldingParameters(FoldingSettings):
         """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
         return thickness_at(self, self.start_week, week, maps)
 
-    @check
-    def _values_are_possible(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
             yield Problem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))

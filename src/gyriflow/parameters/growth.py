@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from .settings import Problem, Settings, check
+from .settings import Problem, Settings
 from .varying import Week
 
 SizeCurve = Annotated[
@@ -53,8 +53,7 @@ class Growth(Settings):
     def _model_alone(cls, raw: Any) -> Any:
         return {"model": raw} if isinstance(raw, str) else raw
 
-    @check
-    def _keys_fit_the_model(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         for key, models in MODELS_OF_KEY.items():
             if self.model not in models and getattr(self, key) != type(self).model_fields[key].default:
                 yield Problem(f"has no meaning with the model {self.model}; expected {' or '.join(models)}", (key,))

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..shipped import SHIPPED
-from .settings import Problem, Settings, check
+from .settings import Problem, Settings
 
 SCHEME_FILES = {path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))}
 """The files of the schemes that come with gyriflow, by name."""
@@ -46,8 +46,7 @@ class SchemeSettings(Settings):
             named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
         return dict(sorted((named | self.known).items()))
 
-    @check
-    def _parts_of_the_cerebrum(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         if not self.cerebrum:
             yield Problem("found no labels; it should have one or more", ("cerebrum",))
         for key in ("cerebrum", "cortex", "left", "right", "white_matter", "ventricles"):

@@ -1,23 +1,20 @@
 """The base of all settings: a key's docstring is its description, with the unit, and problems are told together.
 
-Pydantic checks single keys. A check across keys is a method with the decorator `check` that yields a `Problem` for each
-mistake; it runs where all keys are valid.
+Pydantic checks single keys. `Settings.problems` checks them against each other, where all are valid.
 """
 
 import difflib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, ClassVar, Self, Union, get_args, get_origin
+from typing import Annotated, Any, Self, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
-    Field,
     ModelWrapValidatorHandler,
     ValidationError,
     ValidationInfo,
@@ -29,7 +26,7 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 from ..errors import InputError
 
 PROBLEM = "problem"
-"""Type of the errors whose message is complete as it is."""
+"""Type of the errors whose message says what was found."""
 
 
 @dataclass(frozen=True)
@@ -40,14 +37,8 @@ class Problem:
     key: tuple[str | int, ...] = ()
 
 
-def check[Check: Callable[[Any], Iterator[Problem]]](method: Check) -> Check:
-    """Marks a method of settings that yields problems as a check across their keys."""
-    method.is_check = True  # type: ignore[attr-defined]
-    return method
-
-
 def refused(text: str) -> PydanticCustomError:
-    """Returns the error that a validator of one key raises so that `text` becomes its whole message."""
+    """Return the error that a validator of one key raises so that `text` becomes its whole message."""
     return PydanticCustomError(PROBLEM, text)
 
 
@@ -63,57 +54,49 @@ class Settings(BaseModel):
         # an empty section, such as `mesh:`
         json_schema_extra={"type": ["object", "null"]},
     )
-    checks: ClassVar[tuple[Callable[[Any], Iterator[Problem]], ...]] = ()
-
-    @classmethod
-    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        super().__pydantic_init_subclass__(**kwargs)
-        known = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
-        cls.checks = tuple(value for value in known.values() if getattr(value, "is_check", False))
 
     @field_validator("*", mode="before")
     @classmethod
     def _refuse_what_yaml_or_a_system_takes_amiss(cls, value: Any, info: ValidationInfo) -> Any:
         # YAML reads `on`, `yes` and the like as true, which would pass as 1.0
         if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
-            raise ValueError("Input should be a number or text, not true or false")
+            raise ValueError("should be a number or text, not true or false")
         # which ends a path or an argument for the system
         inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
         if any(isinstance(text, str) and "\0" in text for text in inner):
-            raise ValueError("Text should have no NUL characters")
+            raise ValueError("should have no NUL characters")
         return value
 
     @model_validator(mode="wrap")
     @classmethod
     def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         settings = handler({} if raw is None else raw)
-        if found := dict.fromkeys(problem for check in cls.checks for problem in check(settings)):
-            errors = [InitErrorDetails(type=refused(problem.text), loc=problem.key, input=None) for problem in found]
+        if problems := dict.fromkeys(settings.problems()):
+            errors = [InitErrorDetails(type=refused(each.text), loc=each.key, input=None) for each in problems]
             raise ValidationError.from_exception_data(cls.__name__, errors)
         return settings
 
+    def problems(self) -> Iterable[Problem]:
+        """Return what is wrong between keys that are valid each."""
+        return ()
+
     def gives(self, key: str) -> bool:
-        """Returns whether a key was given with a value other than null."""
+        """Return whether a key was given with a value other than null."""
         return key in self.model_fields_set and getattr(self, key) is not None
 
 
-def setting(default: Any, unit: str, description: str, **bounds: Any) -> Any:
-    """Returns a pydantic field with its unit; `default` is ... if the user has to give the value."""
-    return Field(default, description=f"{description} [{unit}]" if unit else description, **bounds)
-
-
-# messages: the full path of each key, what was found, what is allowed
+# messages: the path of each key, what is allowed, what was found
 
 Key = tuple[str | int, ...]
 
 
 def messages(error: ValidationError, kind: type[BaseModel]) -> list[tuple[Key, str]]:
-    """Returns the path and the text of each problem of settings of a kind, in the order of the keys."""
+    """Return the path and the text of each problem of settings of a kind, in the order of the keys."""
     return [_message(details, kind) for details in error.errors()]
 
 
 def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
-    """Returns settings of a kind from plain mappings; InputError naming `where` and all problems at once."""
+    """Return settings of a kind from plain mappings; InputError naming `where` and all problems at once."""
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
@@ -121,18 +104,18 @@ def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
 
 
 def line(path: Key, text: str) -> str:
-    """Returns a problem as a line, such as `brains[0].week: found 20; it should be 21 or more`."""
+    """Return a problem as a line, such as `brains[0].week: Field required`."""
     return f"{dotted(path)}: {text}"
 
 
 def dotted(path: Key) -> str:
-    """Returns the path of a key as it is written, such as `brains[0].week`."""
+    """Return the path of a key as it is written, such as `brains[0].week`."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Returns a hint for an unknown name: the known names that end with it, the most similar one, or all of them."""
+    """Return a hint for an unknown name: the known names that end with it, the most similar one, or all of them."""
     known = list(known)
     longer = [other for other in known if other.endswith(f"_{name}")]
     near = longer or difflib.get_close_matches(name, known, n=1, cutoff=0.5)
@@ -142,38 +125,23 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
     # pydantic puts the tag of a union's member, here in parentheses, into the path
     path = tuple(part for part in details["loc"] if not str(part).startswith("("))
-    match details["type"]:
-        case t if t == PROBLEM:
-            return path, details["msg"]
-        case "extra_forbidden":
-            return path, f"unknown key; {nearest(str(path[-1]), keys_at(kind, path[:-1]))}"
-        case "missing":
-            return path, "is missing"
-        case "model_type":
-            return path, f"found {details['input']!r}; it should hold keys and values"
-    # pydantic begins with what the value is: "String should", "Tuple should"
-    expected = re.sub(r"^(Value error, )?(\w+ should )?", "", details["msg"].partition(", unable to")[0])
-    return path, f"found {details['input']!r}; it should {expected}"
+    text = details["msg"].removeprefix("Value error, ")
+    if details["type"] == "extra_forbidden":
+        text = f"unknown key; {nearest(str(path[-1]), keys_at(kind, path[:-1]))}"
+    elif details["type"] not in (PROBLEM, "missing"):
+        text += f"; found {details['input']!r}"
+    return path, text
 
 
 def keys_at(kind: Any, path: Key) -> list[str]:
-    """Returns the keys of the settings at `path` inside the type `kind`."""
-    origin, arguments = get_origin(kind), get_args(kind)
-    if path and origin in (dict, tuple):
-        return keys_at(arguments[1 if origin is dict else 0], path[1:])
-    models = _models(kind)
-    if not models:
-        return []
-    if not path:
-        return list(models[0].model_fields)
-    field = models[0].model_fields.get(str(path[0]))
-    return keys_at(field.annotation, path[1:]) if field is not None else []
-
-
-def _models(kind: Any) -> list[type[BaseModel]]:
-    if get_origin(kind) in (Union, UnionType, Annotated):
-        return [model for part in get_args(kind) for model in _models(part)]
-    return [kind] if isinstance(kind, type) and issubclass(kind, BaseModel) else []
+    """Return the keys of the settings at `path` inside the type `kind`; none where there are no settings."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        if not path:
+            return list(kind.model_fields)
+        field = kind.model_fields.get(str(path[0]))
+        return [] if field is None else keys_at(field.annotation, path[1:])
+    inner = path[1:] if get_origin(kind) in (dict, tuple) else path
+    return next((keys for part in get_args(kind) if (keys := keys_at(part, inner))), [])
 
 
 # paths of input files
@@ -183,7 +151,7 @@ WILDCARD = re.compile(r"\{.*\}", re.DOTALL)
 
 
 def beside(folder: Path, path: str) -> Path:
-    """Returns the place of a file that is named relative to a folder, or below a home folder (`~/scans/a.nii.gz`)."""
+    """Return the place of a file that is named relative to a folder, or below a home folder (`~/scans/a.nii.gz`)."""
     try:
         return folder / Path(path).expanduser()
     except RuntimeError:  # no home folder of that name: `~` is part of the file's
@@ -191,13 +159,13 @@ def beside(folder: Path, path: str) -> Path:
 
 
 def located(folder: Path | str, path: str) -> Path:
-    """Returns the absolute path of a file or folder in a folder or else, where it is only there, in the working one."""
+    """Return the absolute path of a file or folder in a folder or else, where it is only there, in the working one."""
     places = [beside(Path(folder), path), Path.cwd() / path]
     return next((place for place in places if place.exists()), places[0]).resolve()
 
 
 def _absolute(path: str, info: ValidationInfo) -> str:
-    """Returns the path of a file, which must exist: absolute, or relative in a working directory with braces.
+    """Return the path of a file, which must exist: absolute, or relative in a working directory with braces.
 
     The context names the `folder` of the configuration, which is searched for relative paths before the working
     directory, and `awaited` files, which need not exist yet. Without a context the path is returned unchanged.
@@ -220,7 +188,7 @@ InputFile = Annotated[str, AfterValidator(_absolute)]
 
 
 def _present_instead(path: Path) -> str:
-    """Returns the files beside a missing one that differ from it only in a number, such as other weeks."""
+    """Return the files beside a missing one that differ from it only in a number, such as other weeks."""
     pattern = re.compile(re.sub(r"\d+(\\\.\d+)?", r"[0-9.]+", re.escape(path.name)))
     try:
         names = sorted(other.name for other in path.parent.iterdir() if pattern.fullmatch(other.name))

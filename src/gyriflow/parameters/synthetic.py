@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .settings import Problem, Settings, check
+from .settings import Problem, Settings
 
 SHAPE_SIZES = {"sphere": "radius_mm", "ellipsoid": "semi_axes_mm"}
 """The key that holds the size of each kind of shape."""
@@ -37,8 +37,7 @@ class ShapeSettings(Settings):
         """The three semi-axes."""
         return (self.radius_mm,) * 3 if self.kind == "sphere" else self.semi_axes_mm
 
-    @check
-    def _size_and_bumps_fit_the_kind(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         own, longest, shortest = SHAPE_SIZES[self.kind], max(self.size_mm), min(self.size_mm)
         for key in SHAPE_SIZES.values():
             if self.gives(key) and key != own:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, field_validator
 from pydantic.fields import FieldInfo
 
-from .settings import InputFile, Problem, Settings, check
+from .settings import InputFile, Problem, Settings
 
 Floats = NDArray[np.float64]
 Maps = Mapping[str, Floats]
@@ -42,9 +42,9 @@ class Varying(Settings):
     def _numbers_by_week(cls, value: Any) -> Any:
         if isinstance(value, dict):
             if any(isinstance(number, bool) for number in value.values()):
-                raise ValueError("hold numbers, not true or false")
+                raise ValueError("should hold numbers, not true or false")
             if len({float(week) for week in value}) < len(value):
-                raise ValueError("name each week once")
+                raise ValueError("should name each week once")
         return value
 
     @field_validator("weeks")
@@ -52,13 +52,9 @@ class Varying(Settings):
     def _by_week(cls, value: dict[float, float] | None) -> dict[float, float] | None:
         return None if value is None else dict(sorted(value.items()))
 
-    @check
-    def _has_a_curve_or_a_map(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[Problem]:
         if not self.weeks and self.map is None:
-            yield Problem("found no values; it should be a number, or have `weeks` or a `map`")
-
-    @check
-    def _map_and_surface_fit(self) -> Iterator[Problem]:
+            yield Problem("found no values; expected a number, `weeks` or a `map`")
         maps, surfaces = (
             [value] if isinstance(value, str) else list(value or ()) for value in (self.map, self.surface)
         )
@@ -112,7 +108,7 @@ def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
     for name, bound in bounds.items():
         _, text, holds = BOUND_TEXTS[name]
         if not all(holds(number, bound) for number in numbers):
-            raise ValueError(f"be {text} {bound:g}")
+            raise ValueError(f"should be {text} {bound:g}")
 
 
 def map_of(value: float | Varying) -> str | None:

@@ -30,7 +30,7 @@ def test_defaults_are_the_reference_values():
 def test_all_mistakes_are_named_at_once():
     wrong = study(folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}, metric={}, start="a")
     assert problems(wrong) == [
-        "folding.poisson_ratio: found 0.5; it should be less than 0.5",
+        "folding.poisson_ratio: Input should be less than 0.5; found 0.5",
         "folding.thicknes_mm: unknown key; did you mean thickness_mm?",
         "metric: unknown key; did you mean metrics?",
     ]
@@ -66,7 +66,7 @@ def test_a_value_out_of_bounds_is_refused_with_the_bound(key, value, bound):
 
 
 def test_missing_keys_are_named():
-    assert problems({}) == ["folding.end_week: is missing"]
+    assert problems({}) == ["folding.end_week: Field required"]
     assert problems({"folding": {"end_week": 24}}) == [
         "brains: found nothing; expected a list of brains, each with id, week and a source",
         "start: is missing; it is the id of the brain that is folded, a list of ids, or all",
@@ -88,7 +88,7 @@ def test_runs_are_validated_whole_on_top_of_folding():
 def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
     found = problems(study(folding={"end_week": 24, "step_s": 0}, runs={"x": {"poison_ratio": 0.4}, "y": {}}))
     assert found == [
-        "folding.step_s: found 0; it should be greater than 0",
+        "folding.step_s: Input should be greater than 0; found 0",
         "runs.x.poison_ratio: unknown key; did you mean poisson_ratio?",
     ]
 
@@ -175,7 +175,7 @@ def test_a_brain_needs_exactly_one_source_of_its_own_id():
 def test_an_unknown_start_and_a_week_of_no_fetus_are_refused():
     brains = [{"id": "c", "week": 50, "pial": __file__}]
     assert problems(study(brains=brains)) == [
-        "brains[0].week: found 50; it should be less than or equal to 45",
+        "brains[0].week: Input should be less than or equal to 45; found 50",
     ]
     assert problems(study(start="x")) == ["start: found 'x'; expected the id of a brain: a, b"]
 
@@ -212,7 +212,7 @@ def test_white_surfaces_are_files_beside_the_pial_ones(tmp_path):
     brains[2] = {"id": "c", "week": 22, **LABELLED, "white": "white.stl"}
     assert problems(study(brains=brains), tmp_path) == [
         f"brains[0].hemispheres.white.right: no such file: {tmp_path / 'lost.gii'}",
-        "brains[2].white: has no meaning with labels; only with pial",
+        "brains[2].white: has no meaning with labels; only with pial or a hemisphere's surface",
     ]
 
 
@@ -329,10 +329,10 @@ def test_what_cannot_vary_a_parameter_is_refused(value):
 
 
 def test_truth_values_are_no_times():
-    (line,) = problems(study(folding={"end_week": 24, "stress_memory_gw": True}))
-    assert line.startswith("folding.stress_memory_gw: found True")
-    (line,) = problems(study(folding={"end_week": 24, "stress_memory_gw": "forever"}))
-    assert line.startswith("folding.stress_memory_gw: found 'forever'")
+    for wrong in (True, "forever"):
+        (line,) = problems(study(folding={"end_week": 24, "stress_memory_gw": wrong}))
+        assert line.startswith("folding.stress_memory_gw: should be ")
+        assert line.endswith(f"; found {wrong!r}")
 
 
 @pytest.mark.fault(28)

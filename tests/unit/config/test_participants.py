@@ -177,11 +177,11 @@ def test_a_hemisphere_is_a_surface_or_labels_with_a_scheme(folder):
 
     labels = {"file": "a.nii.gz", "side": "left"}
     assert "brains[0].scheme: is missing" in problems(hemisphere=labels)
-    assert "scheme: has no meaning with a surface" in problems(
+    assert "scheme: has no meaning with a hemisphere's surface" in problems(
         hemisphere=labels | {"file": "lh.surf.gii"}, scheme="feta-7"
     )
     assert "hemisphere.side" in problems(hemisphere=labels | {"side": "middle"}, scheme="feta-7")
-    assert "coordinates: has no meaning with a label volume" in problems(
+    assert "coordinates: has no meaning with labels of a hemisphere" in problems(
         hemisphere=labels, scheme="feta-7", coordinates="ras"
     )
 

@@ -52,8 +52,8 @@ def test_all_mistakes_in_schemes_are_named_at_once(folder):
         "schemes.a.right: found 1, which are in left too",
         "schemes.b.cortex: found all of the cerebrum; the tissue inside the cortex is missing",
         "schemes.b.right: is missing; the hemispheres are separated by both left and right",
-        "schemes.c.cerebrum[0]: found 0; it should be greater than or equal to 1",
-        "schemes.c.left[0]: found 'x'; it should be a valid integer",
+        "schemes.c.cerebrum[0]: Input should be greater than or equal to 1; found 0",
+        "schemes.c.left[0]: Input should be a valid integer, unable to parse string as an integer; found 'x'",
         "schemes.c.cortx: unknown key; did you mean cortex?",
         "schemes.e.cerebrum: found no labels; it should have one or more",
     ]

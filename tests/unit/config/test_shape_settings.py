@@ -41,12 +41,12 @@ def test_all_mistakes_in_shapes_are_named_at_once():
         )
     )
     assert found == [
-        "brains[0].shape.kind: found 'cube'; it should be 'sphere' or 'ellipsoid'",
-        "brains[1].shape.kind: is missing",
-        "brains[2].shape.radius_mm: found 200; it should be less than or equal to 150",
+        "brains[0].shape.kind: Input should be 'sphere' or 'ellipsoid'; found 'cube'",
+        "brains[1].shape.kind: Field required",
+        "brains[2].shape.radius_mm: Input should be less than or equal to 150; found 200",
         "brains[2].shape.noise: unknown key; did you mean noise_mm?",
-        "brains[3].shape.semi_axes_mm[2]: is missing",
-        "brains[3].shape.noise_mm: found -0.1; it should be greater than or equal to 0",
+        "brains[3].shape.semi_axes_mm[2]: Field required",
+        "brains[3].shape.noise_mm: Input should be greater than or equal to 0; found -0.1",
         "brains[4].shape.semi_axes_mm: has no meaning with kind sphere, whose size is radius_mm",
         "brains[5].shape.radius_mm: has no meaning with kind ellipsoid, whose size is semi_axes_mm",
     ]
@@ -77,6 +77,6 @@ def test_a_shape_is_the_only_source_of_its_brain_and_takes_no_keys_of_others():
     assert problems(study(brains=brains)) == [
         "brains[0]: found labels and shape as its source; expected exactly one of labels, hemispheres, hemisphere, "
         "pial, shape",
-        "brains[1].week: found 50; it should be less than or equal to 45",
-        "brains[2].coordinates: has no meaning with shape; only with hemispheres or hemisphere or pial",
+        "brains[1].week: Input should be less than or equal to 45; found 50",
+        "brains[2].coordinates: has no meaning with shape; only with hemispheres or a hemisphere's surface or pial",
     ]

@@ -92,7 +92,7 @@ def test_the_run_of_a_single_value_may_differ_further():
     ("change", "said"),
     [
         ({"vary": {"thicknes_mm": [1]}}, "studies.s.vary.thicknes_mm: there is no such key"),
-        ({"vary": {"thickness_mm": [-1]}}, "studies.s.vary.thickness_mm: found -1"),
+        ({"vary": {"thickness_mm": [-1]}}, "studies.s.vary.thickness_mm: should be greater than 0"),
         ({"vary": {"thickness_mm": [1, 1]}}, "each once"),
         ({"vary": {"preset": ["measured"]}}, "studies.s.vary.preset: cannot differ"),
         ({"vary": {}}, "studies.s.vary: found nothing"),
@@ -124,7 +124,7 @@ def test_a_calibration_knows_its_runs_beforehand():
     ("change", "said"),
     [
         ({"parameters": {"thickness_mm": [3, 1]}}, "the lowest and the highest"),
-        ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm: found -1"),
+        ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm: should be greater than 0"),
         ({"parameters": {"poisson": [0, 0.4]}}, "no such key"),
         ({"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}}, "growth_rate_per_s is no curve in the base run"),
         ({"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}, "the base run follows no curve"),
