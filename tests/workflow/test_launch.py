@@ -4,7 +4,7 @@ import subprocess
 
 import pytest
 
-from gyriflow.cli.launch import add_snakefile, clear_stale_lock, hold_lock, value_of
+from gyriflow.cli.launch import clear_stale_lock, hold_lock
 from gyriflow.errors import StorageError
 from gyriflow.io.files import write_json
 
@@ -139,18 +139,3 @@ def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
     outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")
     assert outcome.returncode == 5
     assert "file/below: the working directory cannot be written" in message(outcome)
-
-
-def test_an_option_is_found_however_it_is_written():
-    assert value_of(["-n", "--directory", "a"], "--directory", "-d") == "a"
-    assert value_of(["--directory=a", "-d", "b"], "--directory", "-d") == "b"
-    assert value_of(["-da"], "--directory", "-d") == "a"
-    assert value_of(["--dry-run"], "--directory", "-d") is None
-
-
-def test_the_checkouts_workflow_is_taken_where_none_is_named_or_at_hand(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert add_snakefile(["-n"])[0] == "--snakefile"
-    assert add_snakefile(["-s", "x", "-n"]) == ["-s", "x", "-n"]
-    (tmp_path / "Snakefile").touch()
-    assert add_snakefile(["-n"]) == ["-n"]

@@ -33,7 +33,7 @@ def test_a_run_names_its_stage_and_brain_and_all_else_is_in_the_log(workflow):
     assert len(lines) < 10
     # after Snakemake's on its profile
     assert re.match(r"gyriflow: \d+ steps to do", lines[1])
-    assert "  0 %  phantom a" in lines
+    assert "  0 %  pial_from_labels a" in lines
     assert re.fullmatch(r"gyriflow: done in .*", lines[-1])
     details = log_of(said)
     assert "rule pial_from_labels:" in details
@@ -74,7 +74,7 @@ def test_a_terminal_gets_a_line_that_is_written_over(workflow):
     name = workflow.write("study.yaml", ONE_BRAIN)
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
-        workflow.command("--cores", "1", "results/brains/a/surface/labels.nii.gz", "--configfile", name),
+        workflow.command("--cores", "1", "results/brains/a/surface/pial.surf.gii", "--configfile", name),
         cwd=workflow.directory, env=workflow.environment | {"TERM": "xterm"},
         stdin=theirs, stdout=theirs, stderr=theirs,
     )  # fmt: skip

@@ -98,11 +98,13 @@ class RunDisplay:
             case "job_finished" if job := self.running.pop(said["job_id"], None):
                 self._tell_warnings(job)
                 self.work_done += WEIGHTS.get(job.rule, 1.0)
-            case "job_error" if not self.interrupted:
-                self._fail(said)
+            case "job_error":
+                # what was stopped has not failed
+                if not self.interrupted:
+                    self._fail(said)
             case "progress":
                 self.done, self.total = said["done"], said["total"]
-            case None:
+            case _:
                 text = record.getMessage().strip()
                 self.interrupted |= text.startswith(INTERRUPTED)
                 if text.startswith("Nothing to be done"):

@@ -159,6 +159,6 @@ def test_what_was_stopped_is_no_failure(run):
 
 def test_an_error_of_no_job_is_told(run):
     run.tell("run_info", stats={"measure": 1})
-    run.tell(text="WorkflowError: no such profile", level=logging.ERROR)
+    run.tell("error", text="WorkflowError: no such profile", level=logging.ERROR)
     run.display.end()
     assert run.lines[1:] == ["WorkflowError: no such profile"]
