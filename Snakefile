@@ -66,7 +66,7 @@ for job in workflow.rules:
         if not job.log:
             job.set_log(log)
         # a download's time is the network's, and figures take little
-        if job.name not in ("atlas_file", *(row.name for row in FIGURES.drawn)):
+        if job.name not in ("atlas_file", *by_rule(FIGURES)):
             job.benchmark = job.benchmark or benchmark
         job.set_params(
             contents=lambda wildcards, job=job: [

@@ -87,4 +87,4 @@ rule calibration_tables:
 rule calibrate:
     input:
         rules.calibration_tables.output if CALIBRATED else [],
-        PLAN.figures.target("calibrate"),
+        asked_for(FIGURES, "calibrate"),

@@ -4,7 +4,8 @@ from operator import attrgetter
 from gyriflow.errors import GyriflowError
 from gyriflow.parameters.measures import SHAPE_MEASURES
 from gyriflow.parameters.terms import SIDES
-from gyriflow.study import Plan, resolve
+from gyriflow.study import resolve
+from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of
 from gyriflow.study.paths import *
 from gyriflow.cli.launch import hold_lock, keeps_going, refused_brains, runs_nothing
 from gyriflow.cli.provenance import input_contents, require_own_results
@@ -49,7 +50,7 @@ def validated_study():
 
 study, CONTENTS = validated_study()
 CONFIG = study.config
-PLAN = Plan(CONFIG.without(refused_brains(), unfolded=study.unreachable))
+FIGURES = figures_of(study)
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
 REFUSED = {
     brain: cause

@@ -1,30 +1,46 @@
-# Figures and tables of the registry, `gyriflow.study.figures`: each row that is drawn has a rule.
-from dataclasses import replace
-
-FIGURES = replace(PLAN.figures, reaches=reaches)
+# Figures and tables of the registry, `gyriflow.study.figures`: what is drawn has a rule for each kind.
 DRAW = Path(workflow.basedir, "workflow", "scripts", "draw.py")
 
-for row in FIGURES.drawn:
+
+def inputs_of(figure):
+    """Return the inputs of a figure; which members of studies have come to their week is known once they are solved."""
+    ended = (
+        run for run, brain, week in figure.may_end if not reaches(run, brain, week)
+    )
+    return figure.inputs_without(ended)
+
+
+for name, figures in by_rule(FIGURES).items():
+    some = next(iter(figures.values()))
+    drawn_in = some.draw.rpartition(".")[0]
+
+    def figure_of(wildcards, figures=figures, pattern=some.pattern):
+        return figures[pattern.format(**dict(wildcards))]
 
     rule:
         name:
-            row.name
+            name
         input:
-            lambda wildcards, row=row: row.files(**dict(wildcards)),
+            lambda wildcards, of=figure_of: files_in(inputs_of(of(wildcards))),
         output:
-            row.outputs,
+            some.outputs,
         wildcard_constraints:
-            measure=one_of(SHAPE_MEASURES),
-            study=one_of(CONFIG.studies),
+            **{
+                key: one_of(
+                    dict.fromkeys(figure.names[key] for figure in figures.values())
+                )
+                for key in some.names
+                if f"{{{key}}}" in some.pattern
+            },
         params:
-            draw=row.draw,
-            inputs=lambda wildcards, row=row: row.inputs(**dict(wildcards)),
-            options=lambda wildcards, row=row: row.options(**dict(wildcards)),
-            dpi=CONFIG.report.dpi if row.path.endswith(".png") else None,
+            draw=some.draw,
+            inputs=lambda wildcards, of=figure_of: inputs_of(of(wildcards)),
+            options=lambda wildcards, of=figure_of: of(wildcards).options,
+            dpi=CONFIG.report.dpi if some.path.endswith(".png") else None,
             code=code_hash(
                 DRAW,
-                Path(SOURCE, "gyriflow", "report", f"{row.module}.py"),
-                function=row.function,
+                Path(SOURCE, "gyriflow", "report", f"{drawn_in}.py"),
+                function=name,
             ),
         script:
             "../scripts/draw.py"
@@ -32,18 +48,18 @@ for row in FIGURES.drawn:
 
 rule figures:
     input:
-        FIGURES.target("figures", "growth"),
+        asked_for(FIGURES, "figures", "growth"),
 
 
 rule influence_figures:
     input:
-        FIGURES.target("influence_figures"),
+        asked_for(FIGURES, "influence_figures"),
 
 
 # the figures and tables of the paper; brains are measured at the weeks of comparison only
 rule paper:
     input:
-        FIGURES.target("paper"),
+        asked_for(FIGURES, "paper"),
         rules.growth_rates.output if study.growing else [],
         rules.replication.output,
         rules.studies.input,

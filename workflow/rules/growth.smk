@@ -29,4 +29,4 @@ rule growth_curves:
 rule growth:
     input:
         rules.growth_rates.output if study.growing else [],
-        PLAN.figures.target("growth"),
+        asked_for(FIGURES, "growth"),

@@ -60,7 +60,7 @@ rule html_report:
         rules.figures.input,
         rules.metrics.input,
         rules.influence_figures.input,
-        FIGURES.target("report", "quality"),
+        asked_for(FIGURES, "report", "quality"),
         surfaces=expand(PIAL["report"], brain=study.brains),
         runs=rules.study_runs.output.csv,
         quality=rules.quality_table.output[0],
@@ -68,7 +68,8 @@ rule html_report:
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         provenance=rules.report_provenance.output[0],
         methods=rules.methods.output[0],
-        view=FIGURES.target("view")[0],
+        view=asked_for(FIGURES, "view"),
+        words=f"{workflow.basedir}/workflow/report/figures.yaml",
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
@@ -80,8 +81,11 @@ rule html_report:
     resources:
         runtime=20,
     params:
-        entries=FIGURES.entries(),
-        first=FIGURES.first,
+        figures=[
+            (figure.name, figure.path, dict(figure.names))
+            for figure in FIGURES
+            if figure.target
+        ],
         picture_bytes=PICTURE_BYTES,
         brains=reporting.described_brains(study),
         surfaced=list(study.brains),

@@ -172,4 +172,4 @@ rule validate:
             if files
         ],
         rules.deviation_scores.output if study.expected else [],
-        PLAN.figures.target("validate"),
+        asked_for(FIGURES, "validate"),

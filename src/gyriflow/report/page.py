@@ -14,7 +14,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..parameters.terms import run_names
-from .labels import week_label
+from .labels import plain, week_label
 from .solve import resolution_verdict
 from .tables import html_table
 
@@ -22,6 +22,8 @@ FILE, COMMAND = "(file)", "(command)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
 DOTS_PER_INCH = 150
 """Of the page, for an inch of print: a figure as wide as a journal's page has 1080."""
+FIRST = "weekly_figure"
+"""The rule whose first figure stands on the first page."""
 DEEP_MM = 0.5
 """Walls of the fissure that begin so far beyond their planes are told of."""
 
@@ -70,6 +72,45 @@ class Results:
     validation: pd.DataFrame | None = None
     quality: pd.DataFrame | None = None
     warnings: pd.DataFrame | None = None
+
+
+def shown_figures(
+    words: Mapping[str, Mapping[str, Any]],
+    figures: Sequence[tuple[str, str, Mapping[str, str]]],
+    contents: Mapping[str, str | tuple[str, float]],
+) -> list[Shown]:
+    """Return the figures and tables that the report has words on; simulated beside measured brains stand first.
+
+    Parameters
+    ----------
+    words : {name of a rule: section, title, caption and technical}
+        In titles and captions the names of figures stand in braces.
+    figures
+        Rule, path and names of each figure.
+    contents : {path: HTML, or a picture's data address and its width in inches}
+    """
+    starts = {rule: {names.get("brain") for other, _, names in figures if other == rule} for rule, _, _ in figures}
+    first = next((path for rule, path, _ in figures if rule == FIRST), None)
+    shown = []
+    for rule, path, names in figures:
+        if rule not in words:
+            continue
+        # the page's title names a brain that all figures of a kind are of
+        keys = ("run", "study", "brain") if len(starts[rule]) > 1 else ("run", "study")
+        title = words[rule]["title"].format(**{key: plain(name.removesuffix("_mm")) for key, name in names.items()})
+        title = " · ".join([title, *(name for key, name in names.items() if key in keys)])
+        content = contents[path]
+        shown.append(
+            Shown(
+                section=words[rule]["section"],
+                title=title,
+                content=content if isinstance(content, str) else picture(*content, title),
+                caption=words[rule]["caption"].format(**names),
+                first=path == first,
+                technical=words[rule].get("technical", False),
+            )
+        )
+    return shown
 
 
 def assemble(results: Results, shown: Sequence[Shown], view: Mapping[str, Any]) -> dict[str, Any]:

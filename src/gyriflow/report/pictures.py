@@ -343,52 +343,45 @@ def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Float
 @styled
 def influence_picture(
     members: Mapping[str, Halves | None],
-    real: Mapping[str, Halves],
+    real: Halves | None,
     *,
     values: Mapping[str, Mapping[str, Any]],
+    measured: str = REAL_BRAIN,
     views: Sequence[str] = SIDE_VIEWS,
-    **shown: Any,
 ) -> Figure:
-    """Returns the surfaces of the members of a study at one week above their maps of the shape index on one scale.
+    """Draw the surfaces of the members of a study at one week above their maps of the shape index on one scale.
 
     Parameters
     ----------
     members : {run: hemispheres with their maps}
         In the order of the study; None for a member that has not come to the week.
-    real : {what it is called: hemispheres with their maps}
-        The measured brain of the week, if there is one, shown last.
+    real
+        The hemispheres of the measured brain of the week with their maps, shown last under the name `measured`.
     values : {run: {parameter: value}}
         What is varied, for the headings.
     """
     quantity = "shape_index"
-    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
-    members = {labels[run]: halves for run, halves in members.items()}
-    known = {
-        name: None if halves is None else whole_maps(halves, [quantity]) for name, halves in {**members, **real}.items()
-    }
-    measured_values = [maps[quantity] for _, maps in filter(None, known.values())]
-    scale = scale_of(quantity, np.concatenate(measured_values) if measured_values else np.empty(0))
-    meshes = {name: found[0] if found else None for name, found in known.items()}
-    maps = {name: (found[0], found[1][quantity]) if found else None for name, found in known.items()}
-    seen = named_views(views)
-    rows = [
-        Row(
-            f"{view.name} view",
-            _plain_panels(meshes, list(members), SIMULATED_SURFACE_COLOUR, view)
-            + _plain_panels(meshes, list(real), REAL_SURFACE_COLOUR, view),
-            absent=ABSENT,
-        )
-        for view in seen
-    ]
-    rows += [
-        Row(
-            f"{plain(quantity)}\n{view.name} view",
-            [_map_panel(maps[name], scale, view, quantity) for name in known],
-            absent=ABSENT,
-        )
-        for view in seen
-    ]
-    return panel_grid(list(known), rows, colour_bars=[(scale, MAPS[quantity])], **shown)
+    headings = dict(zip(values, value_labels(list(values.values())), strict=True))
+    brains = {headings[run]: halves for run, halves in members.items()}
+    colours = dict.fromkeys(brains, SIMULATED_SURFACE_COLOUR)
+    if real:
+        brains[measured], colours[measured] = real, REAL_SURFACE_COLOUR
+    maps: dict[str, SurfaceMap | None] = dict.fromkeys(brains)
+    for name, halves in brains.items():
+        if halves:
+            mesh, of_mesh = whole_maps(halves, [quantity])
+            maps[name] = mesh, of_mesh[quantity]
+    scale = scale_of(quantity, np.empty(0))
+    seen, rows = named_views(views), []
+    for view in seen:
+        panels = [
+            shown and Panel(shown[0], uniform_colours(shown[0], colours[name]), view) for name, shown in maps.items()
+        ]
+        rows.append(Row(f"{view.name} view", panels, absent=ABSENT))
+    for view in seen:
+        panels = [_map_panel(shown, scale, view, quantity) for shown in maps.values()]
+        rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, absent=ABSENT))
+    return panel_grid(list(brains), rows, colour_bars=[(scale, MAPS[quantity])])
 
 
 def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:

@@ -195,7 +195,8 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
 
 @styled
 def influence_spectra(
-    spectra: Sequence[pd.DataFrame],
+    members: Mapping[str, pd.DataFrame | None],
+    real: Sequence[pd.DataFrame],
     *,
     values: Mapping[str, Mapping[str, Any]],
     week: float,
@@ -207,14 +208,15 @@ def influence_spectra(
 
     Parameters
     ----------
-    spectra : tables as for `spectra_chart`
+    members : {run: table as for `spectra_chart`}
+        None for a member that has not come to the week.
+    real : tables as for `spectra_chart`
     values : {run: {parameter: value}}
         What is varied, in the order of the study.
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
-    table = pd.concat(spectra, ignore_index=True)
-    members = table[table["run"].isin([*labels, MEASURED])]
-    named = members.assign(run=[labels.get(run, run) for run in members["run"]])
+    simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
+    named = pd.concat([*simulated, *real], ignore_index=True)
     shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
     colours = dict(zip(labels.values(), shades, strict=False))
     return spectra_chart(named, week=week, colours=colours, **shown)
@@ -325,8 +327,8 @@ def calibration_chart(
     """
     figure = new_figure(FULL_WIDTH_IN, 2.7, synthetic=synthetic)
     panels = figure.subplots(1, len(optimum), squeeze=False)[0]
-    for axes, best in zip(panels, optimum.itertuples(), strict=True):
-        _parameter_panel(axes, best.parameter, runs, best.value)
+    for axes, name, value in zip(panels, optimum["parameter"], optimum["value"], strict=True):
+        _parameter_panel(axes, name, runs, value)
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
     add_letters(panels)
     figure.legend(handles=panels[0].get_legend_handles_labels()[0], loc="outside lower center", ncols=5)

@@ -285,5 +285,5 @@ def mesh_quality_page(quality: Mapping[str, Mapping[str, Any]], gates: Mapping[s
         for brain, found in quality.items()
     }
     table = pd.DataFrame(columns, dtype=object).reindex(list(OF_THE_MESH)).rename(index=OF_THE_MESH)
-    limits = [gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}"))) for name in OF_THE_MESH]
-    return html_table(table.assign(limit=limits).rename_axis("measure"), digits=3)
+    table["limit"] = [gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}"))) for name in OF_THE_MESH]
+    return html_table(table.rename_axis("measure"), digits=3)

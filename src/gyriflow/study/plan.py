@@ -7,7 +7,6 @@ from ..config.root import Config
 from .brains import Brains
 from .chains import Chains
 from .expecting import Expecting
-from .figures import Figures
 from .measuring import Measuring
 from .runs import Runs
 from .studying import Calibrating, Studying
@@ -59,9 +58,3 @@ class Plan:
     def calibrating(self) -> Calibrating:
         """The runs of the calibration."""
         return Calibrating(self.config, self.runs)
-
-    @cached_property
-    def figures(self) -> Figures:
-        """The figures and tables that are drawn."""
-        parts = (self.brains, self.runs, self.chains, self.measuring, self.validating, self.studying)
-        return Figures(self.config, *parts)

@@ -324,7 +324,7 @@ def test_a_study_has_renders_and_maps_of_all_members_and_says_which_did_not_come
     halves = [(SMOOTH, {"shape_index": np.linspace(-1, 1, len(SMOOTH.vertices))})]
     members = {"a": None, "b": halves, "c": halves}
     values = {run: {"thickness_mm": value} for run, value in zip(members, (0.8, 1.5, 2.25), strict=True)}
-    figure = influence_picture(members, {"real brain": halves}, values=values, views=("left",))
+    figure = influence_picture(members, halves, values=values, views=("left",))
     assert len(pictures(figure)) == 6
     assert {"0.8 mm", "1.5 mm", "2.25 mm", "real brain", ABSENT, "a", "b"} <= words(figure)
     assert colour_bar(figure, "shape index").get_xlim() == (-1.0, 1.0)

@@ -150,8 +150,8 @@ def distances(values: dict[float, float], flag: str = "ok", **labels: str) -> pd
 
 def test_spectra_of_a_study_stand_in_its_order_from_pale_to_dark():
     values = {run: {"thickness_mm": value} for run, value in (("a", 0.8), ("b", 1.5), ("c", 6.0))}
-    spectra = pd.concat([spectrum("c", 0.3), spectrum("a", 0.1), spectrum("b", 0.2), spectrum("real", 0.15)])
-    figure = influence_spectra([spectra], values=values, week=28.0)
+    members = {"c": spectrum("c", 0.3), "a": spectrum("a", 0.1), "b": spectrum("b", 0.2)}
+    figure = influence_spectra(members, [spectrum("real", 0.15)], values=values, week=28.0)
     left = figure.axes[0]
     assert [bar.get_height() for bar in left.patches[::3]] == pytest.approx([0.1, 0.2, 0.3])
     brightness = [sum(bar.get_facecolor()[:3]) for bar in left.patches[::3]]

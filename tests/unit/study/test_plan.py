@@ -9,7 +9,8 @@ from configurations import LABELLED
 from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.study import Plan
+from gyriflow.study import Plan, resolve
+from gyriflow.study.figures import asked_for, figures_of
 from gyriflow.study.paths import CURVES, FOLDING, MEASURES, PARAMETERS, READY, THICKNESS, job_files, one_of
 
 CURVE = {21: 99, 24: 150}
@@ -27,6 +28,10 @@ def labels(tmp_path, week, **given):
 
 def plan(brains, **sections):
     return Plan(load({"brains": brains, "start": "first", "folding": {"end_week": 24}, **sections}))
+
+
+def figures(found):
+    return figures_of(resolve(found.config))
 
 
 @pytest.fixture
@@ -67,9 +72,8 @@ def test_runs_that_write_contact_pressure_have_a_figure_of_it():
         "between": fields | {"contact": {"kind": "planes"}},
         "plain": {"fields": ["displacement"]},
     }
-    rows = plan([brain(21), brain(22)], runs=runs).figures.drawn
-    (row,) = [row for row in rows if row.name == "contact_maps"]
-    assert [one["run"] for one in row.of] == ["pressed"]
+    rows = figures(plan([brain(21), brain(22)], runs=runs))
+    assert [row.names["run"] for row in rows if row.name == "contact_maps"] == ["pressed"]
 
 
 def test_every_run_folds_its_starts():
@@ -349,7 +353,7 @@ def test_a_closed_loop_of_its_own_goes_through_the_later_brains_of_its_series(re
     assert [found.expecting.targets(run, "b21") for run in runs] == [[], "results/brains/b21/mesh/targets.self.h5"]
     assert set(found.validating.kinds("own", "b21").values()) == {"explained"}
     assert found.validating.foretold == found.validating.tables["prediction"] == []
-    assert "results/study/figures/prediction.png" not in found.figures.target("validate")
+    assert "results/study/figures/prediction.png" not in asked_for(figures(found), "validate")
     # sizes come from the shapes, and growth from no carried mesh
     assert found.runs.curves("own") == []
 
@@ -464,7 +468,7 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
     assert found.validating.prediction("a", "own22")["atlas"] == [
         f"results/brains/b{week}/surface/pial.surf.gii" for week in (22, 23, 24)
     ]
-    assert "results/study/figures/prediction.png" in found.figures.target("validate")
+    assert "results/study/figures/prediction.png" in asked_for(figures(found), "validate")
     # a run that no brain tells of stands beside it, and one that later brains explain does not
     runs = {"a": EXPECTED["runs"]["a"], "paper": {}, "measured": {"preset": "measured"}}
     beside = plan(of_two(tmp_path, 22, 23, 24), runs=runs).validating
@@ -492,7 +496,7 @@ def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_thei
     assert subjects == ["own23", "s"]
     assert len(found.validating.tables["deviation"]) == 2
     names = ("expected", "deviation_log_area", "deviation_thickness_difference_mm")
-    assert {f"results/runs/a/own22/figures/{name}.png" for name in names} <= {*found.figures.target("validate")}
+    assert {f"results/runs/a/own22/figures/{name}.png" for name in names} <= {*asked_for(figures(found), "validate")}
     # whose growth is its own explains
     own = plan(of_two(tmp_path, 22, 23, atlas=()), runs={"a": {"preset": "measured"}}, folding={"end_week": 23})
     assert own.validating.tables["deviation"] == []
@@ -501,8 +505,8 @@ def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_thei
 def test_of_many_weeks_every_other_one_is_shown_with_the_start_and_the_last(tmp_path):
     weeks = tuple(range(22, 31))
     found = plan(of_two(tmp_path, *weeks, atlas=weeks), folding={"end_week": 30}, **EXPECTED)
-    (shown,) = [row for row in found.figures.all if row.name == "expected_figure"]
-    brains = shown.inputs(run="a", brain="own22")
+    (shown,) = [row for row in figures(found) if row.name == "expected_figure"]
+    brains = shown.inputs
     assert list(brains["real"]) == list(brains["runs"]["expected"]) == [22, 24, 26, 28, 30]
     assert sorted(brains["deviations"]) == [24, 26, 28, 30]
 
