@@ -26,14 +26,9 @@ def _check(code: int) -> None:
 
 
 class BlockMatrix:
-    """A square matrix with the same entries for dolfinx and for PETSc.
+    """A square matrix with the same entries for dolfinx and for PETSc: 3 × 3 blocks, one block row for each local node.
 
-    Parameters
-    ----------
-    blocks
-        Matrix of 3 × 3 blocks, one block row for each local node.
-    fixed : (owned, 3) bool
-        Components of the owned nodes whose rows and columns are those of the unit matrix.
+    `fixed` (owned, 3) are the components of the owned nodes whose rows and columns are those of the unit matrix.
     """
 
     def __init__(self, blocks: MatrixCSR, fixed: NDArray[np.bool_]) -> None:

@@ -30,31 +30,11 @@ ARRAYS = ("positions", "last", "before_last", "stretch", "grown")
 class State:
     """Where a run stands: everything that the next step depends on.
 
-    Attributes
-    ----------
-    positions : (n, 3) float
-        In m.
-    time_s : float
-        Time since the start.
-    step_s : float
-        The present time step, smaller than the nominal one after a halving.
-    last, before_last : (n, 3) float
-        Displacements in m of the two last steps; zero where there was none.
-    last_s, before_last_s : float
-        Lengths of the two last steps; zero where there was none.
-    successes : int
-        Steps since the last halving.
-    stretch : (m, q, 6) float or None
-        Elastic stretch at the integration points of the elements that the next step starts with, where stress is
-        remembered (see `memory`).
-    learnt : sequence of float or None
-        What growth that follows has learnt of the brain's response.
-    grown : (6, n) float or None
-        Logarithm of growth since the last output week, where it is not by rates.
-    grown_s : float
-        Time since then.
-    rows : tuple of dict
-        The step table so far.
+    The (n, 3) positions in m, the time since the start, and the present time step, smaller than the nominal one after a
+    halving; the (n, 3) displacements in m and the lengths of the two last steps, zero where there was none; steps since
+    the last halving. Where stress is remembered, the (m, q, 6) elastic stretch that the next step starts with; what
+    the last step has taught growth by sizes; where growth is not by rates, its logarithm (6, n) since the last output
+    week, and the time since then; the step table so far.
     """
 
     positions: Floats

@@ -107,26 +107,9 @@ class SelfContact:
     Curved faces are taken as 16 flat triangles each, whose vertices follow the nodes: with the four between the nodes,
     an even pressure would press the nodes unevenly, and quadratic elements would be pressed into waves of their size.
 
-    Parameters
-    ----------
-    domain
-        The mesh.
-    displacement : (k, 3) float
-        The displacements in m of the local nodes that all methods refer to: the problem's own array.
-    facets : (f, 3) int
-        The surface, as vertex indices of the file.
-    settings
-        Distance and stiffness.
-
-    Attributes
-    ----------
-    distance_mm, stiffness_pa : float
-        The present distance d̂ and stiffness κ.
-
-    Raises
-    ------
-    MeshError
-        Where the surface crosses itself at the start.
+    `displacement` (k, 3) in m of the local nodes is what all methods refer to: the problem's own array; `facets` (f, 3)
+    are vertex indices of the file. `distance_mm` and `stiffness_pa` are the present distance d̂ and stiffness κ.
+    MeshError where the surface crosses itself at the start.
     """
 
     def __init__(
@@ -165,10 +148,8 @@ class SelfContact:
         surface, part = self._surface_at(self._start)
         if domain.comm.allreduce(ipctk.has_intersections(surface, part.at(self._start)), op=MPI.LOR):
             raise MeshError(
-                "the pial surface of the mesh crosses itself",
-                expected="a surface without self-intersections, which contact could not undo",
-                remedy="Repair the surface, mesh with a smaller mesh.envelope_mm, or choose another "
-                "folding.contact.kind.",
+                "the pial surface of the mesh crosses itself, which contact could not undo",
+                remedy="Repair the surface, or mesh with a smaller mesh.envelope_mm.",
             )
         if settings.distance_mm is None:
             self._widest_mm = self._smallest_gap()
@@ -183,7 +164,6 @@ class SelfContact:
         self._known: ContactCache | None = None
 
     def _distance_of_edges(self) -> float:
-        """Returns the distance in mm that belongs to the present edges, the same whatever a rank's processor rounds."""
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
         return DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
 
@@ -201,12 +181,10 @@ class SelfContact:
         self.stiffness_pa = last
 
     def _smallest_gap(self) -> float:
-        """Returns the smallest distance in mm at the step's start, infinite where no pair is within the present d̂."""
         # rounding must not make a pair of what is just at the limit
         return BESIDE * self.domain.comm.allreduce(self._state_at(np.zeros_like(self._start)).gap, op=MPI.MIN)
 
     def _on_surface(self, local: Floats) -> Floats:
-        """Returns the (s, 3) values of the surface's vertices from those of the local nodes, on every rank."""
         received = np.empty((len(self._vertices), 3))
         self.domain.comm.Allgatherv(np.ascontiguousarray(local[self._owned_nodes]), (received, self._counts))
         values = np.empty_like(received)
@@ -214,11 +192,9 @@ class SelfContact:
         return self._at_vertices(values)
 
     def _at_vertices(self, at_nodes: Floats) -> Floats:
-        """Returns the (s, 3) values at the vertices of the surface of contact from those at the surface's nodes."""
         return np.asarray(self._weights @ at_nodes)
 
     def _surface_at(self, *places: Floats) -> tuple[ipctk.CollisionMesh, SurfacePart]:
-        """Returns this rank's part of the surface, good for all that can be near at some (s, 3) positions in mm."""
         if self._part_range is None or not self._part_range.at(self.distance_mm, *places):
             way = max(float(np.abs(place - places[0]).max()) for place in places)
             # a single rank's part is the whole surface, wherever it moves
@@ -237,11 +213,9 @@ class SelfContact:
         return self._surface, self._part
 
     def _state(self) -> ContactCache:
-        """Returns where this rank's part is at the present displacement, and its pairs within the distance."""
         return self._state_at(self._on_surface(self._displacement))
 
     def _state_at(self, u: Floats) -> ContactCache:
-        """Returns the same at a displacement (s, 3) in m of the whole surface."""
         if self._known is None or not np.array_equal(u, self._known.displacement):
             whole = self._start + u * MM_PER_M
             surface, part = self._surface_at(whole)
@@ -284,14 +258,12 @@ class SelfContact:
         return self._summed(self._follow.T @ self._own_forces(state))
 
     def _own_forces(self, state: ContactCache) -> Floats:
-        """Returns the (p, 3) derivative of the energy of this rank's pairs in N at its part's vertices."""
         if not len(state.pairs):
             return np.zeros_like(state.positions)
         gradient = self._barrier.gradient(state.pairs, state.surface, state.positions)
         return gradient.reshape(-1, 3) * N_PER_PA_MM2
 
     def _summed(self, own: Floats) -> Floats:
-        """Returns the sum of an array over the ranks."""
         total = np.empty_like(own, order="C")
         self.domain.comm.Allreduce(np.ascontiguousarray(own), total)
         return total
@@ -313,7 +285,6 @@ class SelfContact:
         return self._distributed(own)
 
     def _distributed(self, own: sparse.csr_matrix | None) -> PETSc.Mat:
-        """Returns the PETSc matrix of all unknowns, the sum of each rank's of the surface's, None for none."""
         comm, components = self.domain.comm, np.arange(3)
         # each rank gets what all have of the rows that it owns
         of_rank = [
@@ -342,7 +313,6 @@ class SelfContact:
         return part * self.domain.comm.allreduce(self._free_part(self._state(), part * way), op=MPI.MIN)
 
     def _free_part(self, state: ContactCache, way: Floats) -> float:
-        """Returns the part of a way (s, 3) in mm before the first touch of this rank's pairs."""
         # what is no pair is farther apart than the distance
         gap = min(self.distance_mm, state.gap)
         if 2 * float(np.linalg.norm(way, axis=1).max()) <= CLOSED * gap:

@@ -38,28 +38,17 @@ class Domain:
 
     Attributes
     ----------
-    order : int
+    order
         1 where elements and displacement are linear, 2 where both are quadratic.
-    mesh : dolfinx.mesh.Mesh
-        The updated reference: moves with every step.
-    space : dolfinx.fem.FunctionSpace
-        Continuous vectors, linear or quadratic in each element: the displacement in m.
-    positions : (n, 3) float
-        Positions of all vertices in m, in the file's order, equal on every rank.
+    mesh, space
+        The updated reference, which moves with every step, and the displacements in m on it.
+    positions, part, node_of_vertex : (n, 3) float, (n,) int, (n,) int
+        Of all vertices in the file's order, equal on every rank: positions in m, the connected part of the mesh, and
+        the global node, rank by rank.
     vertex_of_node : (k,) int
-        File index of each local node (owned nodes first, then ghosts).
-    owned : int
-        Number of owned nodes.
-    cells : (c, 4) or (c, 10) int
-        Local nodes of the local elements, in the order of the file.
-    part : (n,) int
-        The connected part of the mesh that each vertex belongs to, equal on every rank.
-    tet_of_cell : (c,) int
-        File index of each local element.
-    volumes : (c,) float
-        Volumes of the local elements in m³.
-    node_of_vertex : (n,) int
-        The global node of each vertex: rank by rank, owned nodes in their order.
+        File index of each local node, the `owned` ones first, then ghosts.
+    cells, tet_of_cell, volumes : (c, 4) or (c, 10) int, (c,) int, (c,) float
+        Local nodes of the local elements in the order of the file, their index there, and their volumes in m³.
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
@@ -119,18 +108,13 @@ class Domain:
         self.mesh.geometry.x[self._geometry_node] = nodes
         self._measure(nodes)
 
-    def cell_volumes(self, node_positions: Floats) -> Floats:
-        """Returns the signed volumes in m³ of the local elements for (k, 3) positions of the local nodes."""
-        return volumes_between(node_positions, self.cells)
-
     @property
     def corners(self) -> NDArray[np.int32]:
         """Local nodes (c, 4) at the corners of the local elements."""
         return self.cells[:, : NODES_OF_ORDER[1]]
 
     def _measure(self, node_positions: Floats) -> None:
-        """Takes note of what elements are measured against, for (k, 3) positions of the local nodes."""
-        self.volumes = self.cell_volumes(node_positions)
+        self.volumes = volumes_between(node_positions, self.cells)
         if self.order == 2:
             self._maps_at_nodes = jacobians(node_positions, self.cells, AT_NODES)
             self._largest_maps = coefficients(node_positions, self.cells).max(axis=1)
@@ -138,7 +122,7 @@ class Domain:
     def volume_ratios(self, node_positions: Floats) -> Floats:
         """Returns det F of a move of local nodes to (k, 3) positions in m: (c, 1), or (c, 10) at quadratic nodes."""
         if self.order == 1:
-            return (self.cell_volumes(node_positions) / self.volumes)[:, None]
+            return (volumes_between(node_positions, self.cells) / self.volumes)[:, None]
         return jacobians(node_positions, self.cells, AT_NODES) / self._maps_at_nodes
 
     def smallest_volume_ratio(self, node_positions: Floats) -> float:

@@ -1,13 +1,12 @@
 """Growth: what the solver knows of it, its tensor G in a step, and growth by rates.
 
-A growth model says how tissue grows in each step, from where the brain is at its start. A new one is a subclass of
-`Growth` with its model, and a line in `growth_models`.
+A new growth model is a subclass of `Growth`, a function that makes it for a step, and a line in `growth_models`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +40,7 @@ class Size:
 class GrowthInputs:
     """What growth depends on besides shape and time.
 
-    Attributes
-    ----------
-    pieces : (p, 4) int
-        Linear tetrahedra between the vertices of the mesh.
-    zones, maps
-        Those of the run, at all vertices.
+    The mesh as (p, 4) linear tetrahedra between its vertices, and the run's zones and maps at all of these.
     """
 
     pieces: NDArray[np.int64]
@@ -70,14 +64,8 @@ class GrowthInputs:
 class StepStart:
     """What a growth model is told of a step.
 
-    Attributes
-    ----------
-    positions_mm : (n, 3) float
-        Of all vertices at the step's start, equal on every rank.
-    time_s, step_s
-        Time since the start of the run, and the length of the step.
-    learnt
-        What the steps before have taught, None where there was none.
+    The (n, 3) positions of all vertices at its start, equal on every rank, the time since the start of the run, the
+    length of the step, and what the step before has taught.
     """
 
     positions_mm: Floats
@@ -92,15 +80,7 @@ class StepStart:
 
 @dataclass(frozen=True, eq=False)
 class Growth(ABC):
-    """How tissue grows in one step.
-
-    Attributes
-    ----------
-    parameters
-        Those of the run, with the rates of this step: what frames show of growth.
-    start
-        Where the step begins.
-    """
+    """How tissue grows in one step: by the run's parameters with the step's rates, which frames show."""
 
     parameters: FoldingParameters
     start: StepStart
@@ -122,11 +102,8 @@ class Growth(ABC):
         return {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
 
 
-class GrowthModel(Protocol):
-    """Says how tissue grows in each step."""
-
-    def growth(self, start: StepStart) -> Growth:
-        """Returns the growth of a step."""
+GrowthModel = Callable[[StepStart], Growth]
+"""Says how tissue grows in each step."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -106,14 +106,7 @@ def new_krylov(comm: MPI.Comm, method: str, max_iterations: int, hierarchy: Orde
 def smooth_with(krylov: PETSc.KSP, products: PETSc.Mat, smoothing: PETSc.Mat) -> None:
     """Gives the smoothers of a multigrid that is set up matrices stored by blocks, which are read in less time.
 
-    Parameters
-    ----------
-    krylov
-        The solver, preconditioned by multigrid.
-    products
-        What the finest level is multiplied by.
-    smoothing
-        What the finest level's Jacobi smoother is made from.
+    On the finest level `products` is what is multiplied by, and `smoothing` what Jacobi's smoother is made from.
     """
     multigrid = krylov.getPC()
     _finest(krylov).setOperators(products, smoothing)
@@ -173,7 +166,6 @@ def _finest_smoother(krylov: PETSc.KSP) -> ctypes.c_void_p:
 
 
 def _store_by_blocks(multigrid: PETSc.PC, levels: Iterable[int]) -> None:
-    """Gives the smoothers of some levels their matrices stored by blocks."""
     for level in levels:
         smoother = multigrid.getMGSmoother(level)
         operator, matrix = smoother.getOperators()

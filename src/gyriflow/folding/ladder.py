@@ -40,14 +40,8 @@ class LinearCount:
 class LinearLadder:
     """Finds descent directions from one tangent after the other, with solvers made once.
 
-    What it keeps from one solve to the next decides how a direction is found.
-
-    Parameters
-    ----------
-    problem
-        Whose tangents are solved with.
-    max_iterations
-        Iterations after which a solver has failed.
+    What it keeps from one solve to the next decides how a direction is found. A solver has failed after
+    `max_iterations`.
     """
 
     def __init__(self, problem: Problem, max_iterations: int) -> None:
@@ -72,21 +66,8 @@ class LinearLadder:
     ) -> LinearCount:
         """Leaves in `direction` a solution of J d = −r that descends; goes down the ladder until there is one.
 
-        Parameters
-        ----------
-        tangent
-            J; where it is indefinite, it may be made convex.
-        residual
-            r.
-        reduction
-            Part of the right-hand side that may be left.
-        convexify
-            Whether its further parts may be made convex where conjugate gradients fail with the true ones.
-
-        Raises
-        ------
-        NotConvergedError
-            Where the last rung fails too.
+        `reduction` is the part of the right-hand side that may be left. Where conjugate gradients fail with the true
+        tangent, its further parts may be made convex if `convexify`. NotConvergedError where the last rung fails too.
         """
         system = _System(self.problem, tangent, residual, direction, reduction)
         count = LinearCount()
@@ -104,7 +85,6 @@ class LinearLadder:
         return count
 
     def _solve_with_kept(self, system: "_System", count: LinearCount) -> bool:
-        """Tries conjugate gradients with the kept preconditioner alone; returns whether the direction descends."""
         if self.lifetime.over:
             return False
         reason, iterations = system.run(self._cg, reuse=True, fast=True)
@@ -117,7 +97,6 @@ class LinearLadder:
         return False
 
     def _solve_shifted(self, system: "_System", count: LinearCount) -> bool:
-        """Raises the diagonal until conjugate gradients find no direction in which the tangent is negative."""
         # where the tangent was not positive definite before, it may still not be
         for level in range(max(self._level - 1, 0), len(SHIFTS)):
             with system.tangent.raised(SHIFTS[level]):
@@ -130,7 +109,6 @@ class LinearLadder:
         return reason > 0 and system.slope < 0
 
     def _run_cg(self, system: "_System", count: LinearCount, *, shifted: bool) -> int:
-        """Solves by conjugate gradients, with the kept preconditioner and then a new one; returns PETSc's reason."""
         if not self.lifetime.over:
             reason, iterations = system.run(self._cg, reuse=True, fast=not shifted)
             count.iterations += iterations
@@ -155,14 +133,12 @@ class LinearLadder:
         return reason
 
     def _served(self, iterations: int, reduction: float, *, definite: bool) -> None:
-        """Takes note of a solve with the kept preconditioner."""
         self.lifetime.add(iterations, reduction)
         # one made of an indefinite tangent serves its shifts, and then gives way to a better one
         if self._doubtful and definite:
             self.lifetime.end()
 
     def _fall_back(self, system: "_System", count: LinearCount) -> None:
-        """Takes GMRES, which needs no positive definite tangent."""
         if self._gmres is None:
             self._gmres = self._new_krylov("gmres")
         reason, iterations = system.run(self._gmres, reuse=False)

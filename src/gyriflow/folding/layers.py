@@ -39,15 +39,7 @@ def shear_modulus(p: FoldingParameters, w: Floats, maps: Maps, week: float) -> F
 
 
 class PialSearch:
-    """Nearest points of the pial surface at one moment.
-
-    Parameters
-    ----------
-    positions : (n, 3) float
-        Positions of all vertices, in any unit.
-    facets : (f, 3) int
-        Pial facets, outward, as vertex indices.
-    """
+    """Nearest points of the pial surface at one moment: (n, 3) positions of all vertices, and its (f, 3) facets."""
 
     def __init__(self, positions: Floats, facets: Ints) -> None:
         self.pial = np.unique(facets)
@@ -90,13 +82,11 @@ class PialSearch:
         return distance, normals
 
     def _within(self, to_vertex: Floats, reach: float) -> NDArray[np.bool_]:
-        """Returns which points may be within reach of a triangle, from their distances to the nearest vertices."""
         # a point of a triangle is at most edge/√3 from its nearest vertex
         longest = np.linalg.norm(np.diff(self.surface.vertices[self.surface.faces], axis=1), axis=2).max()
         return np.asarray(to_vertex <= np.hypot(reach, longest / np.sqrt(3)))
 
     def _nearest_places(self, points: Floats) -> tuple[Floats, Ints, Floats]:
-        """Returns distances of (k, 3) points to the triangles, the nearest ones, and barycentric coordinates there."""
         faces = self.surface.faces.astype(np.int32)
         vertices = self.surface.vertices.copy()
         squared, face, place = igl.point_mesh_squared_distance(points, vertices, faces)
@@ -136,12 +126,7 @@ def normals_between(normals: Floats, smooth: Floats, bounded: Floats) -> Floats:
 
     Only the direction of a normal counts, not its sense: walls that face each other have the same. So normals are
     turned to the side of the first before their mean is taken; where that all but vanishes, the nearest node's stands
-    for it.
-
-    Parameters
-    ----------
-    smooth, bounded : (q, k) float
-        Weights of the nodes at the points, see `IntegrationPoints`.
+    for it. `smooth` and `bounded` are weights of the nodes at the points, see `IntegrationPoints`.
     """
     turned = normals * np.where(np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0, -1.0, 1.0)[:, :, None]
     mean = np.matmul(smooth, turned)
@@ -160,22 +145,14 @@ class Tissue:
 
     Attributes
     ----------
-    cells : (c, 4) or (c, 10) int
-        Local nodes of the elements.
-    vertices : (k,) int
-        Numbers of the local nodes among the vertices of the whole mesh.
-    points
-        The integration points of an element.
+    cells, vertices : (c, 4) or (c, 10) int, (k,) int
+        Local nodes of the elements, and their numbers among the vertices of the whole mesh.
     nodes, depth : (k, 3) and (k,) float
         Positions of the local nodes and their distances to the pial surface, in m.
-    pial
-        The pial surface.
     nearest : (k,) int or (k, 3) float
         The pial vertices nearest to the nodes of linear elements; normals at the nodes of quadratic ones.
-    weight, growing : float
-        Cortical weight, and 1 where tissue grows, else 0: (k,) at nodes or (c, q) at integration points.
-    maps
-        Parameters' maps, likewise.
+    weight, growing, maps
+        Cortical weight, 1 where tissue grows, else 0, and parameters' maps: (k,) at nodes or (c, q) at the points.
     """
 
     cells: NDArray[np.integer]

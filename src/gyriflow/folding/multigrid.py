@@ -47,12 +47,8 @@ class OrderHierarchy:
 def linear_in_quadratic(domain: Domain, fixed: NDArray[np.bool_]) -> tuple[PETSc.Mat, NDArray[np.int64]]:
     """Returns the prolongation from corners to all nodes, 3 unknowns each, and the local nodes of the owned corners.
 
-    Parameters
-    ----------
-    domain
-        A mesh of quadratic elements.
-    fixed : (owned, 3) bool
-        Components of the owned nodes whose rows and columns are those of the unit matrix: they stay apart from others.
+    `fixed` (owned, 3) are the components of the owned nodes whose rows and columns are those of the unit matrix: they
+    stay apart from others.
     """
     comm, owned = domain.comm, domain.owned
     everywhere = np.concatenate(comm.allgather(fixed))

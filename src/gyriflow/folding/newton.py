@@ -42,18 +42,9 @@ class NewtonSettings:
 
 @dataclass
 class StepCount:
-    """What a step took.
+    """What a step took: iterations, the furthest rung of the linear ladder, and the residual relative to that at u = 0.
 
-    Attributes
-    ----------
-    newton, krylov
-        Iterations, the latter in all.
-    rung
-        The furthest one of the linear ladder.
-    residual
-        What is left, relative to that at u = 0.
-    converged
-        Whether that is below the tolerance: not where nothing but the energy's round-off was left to gain.
+    It has `converged` where that is below the tolerance: not where nothing but round-off was left to gain.
     """
 
     newton: int = 0
@@ -67,16 +58,8 @@ class StepCount:
 class Iterate:
     """Where the iteration stands; the displacement and its residual are with problem and solver.
 
-    Attributes
-    ----------
-    norm
-        Norm of the residual in N.
-    energy
-        In J, where it is known.
-    gain
-        Relative fall of the energy that led here, 0 where it was not asked for.
-    exhausted
-        Whether nothing is left to gain but round-off.
+    The norm of the residual in N, the energy in J where it is known, its relative fall that led here where that was
+    asked for, and whether nothing is left to gain but round-off.
     """
 
     norm: float
@@ -88,14 +71,8 @@ class Iterate:
 def linear_tolerance(enough: float, left: float, least: float) -> float:
     """Returns the part of the residual that a linear solve may leave (forcing terms as of Eisenstat and Walker 1996).
 
-    Parameters
-    ----------
-    enough
-        The part that ends the step.
-    left
-        What the last iteration left of its residual: the next one leaves about the square, however well it is solved.
-    least
-        The tolerance of solves in which the iteration converges fast.
+    `enough` ends the step, `left` is what the last iteration left of its residual (the next one leaves about the
+    square, however well it is solved), and `least` the tolerance of solves in which the iteration converges fast.
     """
     if left**2 > LOOSE:
         return max(LOOSE, enough)
@@ -109,19 +86,8 @@ class NewtonSolver:
 
     What it keeps from one step to the next decides how a solution is found, and changes it within the tolerance only.
 
-    Parameters
-    ----------
-    problem
-        Energy, residual and tangent.
-    settings
-        Tolerances and limits.
-    residual_floor
-        Residual in N below which a step counts as solved whatever its start.
-
-    Attributes
-    ----------
-    inverting : (c, p) float or None
-        det F of the local elements at the last trial of the present step that turned one inside out.
+    A residual below `residual_floor`, in N, counts as solved whatever the step's start. `inverting` is det F (c, p) of
+    the local elements at the last trial of the present step that turned one inside out.
     """
 
     def __init__(self, problem: Problem, settings: NewtonSettings, residual_floor: float) -> None:
@@ -184,7 +150,6 @@ class NewtonSolver:
     def _iterate(
         self, iterate: Iterate, tangent: Tangent, reduction: float, count: StepCount, *, convexify: bool
     ) -> Iterate:
-        """Returns where one iteration with a tangent leads, and notes in `count` what its linear solve took."""
         linear = self.ladder.solve(tangent, self._residual, self._direction, reduction, convexify=convexify)
         count.krylov += linear.iterations
         count.rung = max(count.rung, linear.rung)

@@ -155,8 +155,7 @@ def save_frame(
 ) -> None:
     """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name.
 
-    `contact` holds the (n,) fields that contact has left, `elements` the (m,) fields of the elements; `log_growth` as
-    for `layer_fields`.
+    `contact` and `elements` hold the (n,) and (m,) fields of the last step; `log_growth` as for `layer_fields`.
     """
     fields: dict[str, NDArray] = {"positions": positions * MM_PER_M}
     if "displacement" in parameters.fields:

@@ -21,17 +21,7 @@ is preferred, so that mirrored elements are integrated alike."""
 
 @dataclass(frozen=True, eq=False)
 class IntegrationPoints:
-    """Points of the regular element, for elements of an order.
-
-    Attributes
-    ----------
-    order : int
-        Of the elements.
-    places : (q, 4) float
-        Barycentric coordinates.
-    weights : (q,) float
-        Their parts of the element's volume, of sum 1.
-    """
+    """Points of the regular element: (q, 4) barycentric coordinates, and (q,) parts of its volume, of sum 1."""
 
     order: int
     places: Floats

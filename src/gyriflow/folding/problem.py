@@ -14,8 +14,6 @@ from dolfinx.la import BlockMode
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..mechanics.fissure import contact_energy_density
-from ..mechanics.kinematics import deformation_gradient, elastic_deformation
 from ..mechanics.materials import Material
 from ..parameters.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
@@ -36,50 +34,30 @@ FACET_DEGREE = {1: 2, 2: 4}
 
 
 class Contribution(Protocol):
-    """A further part of the energy, such as contact between folds; all of it at the problem's present displacement."""
+    """A further part of the energy at the problem's present displacement, such as contact between folds.
 
-    def energy(self) -> float:
-        """Returns the energy in J, the same on every rank."""
+    `energy` is in J and the same on every rank; `add_residual` adds its derivative in N to the owned components;
+    `stiffness` is the second derivative in N/m, or one made positive semidefinite, None where it is zero: a sum of
+    terms that couple few nodes each (`NODES_PER_TERM`), where fixed components need no care. `largest_step` is the part
+    of (k, 3) local displacements that can safely be added, at most 1, equal on all ranks.
+    """
 
-    def add_residual(self, out: PETSc.Vec) -> None:
-        """Adds the energy's derivative in N to the owned components of a vector."""
-
-    def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
-        """Returns the energy's second derivative in N/m, or one made positive semidefinite; None where it is zero.
-
-        A sum of terms that couple few nodes each (`NODES_PER_TERM`). Rows and columns of fixed components need no care.
-        """
-
-    def largest_step(self, direction: Floats) -> float:
-        """Returns the part of (k, 3) local displacements that can safely be added: at most 1, equal on all ranks."""
+    def energy(self) -> float: ...
+    def add_residual(self, out: PETSc.Vec) -> None: ...
+    def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None: ...
+    def largest_step(self, direction: Floats) -> float: ...
 
 
 class Problem:
     """Energy, residual and tangent of the displacement of one step.
 
-    Parameters
-    ----------
-    domain, zones, material
-        The mesh, its fixed zones, and what the tissue is made of.
-    penalty_pa_per_m
-        Pressure per depth of what passes the planes at the fissure; with 0 they hold nothing back.
-    remembers_stress
-        Whether the present mesh may be stretched elastically, see `set_stretch`.
-    quadrature_degree
-        Degree of the polynomials that are integrated exactly; None takes what the elements' order needs.
+    Planes at the fissure press back with `penalty_pa_per_m` per depth, with 0 not at all. With `remembers_stress` the
+    present mesh may be stretched elastically (`set_stretch`). `quadrature_degree` is that of the polynomials that are
+    integrated exactly; None takes what the elements' order needs.
 
-    Attributes
-    ----------
-    u : dolfinx.fem.Function
-        The displacement of the step in m, the unknown.
-    contributions : list of Contribution
-        Further parts of the energy.
-    free : bool
-        Whether the body is unconstrained.
-    hierarchy : OrderHierarchy or None
-        The linear level below quadratic elements for multigrid, None for linear ones.
-    points : IntegrationPoints
-        Where stiffness, growth and kept stretch are taken: q points in each element.
+    Attributes: the unknown displacement `u` in m, further `contributions` to the energy, whether the body is `free`,
+    the linear level `hierarchy` below quadratic elements, and the q `points` of each element at which stiffness, growth
+    and kept stretch are taken.
     """
 
     def __init__(
@@ -114,23 +92,25 @@ class Problem:
         dx = ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True)))
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[domain.order]})
 
-        F = deformation_gradient(self.u)
+        # finite growth (Rodriguez et al. 1994) on the updated reference
+        F = ufl.Identity(3) + ufl.grad(self.u)
         moduli = self._mu, ratio * self._mu
         if remembers_stress:
             self._V = self._field_at_points((3, 3))
             set_at_points(self._V, undeformed)
-            Fe = elastic_deformation(F * self._V, self._G_inverse)
+            Fe = F * self._V * self._G_inverse
             # counted per volume of the state without stress
             energy = material.energy_density(Fe, *moduli) / ufl.det(self._V) * dx
         else:
-            Fe = elastic_deformation(F, self._G_inverse)
+            Fe = F * self._G_inverse
             energy = material.energy_density(Fe, *moduli) * dx
         self._outcomes = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
         self._evaluated: dict[str, dolfinx.fem.Expression] = {}
         x = ufl.SpatialCoordinate(mesh)[0] + self.u[0]
         if penalty_pa_per_m and len(zones.vertices_of(LEFT_CONTACT, RIGHT_CONTACT)):
-            energy += contact_energy_density(x, planes[0], -1, penalty) * ds(LEFT_CONTACT)
-            energy += contact_energy_density(x, planes[1], +1, penalty) * ds(RIGHT_CONTACT)
+            # ε/2 ⟨penetration⟩² per area: the left hemisphere stays below its plane, the right one above
+            for beyond, tag in ((x - planes[0], LEFT_CONTACT), (planes[1] - x, RIGHT_CONTACT)):
+                energy += penalty / 2 * ufl.max_value(beyond, 0) ** 2 * ds(tag)
         residual = ufl.derivative(energy, self.u)
         tangent = ufl.derivative(residual, self.u)
         with form_compiler(domain.comm) as options:
@@ -154,7 +134,6 @@ class Problem:
         self.mesh_moved(domain.part)
 
     def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
-        """Returns a field with values at the integration points alone."""
         element = basix.ufl.quadrature_element("tetrahedron", shape, points=self._rule[0], weights=self._rule[1])
         return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
 
@@ -274,7 +253,6 @@ class Problem:
         tangent.set_parts(self._further_parts(convex=True))
 
     def _further_parts(self, *, convex: bool) -> list[PETSc.Mat]:
-        """Returns the contributions' tangents, without entries of fixed components, and has the products know them."""
         parts = [part for part in (part.stiffness(convex=convex) for part in self.contributions) if part is not None]
         for part in parts:
             part.zeroRowsColumns(self._fixed_global, diag=0.0)
@@ -310,7 +288,6 @@ class Problem:
         return self.domain.smallest_volume_ratio(self._moved())
 
     def _moved(self) -> Floats:
-        """Returns the (k, 3) positions in m of the local nodes after the displacement."""
         return np.asarray(self.domain.local(self.domain.positions) + self.displacement)
 
 

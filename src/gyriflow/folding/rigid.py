@@ -12,15 +12,8 @@ Ints = NDArray[np.int64]
 
 
 class RigidMotions:
-    """The translations and rotations of the connected parts of the present mesh, orthonormal.
-
-    Parameters
-    ----------
-    domain
-        The mesh.
-    part : (n,) int
-        Number of the part that each vertex belongs to.
-    """
+    """The translations and rotations, orthonormal, of the parts of the present mesh that vertices belong to by (n,)
+    numbers."""
 
     def __init__(self, domain: Domain, part: Ints) -> None:
         self.comm = domain.comm

@@ -96,14 +96,13 @@ class Folding:
         self.solver = NewtonSolver(self.problem, newton, self._residual_floor(mesh))
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
         self.model = growth_model(p, self.inputs, mesh.vertices)
-        self.growth: Growth = self.model.growth(StepStart(mesh.vertices, 0.0, p.step_s))
+        self.growth: Growth = self.model(StepStart(mesh.vertices, 0.0, p.step_s))
         self.fields = StepFields(self.domain, self.problem, self.contact, zones, p)
         self._growing = self.domain.local(zones.growth)
         self._local_maps = {name: self.domain.local(values) for name, values in self.maps.items()}
         self._pial = np.unique(zones.cortex_facets)
 
     def _residual_floor(self, mesh: TetrahedralMesh) -> float:
-        """Returns a residual in N far below any force of growth: a brain that does not grow must stay where it is."""
         p = self.parameters
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         stiffness = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
@@ -171,29 +170,25 @@ class Folding:
         self.problem.mesh_moved(part)
         if p.stress_memory_gw > 0:
             self.problem.set_stretch(self._kept_stretch(state, step_s))
-        growth = self.model.growth(start)
+        growth = self.model(start)
         self.problem.set_growth(growth.inverse(tissue))
         return tissue, growth
 
     def _grow(self, tissue: Tissue, growth: Growth, state: State, step_s: float) -> tuple[Floats, StepCount]:
-        """Solves a step; returns its (n, 3) displacement in m and what it took."""
         count = self.solver.solve(*[self.domain.local(guess) for guess in state.predicted(step_s)])
         self.growth, self.fields.step_s = growth, step_s
         return self.domain.gathered(self.problem.displacement[: self.domain.owned]), count
 
     def _kept_stretch(self, state: State, step_s: float) -> Floats:
-        """Returns the (c, q, 3, 3) stretch of local elements that is left for a step."""
         if state.stretch is None:
             return unpacked(unstretched(len(self.domain.cells), len(self.problem.points.weights)))
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
 
     def _thickness_m(self, start: StepStart) -> float:
-        """Returns the mean thickness of the cortex in the middle of a step."""
         return float(np.mean(self.parameters.thickness_at(start.week(self.parameters, 0.5), self.maps))) * M_PER_MM
 
     def _solved_row(self, u: Floats, count: StepCount) -> dict[str, float]:
-        """Returns what the step table says of a solve and the (n, 3) displacement in m that it led to."""
         ratios, length = self.problem.volume_ratios(), np.linalg.norm(u, axis=1) * MM_PER_M
         return {
             "newton": count.newton,

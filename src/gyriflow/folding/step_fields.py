@@ -89,7 +89,6 @@ class StepFields:
         return self._per_gw({"contact_pressure_pa": self.contact.pressure()})
 
     def _per_gw(self, fields: dict[str, Floats]) -> dict[str, Floats]:
-        """Returns fields of a step as they are where stress is remembered, and else as rates, named so."""
         if self._remembers:
             return fields
         return {f"{name}_per_gw": values * (SECONDS_PER_GW / self.step_s) for name, values in fields.items()}

@@ -20,16 +20,8 @@ Floats = NDArray[np.float64]
 class SurfacePart:
     """What a rank looks at of a surface.
 
-    Attributes
-    ----------
-    vertices : (p,) int
-        Their numbers in the whole surface, ascending.
-    faces : (f, 3) int
-        Faces as numbers of the part's vertices.
-    edges : (e, 2) int
-        Edges likewise, each once, ascending.
-    owned : (p,) bool
-        Which vertices are the rank's own.
+    The (p,) numbers of its vertices in the whole surface, ascending; (f, 3) faces and (e, 2) edges by numbers of these,
+    each edge once; and which of its vertices are the rank's own.
     """
 
     vertices: NDArray[np.int64]
@@ -98,18 +90,9 @@ def shared_out(positions: Floats, ranks: int) -> NDArray[np.int64]:
 def part_of_surface(
     positions: Floats, faces: NDArray[np.integer], owned: NDArray[np.bool_], reach: float
 ) -> SurfacePart:
-    """Returns what has to be looked at for the pairs that belong to some vertices of a surface.
+    """Returns what has to be looked at for the pairs that belong to the (n,) `owned` vertices of a surface.
 
-    Parameters
-    ----------
-    positions : (n, 3) float
-        Where its vertices are.
-    faces : (f, 3) int
-        The surface.
-    owned : (n,) bool
-        The vertices.
-    reach
-        The largest distance, along the axes, between two things that make a pair.
+    `reach` is the largest distance, along the axes, between two things that make a pair.
     """
     if owned.all():
         near = np.ones(len(faces), dtype=bool)

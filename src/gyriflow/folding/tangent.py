@@ -23,17 +23,8 @@ edges, of which each vertex follows the six nodes of a curved face."""
 class Operator:
     """The action of a sum of matrices, less the rigid part of the product where the body is unconstrained.
 
-    Parameters
-    ----------
-    like
-        A vector of the matrices' layout.
-
-    Attributes
-    ----------
-    matrix : PETSc.Mat
-        What acts so, symmetric, of type python: one for all iterates, since multigrid keeps the first it is given.
-    parts
-        The matrices, which change; at least one.
+    `parts` are the matrices, at least one, which change; `matrix` acts as their sum: one object for all iterates, since
+    multigrid keeps the first it is given. `like` is a vector of their layout.
     """
 
     def __init__(self, like: PETSc.Vec) -> None:
@@ -62,19 +53,7 @@ class Operator:
 class KeptTangent:
     """The elastic tangent of a step, kept from one displacement to the next while it predicts how forces change.
 
-    Parameters
-    ----------
-    blocks
-        The matrix that the tangent is assembled into.
-    form
-        The form of the tangent.
-    like
-        A vector of the displacement's layout.
-
-    Attributes
-    ----------
-    kept : bool
-        Whether the last one was that of an earlier displacement.
+    It is assembled into `blocks` by its form; `kept` says whether the last one was that of an earlier displacement.
     """
 
     def __init__(self, blocks: BlockMatrix, form: dolfinx.fem.Form, like: PETSc.Vec) -> None:
@@ -126,24 +105,10 @@ class KeptTangent:
 class Tangent:
     """The tangent of one iterate; good until the next one is assembled.
 
-    Parameters
-    ----------
-    matrix
-        The elastic part, stored by rows; its block diagonal is raised by the parts'.
-    products
-        What acts like the whole tangent, with fast products.
-    parts
-        Further parts in N/m, without entries in rows and columns of fixed components.
-    nodes_per_term
-        Nodes that a single term of a part couples at most.
-
-    Attributes
-    ----------
-    products : PETSc.Mat
-        As given.
-    smoothing : PETSc.Mat
-        A matrix whose block diagonal bounds the tangent as Jacobi's smoother needs it: a positive semidefinite term
-        that couples k nodes is at most k times its own block diagonal. The negative part of each is left out.
+    `matrix` is the elastic part, stored by rows; `products` acts like the whole tangent; `parts` are further ones in
+    N/m, without entries of fixed components, of terms that couple `nodes_per_term` nodes at most. `smoothing` is the
+    matrix with a block diagonal that bounds the tangent as Jacobi's smoother needs it: a positive semidefinite term
+    that couples k nodes is at most k times its own block diagonal. The negative part of each is left out.
     """
 
     def __init__(

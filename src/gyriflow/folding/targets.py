@@ -29,12 +29,8 @@ SOON_GW = 1e-6
 class TargetGrowth(Growth):
     """Growth of a step towards a shape.
 
-    Attributes
-    ----------
-    strain : (6, n) float
-        Logarithm of G at all vertices.
-    away_mm
-        Root mean square distance from the shape at the step's start, without rigid motion.
+    `strain` (6, n) is the logarithm of G at all vertices, `away_mm` the root mean square distance from the shape at the
+    step's start, without rigid motion.
     """
 
     strain: Floats
@@ -54,14 +50,8 @@ class TargetGrowth(Growth):
 class GrowthToTargets:
     """The model of growth towards shapes of the whole mesh at later weeks.
 
-    Attributes
-    ----------
-    parameters, inputs
-        Of the run.
-    targets : {week: (n, 3) float}
-        Positions of all vertices in mm; only the shape counts, not its pose.
-    smoothing_mm
-        Standard deviation that growth is smoothed with.
+    `targets` are the (n, 3) positions of all vertices in mm by week, of which only the shape counts, not the pose;
+    `smoothing_mm` is the standard deviation that growth is smoothed with.
     """
 
     parameters: FoldingParameters
@@ -111,12 +101,7 @@ class GrowthToTargets:
 def log_growth(positions: Floats, pieces: np.ndarray, displacement: Floats, smoothing_mm: float) -> Floats:
     """Returns the (n, 6) logarithm ln U of the stretch of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
 
-    Parameters
-    ----------
-    positions, displacement : (n, 3) float
-        In mm.
-    pieces : (p, 4) int
-        Linear tetrahedra.
+    Positions and displacement are (n, 3) in mm, `pieces` (p, 4) linear tetrahedra.
     """
     after = positions + displacement
     edges = [np.swapaxes(at[pieces[:, 1:]] - at[pieces[:, :1]], 1, 2) for at in (positions, after)]

@@ -46,21 +46,17 @@ class Zones:
 
     Attributes
     ----------
-    facets : (f, 3) int
-        Pial facets, outward, as vertex indices; the four triangles of a quadratic element's face follow each other.
-    facet_zone : (f,) int
-        FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES; BASE, SIDE_X or SIDE_Y where tissue is cut off
-        flat and there is no cortex; MEDIAL_WALL where the only hemisphere faces the one that is not there.
+    facets, facet_zone : (f, 3) int, (f,) int
+        Pial facets, outward, as vertex indices, the four of a quadratic element's face together. Their zone: FREE,
+        CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES; BASE, SIDE_X or SIDE_Y where tissue is cut off flat and
+        there is no cortex; MEDIAL_WALL where the only hemisphere faces the one that is not there.
     growth : (n,) float
         1 where tissue grows, 0 where it does not.
-    fissure_x_mm : float
-        Position of the interhemispheric fissure.
-    planes_mm : (float, float)
-        The plane that the left, and that the right hemisphere may not pass.
-    free : bool
-        Whether nothing is fixed on purpose, so that rigid motions are to be removed.
-    wall_held : bool
-        Whether the medial wall is clamped; else it stays in its plane.
+    planes_mm
+        The planes that the left, and that the right hemisphere may not pass.
+    free, wall_held
+        Whether nothing is fixed on purpose, so that rigid motions are to be removed; whether the medial wall is clamped
+        or stays in its plane.
     anchors : (k,) int, (k, 3) bool
         Vertices, and which of their components are fixed beside the zones', so that a body whose only support is a
         sliding wall makes no rigid motion. They take no force: as few are fixed as there are such motions.
@@ -136,22 +132,11 @@ def medial_wall_facets(mesh: TetrahedralMesh, facets: NDArray[np.int64], side: S
 def _wall_anchors(
     vertices: NDArray[np.float64], wall: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Returns the vertices of a wall in a plane x = const, and components, whose fixing leaves it no rigid motion."""
     places = vertices[wall][:, 1:]
     middle = int(((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin())
     away = int(np.abs(places[:, 0] - places[middle, 0]).argmax())
     # shifts along y and z, and the turn about x
     return wall[[middle, away]], np.array([[False, True, True], [False, False, True]])
-
-
-def no_growth_ellipsoid(vertices: Floats, parameters: FoldingParameters) -> tuple[Floats, Floats] | None:
-    """Returns centre and semi-axes, (3,) in mm, of the ellipsoid in which nothing grows; None where there is none."""
-    p = parameters.no_growth
-    if p.kind == "none":
-        return None
-    low, high = brain_box(vertices, parameters.side)
-    shift = np.array([0.0, p.shift_y, p.shift_z])
-    return (low + high) / 2 + shift * (high - low), np.array(p.semi_axes) * (high - low)
 
 
 def inside_ellipsoid(

@@ -85,7 +85,6 @@ def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.intege
 
 
 def _require_along(share: float) -> None:
-    """Raises InputError where too little of the regions and the pial surface lies near the other, warns of little."""
     if share < LEAST_NEAR:
         raise InputError(
             "the regions do not lie along the pial surface",

@@ -140,7 +140,6 @@ def _intensity(
 
 
 def _resample(values: NDArray[np.float32], affine: Floats, grid: Floats, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Returns values of a volume at the points of another grid, linear in between, 0 outside."""
     index = np.linalg.inv(affine) @ grid
     return np.asarray(
         affine_transform(values, index[:3, :3], index[:3, 3], output_shape=shape, order=1), dtype=np.float32

@@ -180,13 +180,11 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
 
 
 def _design(weeks: Floats, first: float, last: float) -> Floats:
-    """Returns the (n, 1 + k) matrix of the logarithm, whose rate is a quadratic spline: column 0 is that at `first`."""
     integral = BSpline(_knots(first, last), np.eye(KNOT_INTERVALS + 2), 2, extrapolate=False).antiderivative()
     return np.column_stack([np.ones(len(weeks)), integral(weeks) - integral(first)])
 
 
 def _penalty(first: float, last: float, order: int) -> Floats:
-    """Returns the (1 + k, 1 + k) matrix of squared differences of the rate."""
     # the end knots lie together, so differences are those of the splines' middles
     knots = _knots(first, last)
     middles = 0.5 * (knots[1:-2] + knots[2:-1])
@@ -201,7 +199,6 @@ def _knots(first: float, last: float) -> Floats:
 
 
 def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
-    """Returns the factor of the penalty that leaves the degrees of freedom, the trace of the hat matrix."""
     # a trace of ridge keeps the matrix regular where weeks are fewer than splines
     ridge = 1e-10 * np.eye(len(penalty))
 
@@ -230,7 +227,6 @@ def _solved(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_
 def _robust_weights(
     design: Floats, logs: Floats, penalty: Floats, strength: float, degrees: float, may_shrink: bool
 ) -> Floats:
-    """Returns the (n,) weights of the weeks: least absolute deviations first, then Tukey's biweight."""
     count = len(logs)
     weights = np.ones(count)
     if count < TELLING * degrees:

@@ -107,7 +107,6 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
 
 
 def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
-    """Returns a volume for greedy, with RAS+ mm in the place of its LPS mm: turned alike for both brains."""
     image = SimpleITK.GetImageFromArray(np.ascontiguousarray(values.transpose(2, 1, 0)))
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     image.SetSpacing(spacing.tolist())
@@ -117,13 +116,11 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
 
 
 def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
-    """Returns 1 in the cerebrum and near it: the surroundings of the brain must not pull on it."""
     rounds = int(np.ceil(NEAR_MM / brain.voxel_mm))
     return binary_dilation(brain.tissue & CEREBRUM > 0, iterations=rounds).astype(np.float32)
 
 
 def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
-    """Returns the (3, 3) turn and the (4, 4) similarity, from earlier to later, that registration begins with."""
     (first, size), (second, other_size) = _place(earlier), _place(later)
     scale = (other_size / size) ** (1 / 3)
     index = np.argwhere(earlier.cerebrum > 0.01)
@@ -148,6 +145,5 @@ def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> t
 
 
 def _place(brain: Channels) -> tuple[Floats, float]:
-    """Returns the (3,) centroid in mm and the volume in mm³ of a cerebrum."""
     index = np.argwhere(brain.tissue & CEREBRUM > 0)
     return transform_points(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3

@@ -79,7 +79,6 @@ def curves_of_run(growth: Mapping[str, Any], curves: pd.DataFrame | None, series
 
 
 def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str) -> Curve:
-    """Returns the curve through the measured brains of a series; InputError where there is none."""
     table = pd.DataFrame(columns=["series", "quantity", "week", "value"]) if curves is None else curves
     of_series = table[table["series"] == series]
     rows = of_series[of_series["quantity"] == quantity]

@@ -111,5 +111,4 @@ def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces]) -> Fl
 
 
 def _triangles(mesh: TriangleMesh) -> NDArray[np.integer]:
-    """Returns the triangles with their corners, and themselves, in ascending order."""
     return np.unique(np.sort(mesh.faces, axis=1), axis=0)

@@ -95,7 +95,6 @@ def require_good(quality: Quality, *, pair: str) -> None:
 
 
 def _dice(earlier: Channels, later: Channels, bit: int, places: Floats) -> float:
-    """Returns the overlap of a mask with that of the later brain taken back; `places` are (3, n) indices there."""
     one = (earlier.tissue & bit > 0).ravel()
     other = map_coordinates((later.tissue & bit > 0).astype(np.float32), places, order=1) > 0.5
     return float(2 * np.count_nonzero(one & other) / max(np.count_nonzero(one) + np.count_nonzero(other), 1))
