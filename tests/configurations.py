@@ -44,3 +44,8 @@ def problems(raw, folder="."):
     first, *lines, _ = message.splitlines()
     assert first.startswith(f"the configuration has {len(lines)} problem")
     return [line.strip() for line in lines]
+
+
+def keys(raw, folder="."):
+    """Returns the keys of these problems."""
+    return [line.partition(": ")[0] for line in problems(raw, folder)]

@@ -6,7 +6,7 @@ from .conftest import Workflow, labelled
 
 STUDY = {
     "brains": [
-        {"id": "ball", "week": 21, "shape": {"kind": "ellipsoid"}},
+        {"id": "ball", "week": 21, "shape": {}},
         {"id": "old", "week": 22, **labelled(22)},
     ],
     "start": "ball",
@@ -36,10 +36,10 @@ def made(checkout_copy, tmp_path_factory):
     ("change", "expected"),
     [
         ({"surface": {"edge_length_mm": 1.2}}, {"shape": 1, "pial_from_shape": 1}),
-        ({"shape": {"kind": "sphere"}}, {"shape": 1, "pial_from_shape": 1}),
-        ({"shape": {"kind": "ellipsoid", "seed": 1}}, {"shape": 1, "pial_from_shape": 1}),
+        ({"shape": {"semi_axes_mm": [23, 23, 23]}}, {"shape": 1, "pial_from_shape": 1}),
+        ({"shape": {"seed": 1}}, {"shape": 1, "pial_from_shape": 1}),
         # defaults written out, and what is for other kinds of input
-        ({"shape": {"kind": "ellipsoid", "noise_mm": 0.05}}, {}),
+        ({"shape": {"noise_mm": 0.05}}, {}),
         ({"surface": {"smoothing_iterations": 3, "max_hole_mm": 1.0}}, {}),
     ],
 )

@@ -5,7 +5,7 @@ import pytest
 
 from .conftest import COARSE
 
-ELLIPSOID = {"kind": "ellipsoid", "semi_axes_mm": [20, 26, 18]}
+ELLIPSOID = {"semi_axes_mm": [20, 26, 18]}
 STUDY = {
     "brains": [
         {"id": "a", "week": 21, "shape": ELLIPSOID},

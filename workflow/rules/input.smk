@@ -3,7 +3,7 @@ def shape_settings(wildcards):
     """Return what a simple shape depends on."""
     shape = study.brains[wildcards.brain].given.shape
     return {
-        "semi_axes_mm": list(shape.size_mm),
+        "semi_axes_mm": list(shape.semi_axes_mm),
         "noise_mm": shape.noise_mm,
         "seed": shape.seed,
         "edge_length_mm": CONFIG.surface.edge_length_mm,

@@ -93,7 +93,7 @@ class Brains:
         shape = self.config.brain(brain).shape
         assert shape is not None
         return {
-            **{"semi_axes_mm": list(shape.size_mm), "noise_mm": shape.noise_mm, "seed": shape.seed},
+            **{"semi_axes_mm": list(shape.semi_axes_mm), "noise_mm": shape.noise_mm, "seed": shape.seed},
             "edge_length_mm": self.config.surface.edge_length_mm,
         }
 

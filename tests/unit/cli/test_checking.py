@@ -75,7 +75,9 @@ def test_a_mesh_too_coarse_for_the_cortex_is_told_before_it_is_made():
 
 def test_a_look_leaves_nothing_behind(tmp_path):
     config = tmp_path / "a.yaml"
-    config.write_text("brains: [{id: a, week: 23, shape: {kind: sphere}}]\nstart: a\nfolding: {end_week: 24}\n")
+    config.write_text(
+        "brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\nstart: a\nfolding: {end_week: 24}\n"
+    )
     assert plan(config, tmp_path / "new" / "study", ["surface"])
     (said,) = work_of_study(config, tmp_path / "new" / "study", 1, ["calibrate"])
     assert said == "nothing to run: the configuration asks for no results of this stage"

@@ -18,7 +18,7 @@ from gyriflow.config.stages import MeshSettings
 from gyriflow.study import resolve
 
 STUDY = {
-    "brains": [{"id": "a", "week": 21, "shape": {"kind": "sphere", "radius_mm": 20}}],
+    "brains": [{"id": "a", "week": 21, "shape": {"semi_axes_mm": [20, 20, 20]}}],
     "start": "a",
     "mesh": {"mesher": "tetgen", "order": 1, "surface_edge_mm": 0.67, "core_edge_mm": 4.0},
     "folding": {"end_week": 25, "step_s": 86400, "ranks": 1},
@@ -61,7 +61,7 @@ def test_a_folding_takes_as_long_as_it_has_elements_and_steps():
 
 
 def test_runs_of_studies_and_calibrations_cost_what_runs_do():
-    later = [{"id": f"w{week}", "week": week, "shape": {"kind": "sphere", "radius_mm": 22}} for week in (23, 25)]
+    later = [{"id": f"w{week}", "week": week, "shape": {"semi_axes_mm": [22, 22, 22]}} for week in (23, 25)]
     study = STUDY | {
         "brains": [*STUDY["brains"], *later],
         "runs": {"reference": {}},

@@ -76,7 +76,7 @@ def test_a_folder_without_a_study_is_named(tmp_path):
 
 
 def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(study):
-    brain = "brains: [{id: a, week: 23, shape: {kind: sphere}}]\nstart: a\nfolding: {end_week: 24}\n"
+    brain = "brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\nstart: a\nfolding: {end_week: 24}\n"
     (study / "gyriflow.yaml").write_text(brain + "runs: {r: {}, later: {}}\n")
     found = json.loads(as_json(status(study)))
     assert found["brains"][0] == {"brain": "a", "surface": "done", "mesh": "-", "metrics": "-"}

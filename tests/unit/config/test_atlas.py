@@ -127,7 +127,7 @@ def test_a_population_of_a_brain_of_ones_own(tmp_path):
     brains = [
         {"id": "a", "week": 21, "pial": "a.stl", "population": "sheep"},
         {"id": "b", "week": 22, "pial": "b.stl"},
-        {"id": "c", "week": 22, "shape": {"kind": "sphere"}},
+        {"id": "c", "week": 22, "shape": {"semi_axes_mm": [23, 23, 23]}},
     ]
     raw = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
     config = load(raw, tmp_path)

@@ -248,7 +248,10 @@ def test_a_validated_configuration_written_out_is_valid_again():
 def test_only_real_brains_are_called_so(tmp_path, shown, name):
     touched(tmp_path, "a.stl")
     brains = [{"id": "real", "week": 22, "pial": "a.stl"}]
-    brains += [{"id": i, "week": 21, "shape": {"kind": kind}} for i, kind in (("ball", "sphere"), ("egg", "ellipsoid"))]
+    brains += [
+        {"id": "ball", "week": 21, "shape": {"semi_axes_mm": [23, 23, 23]}},
+        {"id": "egg", "week": 21, "shape": {}},
+    ]
     assert load(study(brains, start="ball"), tmp_path).measured_name(shown) == name
 
 

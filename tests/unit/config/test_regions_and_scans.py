@@ -73,7 +73,7 @@ def test_the_norm_is_of_all_measured_brains_of_one_kind():
 def test_the_norm_is_of_real_brains_where_there_are_any_and_never_of_simple_shapes(tmp_path):
     (tmp_path / "a.stl").touch()
     real = [{"id": f"r{week}", "week": week, "pial": str(tmp_path / "a.stl")} for week in (21, 22)]
-    shapes = [{"id": f"s{week}", "week": week, "shape": {"kind": "sphere"}} for week in (21, 22)]
+    shapes = [{"id": f"s{week}", "week": week, "shape": {"semi_axes_mm": [23, 23, 23]}} for week in (21, 22)]
     assert load(study([*shapes, *real]) | {"start": "s21"}).norm_reference == ["r21", "r22"]
     assert load(study([*BRAINS, *real], norm_reference=["p22", "r21"])).norm_reference == ["p22", "r21"]
     assert load(study(shapes) | {"start": "s21"}).norm_reference == []

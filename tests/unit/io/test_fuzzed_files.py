@@ -204,7 +204,7 @@ def test_json(tmp_path, content):
     tried(tmp_path, "a.json", content, read_json)
 
 
-YAML = b"brains:\n  - {id: a, week: 21.5, shape: {kind: sphere}}\nstart: a\nfolding: &f {end_week: 23}\nruns: {b: *f}\n"
+YAML = b"brains:\n  - {id: a, week: 21.5, shape: {}}\nstart: a\nfolding: &f {end_week: 23}\nruns: {b: *f}\n"
 
 
 @MANY

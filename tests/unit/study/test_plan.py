@@ -165,7 +165,7 @@ def test_runs_are_compared_with_the_population_and_the_sides_of_their_start_only
 
 
 def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_worth():
-    shape = {"shape": {"kind": "sphere"}}
+    shape = {"shape": {"semi_axes_mm": [23, 23, 23]}}
     found = plan([brain(21, **shape), brain(22, **shape)])
     assert found.measuring.beside("reference", "b21") == {"21.00": "b21", "22.00": "b22"}
     assert found.validating.compared("reference", "b21") == {}
@@ -245,7 +245,7 @@ def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
 def test_regions_are_those_of_the_nearest_brain_that_has_any(tmp_path):
     (tmp_path / "regions.nii.gz").touch()
     given = {"b21": {"volume": str(tmp_path / "regions.nii.gz"), "names": {1: "frontal"}}}
-    shape = brain(22, shape={"kind": "sphere", "radius_mm": 20}) | {"id": "sphere"}
+    shape = brain(22, shape={"semi_axes_mm": [20, 20, 20]}) | {"id": "sphere"}
     found = plan([labels(tmp_path, 21), labels(tmp_path, 22), shape], metrics={"regions": given})
     assert (found.measuring.regioned, found.measuring.given) == (["b21", "b22"], ["b21"])
     assert found.chains.given_regions("b22") == {
@@ -512,7 +512,7 @@ def test_of_many_weeks_every_other_one_is_shown_with_the_start_and_the_last(tmp_
 
 
 def test_named_sulci_are_those_of_real_whole_brains_and_name_what_begins(tmp_path, real):
-    shape = brain(22, shape={"kind": "sphere", "radius_mm": 20}) | {"id": "sphere"}
+    shape = brain(22, shape={"semi_axes_mm": [20, 20, 20]}) | {"id": "sphere"}
     found = plan([*real, shape])
     last = found.chains.later("b21")[-1]
     assert last in found.measuring.named
