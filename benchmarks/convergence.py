@@ -45,10 +45,9 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, fine
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.frames import read_positions, read_tets
-from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.io.yaml_files import read_yaml, write_yaml
+from gyriflow.io.yaml_files import SCHEMES, read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.metrics.measure import Settings, folding_rows, measure_hemisphere, size_rows, spectrum_rows
 

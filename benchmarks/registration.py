@@ -15,8 +15,8 @@ from gyriflow.errors import InputError
 from gyriflow.growth.channels import channels
 from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.registration_quality import judge, require_good
-from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.yaml_files import SCHEMES
 
 
 def main() -> None:

@@ -13,9 +13,8 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_json
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_carried_mesh
-from gyriflow.io.surfaces import write_surface
+from gyriflow.io.surfaces import read_pose, write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.parameters.terms import SIDES
 

@@ -13,7 +13,7 @@ from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
 from gyriflow.io.registrations import read_targets
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.metrics.similarity import surface_distance
+from gyriflow.metrics.similarity import aligned_distance
 from gyriflow.report.labels import FORETOLD
 
 STUDY = {
@@ -120,7 +120,7 @@ def test_a_surface_in_another_pose_is_carried_through_the_labels_of_an_atlas(wor
     atlas, target = (TriangleMesh(places, boundary.faces) for places in ends)
     # the former in the pose of that brain, the latter in that of the start
     assert nearest_on(atlas.vertices, real)[0].mean() < 0.3
-    assert surface_distance(target, real)["symmetric_mean"] < 1.5
+    assert aligned_distance(target, real)["symmetric_mean"] < 1.5
     assert signed_volume(target) == pytest.approx(signed_volume(real), rel=0.1)
     motion = rigid_fit(targets.positions[2], targets.positions[0], np.ones(len(targets.positions[0])))
     assert angle_deg(motion[:3, :3]) < 2.0

@@ -10,8 +10,14 @@ from phantoms import CORTEX, phantom_labels
 from shapes import LPS, hemisphere, save_gifti
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps, write_surface, write_vertex_labels
+from gyriflow.io.surfaces import (
+    read_pose,
+    read_surface,
+    read_vertex_labels,
+    read_vertex_maps,
+    write_surface,
+    write_vertex_labels,
+)
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
 

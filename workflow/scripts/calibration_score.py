@@ -8,7 +8,7 @@ from gyriflow.compare.shapes import Shape, ready
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import curvature
-from gyriflow.metrics.similarity import surface_distance
+from gyriflow.metrics.similarity import aligned_distance
 from gyriflow.step import step
 
 files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
@@ -30,7 +30,7 @@ with step(snakemake.log[0]):
         shapes = set(params.weights) - {"size", "surface_distance"}
         row = shape_scores(shape(mesh, real), shape(real, real), shapes) if shapes else {}
         row |= {"size": size_score(mesh, real)} if "size" in params.weights else {}
-        distance = {"surface_distance": surface_distance(mesh, real)["symmetric_mean"]}
+        distance = {"surface_distance": aligned_distance(mesh, real)["symmetric_mean"]}
         rows.append(row | (distance if "surface_distance" in params.weights else {}))
     found = pd.DataFrame(rows, columns=list(params.weights)).mean()
     score = sum(weight * found[name] for name, weight in params.weights.items())

@@ -5,8 +5,8 @@ import numpy as np
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.growth.carrying import carry_mesh
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import CarriedMesh, read_correspondence, write_carried_mesh
+from gyriflow.io.surfaces import read_pose
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.step import step
 

@@ -4,9 +4,8 @@ import numpy as np
 
 from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carrying import carry_regions
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_correspondence
-from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_vertex_labels
+from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_labels, write_vertex_labels
 from gyriflow.parameters.terms import SIDES, STRUCTURES
 from gyriflow.step import step
 

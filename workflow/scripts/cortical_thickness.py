@@ -2,8 +2,7 @@
 
 from gyriflow.anatomy.thickness import thickness_from_labels
 from gyriflow.io.files import write_json
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_surface, write_vertex_maps
+from gyriflow.io.surfaces import read_pose, read_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step

@@ -5,8 +5,7 @@ import numpy as np
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carried_regions import number_regions, regions_from_surface, regions_from_volume, renumber
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_vertex_labels
+from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_labels, write_vertex_labels
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.terms import SIDES, STRUCTURES
 from gyriflow.step import step

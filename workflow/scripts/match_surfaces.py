@@ -2,9 +2,8 @@
 
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.matched_surfaces import match_surfaces
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import write_matched_surfaces
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.step import step
 
 files = snakemake.input

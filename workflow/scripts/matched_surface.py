@@ -2,8 +2,7 @@
 
 from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.growth.matched_surfaces import outward
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.surfaces import read_pose, read_surface, write_surface
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 

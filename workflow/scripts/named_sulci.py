@@ -7,11 +7,9 @@ import numpy as np
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.growth.carried_regions import NO_REGION, PLACES_MM, find_places, regions_by_deformation
 from gyriflow.growth.channels import channels
-from gyriflow.io.poses import read_pose
-from gyriflow.io.schemes import SCHEMES
-from gyriflow.io.surfaces import read_surface, write_vertex_labels
+from gyriflow.io.surfaces import read_pose, read_surface, write_vertex_labels
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.io.yaml_files import read_yaml
+from gyriflow.io.yaml_files import SCHEMES, read_yaml
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.parameters.terms import SIDES, STRUCTURES
 from gyriflow.step import step

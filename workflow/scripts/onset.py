@@ -7,9 +7,8 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carrying import carry_surface
 from gyriflow.io.files import write_table
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_correspondence
-from gyriflow.io.surfaces import read_surface, read_vertex_labels
+from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_labels
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.gyrification import convex_hull, sulcal_depth
 from gyriflow.step import step

@@ -2,8 +2,8 @@
 
 from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_targets
+from gyriflow.io.surfaces import read_pose
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.mesh import maps as on_mesh
 from gyriflow.parameters.folding import target_maps

@@ -4,8 +4,7 @@ from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, fro
 from gyriflow.anatomy.plausible import Limits
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_one_hemisphere, read_surface, write_brain
+from gyriflow.io.surfaces import read_one_hemisphere, read_pose, read_surface, write_brain
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.parameters.terms import SIDES

@@ -7,8 +7,7 @@ from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.jobs import read_messages
 from gyriflow.io.maps import read_volume_map
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_surface, read_vertex_maps
+from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.report.quality import Brain, Volume, facts, quality_page, quality_row, tissue_groups

@@ -8,9 +8,8 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import write_table
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_carried_mesh
-from gyriflow.io.surfaces import read_surface, read_vertex_maps
+from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step

@@ -6,9 +6,8 @@ import numpy as np
 
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.expected import carry_sharply, foretell, sizes_of
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import Targets, read_correspondence, write_targets
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.step import step
 

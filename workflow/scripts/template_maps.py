@@ -4,9 +4,8 @@ import numpy as np
 
 from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carrying import maps_on_template
-from gyriflow.io.poses import read_pose
 from gyriflow.io.registrations import read_correspondence
-from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_vertex_maps
+from gyriflow.io.surfaces import STRUCTURES, read_pose, read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.step import step
 
 files = snakemake.input

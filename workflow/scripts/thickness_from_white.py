@@ -2,8 +2,7 @@
 
 from gyriflow.anatomy.thickness import thickness_from_white
 from gyriflow.io.files import read_json, write_json
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import read_one_hemisphere, read_surface, write_vertex_maps
+from gyriflow.io.surfaces import read_one_hemisphere, read_pose, read_surface, write_vertex_maps
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 

@@ -2,8 +2,14 @@
 
 from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
 from gyriflow.io.files import write_table
-from gyriflow.io.poses import read_pose
-from gyriflow.io.surfaces import STRUCTURES, read_one_hemisphere, read_surface, write_surface, write_vertex_maps
+from gyriflow.io.surfaces import (
+    STRUCTURES,
+    read_one_hemisphere,
+    read_pose,
+    read_surface,
+    write_surface,
+    write_vertex_maps,
+)
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.metrics.measure import measure_white
 from gyriflow.parameters.schemes import LabelScheme

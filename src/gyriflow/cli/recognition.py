@@ -16,8 +16,8 @@ from ..config.brains import covariates
 from ..config.scans import Scan, read_scans
 from ..errors import InputError
 from ..io.files import files_in, read_json
-from ..io.schemes import SCHEMES
 from ..io.volumes import read_label_volume
+from ..io.yaml_files import SCHEMES
 
 VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
 SURFACES = (".gii", ".vtk", ".stl", ".ply", ".obj")

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pydantic import ValidationError
 
-from ..io.schemes import SCHEMES
+from ..io.yaml_files import SCHEMES
 from ..parameters.folding import VARYING, value_problems
 from ..parameters.settings import Key, Problem, messages, nearest
 from ..parameters.terms import AMPLITUDE, LONGEST_NAME, STIFFNESS_RATIO

@@ -8,8 +8,7 @@ from typing import Any
 from pydantic import Field, PrivateAttr, field_validator
 
 from ..errors import InputError
-from ..io.schemes import SCHEMES
-from ..io.yaml_files import read_keys
+from ..io.yaml_files import SCHEMES, read_keys
 from ..parameters.folding import VARYING, FoldingSettings, output_weeks
 from ..parameters.schemes import LabelScheme, SchemeSettings
 from ..parameters.settings import Settings, refused

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry.triangles import TriangleMesh, unit, vertex_normals
 from ..parameters.folding import FoldingParameters
+from ..parameters.terms import CORTICAL_STEEPNESS
 from ..parameters.varying import Maps, value_at
 from ..units import M_PER_MM, MM_PER_M
 from .points import IntegrationPoints
@@ -29,7 +30,7 @@ TIE = 1e-9
 
 def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:
     """Returns w = 1/(1 + exp(10 (d/H − 1))): 1 in the cortex, 0 in the core (paper, after Tallinen et al. 2016)."""
-    return 1.0 / (1.0 + np.exp(np.minimum(10.0 * (distance / thickness - 1.0), 700.0)))
+    return 1.0 / (1.0 + np.exp(np.minimum(CORTICAL_STEEPNESS * (distance / thickness - 1.0), 700.0)))
 
 
 def shear_modulus(p: FoldingParameters, w: Floats, maps: Maps, week: float) -> Floats:

@@ -109,22 +109,18 @@ def follow_planes(
     planes: Callable[[Floats, Floats], Planes],
     rounds: int,
     arrived: Callable[[Floats, Floats, Floats], bool],
-    as_matrices: bool = False,
 ) -> tuple[Floats, Floats]:
     """Returns the rotation and shift that iterative closest points lead to from given ones, in at most `rounds` steps.
 
     `planes` leads from rotation and shift to the moved points and the planes that they are to reach, `arrived` from the
-    points of a step, its turn and its move to whether it is the last one. Steps are put together as (4, 4) matrices on
-    demand: round-off decides which of two equally near faces is taken, which changes results by thousandths.
+    points of a step, its turn and its move to whether it is the last one.
     """
     for _ in range(rounds):
         points, normals, ahead, weights = planes(rotation, shift)
         turn, move = step_towards_planes(points, normals, ahead, weights)
-        if as_matrices:
-            whole = motion(turn, move) @ motion(rotation, shift)
-            rotation, shift = whole[:3, :3], whole[:3, 3]
-        else:
-            rotation, shift = turn @ rotation, turn @ shift + move
+        # as (4, 4) matrices: round-off decides which of two equally near faces is taken
+        whole = motion(turn, move) @ motion(rotation, shift)
+        rotation, shift = whole[:3, :3], whole[:3, 3]
         if arrived(points, turn, move):
             break
     return rotation, shift
@@ -160,7 +156,7 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         return bool(np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < ARRIVED_MM)
 
     apart = of_b.mean(axis=0) - of_a.mean(axis=0)
-    return motion(*follow_planes(np.eye(3), apart, planes, ROUNDS, arrived, as_matrices=True))
+    return motion(*follow_planes(np.eye(3), apart, planes, ROUNDS, arrived))
 
 
 def fits_from_all_sides(

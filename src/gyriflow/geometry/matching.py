@@ -1,5 +1,6 @@
 """What lies inside surfaces, where they are near each other, match or cross, and values brought from one to another."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import igl
@@ -36,6 +37,17 @@ def nearest_on(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Flo
     """Returns the (n,) distances of points from a surface, and the faces and (n, 3) positions of its nearest points."""
     squared, face, place = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces)
     return np.sqrt(squared), face.astype(np.int64), place
+
+
+def surface_distance(ways: Iterable[tuple[Floats, Floats]], share: float = 0.95) -> tuple[float, float]:
+    """Summarise how far two surfaces are from each other, given the (n,) distances of points of either and weights.
+
+    The mean of both weighted means, and the larger of the distances within which a `share` of each weight lies.
+    """
+    both = list(ways)
+    mean = float(np.mean([np.average(away, weights=weights) for away, weights in both]))
+    far = [np.quantile(away, share, weights=weights, method="inverted_cdf") for away, weights in both]
+    return mean, float(max(far))
 
 
 def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:

@@ -26,9 +26,10 @@ from nibabel.gifti import (
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import TriangleMesh, is_closed
 from ..parameters.terms import STRUCTURES, Side
-from .files import AGAIN, AnyPath, reading, replaced, require_finite
+from .files import AGAIN, AnyPath, read_json, reading, replaced, require_finite
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -272,6 +273,12 @@ def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:
     # process=True joins equal vertices: STL stores each corner of each face
     body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
     return np.asarray(body.vertices, dtype=float), np.asarray(body.faces)
+
+
+def read_pose(path: AnyPath) -> Pose:
+    """Read the pose in a `surface.json` or `pose.json`; InputError, for its reason, where it is a refusal."""
+    content = read_json(path)
+    return pose_from(content.get("pose", content))
 
 
 # --- matched surfaces ------------------------------------------------------------------------------------------

@@ -1,11 +1,14 @@
-"""YAML files: configurations, read strictly, and the parameters of a run."""
+"""YAML files: configurations, read strictly, the parameters of a run, and the label schemes of the folder `schemes`."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from ..errors import InputError
+from ..parameters.schemes import SCHEME_FILES, LabelScheme, SchemeSettings
+from ..parameters.settings import validated
 from .files import AnyPath, write_text
 
 MOST_VALUES = 1_000_000
@@ -83,3 +86,27 @@ def yaml_text(content: Any) -> str:
 def write_yaml(path: AnyPath, content: Any) -> None:
     """Writes plain dictionaries, lists and numbers, keys in their order."""
     write_text(path, yaml_text(content))
+
+
+class Schemes(Mapping[str, LabelScheme]):
+    """The schemes by name, each read when it is first asked for; InputError where a file is no scheme."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, LabelScheme] = {}
+
+    def __getitem__(self, name: str) -> LabelScheme:
+        if name not in self._known:
+            path = SCHEME_FILES[name]
+            settings = validated(SchemeSettings, read_keys(path), str(path))
+            self._known[name] = LabelScheme(name=name, **settings.model_dump())
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(SCHEME_FILES)
+
+    def __len__(self) -> int:
+        return len(SCHEME_FILES)
+
+
+SCHEMES = Schemes()
+"""A further scheme is a further file."""

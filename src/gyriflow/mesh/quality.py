@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import MeshError
 from ..geometry.jacobians import lower_bounds
-from ..geometry.matching import crossing_faces, nearest_on
+from ..geometry.matching import crossing_faces, nearest_on, surface_distance
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, radius_ratios, signed_volumes
 from ..geometry.triangles import TriangleMesh, area, corners, face_areas, face_normals, mean_edge_length, signed_volume
 
@@ -49,7 +49,7 @@ class GapWalls:
     area: Floats
 
 
-def surface_distance(mesh: TriangleMesh, other: TriangleMesh) -> dict[str, float]:
+def fidelity(mesh: TriangleMesh, other: TriangleMesh) -> dict[str, float]:
     """Returns how far two surfaces are from each other, in mm.
 
     `hausdorff99` is the distance within which 99 % of either surface's area lies from the other surface, the larger of
@@ -58,7 +58,7 @@ def surface_distance(mesh: TriangleMesh, other: TriangleMesh) -> dict[str, float
     """
     ways = [_distances(mesh, other), _distances(other, mesh)]
     return {
-        "hausdorff99": max(_quantile(distance, weight, QUANTILE) for distance, weight in ways),
+        "hausdorff99": surface_distance(ways, QUANTILE)[1],
         "hausdorff": max(float(distance.max()) for distance, _ in ways),
     }
 
@@ -188,7 +188,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "pial_area_mm2": area(own),
         "smallest_pial_face_mm2": float(face_areas(own).min()),
         "crossing_faces": crossing_faces(own),
-        "surface_distance_mm": surface_distance(own, surface),
+        "surface_distance_mm": fidelity(own, surface),
         "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(own))},
         "gap_kept": gap_kept(walls, own),
         "volume_mm3": float(volume.sum()),

@@ -11,8 +11,8 @@ from scipy import stats
 from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..parameters.schemes import LabelScheme
-from ..parameters.terms import SIDES, Side
-from .tables import BRAIN, MEASURED, OF_THE_ANALYSIS
+from ..parameters.terms import MEASURED, SIDES, Side
+from .tables import BRAIN, OF_THE_ANALYSIS
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""

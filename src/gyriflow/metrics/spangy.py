@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints
-from ..parameters.terms import FOLD_BANDS, LastBand
+from ..parameters.terms import FOLD_BANDS, MEASURED, LastBand
 from .laplace_beltrami import Modes, count_below, lowest_modes, modes_below
 
 type SpangyModes = int | LastBand
@@ -214,7 +214,7 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
         (*own, other[0], other[2], *row)
         for i, own in enumerate(hemispheres)
         for j, other in enumerate(hemispheres)
-        if other[1] == "real" and other[3] == own[3] and i != j
+        if other[1] == MEASURED and other[3] == own[3] and i != j
         for row in _distances(whole[i], whole[j], fine[i] & fine[j])
     ]
     table = pd.DataFrame(rows, columns=[*HEMISPHERE, "real", "real_week", "metric", "value", "flag"])

@@ -9,9 +9,7 @@ from ..errors import InputError, MeshError
 from ..geometry.matching import layer_thickness
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh
-
-STEEPNESS = 10.0
-"""Of the cortical weight in the folding model."""
+from ..parameters.terms import CORTICAL_STEEPNESS
 
 SAME_POINT_MM = 1e-3
 """Surfaces are written in single precision: vertices that are nearer are the same."""
@@ -24,7 +22,7 @@ def depth_of_weight(weight: Floats) -> Floats:
     """
     # beyond three thicknesses the weight is written as 0
     within = np.clip(weight, 1e-9, 1.0 - 1e-9)
-    return 1.0 + np.log(1.0 / within - 1.0) / STEEPNESS
+    return 1.0 + np.log(1.0 / within - 1.0) / CORTICAL_STEEPNESS
 
 
 def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats, pial: TriangleMesh) -> Floats:

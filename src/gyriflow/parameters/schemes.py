@@ -1,6 +1,6 @@
 """Label schemes: which numbers of a tissue label volume make the cerebrum, the cortex, left and right.
 
-Those that come with gyriflow are the files of `schemes`; `io.schemes` reads them.
+Those that come with gyriflow are the files of `schemes`; `io.yaml_files` reads them.
 """
 
 from collections.abc import Iterator

@@ -63,6 +63,12 @@ of that table were found), so that what is said of later weeks is cautious."""
 LONGEST_NAME = 100
 """Characters that the name of a brain, run or study has at most: names of files have 255 bytes."""
 
+MEASURED = "real"
+"""The run of measured brains in tables."""
+
+CORTICAL_STEEPNESS = 10.0
+"""Of the cortical weight w = 1/(1 + exp(10 (d/H − 1))), which is ½ at the border of cortex and core."""
+
 # metrics
 
 LastBand = Literal["B4", "B5", "B6"]

@@ -12,11 +12,10 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..parameters.terms import FOLD_BANDS, SIDES
+from ..parameters.terms import FOLD_BANDS, MEASURED, SIDES
 from .labels import METRICS, week_label, with_unit
 from .pictures import region_colours
 from .style import (
-    MEASURED,
     MUTED_COLOUR,
     NEUTRAL_COLOUR,
     REAL_BRAIN,

@@ -14,12 +14,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from ..errors import InputError
-from ..parameters.terms import SIDES
+from ..parameters.terms import MEASURED, SIDES
 from .charts import spectra_chart
 from .labels import FORETOLD, MEASURES, parameter_label, plain, value_labels, with_unit
 from .style import (
     FULL_WIDTH_IN,
-    MEASURED,
     MUTED_COLOUR,
     REAL_COLOUR,
     RUN_COLOURS,

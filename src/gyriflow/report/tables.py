@@ -9,9 +9,10 @@ import pandas as pd
 from jinja2 import Environment
 from markupsafe import Markup
 
+from ..parameters.terms import MEASURED
 from .charts import WITH_NORMS
 from .labels import FORETOLD, METRICS, parameter_label, plain, week_label, with_unit
-from .style import MEASURED, REAL_BRAIN, SIMPLE_SHAPE, runs_by_name, simulated_runs, synthetic_note
+from .style import REAL_BRAIN, SIMPLE_SHAPE, runs_by_name, simulated_runs, synthetic_note
 
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..config.brains import Brain
 from ..config.root import Config
-from ..io.schemes import SCHEMES
+from ..io.yaml_files import SCHEMES
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import Side
 from .paths import MASK, POSE, THICKNESS, pial_of

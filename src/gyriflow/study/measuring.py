@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any
 
 from ..config.root import Config
-from ..parameters.terms import SIDES, Side
+from ..parameters.terms import MEASURED, SIDES, Side
 from ..units import week_tag
 from .brains import Brains
 from .paths import (
@@ -21,9 +21,6 @@ from .paths import (
     white_of,
 )
 from .runs import Runs
-
-MEASURED = "real"
-"""The run of measured brains."""
 
 
 @dataclass(frozen=True)

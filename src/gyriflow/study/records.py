@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from ..config.brains import Brain as GivenBrain
 from ..config.runs import Run
-from ..io.schemes import SCHEMES
+from ..io.yaml_files import SCHEMES
 from ..parameters.folding import VARYING
 from ..parameters.terms import MEASURED, Side
 from ..parameters.varying import Varying, bounds_of, files_of

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..config.root import Config
 from ..errors import InputError
-from ..parameters.terms import SIDES, Side
+from ..parameters.terms import MEASURED, SIDES, Side
 from ..units import week_tag
 from .paths import (
     AGREEMENT,
@@ -26,7 +26,7 @@ from .paths import (
     folded_of,
     pial_of,
 )
-from .records import MEASURED, Brain, Calibration, Chain, Comparison, Measured, Origin, Simulation
+from .records import Brain, Calibration, Chain, Comparison, Measured, Origin, Simulation
 from .series import Series
 
 

@@ -12,7 +12,7 @@ from gyriflow.anatomy.pose import doubts_of_hemispheres, pose_of_labels, pose_of
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import transformed
-from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.yaml_files import SCHEMES
 
 TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]
 

@@ -11,8 +11,8 @@ from gyriflow.anatomy.labels import (
 )
 from gyriflow.anatomy.pose import pose_of_labels
 from gyriflow.errors import InputError
-from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.shipped import SHIPPED
 
 ATLAS = SCHEMES["spina-bifida-atlas"]

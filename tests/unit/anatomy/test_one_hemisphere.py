@@ -11,7 +11,7 @@ from gyriflow.anatomy.thickness import thickness_from_white
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
-from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.yaml_files import SCHEMES
 
 QUICK = {"week": 24.0, "edge_length_mm": 2.0}
 DHCP = SCHEMES["dhcp-19"]

@@ -12,7 +12,7 @@ from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged
-from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.yaml_files import SCHEMES
 
 
 @pytest.fixture(scope="module")

@@ -29,9 +29,9 @@ from gyriflow.geometry.triangles import (
     submesh,
     transformed,
 )
-from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.mesh.maps import move_to_mesh
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))

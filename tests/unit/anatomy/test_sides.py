@@ -11,7 +11,7 @@ from gyriflow.anatomy.repair import after_repairs, with_volume
 from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
-from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.parameters.schemes import LabelScheme
 
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))

@@ -10,8 +10,8 @@ from gyriflow.anatomy.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.anatomy.labels import outside_ventricles, read_cerebrum, unlabelled_ventricles
 from gyriflow.anatomy.repair import surface_without_stalks
 from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
-from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.shipped import SHIPPED
 

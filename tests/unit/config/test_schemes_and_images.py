@@ -5,7 +5,7 @@ import pytest
 from configurations import LABELLED, problems, touched
 
 from gyriflow.config import load
-from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.parameters.schemes import LabelScheme
 
 MINE = {"cerebrum": [1, 2], "cortex": [2], "known": {9: "outer CSF"}}

@@ -13,9 +13,8 @@ from gyriflow.geometry.deformations import Deformation, transform_points
 from gyriflow.geometry.triangles import vertex_areas
 from gyriflow.growth.carried_regions import PLACES_MM, find_places, regions_by_deformation
 from gyriflow.growth.channels import Channels, channels
-from gyriflow.io.schemes import SCHEMES
 from gyriflow.io.volumes import LabelVolume, read_label_volume
-from gyriflow.io.yaml_files import read_yaml
+from gyriflow.io.yaml_files import SCHEMES, read_yaml
 from gyriflow.metrics.curvature import curvature
 
 DRAWING = read_yaml(SULCI / "sulci.yaml")

@@ -9,7 +9,7 @@ from shapes import moved, sphere
 
 from gyriflow.geometry.matching import crossing_faces
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged
-from gyriflow.mesh.quality import gap_kept, gap_summary, gap_walls, surface_distance
+from gyriflow.mesh.quality import fidelity, gap_kept, gap_summary, gap_walls
 
 box = partial(shapes.box, subdivisions=3)
 
@@ -19,7 +19,7 @@ def pair(gap):
 
 
 def test_concentric_spheres_are_as_far_apart_as_their_radii():
-    distance = surface_distance(sphere(10.0), sphere(10.5))
+    distance = fidelity(sphere(10.0), sphere(10.5))
     assert distance["hausdorff99"] == pytest.approx(0.5, abs=0.01)
     assert distance["hausdorff"] == pytest.approx(0.5, abs=0.01)
 
@@ -28,7 +28,7 @@ def test_both_directions_count():
     small = box((4.0, 4.0, 4.0))
     both = merged(small, box((4.0, 4.0, 4.0), (7.0, 0.0, 0.0)))
     # all of the small one lies on the other surface, whose second box is up to 7 mm from it
-    forth, back = surface_distance(small, both), surface_distance(both, small)
+    forth, back = fidelity(small, both), fidelity(both, small)
     assert forth == back
     assert forth["hausdorff"] == pytest.approx(7.0)
 
@@ -38,7 +38,7 @@ def test_a_small_bump_counts_in_the_largest_distance_only():
     vertices = np.array(flat.vertices)
     top = np.argmin(np.linalg.norm(vertices - [0, 0, 5], axis=1))
     vertices[top, 2] += 1.0
-    distance = surface_distance(TriangleMesh(vertices, flat.faces), flat)
+    distance = fidelity(TriangleMesh(vertices, flat.faces), flat)
     assert distance["hausdorff99"] < 1e-3
     assert distance["hausdorff"] == pytest.approx(1.0)
 

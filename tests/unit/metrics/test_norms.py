@@ -9,7 +9,7 @@ import yaml
 from scipy import stats
 
 from gyriflow.errors import InputError
-from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.norms import (
     measured_norms,
     measured_scores,

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from shapes import rigid, sphere
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.metrics.similarity import brain_distances, surface_distance
+from gyriflow.metrics.similarity import aligned_distance, brain_distances
 
 
 def brain_like(subdivisions: int = 4) -> TriangleMesh:
@@ -24,18 +24,18 @@ def motion(degrees: float, shift: list[float]) -> np.ndarray:
 
 def test_a_motion_is_no_distance() -> None:
     mesh = brain_like()
-    result = surface_distance(transformed(mesh, motion(12.0, [8.0, -5.0, 3.0])), mesh)
+    result = aligned_distance(transformed(mesh, motion(12.0, [8.0, -5.0, 3.0])), mesh)
     assert result["symmetric_mean"] < 0.02
     assert result["hausdorff95"] < 0.05
 
 
 def test_distance_does_not_depend_on_the_triangles() -> None:
-    result = surface_distance(brain_like(3), brain_like(4))
+    result = aligned_distance(brain_like(3), brain_like(4))
     assert result["symmetric_mean"] < 0.25  # the coarse one lies inside by the sag of its triangles
 
 
 def test_spheres_of_different_radius() -> None:
-    result = surface_distance(sphere(20.0), sphere(22.0))
+    result = aligned_distance(sphere(20.0), sphere(22.0))
     assert result["symmetric_mean"] == pytest.approx(2.0, abs=0.05)
     assert result["hausdorff95"] == pytest.approx(2.0, abs=0.05)
 
@@ -45,14 +45,14 @@ def test_hausdorff_sees_what_the_mean_does_not() -> None:
     tall = smooth.vertices.copy()
     cap = tall[:, 2] > 25.0 * np.cos(np.arccos(1 - 2 * 0.08))  # 8 % of the sphere's area
     tall[cap] *= 1.2
-    result = surface_distance(TriangleMesh(tall, smooth.faces), smooth)
+    result = aligned_distance(TriangleMesh(tall, smooth.faces), smooth)
     assert result["symmetric_mean"] < 1.0
     assert result["hausdorff95"] > 3.0
 
 
 def test_same_in_both_orders() -> None:
     a, b = brain_like(), transformed(sphere(22.0), motion(0.0, [5.0, 0.0, 0.0]))
-    there, back = surface_distance(a, b), surface_distance(b, a)
+    there, back = aligned_distance(a, b), aligned_distance(b, a)
     assert there["symmetric_mean"] == pytest.approx(back["symmetric_mean"], rel=0.02)
     assert there["hausdorff95"] == pytest.approx(back["hausdorff95"], rel=0.02)
 

@@ -7,7 +7,7 @@ from shapes import sphere
 
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.io.schemes import SCHEMES
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.report.quality import (
     LINE_IN,
     MOST_LINES,
