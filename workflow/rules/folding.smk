@@ -40,7 +40,6 @@ rule parameter_maps:
         # volumes of maps are read like those of the brain
         affine_from=from_brain("given.affine_from"),
         maps=from_simulation("map_sources"),
-        bounds=from_simulation("map_bounds"),
     script:
         "../scripts/parameter_maps.py"
 

@@ -96,7 +96,7 @@ rule similarity:
 
 rule label_volumes:
     input:
-        labels=from_brain("label_volume"),
+        labels=from_brain("given.label_volume"),
         norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
     output:
         **VOLUMES,

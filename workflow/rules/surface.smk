@@ -9,7 +9,9 @@ def surface_memory(wildcards):
     """Return the memory in MiB that a brain's surface may need, of labels foreseen from their header."""
     brain = study.brains[wildcards.brain]
     labelled = brain.given.has_labels
-    return surface_memory_mib(brain.label_volume, brain.week) if labelled else 4000
+    return (
+        surface_memory_mib(brain.given.label_volume, brain.week) if labelled else 4000
+    )
 
 
 def surface_settings(*names):
@@ -72,7 +74,7 @@ for name, source, sides in (
 
 rule cortical_thickness:
     input:
-        labels=from_brain("label_volume"),
+        labels=from_brain("given.label_volume"),
         surface=PIAL["whole"],
         report=PIAL["report"],
     output:
@@ -89,7 +91,7 @@ rule cortical_thickness:
         "../scripts/cortical_thickness.py"
 
 
-POSED = [brain for brain in study.brains.values() if brain.to_pose]
+POSED = [brain for brain in study.brains.values() if brain.pose]
 
 
 rule poses:

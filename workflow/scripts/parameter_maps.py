@@ -6,7 +6,8 @@ from gyriflow.io.registrations import read_targets
 from gyriflow.io.surfaces import read_pose
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.mesh import maps as on_mesh
-from gyriflow.parameters.folding import target_maps
+from gyriflow.parameters.folding import FoldingSettings, target_maps
+from gyriflow.parameters.varying import bounds_of
 from gyriflow.step import step
 
 files, maps, given = snakemake.input, {}, snakemake.params
@@ -23,7 +24,7 @@ with step(snakemake.log[0]):
         else:
             volume, motion = read_volume_map(path, given.affine_from), pose.of_volume(path)
             maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
-        on_mesh.require_within(maps[name], given.bounds[name], path)
+        on_mesh.require_within(maps[name], bounds_of(FoldingSettings.model_fields[name]), path)
     if targets:
         maps |= target_maps(targets.weeks[1:], targets.positions[1:])
     write_maps(snakemake.output[0], maps)

@@ -85,6 +85,15 @@ class Run(FoldingSettings):
                 yield Problem("has no meaning with the model shapes; expected sizes", ("growth", key))
 
 
+def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:
+    """Return those of the ids of all brains that a run folds."""
+    start = study_start if run.start is None else run.start
+    if start == FIRST:
+        return list(ids[:1])
+    named = ids if start == ALL else [start] if isinstance(start, str) else start or ()
+    return [brain for brain in ids if brain in named]
+
+
 # growth
 
 Names = tuple[str, ...]

@@ -1,4 +1,4 @@
-"""The records of a study: what is made of each brain, run and comparison, and from which files."""
+"""The records of a study: what is known of each brain, run and comparison before data are read, and their files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,31 +10,12 @@ from ..config.runs import Run
 from ..io.yaml_files import SCHEMES
 from ..parameters.folding import VARYING
 from ..parameters.terms import MEASURED, Side
-from ..parameters.varying import Varying, bounds_of, files_of
+from ..parameters.varying import Varying, files_of
 from ..units import week_tag
-from .paths import (
-    CALIBRATION,
-    COMPARED_MEMBER,
-    FOLDING,
-    MAPS,
-    MASK,
-    PARAMETERS,
-    PIAL,
-    POSE,
-    READY,
-    RUN,
-    TARGETS,
-    THICKNESS,
-    region_files,
-    surfaces_in,
-    white_of,
-)
+from . import paths
 
 Origin = Literal["self", "atlas"]
 """Whose growth a run has: that of the start's own series, or of another population."""
-Kind = Literal["explained", "predicted"]
-"""Whether growth taken from brains of a week explains the brain of this week, or it is predicted."""
-Files = Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -54,11 +35,10 @@ class Measured:
     surfaces: str
     thickness: str | list[str]
     report: str | list[str]
-    regions: Files
+    regions: Mapping[str, str]
 
     @property
     def folder(self) -> str:
-        """The folder of its metrics."""
         return f"results/{self.where}"
 
     @property
@@ -69,7 +49,7 @@ class Measured:
     @property
     def parts(self) -> dict[str, str]:
         """The files of its surfaces: of the whole, and of its hemispheres."""
-        return surfaces_in(self.surfaces, self.sides)
+        return paths.surfaces_in(self.surfaces, self.sides)
 
     @property
     def hemispheres(self) -> list[str]:
@@ -78,30 +58,18 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Brain:
-    """A brain, with what is known of it before it is looked at.
+    """A brain of the study, as `given` by the configuration.
 
-    Attributes
-    ----------
-    given
-        What the configuration says of it.
-    scheme
-        The fields of its labels' scheme; None without labels.
-    thickness_from
-        What its cortical thickness is measured from: `labels` or `white` surfaces; None where it is unknown.
-    white_from
-        The files that its white surfaces are made from, by what they are of; none where they are not measured.
-    regions_from
-        How it gets regions of the cortex: they are `given`, `carried` from another brain, or `named` sulci.
-    has_regions
-        Whether its metrics are measured by region, too.
-    checksums
-        The atlas and the SHA-256 of those of its files that are an atlas's, by their paths.
+    `scheme` holds the fields of its labels' scheme. Thickness is measured from `labels` or `white` surfaces, and white
+    surfaces from the files `white_from`, if at all. Regions of the cortex are `given`, `carried` from another brain, or
+    `named` sulci, by which its metrics are measured where it `has_regions`. `checksums` are the atlas and the SHA-256
+    of those of its files that are an atlas's, by path.
     """
 
     given: GivenBrain
     scheme: Mapping[str, Any] | None
     thickness_from: Literal["labels", "white"] | None
-    white_from: Files
+    white_from: Mapping[str, str]
     regions_from: Literal["given", "carried", "named"] | None
     has_regions: bool
     checksums: Mapping[str, tuple[str, str]]
@@ -129,15 +97,9 @@ class Brain:
         return self.given.population or ("synthetic" if self.given.synthetic else "unknown")
 
     @property
-    def label_volume(self) -> str:
-        """Its label volume; only of a brain that has one."""
-        assert self.given.label_volume is not None
-        return self.given.label_volume
-
-    @property
     def registered_volume(self) -> str:
         """The volume by which it is registered: its labels, or a mask made of its surface."""
-        return self.label_volume if self.given.has_labels else MASK.format(brain=self.id)
+        return self.given.label_volume or paths.MASK.format(brain=self.id)
 
     @property
     def registered(self) -> dict[str, Any]:
@@ -146,32 +108,23 @@ class Brain:
         return {"image": self.given.image, "affine_from": self.given.affine_from, "scheme": scheme}
 
     @property
-    def to_pose(self) -> bool:
-        """Whether the pose of its hemispheres has to be found, for the whole study at once."""
-        return self.given.source == "hemispheres" and self.given.coordinates == "auto"
+    def pose(self) -> str | list[str]:
+        """The pose of its hemispheres where it has to be found, for the whole study at once."""
+        unknown = self.given.source == "hemispheres" and self.given.coordinates == "auto"
+        return paths.POSE.format(brain=self.id) if unknown else []
 
     @property
-    def pose(self) -> str | list[str]:
-        return POSE.format(brain=self.id) if self.to_pose else []
+    def pial(self) -> str:
+        return paths.PIAL["whole"].format(brain=self.id)
 
     @property
     def report(self) -> str:
         """The report of its surface, with its pose."""
-        return PIAL["report"].format(brain=self.id)
+        return paths.PIAL["report"].format(brain=self.id)
 
     @property
-    def pial(self) -> str:
-        return PIAL["whole"].format(brain=self.id)
-
-    @property
-    def regions(self) -> Files:
-        return region_files(f"results/brains/{self.id}/metrics") if self.regions_from else {}
-
-    @property
-    def white(self) -> Files:
-        """Its white surfaces, maps on them and their metrics; none where they are not measured."""
-        files = white_of(*self.sides) if self.white_from else {}
-        return {name: file.format(brain=self.id) for name, file in files.items()}
+    def regions(self) -> Mapping[str, str]:
+        return paths.region_files(f"results/brains/{self.id}/metrics") if self.regions_from else {}
 
     @cached_property
     def measured(self) -> Measured:
@@ -182,7 +135,7 @@ class Brain:
             week=self.week,
             sides=self.sides,
             surfaces=f"results/brains/{self.id}/surface",
-            thickness=THICKNESS["measured"].format(brain=self.id) if self.thickness_from else [],
+            thickness=paths.THICKNESS["measured"].format(brain=self.id) if self.thickness_from else [],
             report=self.report,
             regions=self.regions if self.has_regions else {},
         )
@@ -192,16 +145,8 @@ class Brain:
 class Chain:
     """A start brain, and the brains of a growth series through which its mesh is carried, one a week.
 
-    Attributes
-    ----------
-    brains
-        The start first.
-    correspondences
-        The files that say where the points of each brain are in the next.
-    posed
-        For each brain and the next, whether these are points in the poses of their surfaces, or in their files' worlds.
-    further_weeks
-        Other weeks in which the shapes between them are wanted.
+    The files `correspondences` say where the points of each brain are in the next, `posed` for the two whether these
+    are in the poses of their surfaces or in the worlds of their files. Shapes are wanted in `further_weeks`, too.
     """
 
     brains: tuple[Brain, ...]
@@ -224,7 +169,7 @@ class Chain:
 
     @property
     def surfaces(self) -> list[str]:
-        """The pial surfaces of the brains that follow the start."""
+        """The pial surfaces of those that follow the start."""
         return [brain.pial for brain in self.later]
 
     @property
@@ -243,10 +188,8 @@ class Simulation:
         The output weeks; the start's own is the first.
     shapes
         Whose growth gives the shapes that the run grows towards; None where it has rates or sizes.
-    curves
-        The table of measured curves of size, where the run follows one.
-    series
-        The growth series whose curves tell of sizes such as the start's.
+    series, curves
+        The growth series with curves of sizes for the start, and their table where the run follows one.
     base
         The run whose maps it has: the calibration's base for its runs, else its own name.
     compared
@@ -254,9 +197,9 @@ class Simulation:
     real
         The real brain of each week that tells what the run is worth.
     kind
-        Whether the growth explains them, or predicts them.
+        Whether its growth knows these brains, or it predicts them.
     from_others_only
-        Whether it is a prediction by another population's growth that has seen no later brain like the start.
+        Whether it predicts by another population's growth, which has seen no later brain like the start.
     """
 
     run: str
@@ -264,19 +207,14 @@ class Simulation:
     settings: Run
     weeks: tuple[float, ...]
     shapes: Origin | None
-    curves: str | list[str]
     series: str | None
+    curves: str | list[str]
     base: str
     compared: Mapping[str, tuple[Brain, ...]]
     real: Mapping[str, Brain]
-    kind: Kind
+    kind: Literal["explained", "predicted"]
     from_others_only: bool
     has_regions: bool
-
-    @property
-    def followed_series(self) -> str | None:
-        """The growth series whose curves it follows; None where it follows none."""
-        return self.series if self.curves else None
 
     @property
     def names(self) -> dict[str, str]:
@@ -293,14 +231,13 @@ class Simulation:
         return [week_tag(week) for week in self.weeks]
 
     @property
+    def real_weeks(self) -> list[float]:
+        return [float(week) for week in self.real]
+
+    @property
     def beside(self) -> dict[str, Brain]:
         """The measured brain that it is shown beside, by week, the start at its own week."""
         return {self.week_tags[0]: self.start, **{week: brains[0] for week, brains in self.compared.items()}}
-
-    @property
-    def real_weeks(self) -> list[float]:
-        """The weeks that have a real brain."""
-        return [float(week) for week in self.real]
 
     @property
     def follows_registration(self) -> bool:
@@ -308,9 +245,14 @@ class Simulation:
         return self.shapes is not None and not self.from_others_only
 
     @property
+    def followed_series(self) -> str | None:
+        """The growth series whose curves it follows; None where it follows none."""
+        return self.series if self.curves else None
+
+    @property
     def targets(self) -> str | list[str]:
         """The file with the shapes that the run grows towards."""
-        return TARGETS.format(brain=self.start.id, origin=self.shapes) if self.shapes else []
+        return paths.TARGETS.format(brain=self.start.id, origin=self.shapes) if self.shapes else []
 
     @property
     def map_sources(self) -> dict[str, dict[str, list[str]]]:
@@ -323,17 +265,12 @@ class Simulation:
 
     @property
     def map_files(self) -> list[str]:
-        return [file for files in self.map_sources.values() for file in (*files["map"], *files["surface"])]
-
-    @property
-    def map_bounds(self) -> dict[str, dict[str, float]]:
-        return {name: bounds_of(type(self.settings).model_fields[name]) for name in self.map_sources}
+        return [file for files in self.map_sources.values() for kind in files.values() for file in kind]
 
     @property
     def maps(self) -> str | list[str]:
         """The file with the maps of its parameters and the shapes that it grows towards; none where it has neither."""
-        needed = self.shapes or self.map_sources
-        return MAPS.format(run=self.base, brain=self.start.id) if needed else []
+        return paths.MAPS.format(run=self.base, brain=self.start.id) if self.shapes or self.map_sources else []
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -343,8 +280,7 @@ class Simulation:
         """
         settings = self.settings.model_dump(mode="json", exclude={"ranks", "start"})
         for name in VARYING:
-            value = getattr(self.settings, name)
-            if isinstance(value, Varying):
+            if isinstance(value := getattr(self.settings, name), Varying):
                 curve = {"weeks": value.weeks} if value.weeks else {}
                 settings[name] = curve | ({"map": name} if value.map is not None else {})
         return settings
@@ -352,7 +288,7 @@ class Simulation:
     def at(self, week: float) -> Measured:
         """Return the simulated brain of a week."""
         metrics = f"runs/{self.run}/{self.start.id}/metrics"
-        surfaces = f"{self.file(RUN)}/surfaces/week-{week_tag(week)}"
+        surfaces = f"{self.file(paths.RUN)}/surfaces/week-{week_tag(week)}"
         return Measured(
             where=f"{metrics}/week-{week_tag(week)}",
             subject=self.start.id,
@@ -363,7 +299,7 @@ class Simulation:
             thickness=f"{surfaces}/thickness.shape.gii",
             report=[],
             # those of a run hold at all its weeks
-            regions=region_files(f"results/{metrics}") if self.has_regions else {},
+            regions=paths.region_files(f"results/{metrics}") if self.has_regions else {},
         )
 
     @property
@@ -373,12 +309,12 @@ class Simulation:
 
     @property
     def validation_files(self) -> dict[str, list[str]]:
-        """The surfaces that tell what the run is worth: a list over the weeks that have a real brain of each kind."""
-        simulated = f"{RUN}/surfaces/week-{{week}}/pial.surf.gii"
+        """The files that tell what the run is worth, of each kind one for each week that has a real brain."""
         return {
-            name: [self.file(pattern, week=week) for week in self.real]
-            for name, pattern in {**READY, "simulated": simulated}.items()
-        } | {"whole": [real.pial for real in self.real.values()]}
+            "simulated": [self.at(week).parts["whole"] for week in self.real_weeks],
+            "whole": [real.pial for real in self.real.values()],
+            **{name: [self.file(file, week=week) for week in self.real] for name, file in paths.READY.items()},
+        }
 
     def deviation_files(self, week: str) -> dict[str, str | list[str]]:
         """Return the files that tell how the real brain of a week deviates from the simulated one.
@@ -399,14 +335,10 @@ class Simulation:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A study of the configuration: runs that differ from one in a few parameters, compared with real brains of a week.
+    """What the configuration calls a study: runs that differ in a few parameters, beside real brains of one week.
 
-    Attributes
-    ----------
-    members
-        Each run with each brain that it folds, and the varied values, in the order of the study.
-    real
-        The real brains that runs are compared with, by the id of their start.
+    `members` are each run with each brain that it folds, and the varied values, in the order of the study; `real` are
+    the brains that runs from a start are compared with, by its id.
     """
 
     name: str
@@ -417,58 +349,42 @@ class Comparison:
     @property
     def inputs(self) -> dict[str, list[str]]:
         """The files that the tables of the study are made from, member by member."""
-        patterns = {"comparisons": COMPARED_MEMBER, "params": PARAMETERS}
-        patterns |= {"summaries": FOLDING["summary"], "zones": FOLDING["zones"]}
-        return {
-            name: [member.file(pattern, study=self.name) for member, _ in self.members]
-            for name, pattern in patterns.items()
-        }
+        patterns = {"comparisons": paths.COMPARED_MEMBER, "params": paths.PARAMETERS}
+        patterns |= {"summaries": paths.FOLDING["summary"], "zones": paths.FOLDING["zones"]}
+        return {name: [one.file(file, study=self.name) for one, _ in self.members] for name, file in patterns.items()}
 
     @property
     def rows(self) -> list[dict[str, Any]]:
         """The run, the brain and the varied values of each member."""
-        return [
-            {"run": member.run, "subject": member.start.id, "values": dict(values)} for member, values in self.members
-        ]
+        return [{"run": one.run, "subject": one.start.id, "values": dict(values)} for one, values in self.members]
 
     def tables(self, run: str, brain: str) -> dict[str, list[str]]:
         """Return the tables of a run at the week of comparison and of the real brains."""
         at = f"results/runs/{run}/{brain}/metrics/week-{week_tag(self.week)}"
         folders = [at, *(real.measured.folder for real in self.real[brain])]
-        return {
-            "metrics": [f"{folder}/metrics.csv" for folder in folders],
-            "spectra": [f"{folder}/spectra.csv" for folder in folders],
-            "similarity": [f"{at}/similarity.{real.id}.csv" for real in self.real[brain]],
-        }
+        tables = {name: [f"{folder}/{name}.csv" for folder in folders] for name in ("metrics", "spectra")}
+        return tables | {"similarity": [f"{at}/similarity.{real.id}.csv" for real in self.real[brain]]}
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Rounds of runs, each round's parameters chosen from the scores of the earlier ones.
+    """Rounds of runs that differ from those of `base`, each round's parameters chosen from the scores of earlier ones.
 
-    Attributes
-    ----------
-    base
-        The simulations of the run that all differ from.
-    rounds
-        The round of each run.
-    real
-        The real brains to be met, by the id of the start.
+    `rounds` has the round of each run, `real` the brains to be met by the id of the start.
     """
 
-    week: float
     base: tuple[Simulation, ...]
     rounds: Mapping[str, int]
     real: Mapping[str, tuple[Brain, ...]]
 
     def runs_of(self, number: int) -> list[str]:
         """Return the runs of a round."""
-        return [run for run, own in self.rounds.items() if own == number]
+        return [run for run, of_run in self.rounds.items() if of_run == number]
 
     def scores_before(self, number: int) -> list[str]:
         """Return the scores of all runs of the rounds before one."""
-        return [f"{CALIBRATION}/scores/{run}.csv" for run, own in self.rounds.items() if own < number]
+        return [f"{paths.CALIBRATION}/scores/{run}.csv" for run, of_run in self.rounds.items() if of_run < number]
 
     def design(self, run: str) -> str:
         """Return the table with the parameters of a run and the others of its round."""
-        return f"{CALIBRATION}/round-{self.rounds[run]}.csv"
+        return f"{paths.CALIBRATION}/round-{self.rounds[run]}.csv"

@@ -82,7 +82,7 @@ def quality_files(brain: Brain) -> dict[str, Any]:
     return {
         "surface": brain.pial,
         "report": brain.report,
-        "labels": brain.label_volume if brain.given.has_labels else [],
+        "labels": brain.given.label_volume or [],
         "image": brain.given.image or [],
         "white": list(brain.given.white_files.values()),
         "thickness": brain.measured.thickness,

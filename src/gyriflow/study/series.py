@@ -14,18 +14,10 @@ from .records import Brain
 
 @dataclass(frozen=True)
 class Series:
-    """The growth series by name, and how the brains in them correspond.
+    """The brains of each growth series by its name, in the order of the configuration, and how they correspond.
 
-    Attributes
-    ----------
-    brains
-        The brains of each series, in the order of the configuration.
-    preferred
-        The series that is used where a brain has several; None where none is named.
-    matched
-        The ids of the brains whose surfaces have the same vertices, by the series' name.
-    unmatched
-        Why the vertices of other series of surfaces are not matched.
+    Of several series that a brain may have, one is `preferred`. `matched` are the ids of brains whose surfaces have the
+    same vertices, by series; `unmatched` says why the vertices of other series of surfaces are not.
     """
 
     brains: Mapping[str, tuple[Brain, ...]]
@@ -51,8 +43,8 @@ class Series:
             name
             for name, brains in self.brains.items()
             if start not in brains
-            and all(population is None or brain.given.population != population for brain in brains)
             and all(brain.sides == start.sides for brain in brains)
+            and all(population is None or brain.given.population != population for brain in brains)
         ]
         return [self.preferred] if self.preferred in names else names
 
@@ -80,19 +72,19 @@ def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
     description is believed.
     """
     names = growth_series([brain.given for brain in brains.values()], config.growth.brains)
-    series = {name: tuple(brains[brain] for brain in ids) for name, ids in names.items()}
     believed = {str(f.path) for used in config.atlases for f in used.missing if used.atlas.series[f.series].matched}
     matched, unmatched = {}, {}
-    for name, members in series.items():
-        if not all(brain.given.has_vertices for brain in members):
-            continue
-        cause: str | None = "growth.matched_surfaces is false"
-        if config.growth.matched_surfaces:
-            cause = why_unmatched([brain.given for brain in sorted(members, key=lambda brain: brain.week)], believed)
-        if cause is None:
-            matched[name] = frozenset(brain.id for brain in members)
-        else:
-            unmatched[name] = cause
+    for name, ids in names.items():
+        given = sorted((brains[brain].given for brain in ids), key=lambda brain: brain.week)
+        if all(brain.has_vertices for brain in given):
+            cause: str | None = "growth.matched_surfaces is false"
+            if config.growth.matched_surfaces:
+                cause = why_unmatched(given, believed)
+            if cause is None:
+                matched[name] = frozenset(ids)
+            else:
+                unmatched[name] = cause
+    series = {name: tuple(brains[brain] for brain in ids) for name, ids in names.items()}
     return Series(series, config.growth.estimated_from, matched, unmatched)
 
 
@@ -105,22 +97,21 @@ def why_unmatched(brains: Sequence[GivenBrain], believed: Collection[str] = ()) 
     # files are looked at where growth by vertices is planned, which few configurations ask for
     from ..io.surfaces import connectivity
 
-    first = brains[0]
+    first: tuple[str, list[tuple[int, int, str]]] | None = None
     for brain in brains:
-        if brain.source != first.source:
-            return f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
-    known: list[tuple[str, list[tuple[int, int, str]]]] = []
+        if brain.source != brains[0].source:
+            return f"{brain.id} is given as {brain.source}, {brains[0].id} as {brains[0].source}"
     for brain in brains:
         if believed and all(path in believed for path in brain.files):
             continue
         try:
-            known.append((brain.id, [connectivity(Path(path)) for path in brain.files]))
+            sides = [connectivity(Path(path)) for path in brain.files]
         except InputError as error:
             return str(error)
-        (name, expected), (other, found) = known[0], known[-1]
-        for one, two in zip(expected, found, strict=True):
+        name, expected = first = first or (brain.id, sides)
+        for one, two in zip(expected, sides, strict=True):
             if one[:2] != two[:2]:
-                return f"{other} has {two[0]} vertices and {two[1]} triangles where {name} has {one[0]} and {one[1]}"
+                return f"{brain.id} has {two[0]} vertices and {two[1]} triangles where {name} has {one[0]} and {one[1]}"
             if one != two:
-                return f"{other} has other triangles than {name}"
+                return f"{brain.id} has other triangles than {name}"
     return None

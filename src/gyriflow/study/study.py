@@ -9,23 +9,7 @@ from ..config.root import Config
 from ..errors import InputError
 from ..parameters.terms import MEASURED, SIDES, Side
 from ..units import week_tag
-from .paths import (
-    AGREEMENT,
-    CEILING,
-    DEVIATION,
-    DISPLACEMENT,
-    ONSET,
-    PIAL,
-    PREDICTION,
-    READY,
-    SIMILARITY,
-    TEMPLATE_MAPS,
-    THICKNESS,
-    VALIDATION,
-    VOLUMES,
-    folded_of,
-    pial_of,
-)
+from . import paths
 from .records import Brain, Calibration, Chain, Comparison, Measured, Origin, Simulation
 from .series import Series
 
@@ -75,25 +59,40 @@ class Study:
         """The runs of studies and of the calibration."""
         return list(dict.fromkeys(run for run, _ in self.simulations if run not in self.config.runs))
 
-    @cached_property
+    @property
     def pairs(self) -> list[tuple[str, str]]:
         """The run and the start of each of `folded`."""
         return [(one.run, one.start.id) for one in self.folded]
 
+    def files(self, *patterns: str) -> list[str]:
+        """Return the files of patterns for each of `folded`."""
+        return [one.file(pattern) for one in self.folded for pattern in patterns]
+
     @cached_property
     def starts(self) -> list[Brain]:
         """The brains that some of `runs` folds, in the order of `brains`."""
-        starts = {one.start.id for one in self.folded}
-        return [brain for brain in self.brains.values() if brain.id in starts]
+        starts = {one.start for one in self.folded}
+        return [brain for brain in self.brains.values() if brain in starts]
 
     @cached_property
     def growing(self) -> list[tuple[str, Brain]]:
         """The series and brain of all that growth is measured on, the earliest of each series first."""
-        return [
-            (name, brain)
-            for name, brains in self.series.brains.items()
-            for brain in sorted(brains, key=lambda brain: brain.week)
-        ]
+        series = self.series.brains
+        return [(name, brain) for name in series for brain in sorted(series[name], key=lambda brain: brain.week)]
+
+    @property
+    def with_thickness_curve(self) -> list[str]:
+        """The ids of the brains whose cortical thickness gives a curve, where some run follows it."""
+        followed = any(run.growth.thickness_mm == "measured" for run in self.config.runs.values())
+        return [brain.id for _, brain in self.growing if followed and brain.thickness_from]
+
+    @property
+    def unmatched_starts(self) -> dict[str, str]:
+        """Why the surfaces of a growth series with a start brain are not matched, by the series' name."""
+        starts = set(self.starts)
+        return {name: why for name, why in self.series.unmatched.items() if starts & set(self.series.brains[name])}
+
+    # what runs are worth
 
     @cached_property
     def validated(self) -> list[Simulation]:
@@ -122,11 +121,48 @@ class Study:
         return [one for one in self.validated if one.start.id in self.carried]
 
     @cached_property
+    def validation_tables(self) -> dict[str, list[str]]:
+        """The tables of validation by name, and the files that each is joined from."""
+        compared = {one.start.id for one in self.validated}
+        table = paths.DEVIATION["table"]
+        return {
+            "prediction": [one.file(paths.PREDICTION) for one in self.predictions],
+            "deviation": [one.file(table, week=week) for one in self.expected for week in one.real],
+            "validation": [one.file(paths.VALIDATION) for one in self.validated],
+            "displacement_agreement": [one.file(paths.AGREEMENT) for one in self.validated_carried],
+            "registration_ceiling": [paths.CEILING.format(brain=id) for id in self.carried if id in compared],
+            "onset": [one.file(paths.ONSET) for one in self.validated_carried],
+        }
+
+    def ceiling_weeks(self, brain: str) -> list[float]:
+        """Return the compared weeks that a start brain's mesh is carried to."""
+        weeks = [week_tag(week) for week in self.chains[brain, "self"].later_weeks]
+        return [float(week) for week in weeks if (brain, week) in self.references]
+
+    def ceiling_files(self, brain: str) -> dict[str, list[str]]:
+        """Return the surfaces that tell what registration alone is worth, week by week."""
+        weeks = [week_tag(week) for week in self.ceiling_weeks(brain)]
+        ready = {name: [file.format(brain=brain, week=week) for week in weeks] for name, file in paths.READY.items()}
+        return ready | {"whole": [self.references[brain, week][0].pial for week in weeks]}
+
+    def onset_files(self, run: str, brain: str) -> dict[str, str | list[str]]:
+        """Return the surfaces in which the beginning of sulci is looked for, and how they correspond."""
+        one, chain = self.simulations[run, brain], self.chains[brain, "self"]
+        return {
+            **{f"run_{side}": [row.parts[side] for row in one.measured] for side in one.start.sides},
+            **{f"real_{side}": [real.measured.parts[side] for real in chain.brains] for side in one.start.sides},
+            **chain.brains[-1].regions,
+            "reports": [real.report for real in chain.brains],
+            "correspondences": list(chain.correspondences),
+        }
+
+    # what is measured
+
+    @cached_property
     def measured(self) -> dict[str, Measured]:
         """All that the tables of the study are of, real and simulated, by folder."""
         rows = [brain.measured for brain in self.brains.values()]
-        rows += [row for one in self.folded for row in one.measured]
-        return {row.where: row for row in rows}
+        return {row.where: row for row in (*rows, *(row for one in self.folded for row in one.measured))}
 
     @cached_property
     def places(self) -> dict[str, Measured]:
@@ -140,79 +176,79 @@ class Study:
         return [
             file.format(brain=brain.id)
             for brain in self.brains.values()
-            for file in (*pial_of(*brain.sides).values(), *(THICKNESS.values() if brain.thickness_from else ()))
+            for file in (
+                *paths.pial_of(*brain.sides).values(),
+                *(paths.THICKNESS.values() if brain.thickness_from else ()),
+            )
         ]
 
     @property
     def folded_surfaces(self) -> list[str]:
         """The surfaces of all simulated brains, and their thickness."""
         return [
-            one.file(pattern, week=week)
+            one.file(file, week=week)
             for one in self.folded
-            for pattern in folded_of(*one.start.sides).values()
+            for file in paths.folded_of(*one.start.sides).values()
             for week in one.week_tags
         ]
-
-    @property
-    def with_thickness_curve(self) -> list[str]:
-        """The ids of the brains whose cortical thickness gives a curve, where some run follows it."""
-        followed = any(run.growth.thickness_mm == "measured" for run in self.config.runs.values())
-        return [brain.id for _, brain in self.growing if followed and brain.thickness_from]
-
-    @property
-    def unmatched_starts(self) -> dict[str, str]:
-        """Why the surfaces of a growth series with a start brain are not matched, by the series' name."""
-        starts = set(self.starts)
-        return {name: why for name, why in self.series.unmatched.items() if starts & set(self.series.brains[name])}
-
-    def files(self, *patterns: str) -> list[str]:
-        """Return the files of patterns for every run and each brain that it folds."""
-        return [one.file(pattern) for one in self.folded for pattern in patterns]
 
     @cached_property
     def tables(self) -> dict[str, list[str]]:
         """The tables of metrics by name, and the files that each is joined from."""
-        rows = self.measured.values()
-        with_volumes = [brain for brain in self.brains.values() if brain.given.has_labels]
+        folders = [row.folder for row in self.measured.values()]
+        white = [brain.id for brain in self.brains.values() if brain.white_from]
+        labelled = [brain.id for brain in self.brains.values() if brain.given.has_labels]
         return {
             "metrics": [
-                *(f"{row.folder}/metrics.csv" for row in rows),
-                *(brain.white["metrics"] for brain in self.brains.values() if brain.white_from),
+                *(f"{folder}/metrics.csv" for folder in folders),
+                *(paths.white_of()["metrics"].format(brain=id) for id in white),
             ],
-            "spectra": [f"{row.folder}/spectra.csv" for row in rows],
-            "regions": [f"{row.folder}/regions.csv" for row in rows if row.regions],
-            "volumes": [VOLUMES["volumes"].format(brain=brain.id) for brain in with_volumes],
-            "published_centiles": [VOLUMES["scores"].format(brain=brain.id) for brain in with_volumes],
-            "displacement": self.files(DISPLACEMENT),
+            "spectra": [f"{folder}/spectra.csv" for folder in folders],
+            "regions": [f"{row.folder}/regions.csv" for row in self.measured.values() if row.regions],
+            "volumes": [paths.VOLUMES["volumes"].format(brain=id) for id in labelled],
+            "published_centiles": [paths.VOLUMES["scores"].format(brain=id) for id in labelled],
+            "displacement": self.files(paths.DISPLACEMENT),
             "similarity": [
-                one.file(SIMILARITY, week=week, measured=brain.id)
+                one.file(paths.SIMILARITY, week=week, measured=brain.id)
                 for one in self.folded
                 for week, brains in one.compared.items()
                 for brain in brains
             ],
         }
 
-    @cached_property
-    def validation_tables(self) -> dict[str, list[str]]:
-        """The tables of validation by name, and the files that each is joined from."""
-        return {
-            "prediction": [one.file(PREDICTION) for one in self.predictions],
-            "deviation": [one.file(DEVIATION["table"], week=week) for one in self.expected for week in one.real],
-            "validation": [one.file(VALIDATION) for one in self.validated],
-            "displacement_agreement": [one.file(AGREEMENT) for one in self.validated_carried],
-            "registration_ceiling": [
-                CEILING.format(brain=start)
-                for start in self.carried
-                if start in [one.start.id for one in self.validated]
-            ],
-            "onset": [one.file(ONSET) for one in self.validated_carried],
-        }
+    @property
+    def scans(self) -> dict[str, list[str]]:
+        """The ids of the brains of each subject that was scanned at several weeks, by week."""
+        scans: dict[str, list[str]] = {}
+        for brain in sorted(self.brains.values(), key=lambda brain: (brain.given.subject or "", brain.week)):
+            if brain.given.subject is not None:
+                scans.setdefault(brain.given.subject, []).append(brain.id)
+        return {subject: ids for subject, ids in scans.items() if len(ids) > 1}
 
-    def template_sides(self, measured: Measured) -> list[Side]:
+    # regions, and maps at the vertices of the template
+
+    def giver_of_regions(self, brain: str) -> Brain:
+        """Return the brain with given regions that is nearest in week."""
+        week = self.brains[brain].week
+        given = [known for known in self.brains.values() if known.regions_from == "given"]
+        return min(given, key=lambda other: abs(other.week - week))
+
+    def region_inputs(self, brain: str) -> dict[str, str]:
+        """Return the regions that a brain gets, the surfaces that they are given on, and what carries them."""
+        given = self.giver_of_regions(brain)
+        surfaces = {f"given_{side}": given.measured.parts[side] for side in SIDES}
+        between = self.series.correspondence(given, self.brains[brain])
+        return {**given.regions, **surfaces, "given_report": given.report, "correspondence": between}
+
+    def posed_regions(self, brain: str) -> list[bool]:
+        """Return for the brain of the regions and the one that gets them whether they correspond in their poses."""
+        return self.series.posed(self.giver_of_regions(brain), self.brains[brain])
+
+    def template_sides(self, row: Measured) -> list[Side]:
         """Return the hemispheres of a brain that have maps at the template's vertices."""
         # it may have been refused
         template = self.brains.get(self.config.metrics.template or "")
-        return [side for side in measured.sides if template is not None and side in template.sides]
+        return [side for side in row.sides if template is not None and side in template.sides]
 
     def template_inputs(self, where: str, side: Side) -> dict[str, Any]:
         """Return the surfaces of the template's hemisphere and of one that has maps, and how their brains correspond.
@@ -231,65 +267,19 @@ class Study:
             "correspondence": [] if brain is template else [self.series.correspondence(template, brain)],
         }
 
-    def ceiling_weeks(self, brain: str) -> list[float]:
-        """Return the compared weeks that a start brain's mesh is carried to."""
-        weeks = [week_tag(other.week) for other in self.chains[brain, "self"].later]
-        return [float(week) for week in weeks if (brain, week) in self.references]
-
-    def ceiling_files(self, brain: str) -> dict[str, list[str]]:
-        """Return the surfaces that tell what registration alone is worth, week by week."""
-        weeks = [week_tag(week) for week in self.ceiling_weeks(brain)]
-        ready = {name: [pattern.format(brain=brain, week=week) for week in weeks] for name, pattern in READY.items()}
-        return ready | {"whole": [self.references[brain, week][0].pial for week in weeks]}
-
-    def onset_files(self, run: str, brain: str) -> dict[str, str | list[str]]:
-        """Return the surfaces in which the beginning of sulci is looked for, and how they correspond."""
-        one, chain = self.simulations[run, brain], self.chains[brain, "self"]
-        return {
-            **{f"run_{side}": [row.parts[side] for row in one.measured] for side in one.start.sides},
-            **{f"real_{side}": [real.measured.parts[side] for real in chain.brains] for side in one.start.sides},
-            **chain.brains[-1].regions,
-            "reports": [real.report for real in chain.brains],
-            "correspondences": list(chain.correspondences),
-        }
-
-    def region_inputs(self, brain: str) -> dict[str, str]:
-        """Return the regions that a brain gets, the surfaces that they are given on, and what carries them."""
-        given = self.regions_of(self.brains[brain])
-        surfaces = {f"given_{name}": PIAL[name].format(brain=given.id) for name in ("left", "right", "report")}
-        return {
-            **given.regions,
-            **surfaces,
-            "correspondence": self.series.correspondence(given, self.brains[brain]),
-        }
-
-    def posed_regions(self, brain: str) -> list[bool]:
-        """Return for the brain of the regions and the one that gets them whether they correspond in their poses."""
-        return self.series.posed(self.regions_of(self.brains[brain]), self.brains[brain])
-
-    def regions_of(self, brain: Brain) -> Brain:
-        """Return the brain with given regions that is nearest in week."""
-        given = [self.brains[name] for name in self.config.metrics.regions if name in self.brains]
-        return min(given, key=lambda other: abs(other.week - brain.week))
-
     @property
     def exported(self) -> list[dict[str, Any]]:
         """What the export needs to know of each brain that is measured: names, and files by side."""
-        return [self._exported(row) for row in self.measured.values()]
+        return [self._exported(row, self.brains[row.subject]) for row in self.measured.values()]
 
-    def _exported(self, row: Measured) -> dict[str, Any]:
-        brain, real = self.brains[row.subject], row.run == MEASURED
-        white = brain.white if real else {}
-        volume = (
-            {}
-            if real or not brain.given.has_labels
-            else {
-                "labels": brain.label_volume,
-                "surface": row.parts["whole"],
-                "thickness": row.thickness,
-                "affine_from": brain.given.affine_from,
-            }
-        )
+    def _exported(self, row: Measured, brain: Brain) -> dict[str, Any]:
+        real = row.run == MEASURED
+        labels = {"labels": brain.given.label_volume, "affine_from": brain.given.affine_from}
+        white = paths.white_of(*row.sides) if real and brain.white_from else {}
+        whites = {name: file.format(brain=brain.id) for name, file in white.items()}
+        sides = [side for side in row.sides if whites]
+        template = {side: paths.TEMPLATE_MAPS.format(where=row.where, side=side) for side in self.template_sides(row)}
+        volume = {**labels, "surface": row.parts["whole"], "thickness": row.thickness}
         return {
             "brain": row.subject,
             "run": row.run,
@@ -300,19 +290,9 @@ class Study:
             "regions": dict(zip(SIDES, row.regions.values(), strict=False)),
             "report": brain.report,
             "covariates": brain.given.covariates,
-            "white": {side: white[f"{side}_surface"] for side in row.sides if white},
-            "white_maps": {side: white[f"{side}_maps"] for side in row.sides if white},
+            "white": {side: whites[f"{side}_surface"] for side in sides},
+            "white_maps": {side: whites[f"{side}_maps"] for side in sides},
             "template": self.config.metrics.template,
-            "template_maps": {
-                side: TEMPLATE_MAPS.format(where=row.where, side=side) for side in self.template_sides(row)
-            },
-            "volume": volume,
+            "template_maps": template,
+            "volume": volume if brain.given.has_labels and not real else {},
         }
-
-    @property
-    def scans(self) -> dict[str, list[str]]:
-        """The ids of the brains of each subject that was scanned at several weeks, by week."""
-        subjects = sorted({brain.given.subject for brain in self.brains.values() if brain.given.subject is not None})
-        by_week = sorted(self.brains.values(), key=lambda brain: brain.week)
-        scans = {name: [brain.id for brain in by_week if brain.given.subject == name] for name in subjects}
-        return {name: ids for name, ids in scans.items() if len(ids) > 1}

@@ -1,0 +1,479 @@
+"""A study resolved from its configuration: which brains, weeks and files stand behind each run and comparison."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from gyriflow.config import load
+from gyriflow.errors import InputError
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.study import resolve
+from gyriflow.study.paths import CURVES, FOLDING, READY, THICKNESS, job_files, one_of
+
+EXAMPLES = Path(__file__).parents[3] / "config" / "examples"
+CURVE = {21: 99, 24: 150}
+SIZES = {"model": "sizes", "area_cm2": CURVE, "volume_ml": CURVE}
+SPHERE = {"shape": {"kind": "sphere"}}
+EXPECTED = {"runs": {"a": {"preset": "expected"}}}
+
+
+def ids(brains):
+    return [brain.id for brain in brains]
+
+
+def surface(brain):
+    return f"results/brains/{brain}/surface/pial.surf.gii"
+
+
+@pytest.fixture
+def files(tmp_path):
+    for name in ("labels.nii.gz", "left.gii", "right.gii", "pial.gii", "map.nii.gz"):
+        (tmp_path / name).touch()
+    return tmp_path
+
+
+@pytest.fixture
+def labels(files):
+    """What gives a brain of a week from a label volume."""
+    given = {"labels": str(files / "labels.nii.gz"), "scheme": "feta-7"}
+    return lambda week, **more: {"id": f"b{week}", "week": week, **given, **more}
+
+
+@pytest.fixture
+def real(labels):
+    """Brains of four weeks, from label volumes."""
+    return [labels(week) for week in (21, 22, 23, 24)]
+
+
+@pytest.fixture
+def of_two(labels):
+    """What gives brains of a population, the first of which is to start, and those of an atlas."""
+
+    def brains(*weeks, atlas=(21, 22, 23, 24, 25), population="own"):
+        own = [labels(week, id=f"own{week}", population=population) for week in weeks]
+        return [*own, *(labels(week, population="atlas") for week in atlas)]
+
+    return brains
+
+
+def study(brains, refused=(), **sections):
+    raw = {"brains": brains, "start": "first", "folding": {"end_week": 24}, **sections}
+    return resolve(load(raw), refused)
+
+
+def refusal(brains, **sections):
+    with pytest.raises(InputError) as error:
+        study(brains, **sections)
+    return str(error.value)
+
+
+# what is folded
+
+
+@pytest.mark.parametrize(
+    "atlas",
+    [
+        [{"name": "dhcp-volume", "accept_licence": True}, {"name": "dhcp-surface"}],
+        {"name": "crl", "accept_licence": True},
+    ],
+)
+def test_the_paper_is_planned_of_another_atlas_by_one_line(atlas):
+    paper = read_yaml(EXAMPLES / "paper.yaml")
+    own, other = (resolve(load(paper | one, EXAMPLES)) for one in ({}, {"atlas": atlas}))
+    assert (len(own.folded), len(own.may_diverge)) == (len(other.folded), len(other.may_diverge)) == (2, 10)
+
+
+def test_the_paper_is_planned_with_the_paper_s_steps_and_ratios():
+    members = {
+        name: [(values, one.settings) for one, values in compared.members]
+        for name, compared in resolve(load(read_yaml(EXAMPLES / "paper.yaml"), EXAMPLES)).comparisons.items()
+    }
+    steps = {values["thickness_mm"]: run.step_s for values, run in members["thickness"]}
+    assert steps == {0.8: 86400, 1.5: 43200, 2.25: 86400, 6.0: 86400}
+    ratios = [run.shear_modulus_cortex_pa / run.shear_modulus_core_pa for _, run in members["stiffness"]]
+    assert (ratios[0], ratios[-1], {run.step_s for _, run in members["stiffness"]}) == (1, 20, {43200})
+
+
+def test_every_run_folds_its_starts(real):
+    found = study(real[:2], runs={"one": {}, "two": {"start": "all"}})
+    assert found.pairs == [("one", "b21"), ("two", "b21"), ("two", "b22")]
+    assert found.files("{run}/{brain}") == ["one/b21", "two/b21", "two/b22"]
+    assert found.simulations["two", "b22"].week_tags == ["22.00", "23.00", "24.00"]
+    assert ids(found.starts) == ["b21", "b22"]
+
+
+def test_maps_are_made_for_the_runs_that_have_any(files, labels):
+    pair = [str(files / "left.gii"), str(files / "right.gii")]
+    runs = {
+        "plain": {},
+        "thick": {"thickness_mm": {"map": pair, "surface": pair}},
+        "soft": {"shear_modulus_core_pa": {"map": str(files / "map.nii.gz"), "weeks": {21: 1, 24: 2}}},
+        "shapes": {"growth": "shapes"},
+    }
+    search = {"base": "soft", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
+    found = study([labels(21), labels(24)], runs=runs, calibrate=search)
+    maps = {run: found.simulations[run, "b21"].maps for run in runs}
+    assert maps == {"plain": []} | {run: f"results/runs/{run}/b21/folding/maps.h5" for run in list(runs)[1:]}
+    assert found.simulations["thick", "b21"].map_files == [*pair, *pair]
+    # runs of the calibration have the maps of its base
+    assert found.simulations["calibration-00", "b21"].maps == maps["soft"]
+    # in the parameters a map goes by the name of its parameter
+    parameters = found.simulations["soft", "b21"].parameters
+    assert parameters["shear_modulus_core_pa"] == {"map": "shear_modulus_core_pa", "weeks": {21.0: 1.0, 24.0: 2.0}}
+    assert not {"ranks", "start"} & set(parameters)
+
+
+def test_measured_sizes_are_waited_for_by_the_runs_that_follow_them(real):
+    runs = {"plain": {}, "given": {"growth": SIZES}, "measured": {"growth": SIZES | {"volume_ml": "measured"}}}
+    found = study(real, runs=runs).folded
+    assert [one.curves for one in found] == [[], [], CURVES["curves"]]
+    assert [one.followed_series for one in found] == [None, None, "volume"]
+
+
+# brains that were refused
+
+
+def test_a_refused_brain_leaves_the_others_as_they_are(of_two):
+    runs = {"a": {"preset": "expected"}, "first": {"start": "first", "end_week": 23}}
+    asked = {"start": ["own22", "own23"], "runs": runs}
+    brains = of_two(22, 23)
+    assert study(brains, **asked).pairs == [("a", "own22"), ("a", "own23"), ("first", "own22")]
+    # no other brain is folded in its place
+    assert study(brains, ["own22"], **asked).pairs == [("a", "own23")]
+    # without the end of the atlas no run of it has anywhere to go
+    found = study(brains, ["b24", "b25"], **asked)
+    assert (found.folded, set(found.unreachable)) == ([], {"own22", "own23"})
+    assert "own22" in found.brains
+    # one start of another population's growth is left out, the other goes on by its own
+    other = study(brains, ["b24", "b25"], **asked | {"runs": {"a": runs["a"] | {"start": "own22"}, "plain": {}}})
+    assert (other.pairs, set(other.unreachable)) == ([("plain", "own23")], {"own22"})
+
+
+def test_refused_brains_leave_studies_and_comparisons_too(real, files):
+    varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": 24}
+    regions = {"b23": {"volume": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
+    twin = real[3] | {"id": "twin"}
+    asked = {
+        "studies": {"thick": varied, "one": varied | {"base": "late"}},
+        "runs": {"reference": {"start": ["b21", "b22"]}, "late": {"start": "b22", "poisson_ratio": 0.3}},
+        "metrics": {"regions": regions, "template": "b23", "norm_reference": ["b21", "b22"]},
+    }
+    found = study([*real, twin], ["b22", "b23", "b24"], **asked)
+    # a study none of whose runs has a start is none
+    assert {name: [one.start.id for one, _ in of.members] for name, of in found.comparisons.items()} == {
+        "thick": ["b21", "b21"]
+    }
+    assert ids(found.comparisons["thick"].real["b21"]) == ["twin"]
+    assert found.simulations["reference", "b21"].real == {"24.00": found.brains["twin"]}
+    assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], "named")
+    assert {tuple(row["template_maps"]) for row in found.exported} == {()}
+    # nothing is left where no start is
+    empty = study(real, ["b21"], studies={"thick": varied})
+    assert empty.folded == empty.norm_reference == [] == list(empty.comparisons)
+
+
+# which real brains a run is compared with
+
+
+def test_runs_are_compared_with_the_population_and_the_sides_of_their_start_only(labels, files):
+    brains = [
+        labels(21, population="well"),
+        labels(22, population="ill", id="ill"),
+        labels(22, population="well"),
+        {"id": "half", "week": 22, "hemisphere": {"file": str(files / "left.gii"), "side": "left"}},
+    ]
+    found = study(brains)
+    assert found.tables["similarity"] == ["results/runs/reference/b21/metrics/week-22.00/similarity.b22.csv"]
+    assert [ids(pair) for pair in found.references.values()] == [["b22", "b21"]]
+    assert found.places["brains/half/metrics"].parts == {
+        "whole": surface("half"),
+        "left": "results/brains/half/surface/left.pial.surf.gii",
+    }
+
+
+def test_later_scans_of_the_subject_come_first(labels):
+    brains = [labels(21, subject="s"), labels(22, id="other"), labels(22, id="own", subject="s")]
+    one = study(brains).simulations["reference", "b21"]
+    assert ids(one.compared["22.00"]) == ["own", "other"]
+    assert ids(one.real.values()) == ["own"]
+    assert study(brains).scans == {"s": ["b21", "own"]}
+
+
+def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_worth():
+    found = study([{"id": f"b{week}", "week": week, **SPHERE} for week in (21, 22)])
+    (one,) = found.folded
+    assert {week: brain.id for week, brain in one.beside.items()} == {"21.00": "b21", "22.00": "b22"}
+    assert one.real == {}
+    alone = study([{"id": "b21", "week": 21, **SPHERE}])
+    assert alone.growing == alone.tables["similarity"] == alone.validated == []
+
+
+def test_what_validates_a_run_is_its_surface_and_the_real_one_of_each_week(real):
+    found = study(real[:3], folding={"end_week": 23})
+    validated = found.simulations["reference", "b21"].validation_files
+    assert validated["whole"] == [surface("b22"), surface("b23")]
+    assert validated["simulated"][1] == "results/runs/reference/b21/surfaces/week-23.00/pial.surf.gii"
+    assert validated["adjacent"][1] == READY["adjacent"].format(brain="b21", week="23.00")
+    assert [ids(pair) for pair in found.references.values()] == [["b22", "b21"], ["b23", "b22"]]
+
+
+def test_tables_of_validation_are_joined_from_the_runs_that_are_compared(real):
+    tables = study(real, runs={"a": {}, "late": {"start": "b24", "end_week": 26}}).validation_tables
+    assert tables["validation"] == ["results/runs/a/b21/metrics/validation.csv"]
+    assert tables["onset"] == ["results/runs/a/b21/metrics/onset.csv"]
+    assert tables["registration_ceiling"] == ["results/study/validation/b21/registration.csv"]
+
+
+def test_what_registration_alone_is_worth_is_asked_at_compared_weeks(real):
+    found = study(real, folding={"end_week": 24, "output_every_gw": 2})
+    assert found.ceiling_weeks("b21") == [23, 24]
+    assert found.ceiling_files("b21")["whole"] == [surface("b23"), surface("b24")]
+
+
+def test_a_week_is_explained_by_growth_that_knows_it_and_else_predicted(real):
+    runs = {"plain": {}, "given": {"growth": SIZES}, "sizes": {"growth": "sizes"}, "shapes": {"growth": "shapes"}}
+    found = study(real, runs=runs).folded
+    assert [one.kind for one in found] == ["predicted", "predicted", "explained", "explained"]
+    # only there its displacement is that of the registrations
+    assert [one.follows_registration for one in found] == [False, False, False, True]
+
+
+# the brains behind a run's growth
+
+
+def test_a_start_is_carried_to_one_brain_a_week_up_to_the_first_past_the_end(real, labels):
+    further = labels(23, id="twin"), labels(27), labels(30)
+    found = study([*real[:3], *further], runs={"a": {"growth": "shapes"}, "open": {"growth": SIZES}})
+    chain = found.chains["b21", "self"]
+    assert (ids(chain.brains), chain.later_weeks) == (["b21", "b22", "b23", "b27"], [22, 23, 27])
+    assert chain.correspondences[0] == "results/study/registration/b21/b22.h5"
+    assert found.carried == ["b21"]
+    assert [one.targets for one in found.folded] == ["results/brains/b21/mesh/targets.self.h5", []]
+    # sizes come from the shapes
+    assert found.simulations["a", "b21"].curves == []
+
+
+@pytest.mark.parametrize(
+    ("week", "weeks", "chain"),
+    [
+        (22.4, (21, 22, 23, 24, 25), ["b22", "b23", "b24"]),
+        (22, (21, 22, 23, 24, 25), ["b22", "b23", "b24"]),
+        (20.5, (21, 22, 25), ["b21", "b22", "b25"]),
+        (22.4, (21, 23.5, 24.5, 26), ["b21", "b23.5", "b24.5"]),
+    ],
+)
+def test_a_brain_is_expected_from_the_atlas_week_before_it_to_the_first_past_the_end(of_two, week, weeks, chain):
+    start = f"own{week}"
+    found = study(of_two(week, atlas=weeks), **EXPECTED)
+    assert ids(found.chains[start, "atlas"].brains) == [start, *chain]
+    assert list(found.chains[start, "atlas"].correspondences) == [
+        f"results/study/registration/{one}/{two}.h5" for one, two in pairwise([start, *chain])
+    ]
+    assert found.simulations["a", start].targets == f"results/brains/{start}/mesh/targets.atlas.h5"
+
+
+def test_a_start_before_all_weeks_of_the_atlas_is_led_by_two(of_two):
+    found = study(of_two(20.5), folding={"end_week": 21}, **EXPECTED)
+    assert ids(found.chains["own20.5", "atlas"].later) == ["b21", "b22"]
+
+
+def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_the_end(of_two, labels):
+    both = [*of_two(22), *(labels(week, population="third", id=f"third{week}") for week in (22, 24))]
+    for brains, found in (
+        (of_two(22, 24, atlas=()), "none; the growth series are volume"),
+        (of_two(22, atlas=(21, 23)), "own22 (22 GW), b21 (21 GW), b23 (23 GW)"),
+        # more than a week before the first brain of the atlas
+        (of_two(22, atlas=(23.5, 24)), "own22 (22 GW), b23.5 (23.5 GW), b24 (24 GW)"),
+        (both, "several series: atlas, third"),
+    ):
+        said = refusal(brains, **EXPECTED)
+        assert f"found {found}; expected brains of one series of another population" in said
+        assert "from 22 to 24 GW" in said
+    named = study(both, growth={"estimated_from": "third"}, **EXPECTED)
+    assert ids(named.chains["own22", "atlas"].later) == ["third22", "third24"]
+
+
+def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(of_two):
+    named = {"growth": {"estimated_from": "atlas"}, "runs": {"a": {"preset": "measured"}}}
+    assert ids(study(of_two(22, 23, 24), **named).chains["own22", "self"].later) == ["own23", "own24"]
+    assert "found none; the growth series are atlas" in refusal(of_two(22), **named)
+    early = refusal(of_two(22, 23), runs=named["runs"])
+    assert "found own22 (22 GW), own23 (23 GW); expected brains of the start's own growth series" in early
+
+
+@pytest.mark.parametrize("preset", ["measured", "expected"])
+def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(of_two, preset):
+    runs, later = {"runs": {"a": {"preset": preset}}}, {"base": "a", "compare_week": 26}
+    varied = {"studies": {"late": later | {"vary": {"thickness_mm": [1.0, 2.0]}}}}
+    search = {"calibrate": later | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}}
+    for more in (varied, search):
+        if preset == "measured":
+            assert study(of_two(22, 24, 26), **runs, **more).chains["own22", "self"].later_weeks == [24, 26]
+        else:
+            # the atlas ends at 25 GW
+            assert "from 22 to 26 GW" in refusal(of_two(22, 24, 26), **runs, **more)
+
+
+def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
+    brains = of_two(22.4, 23, 23.4, 23.7, 23.701, 26)
+    found = study(brains, runs=EXPECTED["runs"] | {"plain": {}})
+    one, chain = found.simulations["a", "own22.4"], found.chains["own22.4", "atlas"]
+    assert one.weeks == pytest.approx([22.4, 23, 23.4, 23.701, 24])
+    assert (chain.later_weeks, chain.further_weeks) == ([22, 23, 24], (23.4, 23.701))
+    assert found.chains["own22.4", "self"].further_weeks == ()
+    assert {week: brain.id for week, brain in one.real.items()} == {
+        "23.00": "own23",
+        "23.40": "own23.4",
+        "23.70": "own23.7",
+    }
+    # so are runs beside it; others keep the weeks that are asked for
+    assert found.simulations["plain", "own22.4"].weeks == one.weeks
+    assert [one.run for one in found.predictions] == ["a", "plain"]
+    assert study(brains).simulations["reference", "own22.4"].weeks == (22.4, 23.4, 24)
+
+
+def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_their_files(of_two, files):
+    start = {"id": "own22", "week": 22, "pial": str(files / "pial.gii"), "population": "own"}
+    found = study([start, *of_two()], **EXPECTED)
+    assert list(found.chains["own22", "atlas"].posed) == [[True, False], [False, False], [False, False]]
+    assert found.brains["own22"].registered_volume == "results/brains/own22/surface/mask.nii.gz"
+    assert found.brains["own22"].registered["scheme"]["name"] == "binary"
+    assert found.brains["b21"].registered_volume == str(files / "labels.nii.gz")
+
+
+def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read(of_two):
+    runs = {"a": EXPECTED["runs"]["a"], "paper": {}, "measured": {"preset": "measured"}}
+    found = study(of_two(22, 23, 24), runs=runs)
+    # a run that no brain tells of stands beside it, and one that later brains explain does not
+    assert [(one.run, one.from_others_only) for one in found.predictions] == [("a", True), ("paper", False)]
+    assert [one.kind for one in found.folded] == ["predicted", "predicted", "explained"]
+    # of unknown population, it is compared with the brains that its growth comes from
+    assert study(of_two(22, population=None), **EXPECTED).folded[0].kind == "explained"
+    # a later scan of the same subject is its own, whatever it is called
+    scans = [brain | ({"subject": "s"} if brain["id"] in ("own22", "b24") else {}) for brain in of_two(22)]
+    assert not study(scans, **EXPECTED).folded[0].from_others_only
+
+
+def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(of_two):
+    found = study(of_two(22, 23, 24), **EXPECTED)
+    compared = found.simulations["a", "own22"].deviation_files("24.00")
+    assert compared["expected"] == "results/runs/a/own22/surfaces/week-24.00/pial.surf.gii"
+    assert compared["real"] == surface("own24")
+    places = [path.split("/")[-2] for path in compared["thickness"]]
+    assert places == ["surface", "week-22.00", "week-24.00", "surface"]
+    assert len(found.validation_tables["deviation"]) == 2
+    # whose growth is its own explains
+    own = study(of_two(22, 23, atlas=()), runs={"a": {"preset": "measured"}}, folding={"end_week": 23})
+    assert own.validation_tables["deviation"] == own.expected == []
+
+
+# studies and calibration
+
+
+def test_a_study_is_compared_at_its_week_and_its_members_are_measured_there(real):
+    varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": 23}
+    found = study(real, runs={"reference": {"thickness_mm": 1.0}}, studies={"thick": varied})
+    compared = found.comparisons["thick"]
+    # the run that is equal to the reference is that one
+    assert [row["run"] for row in compared.rows] == ["reference", "thick-2"]
+    assert found.may_diverge == ["thick-2"]
+    assert compared.inputs["summaries"] == [
+        FOLDING["summary"].format(run=run, brain="b21") for run in ("reference", "thick-2")
+    ]
+    place = found.places["runs/thick-2/b21/metrics/week-23.00"]
+    assert place.labels == {"subject": "b21", "run": "thick-2", "week": 23}
+    assert place.thickness == "results/runs/thick-2/b21/surfaces/week-23.00/thickness.shape.gii"
+    assert place.where not in found.measured
+    tables = compared.tables("thick-2", "b21")["metrics"]
+    assert tables == [f"{place.folder}/metrics.csv", "results/brains/b23/metrics/metrics.csv"]
+    assert [brain.population for brain in compared.real["b21"]] == ["unknown"]
+
+
+def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
+    rounds = {"first_runs": 3, "rounds": 1, "runs_per_round": 1}
+    search = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
+    found = study(real, calibrate=search | rounds).calibration
+    assert (found.runs_of(1), found.scores_before(0)) == (["calibration-03"], [])
+    assert found.scores_before(1)[-1] == "results/study/calibration/scores/calibration-02.csv"
+    assert found.design("calibration-03") == "results/study/calibration/round-1.csv"
+    assert ids(found.real["b21"]) == ["b24"]
+
+
+# what is measured
+
+
+def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
+    given = {"b21": {"volume": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
+    sphere = {"id": "sphere", "week": 22, **SPHERE}
+    found = study([labels(21), labels(22), sphere], metrics={"regions": given})
+    assert [brain.regions_from for brain in found.brains.values()] == ["given", "carried", None]
+    inputs = found.region_inputs("b22")
+    assert inputs["left_regions"] == "results/brains/b21/metrics/left.regions.label.gii"
+    assert inputs["given_left"] == "results/brains/b21/surface/left.pial.surf.gii"
+    assert inputs["correspondence"] == "results/study/registration/b21/b22.h5"
+    # those of a run hold at all its weeks
+    regions = found.places["runs/reference/b21/metrics/week-22.00"].regions
+    assert regions["left_regions"] == "results/runs/reference/b21/metrics/left.regions.label.gii"
+
+
+def test_named_sulci_are_those_of_real_whole_brains_and_name_what_begins(real):
+    sphere = {"id": "sphere", "week": 22, **SPHERE}
+    found = study([*real, sphere])
+    assert [brain.regions_from for brain in found.brains.values()] == ["named"] * 4 + [None]
+    assert [one.regions for one in found.measured.values()] == [{}] * len(found.measured)
+    onset = found.onset_files("reference", "b21")
+    assert onset["left_regions"] == "results/brains/b24/metrics/left.regions.label.gii"
+    everywhere = study([*real, sphere], metrics={"named_sulci": True}).brains.values()
+    assert [brain.has_regions for brain in everywhere] == [True] * 4 + [False]
+
+
+def test_thickness_is_known_of_labels_of_the_cortex(labels):
+    found = study([labels(21), labels(22, scheme="binary")]).brains
+    assert found["b21"].measured.thickness == THICKNESS["measured"].format(brain="b21")
+    assert found["b22"].measured.thickness == []
+
+
+def test_maps_are_brought_to_a_template_that_is_there(labels):
+    found = study([labels(21), labels(22)], metrics={"template": "b22"})
+    inputs = found.template_inputs("runs/reference/b21/metrics/week-24.00", "left")
+    # a simulated brain keeps the vertices of its start
+    assert inputs["surface"] == "results/runs/reference/b21/surfaces/week-21.00/left.pial.surf.gii"
+    assert inputs["template"] == "results/brains/b22/surface/left.pial.surf.gii"
+    assert inputs["correspondence"] == ["results/study/registration/b22/b21.h5"]
+    assert found.template_inputs("brains/b22/metrics", "left")["correspondence"] == []
+    assert {len(one["template_maps"]) for one in found.exported} == {2}
+
+
+def test_white_surfaces_of_labels_are_measured_where_they_are_asked_for(labels, files):
+    brains = [labels(21), labels(22, scheme="binary")]
+    found = study(brains, metrics={"white_surfaces": "all"})
+    assert [path for path in found.tables["metrics"] if "white" in path] == ["results/brains/b21/metrics/white.csv"]
+    assert found.brains["b21"].white_from == {"labels": str(files / "labels.nii.gz")}
+    assert [sorted(one["white"]) for one in found.exported[:2]] == [["left", "right"], []]
+    assert study(brains).brains["b21"].white_from == {}
+
+
+# names of files
+
+
+@pytest.mark.parametrize(
+    ("output", "log"),
+    [
+        ("results/brains/{brain}/mesh/brain.xdmf", "results/brains/{brain}/logs/r.log"),
+        ("results/runs/{run}/{brain}/a/week-{week}/b.stl", "results/runs/{run}/{brain}/logs/r.week-{week}.log"),
+        ("results/{where}/metrics.csv", "results/{where}/logs/r.log"),
+        ("results/study/{table}.csv", "results/study/logs/r.{table}.log"),
+        ("results/study/{study}/members/{run}/{brain}.csv", "results/study/{study}/logs/r.{run}.{brain}.log"),
+        ("results/study/calibration/round-{round}.csv", "results/study/calibration/logs/r.{round}.log"),
+        ("results/report/report.html", "results/report/logs/r.log"),
+        ("results/export", "results/study/logs/r.log"),
+    ],
+)
+def test_logs_and_benchmarks_lie_beside_results_and_name_all_wildcards(output, log):
+    assert job_files("r", output) == (log, log.replace("logs", "benchmarks").replace(".log", ".tsv"))
+
+
+def test_a_pattern_of_no_names_matches_nothing():
+    assert one_of(["a.b", "c"]) == r"a\.b|c"
+    assert one_of([]) == r"(?!)"
