@@ -127,7 +127,7 @@ def pressed(step_s, days=4, **changes):
     values |= {"no_growth": {"kind": "none"}, "support": "box", "step_s": step_s, "fields": ["stress", "strain"]}
     folding = Folding(COMM, mesh, in_a_tube(mesh), parameters_from(values | changes))
     state = State.at_start(mesh.vertices * M_PER_MM, step_s)
-    folding.model = EvenGrowth(folding.parameters, None, GROWTH * step_s)
+    folding.model = EvenGrowth(folding.parameters, None, GROWTH * step_s).growth
     # the barrier goes by the parameters
     honest = folding.problem.set_shear_modulus
     folding.problem.set_shear_modulus = lambda mu: honest(np.full_like(mu, MU))

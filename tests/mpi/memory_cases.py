@@ -73,7 +73,7 @@ def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(mesh,
     # uniform isotropic growth of a body whose whole surface is fixed: nothing moves, and ln V adds up and decays
     zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
     folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw, **EVEN)
-    folding.model = EvenGrowth(folding.parameters, None, 0.01)
+    folding.model = EvenGrowth(folding.parameters, None, 0.01).growth
     for _ in range(5):
         state = folding.step(state, 43200.0)
     kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)

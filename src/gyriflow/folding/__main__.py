@@ -66,20 +66,15 @@ def locked(folder: Path) -> Iterator[None]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise StorageError(
-                "another folding run works in this folder", path=folder, remedy="Wait for it or choose another folder."
-            ) from None
+            raise StorageError("another folding run works in this folder", path=folder) from None
         yield
 
 
 def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters) -> None:
     """Raises StorageError where the disk has no room for the run's frames, kept twice while they are joined."""
     # positions in double precision, fields in single
-    per_vertex, per_element = (
-        24 + 12 * len(parameters.fields),
-        4 * len(set(ELEMENT_FIELDS) & set(parameters.fields)) * 4,
-    )
-    frame = per_vertex * len(mesh.vertices) + per_element * len(mesh.tets)
+    per_element = 16 * len(set(ELEMENT_FIELDS) & set(parameters.fields))
+    frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(mesh.tets)
     points = len(IntegrationPoints.of_degree(mesh.order).weights)
     stretch = 8 * 6 * points * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
     # positions and two displacements
@@ -87,13 +82,8 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 4 * mesh.tets.size
     free = shutil.disk_usage(out).free
     if free < needed:
-        raise StorageError(
-            "the disk has no room for this run",
-            path=out,
-            found=f"{free / 2**20:.0f} MiB free",
-            expected=f"{needed / 2**20:.0f} MiB",
-            remedy="Free space, choose another --directory, or write fewer weeks or fields.",
-        )
+        found, expected = (f"{size / 2**20:.0f} MiB" for size in (free, needed))
+        raise StorageError("the disk has no room for this run", path=out, found=f"{found} free", expected=expected)
 
 
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:

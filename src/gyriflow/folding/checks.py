@@ -7,11 +7,9 @@ from ..errors import InputError, MeshError
 from ..geometry.jacobians import lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
-from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, ELEMENTS_NEEDED, MEDIAL_WALL, ZONE_NAMES
+from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
-NAMES_OF_NEEDED = {1: "two elements", 2: f"{ELEMENTS_NEEDED[2]:g} quadratic elements"}
-"""What the elements that `ELEMENTS_NEEDED` asks for are called, by their order."""
 MUCH_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
 LARGEST_POISSON_RATIO = 0.46
@@ -20,11 +18,8 @@ of them through the cortex, at 0.48 40 %, at 0.49 47 %, at 0.499 69 %, the peak 
 
 
 def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
-    """Returns what a user should see before the first step.
-
-    Facets and area per zone, the clamped share of each hemisphere's facets, the initial penetration of the planes
-    in mm (0 by construction) and the number of elements through the cortical thickness.
-    """
+    """Returns facets and area per zone, the clamped share of each hemisphere, the initial penetration of the planes in
+    mm (0 by construction), and the number of elements through the cortex."""
     pial = TriangleMesh(mesh.vertices, zones.facets)
     areas = face_areas(pial)
     centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
@@ -47,20 +42,14 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
 
 def zone_warnings(report: dict) -> list[str]:
     """Returns what a user should know of the zones, from their report, before trusting a run."""
-    warnings = []
-    through, order = report["elements_through_cortex"], report["order"]
-    if through < ELEMENTS_NEEDED[order]:
-        warnings.append(
-            f"fewer than {NAMES_OF_NEEDED[order]} through the cortex ({through:.2f}): folds may be mesh noise"
-        )
     areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
     share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
-    if share > MUCH_BETWEEN_PLANES:
-        warnings.append(
-            f"{share:.0%} of the pial area lies between the contact planes and feels no contact, so the hemispheres "
-            "may cross: lower folding.contact.gap_mm below twice the fissure's width"
-        )
-    return warnings
+    if share <= MUCH_BETWEEN_PLANES:
+        return []
+    return [
+        f"{share:.0%} of the pial area lies between the contact planes and feels no contact, so the hemispheres may "
+        "cross: lower folding.contact.gap_mm below twice the fissure's width"
+    ]
 
 
 def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
@@ -77,23 +66,15 @@ def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float)
 def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     """Raises an error for a brain that cannot be folded with these zones.
 
-    Raises
-    ------
-    InputError
-        Where nothing grows, there is no cortex, no facet is clamped, or the fissure lies outside the brain.
-    MeshError
-        Where elements are inside out, the pial surface is not closed, or a part of the brain has no clamped facet and
-        would float.
+    InputError where nothing grows, there is no cortex, no facet is clamped, or the fissure lies outside the brain;
+    MeshError where elements are inside out, the surface is not closed, or a part has no clamped facet and would float.
     """
     if mesh.order == 2:
         folded = np.flatnonzero(lower_bounds(mesh.vertices, mesh.tets) <= 0)
         if len(folded):
             place = np.round(mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1).tolist()
-            raise MeshError(
-                "the mesh has curved elements that are folded over",
-                found=f"{len(folded)} of {len(mesh.tets)}, one at {place} mm",
-                remedy="Move the nodes on their edges towards the middles of the edges.",
-            )
+            found = f"{len(folded)} of {len(mesh.tets)}, one at {place} mm"
+            raise MeshError("the mesh has curved elements that are folded over", found=found)
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
     alone = (zones.facet_zone == MEDIAL_WALL).any()
     if not alone and not low < zones.fissure_x_mm < high:
@@ -116,19 +97,14 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     if not len(clamped):
         raise InputError(
             "no facet is clamped, so the brain would drift",
-            expected="pial facets inside the no-growth ellipsoid, outside the contact zones, or a flat base",
-            remedy="Make or move the ellipsoid so that it cuts the pial surface (folding.no_growth), or choose another "
-            "folding.support.",
+            expected="pial facets inside the ellipsoid of no growth (folding.no_growth), or another folding.support",
         )
     part = connected_parts(mesh)
     parts = part.max() + 1
     floating = np.setdiff1d(np.arange(parts), part[clamped])
     if len(floating):
-        raise MeshError(
-            "parts of the brain have no clamped facet and would float",
-            found=f"{len(floating)} of {parts} parts, the largest with {np.bincount(part)[floating].max()} vertices",
-            remedy="Drop small parts in the surface stage, or make the no-growth ellipsoid reach every part.",
-        )
+        found = f"{len(floating)} of {parts} parts, the largest with {np.bincount(part)[floating].max()} vertices"
+        raise MeshError("parts of the brain have no clamped facet and would float", found=found)
 
 
 def stiffness_warning(poisson_ratio: float) -> str:

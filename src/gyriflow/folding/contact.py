@@ -152,20 +152,21 @@ class SelfContact:
                 remedy="Repair the surface, or mesh with a smaller mesh.envelope_mm.",
             )
         if settings.distance_mm is None:
-            self._widest_mm = self._smallest_gap()
+            gap = self._state_at(np.zeros_like(self._start)).gap
+            # rounding must not make a pair of what is just at the limit
+            self._widest_mm = BESIDE * domain.comm.allreduce(gap, op=MPI.MIN)
             self.mesh_moved()
 
     def mesh_moved(self) -> None:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
         self._start = self._at_vertices(self.domain.positions[self._vertices]) * MM_PER_M
-        self.distance_mm = self.settings.distance_mm or min(self._distance_of_edges(), self._widest_mm)
+        # the same whatever a rank's processor rounds
+        spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
+        of_edges = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
+        self.distance_mm = self.settings.distance_mm or min(of_edges, self._widest_mm)
         self._barrier = ipctk.BarrierPotential(BARRIER, self.distance_mm, self.stiffness_pa, use_physical_barrier=True)
         self._surface: ipctk.CollisionMesh | None = None
         self._known: ContactCache | None = None
-
-    def _distance_of_edges(self) -> float:
-        spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
-        return DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
 
     def adapt(self, rows: Sequence[dict]) -> None:
         """Sets the stiffness of the next step from the table of the steps so far; call `mesh_moved` after it."""
@@ -179,10 +180,6 @@ class SelfContact:
         elif not part <= WIDE:  # also where nothing is near
             last = max(last / 2, self.settings.stiffness_pa)
         self.stiffness_pa = last
-
-    def _smallest_gap(self) -> float:
-        # rounding must not make a pair of what is just at the limit
-        return BESIDE * self.domain.comm.allreduce(self._state_at(np.zeros_like(self._start)).gap, op=MPI.MIN)
 
     def _on_surface(self, local: Floats) -> Floats:
         received = np.empty((len(self._vertices), 3))

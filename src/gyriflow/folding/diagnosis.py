@@ -23,10 +23,7 @@ WORST = 0.01
 def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
     """Returns a thickness below the pial surface in mean edges of the present elements in it; NaN where there are none.
 
-    Parameters
-    ----------
-    distance : (k,) float
-        Of the local nodes to the pial surface, in m as the thickness.
+    `distance` (k,) is that of the local nodes to the pial surface, in m as the thickness.
     """
     inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
     nodes = domain.local(domain.positions)

@@ -7,12 +7,12 @@ do not depend on the number of ranks.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.triangles import TriangleMesh, unit, vertex_normals
+from ..geometry.matching import barycentric, nearest_on
+from ..geometry.triangles import TriangleMesh, corners, unit, vertex_normals
 from ..parameters.folding import FoldingParameters
 from ..parameters.terms import CORTICAL_STEEPNESS
 from ..parameters.varying import Maps, value_at
@@ -52,20 +52,16 @@ class PialSearch:
         self._order = np.empty(len(self.pial), dtype=np.int64)
         self._order[np.lexsort(self.surface.vertices.T[::-1])] = np.arange(len(self.pial))
 
-    def nearest(self, points: Floats) -> tuple[Floats, Ints]:
-        """Returns distance and index of the pial vertex nearest to each of (k, 3) points."""
-        return self.tree.query(points)
-
     def distance(self, points: Floats, reach: float = np.inf, to_vertex: Floats | None = None) -> Floats:
         """Returns the distances of (k, 3) points to the pial triangles.
 
         Where a distance is beyond `reach`, that to the nearest vertex may stand for it. `to_vertex` are the distances
         to the nearest vertices, where they are known.
         """
-        distance = (self.nearest(points)[0] if to_vertex is None else to_vertex).copy()
+        distance = (self.tree.query(points)[0] if to_vertex is None else to_vertex).copy()
         near = (distance > 0) & self._within(distance, reach)
         if near.any():
-            distance[near] = self._nearest_places(points[near])[0]
+            distance[near] = nearest_on(points[near], self.surface)[0]
         return distance
 
     def distance_and_normals(self, points: Floats, reach: float = np.inf) -> tuple[Floats, Floats]:
@@ -74,11 +70,12 @@ class PialSearch:
         Normals are linear in each triangle between those of its vertices. Beyond `reach` the nearest vertex may stand
         for the nearest place.
         """
-        distance, vertex = self.nearest(points)
+        distance, vertex = self.tree.query(points)
         normals = self.normals[vertex]
         near = self._within(distance, reach)
         if near.any():
-            distance[near], face, weights = self._nearest_places(points[near])
+            distance[near], face, places = nearest_on(points[near], self.surface)
+            weights = barycentric(places, corners(self.surface)[face])
             normals[near] = unit(np.einsum("kc,kci->ki", weights, self.normals[self.surface.faces[face]]))
         return distance, normals
 
@@ -86,13 +83,6 @@ class PialSearch:
         # a point of a triangle is at most edge/√3 from its nearest vertex
         longest = np.linalg.norm(np.diff(self.surface.vertices[self.surface.faces], axis=1), axis=2).max()
         return np.asarray(to_vertex <= np.hypot(reach, longest / np.sqrt(3)))
-
-    def _nearest_places(self, points: Floats) -> tuple[Floats, Ints, Floats]:
-        faces = self.surface.faces.astype(np.int32)
-        vertices = self.surface.vertices.copy()
-        squared, face, place = igl.point_mesh_squared_distance(points, vertices, faces)
-        a, b, c = (np.ascontiguousarray(vertices[faces[face, i]]) for i in range(3))
-        return np.sqrt(squared), face, igl.barycentric_coordinates(place, a, b, c)
 
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
         """Returns for (k, 3) points the unit normals of the nearest of (k, c) candidate pial vertices.
@@ -187,7 +177,7 @@ class Tissue:
         reach = WEIGHT_REACH * thickest_mm * M_PER_MM
         nearest: NDArray
         if points.order == 1:
-            to_vertex, nearest = pial.nearest(nodes)
+            to_vertex, nearest = pial.tree.query(nodes)
             depth = pial.distance(nodes, reach, to_vertex)
             weight = cortical_weight(depth * MM_PER_M, thickness_mm(maps))
         else:

@@ -103,6 +103,9 @@ def layer_fields(
         growth = dict(zip(("tangential_growth_per_step", "radial_growth_per_step"), increments, strict=True))
     else:
         growth = growth_along(log_growth, search.nearest_normals(positions_mm))
+    # of a vertex the highest number of its facets' zones
+    zone = np.zeros(len(positions_mm), dtype=np.int32)
+    np.maximum.at(zone, zones.facets.ravel(), np.repeat(zones.facet_zone, 3).astype(np.int32))
     mu = shear_modulus(parameters, weight, maps, week)
     material = MATERIALS[parameters.material](parameters.poisson_ratio)
     fields: dict[str, dict[str, NDArray]] = {
@@ -112,7 +115,7 @@ def layer_fields(
         "shear_modulus": {"shear_modulus_pa": mu},
         "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * mu},
         "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in wanted else {},
-        "zones": {"zone": vertex_zones(zones, len(positions_mm)), "growing": zones.growth},
+        "zones": {"zone": zone, "growing": zones.growth},
     }
     return {name: values for key in wanted if key in fields for name, values in fields[key].items()}
 
@@ -132,13 +135,6 @@ def growth_along(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
         "radial_growth_per_step": (tensors * outwards).sum(axis=(1, 2)),
         "growth_direction_per_step": axes[:, :, 2] * (values[:, 2:] - values[:, 1:2]),
     }
-
-
-def vertex_zones(zones: Zones, count: int) -> NDArray[np.int32]:
-    """Returns a zone for each of `count` vertices: that of its facets, the highest number where they differ."""
-    zone = np.zeros(count, dtype=np.int32)
-    np.maximum.at(zone, zones.facets.ravel(), np.repeat(zones.facet_zone, 3).astype(np.int32))
-    return zone
 
 
 def save_frame(

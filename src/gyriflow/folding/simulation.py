@@ -33,7 +33,7 @@ from .newton import NewtonSettings, NewtonSolver, StepCount
 from .output import say, warn
 from .problem import Problem
 from .step_fields import StepFields
-from .stress import left_stretch, packed, relaxed, unpacked, unstretched
+from .stress import left_stretch, packed, relaxed, unpacked
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -46,23 +46,8 @@ STEPS_BEFORE_GROWING = 4
 class Folding:
     """A brain that folds: the solver's objects, made once, and one step at a time.
 
-    Parameters
-    ----------
-    comm
-        Communicator of the solve.
-    mesh
-        The brain at the start, RAS+ mm; the whole mesh on every rank.
-    zones, parameters, maps
-        What holds through the run; maps at the mesh's vertices, for the parameters that have one.
-    quadrature_degree
-        See `Problem`.
-
-    Attributes
-    ----------
-    model : GrowthModel
-        How tissue grows.
-    growth : Growth
-        How it grew in the last step, or will in the first one.
+    The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `growth` is how tissue grew
+    in the last step, or will in the first one. `quadrature_degree` is that of `Problem`.
     """
 
     def __init__(
@@ -93,7 +78,10 @@ class Folding:
             self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, settings)
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.solver.newton_tolerance, p.solver.krylov_tolerance, p.solver.max_newton)
-        self.solver = NewtonSolver(self.problem, newton, self._residual_floor(mesh))
+        edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
+        stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
+        floor = 1e-11 * stiffest * edge**2 * math.sqrt(len(mesh.vertices))
+        self.solver = NewtonSolver(self.problem, newton, floor)
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
         self.model = growth_model(p, self.inputs, mesh.vertices)
         self.growth: Growth = self.model(StepStart(mesh.vertices, 0.0, p.step_s))
@@ -102,26 +90,19 @@ class Folding:
         self._local_maps = {name: self.domain.local(values) for name, values in self.maps.items()}
         self._pial = np.unique(zones.cortex_facets)
 
-    def _residual_floor(self, mesh: TetrahedralMesh) -> float:
-        p = self.parameters
-        edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
-        stiffness = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
-        return 1e-11 * stiffness * edge**2 * math.sqrt(len(mesh.vertices))
-
     def step(self, state: State, step_s: float) -> State:
         """Returns the state after a step of a given length, the mesh moved along; its last row says what it took.
 
-        Raises
-        ------
-        NotConvergedError
-            Where the step is too large; the mesh is as before.
+        NotConvergedError where the step is too large; the mesh is as before.
         """
         began = time.monotonic()
         tissue, growth = self.begin(state, step_s)
-        u, count = self._grow(tissue, growth, state, step_s)
+        count = self.solver.solve(*[self.domain.local(guess) for guess in state.predicted(step_s)])
+        self.growth, self.fields.step_s = growth, step_s
+        u = self.domain.gathered(self.problem.displacement[: self.domain.owned])
         positions = state.positions + u
         size = self.inputs.size(positions * MM_PER_M)
-        left = None
+        left, thickness = None, self.parameters.thickness_at(growth.start.week(self.parameters, 0.5), self.maps)
         if self.parameters.stress_memory_gw > 0:
             left = self.domain.gathered_cells(packed(left_stretch(self.problem.outcome("elastic"))))
         row = {
@@ -131,7 +112,9 @@ class Folding:
             **self._solved_row(u, count),
             **contact_row(self.contact, self.zones, positions),
             **self.growth.row(size),
-            "elements_through_cortex": elements_through(self.domain, tissue.depth, self._thickness_m(growth.start)),
+            "elements_through_cortex": elements_through(
+                self.domain, tissue.depth, float(np.mean(thickness)) * M_PER_MM
+            ),
             "rung": RUNGS[count.rung],
         }
         after = state.after(u, step_s, row, left, self.growth.learnt(size), self.growth.logarithm())
@@ -141,10 +124,7 @@ class Folding:
         return after
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, Growth]:
-        """Sets all that a step is solved with: mesh, contact, stiffness, kept stretch, and growth as first tried.
-
-        Returns the tissue, whose parameters are those of the middle of the step, and the growth.
-        """
+        """Sets all that a step is solved with, and returns the tissue as in the middle of the step, and the growth."""
         start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.learnt)
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
         if domain.positions is not state.positions:
@@ -174,19 +154,11 @@ class Folding:
         self.problem.set_growth(growth.inverse(tissue))
         return tissue, growth
 
-    def _grow(self, tissue: Tissue, growth: Growth, state: State, step_s: float) -> tuple[Floats, StepCount]:
-        count = self.solver.solve(*[self.domain.local(guess) for guess in state.predicted(step_s)])
-        self.growth, self.fields.step_s = growth, step_s
-        return self.domain.gathered(self.problem.displacement[: self.domain.owned]), count
-
     def _kept_stretch(self, state: State, step_s: float) -> Floats:
         if state.stretch is None:
-            return unpacked(unstretched(len(self.domain.cells), len(self.problem.points.weights)))
+            return np.tile(np.eye(3), (len(self.domain.cells), len(self.problem.points.weights), 1, 1))
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
-
-    def _thickness_m(self, start: StepStart) -> float:
-        return float(np.mean(self.parameters.thickness_at(start.week(self.parameters, 0.5), self.maps))) * M_PER_MM
 
     def _solved_row(self, u: Floats, count: StepCount) -> dict[str, float]:
         ratios, length = self.problem.volume_ratios(), np.linalg.norm(u, axis=1) * MM_PER_M
@@ -208,10 +180,7 @@ class Folding:
 def advance(folding: Folding, state: State, until_s: float) -> State:
     """Returns the state after one accepted step towards `until_s`; the step is halved while its solve fails.
 
-    Raises
-    ------
-    SolverError
-        Where the smallest step fails too.
+    SolverError where the smallest step fails too.
     """
     p = folding.parameters
     left = until_s - state.time_s

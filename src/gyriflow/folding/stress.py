@@ -80,11 +80,6 @@ def unpacked(values: Floats) -> Floats:
     return tensors
 
 
-def unstretched(cells: int, points: int) -> Floats:
-    """Returns the (c, q, 6) stretches of tissue without stress."""
-    return np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], (cells, points, 1))
-
-
 def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
     """Returns V^power (..., 3, 3) of Fe = V·R: the rotation R has no stress, and an isotropic material forgets it."""
     squares, axes = np.linalg.eigh(Fe @ Fe.swapaxes(-1, -2))

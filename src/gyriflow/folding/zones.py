@@ -10,26 +10,9 @@ from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
 from ..geometry.triangles import TriangleMesh, face_normals
+from ..parameters import terms
 from ..parameters.folding import FoldingParameters, NoGrowth
-from ..parameters.terms import (
-    BASE,
-    BETWEEN_PLANES,
-    BRIDGE,
-    CLAMPED,
-    CORE,
-    CORTEX,
-    FLAT_CUTS,
-    FREE,
-    LEFT,
-    LEFT_CONTACT,
-    MEDIAL_WALL,
-    RIGHT,
-    RIGHT_CONTACT,
-    SHAPE_CUTS,
-    SIDE_X,
-    SIDE_Y,
-    Side,
-)
+from ..parameters.terms import Side
 from .layers import PialSearch
 
 Floats = NDArray[np.float64]
@@ -77,28 +60,28 @@ class Zones:
 
     def penetration_mm(self, positions: NDArray[np.float64]) -> float:
         """Returns how far the fissure's walls stand beyond their planes at most, for (n, 3) positions in mm."""
-        left = positions[self.vertices_of(LEFT_CONTACT), 0] - self.planes_mm[0]
-        right = self.planes_mm[1] - positions[self.vertices_of(RIGHT_CONTACT), 0]
+        left = positions[self.vertices_of(terms.LEFT_CONTACT), 0] - self.planes_mm[0]
+        right = self.planes_mm[1] - positions[self.vertices_of(terms.RIGHT_CONTACT), 0]
         return float(max(left.max(initial=0.0), right.max(initial=0.0)))
 
     @property
     def cortex_facets(self) -> NDArray[np.int64]:
         """The (c, 3) facets under which the cortex lies: all but flat cuts and the wall of a single hemisphere."""
-        return self.facets[~np.isin(self.facet_zone, FLAT_CUTS)]
+        return self.facets[~np.isin(self.facet_zone, terms.FLAT_CUTS)]
 
     @property
     def measured_facets(self) -> NDArray[np.int64]:
         """The (k, 3) facets of the pial surface as its area is measured: with the medial wall, without shapes' cuts."""
-        return self.facets[~np.isin(self.facet_zone, SHAPE_CUTS)]
+        return self.facets[~np.isin(self.facet_zone, terms.SHAPE_CUTS)]
 
     @property
     def fixed(self) -> NDArray[np.bool_]:
         """Which of the (n, 3) components of the vertices' displacements are zero."""
         fixed = np.zeros((len(self.growth), 3), dtype=bool)
-        fixed[self.vertices_of(CLAMPED, BASE)] = True
-        fixed[self.vertices_of(SIDE_X), 0] = True
-        fixed[self.vertices_of(SIDE_Y), 1] = True
-        wall = self.vertices_of(MEDIAL_WALL)
+        fixed[self.vertices_of(terms.CLAMPED, terms.BASE)] = True
+        fixed[self.vertices_of(terms.SIDE_X), 0] = True
+        fixed[self.vertices_of(terms.SIDE_Y), 1] = True
+        wall = self.vertices_of(terms.MEDIAL_WALL)
         fixed[wall, 0] = True
         fixed[wall] |= self.wall_held
         if self.anchors is not None:
@@ -157,13 +140,13 @@ def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64], sides: bool) -> 
     near = FLAT * (high - low)
     normals = face_normals(TriangleMesh(mesh.vertices, facets))
     corners = mesh.vertices[facets]
-    zone = np.full(len(facets), FREE)
-    for axis, name in ((0, SIDE_X), (1, SIDE_Y)) if sides else ():
+    zone = np.full(len(facets), terms.FREE)
+    for axis, name in ((0, terms.SIDE_X), (1, terms.SIDE_Y)) if sides else ():
         for end, sign in ((low, -1.0), (high, 1.0)):
             at_end = (np.abs(corners[:, :, axis] - end[axis]) <= near[axis]).all(axis=1)
             zone[on_whole_faces(at_end & (sign * normals[:, axis] > 0.7), mesh.order)] = name
     at_base = (corners[:, :, 2] <= low[2] + near[2]).all(axis=1)
-    zone[on_whole_faces(at_base & (normals[:, 2] < -0.7), mesh.order)] = BASE
+    zone[on_whole_faces(at_base & (normals[:, 2] < -0.7), mesh.order)] = terms.BASE
     return zone
 
 
@@ -192,20 +175,20 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         """Returns the facets on faces of elements at all of whose vertices something holds."""
         return on_whole_faces(np.asarray(holds.all(axis=1)), mesh.order)
 
-    zone = np.full(len(facets), FREE)
+    zone = np.full(len(facets), terms.FREE)
     if support == "ellipsoid":
-        zone[faces_where(still[facets])] = CLAMPED
+        zone[faces_where(still[facets])] = terms.CLAMPED
     if p.contact.kind != "none":
-        zone[faces_where((facet_x > left_plane) & (facet_x < right_plane))] = BETWEEN_PLANES
-        zone[faces_where((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))] = LEFT_CONTACT
-        zone[faces_where((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))] = RIGHT_CONTACT
+        zone[faces_where((facet_x > left_plane) & (facet_x < right_plane))] = terms.BETWEEN_PLANES
+        zone[faces_where((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))] = terms.LEFT_CONTACT
+        zone[faces_where((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))] = terms.RIGHT_CONTACT
     if support in ("base", "box"):
         cuts = flat_cuts(mesh, facets, sides=support == "box")
-        zone[cuts != FREE] = cuts[cuts != FREE]
+        zone[cuts != terms.FREE] = cuts[cuts != terms.FREE]
     anchors = None
     if side is not None:
-        zone[medial_wall_facets(mesh, facets, side)] = MEDIAL_WALL
-        wall = np.unique(facets[zone == MEDIAL_WALL])
+        zone[medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
+        wall = np.unique(facets[zone == terms.MEDIAL_WALL])
         if support == "free" and not wall_held and len(wall):
             anchors = _wall_anchors(mesh.vertices, wall)
 
@@ -244,9 +227,9 @@ def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
     x = mesh.vertices[mesh.corners, 0].mean(axis=1)
     left, right = zones.planes_mm
     return {
-        "hemisphere": np.select([x <= left, x >= right], [LEFT, RIGHT], BRIDGE).astype(np.int32),
+        "hemisphere": np.select([x <= left, x >= right], [terms.LEFT, terms.RIGHT], terms.BRIDGE).astype(np.int32),
         "growing": (zones.growth[mesh.tets].max(axis=1) > 0).astype(np.int32),
-        "layer": np.where(weight[mesh.tets].mean(axis=1) > 0.5, CORTEX, CORE).astype(np.int32),
+        "layer": np.where(weight[mesh.tets].mean(axis=1) > 0.5, terms.CORTEX, terms.CORE).astype(np.int32),
     }
 
 
@@ -258,5 +241,5 @@ def facet_tags(zones: Zones, on_left: NDArray[np.bool_]) -> Tags:
     on_left : (f,) bool
         Which facets belong to the left hemisphere. The fissure may be curved, so that no plane tells.
     """
-    side = np.where(on_left, LEFT, RIGHT)
+    side = np.where(on_left, terms.LEFT, terms.RIGHT)
     return {"zone": zones.facet_zone.astype(np.int32), "hemisphere": side.astype(np.int32)}

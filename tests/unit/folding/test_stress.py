@@ -24,7 +24,6 @@ from gyriflow.folding.stress import (
     principal_stretches,
     relaxed,
     unpacked,
-    unstretched,
     von_mises,
 )
 from gyriflow.folding.zones import Zones
@@ -221,7 +220,6 @@ KEPT = np.eye(3) + 0.1 * (lambda a: a + a.T)(np.random.default_rng(5).standard_n
 
 def test_packing_keeps_symmetric_tensors():
     np.testing.assert_array_equal(unpacked(packed(KEPT[None]))[0], KEPT)
-    np.testing.assert_array_equal(unpacked(unstretched(4, 2)), np.tile(np.eye(3), (4, 2, 1, 1)))
 
 
 def test_a_rotation_is_forgotten_and_the_stretch_kept():
