@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..io.yaml_files import SCHEMES, read_keys
 from ..parameters.folding import VARYING, FoldingSettings, output_weeks
 from ..parameters.schemes import LabelScheme, SchemeSettings
-from ..parameters.settings import Settings, refused
+from ..parameters.settings import Settings
 from ..parameters.varying import Varying, files_of
 from ..units import week_tag
 from .atlas import Atlas, AtlasSettings, UsedAtlas
@@ -24,8 +24,10 @@ from .runs import (
     GrowthSettings,
     Member,
     Run,
+    RunName,
     Start,
     Study,
+    StudyName,
     estimated_from,
     growth_series,
     members_of,
@@ -57,9 +59,9 @@ class Config(Settings):
     """Growth rates."""
     folding: FoldingSettings
     """Folding simulation."""
-    runs: dict[str, Run] = Field({})
+    runs: dict[RunName, Run] = Field({})
     """Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."""
-    studies: dict[str, Study] = Field({})
+    studies: dict[StudyName, Study] = Field({})
     """Studies by name: runs that differ in a few parameters, compared with real brains."""
     calibrate: Calibration | None = None
     """A search for the parameters that meet a real brain best."""
@@ -73,20 +75,6 @@ class Config(Settings):
     @classmethod
     def _one_or_several(cls, value: Any) -> Any:
         return [value] if isinstance(value, str | dict) else value
-
-    @field_validator("brains", mode="before")
-    @classmethod
-    def _list_of_brains(cls, value: Any) -> Any:
-        if not isinstance(value, list | tuple):
-            raise refused(f"found {value!r}; expected a list of brains, each with id, week and a source")
-        return value
-
-    @field_validator("runs", mode="before")
-    @classmethod
-    def _table_of_runs(cls, value: Any) -> Any:
-        if not isinstance(value, dict):
-            raise refused(f"found {value!r}; expected names, each with the settings that differ from folding")
-        return value
 
     def brain(self, name: str) -> Brain:
         """Returns the brain of an id; KeyError if there is none."""

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag
 from ..parameters.folding import FoldingSettings
 from ..parameters.growth import SIZES
 from ..parameters.settings import Problem, Settings
-from ..parameters.terms import SCORES, Score
+from ..parameters.terms import LONGEST_NAME, SCORES, Score
 from .brains import Brain
 
 ALL = "all"
@@ -24,6 +24,10 @@ Start = Annotated[
 ]
 """The id of a brain, a list of ids, `first` or `all`."""
 
+
+RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=LONGEST_NAME)]
+StudyName = Annotated[str, Field(pattern=r"^[^\W_][\w-]*$", max_length=LONGEST_NAME)]
+"""Names of folders: letters, digits and these marks, first a letter or digit."""
 
 FREE_GROWTH: dict[str, Any] = {
     "step_s": 86_400.0,

@@ -123,8 +123,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
-    # pydantic puts the tag of a union's member, here in parentheses, into the path
-    path = tuple(part for part in details["loc"] if not str(part).startswith("("))
+    # pydantic puts tags into the path: of a union's member, here in parentheses, and of what is wrong with a name
+    path = tuple(part for part in details["loc"] if not str(part).startswith("(") and part != "[key]")
     text = details["msg"].removeprefix("Value error, ")
     if details["type"] == "extra_forbidden":
         text = f"unknown key; {nearest(str(path[-1]), keys_at(kind, path[:-1]))}"

@@ -94,7 +94,7 @@ def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
 
 
 def test_what_stands_for_measured_brains_is_no_name_of_a_run():
-    assert problems(study(runs={"real": {}})) == ["runs.real: the name is reserved; choose another"]
+    assert problems(study(runs={"real": {}})) == ["runs.real: the name is taken; choose another"]
 
 
 def test_a_run_folds_the_brains_that_it_names():
@@ -126,11 +126,11 @@ def test_starts_that_cannot_be_are_all_named():
     }
     assert problems(study(start=["a", "B"], brains=[*labelled(21, 22.5), *labelled(23, names=["all"])])) == [
         "brains: the id all is reserved; choose another",
-        "start: found 'B'; expected the id of a brain: a, b, all",
+        "start: found 'B', which is no brain; known are a, b, all",
     ]
     assert problems(study(start="all", runs=runs)) == [
         "runs.X: is the same folder as that of the run x on some disks; rename one",
-        "runs.x.start: found 'phantom'; expected the id of a brain: a, b",
+        "runs.x.start: found 'phantom', which is no brain; known are a, b",
         "runs.y.start: found no ids; expected one or more",
         "runs.z.start: found b more than once",
         "runs.w.thickness_mm: has a map on a surface, which belongs to one brain; the run starts from a, b",
@@ -177,7 +177,7 @@ def test_an_unknown_start_and_a_week_of_no_fetus_are_refused():
     assert problems(study(brains=brains)) == [
         "brains[0].week: Input should be less than or equal to 45; found 50",
     ]
-    assert problems(study(start="x")) == ["start: found 'x'; expected the id of a brain: a, b"]
+    assert problems(study(start="x")) == ["start: found 'x', which is no brain; known are a, b"]
 
 
 def test_files_are_found_beside_the_configuration_and_missing_ones_named(tmp_path):

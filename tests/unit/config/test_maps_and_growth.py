@@ -93,11 +93,11 @@ def test_series_may_be_named(tmp_path):
     [
         (
             {"brains": {"one": ["v21", "x"], "two": ["v21", "v22"]}},
-            ["growth.brains.one: found x; expected ids of brains: v21, v22, s21, s22"],
+            ["growth.brains.one: found 'x', which is no brain; known are v21, v22, s21, s22"],
         ),
         (
             {"brains": {"one": ["v21", "s21"], "two": ["v21", "v22"]}},
-            ["growth.brains.one: found brains of 1 week; a growth rate needs two or more"],
+            ["growth.brains.one: found brains of 1 week(s); growth needs two or more"],
         ),
         ({"estimated_from": "volumes"}, ["growth.estimated_from: found 'volumes'; the series are surface, volume"]),
         ({"brains": {"one": "v21"}}, ["growth.brains.one: Input should be a valid tuple; found 'v21'"]),
@@ -113,13 +113,13 @@ def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
         ({}, FOLDING, []),
         ({"brains": ["a", "c"]}, FOLDING, []),
         (None, FOLDING, []),
-        ({"brains": ["a", "d"]}, FOLDING, ["growth.brains: found d; expected ids of brains: a, b, c"]),
+        ({"brains": ["a", "d"]}, FOLDING, ["growth.brains: found 'd', which is no brain; known are a, b, c"]),
         (
             {"brains": ["b", "c"]},
             {"end_week": 24},
-            ["growth.brains: found brains of 1 week; a growth rate needs two or more"],
+            ["growth.brains: found brains of 1 week(s); growth needs two or more"],
         ),
-        ({"brains": []}, {"end_week": 24}, ["growth.brains: found brains of 0 weeks; a growth rate needs two or more"]),
+        ({"brains": []}, {"end_week": 24}, ["growth.brains: found brains of 0 week(s); growth needs two or more"]),
     ],
 )
 def test_brains_that_give_no_growth_rate_are_refused(growth, settings, found):

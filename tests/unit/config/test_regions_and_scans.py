@@ -50,9 +50,9 @@ def test_wrong_regions_are_refused(volume, given, match):
 
 
 def test_unknown_brains_are_refused(volume):
-    with pytest.raises(InputError, match=r"metrics.regions: found q; expected ids of brains: p21, p22, p25"):
+    with pytest.raises(InputError, match=r"metrics.regions: found .q., which is no brain; known are p21, p22, p25"):
         load(study(regions={"q": {"volume": volume, **NAMES}}))
-    with pytest.raises(InputError, match=r"metrics.norm_reference: found x"):
+    with pytest.raises(InputError, match=r"metrics.norm_reference: found .x."):
         load(study(norm_reference=["x"]))
 
 

@@ -59,7 +59,7 @@ def test_all_mistakes_in_schemes_are_named_at_once(folder):
     ]
     right = {"feta-7": MINE, "a": MINE}
     assert problems(study({"labels": "labels.nii.gz", "scheme": "d"}, schemes=right), folder) == [
-        "schemes.feta-7: the name is that of a scheme of gyriflow; choose another",
+        "schemes.feta-7: the name is taken; choose another",
         "brains[0].scheme: found 'd'; expected one of binary, crl, dhcp-19, drawem-9, feta-7, freesurfer, "
         "multi-bounti-43, spina-bifida-atlas, a, or a name of schemes",
     ]

@@ -109,7 +109,7 @@ def test_what_is_wrong_with_a_study_is_said(change, said):
 
 
 def test_folders_of_results_are_no_names_of_studies():
-    assert "reserved" in refusal(studies={"figures": THICKNESS})
+    assert "the name is taken" in refusal(studies={"figures": THICKNESS})
     assert "rename one" in refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}})
 
 
@@ -127,7 +127,7 @@ def test_a_calibration_knows_its_runs_beforehand():
         ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm: should be greater than 0"),
         ({"parameters": {"poisson": [0, 0.4]}}, "no such key"),
         ({"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}}, "growth_rate_per_s is no curve in the base run"),
-        ({"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}, "the base run follows no curve"),
+        ({"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}, "growth.area_cm2 is no curve in the base run"),
         ({"parameters": {"stiffness_ratio": [0, 2]}}, "above 0"),
         ({"rounds": 8}, "at most 40"),
         ({"score": {}}, "calibrate.score: found nothing"),
@@ -147,4 +147,4 @@ def test_curves_of_the_base_run_may_be_scaled():
     config(runs=runs, calibrate=CALIBRATION | led)
     # growth towards shapes follows none
     closed = {"led": {"preset": "measured"}, "reference": {}}
-    assert "amplitude: the base run follows no curve" in refusal(runs=closed, calibrate=CALIBRATION | led)
+    assert "growth.area_cm2 is no curve in the base run" in refusal(runs=closed, calibrate=CALIBRATION | led)
