@@ -14,11 +14,6 @@ from click.core import ParameterSource
 from ..errors import GyriflowError, InputError
 from ..shipped import CONFIG, DEMO, SHIPPED
 
-STAGES = (
-    *("retrieve", "surface", "quality", "mesh", "growth", "folding", "metrics", "figures", "report"),
-    *("studies", "calibrate", "paper", "replication", "validate", "export"),
-)
-"""Targets of the workflow that a user asks for by name."""
 CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
 LEVELS = ("participant", "group")
 LABELS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
@@ -27,26 +22,16 @@ ELSEWHERE = ("--profile", "--executor", "-e")
 """Options of Snakemake's by which jobs run on other machines."""
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
+THERE = click.Path(exists=True, file_okay=False, path_type=Path)
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
 )
 cores_option = click.option(
-    "-c",
-    "--cores",
-    type=click.IntRange(1),
-    default=os.cpu_count() or 1,
-    show_default="all",
-    help="How many cores to use.",
+    "-c", "--cores", type=click.IntRange(1), default=os.cpu_count() or 1, show_default="all", help="Cores to use."
 )
-stages_option = click.option(
-    "-s",
-    "--stage",
-    "stages",
-    multiple=True,
-    type=click.Choice(STAGES),
-    help="Run up to this stage only. May be repeated.",
-)
+stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Up to this target only. May be repeated.")
+dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
 config_argument = click.argument("config", type=FILE, required=False)
 
 
@@ -54,13 +39,13 @@ class Commands(click.Group):
     """Commands that end in one message and the exit code of their error, without a traceback."""
 
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
-        """Reads the arguments; those of a BIDS app, `BIDS OUT participant`, are of the command `bids`."""
+        """Read the arguments; those of a BIDS app, `BIDS OUT participant`, are of the command `bids`."""
         if args and args[0] not in self.commands and len(args) > 2 and args[2] in LEVELS:
             args = ["bids", *_one_by_one(args)]
         return super().parse_args(context, args)
 
     def invoke(self, context: click.Context) -> Any:
-        """Runs the command that is asked for."""
+        """Run the command that is asked for."""
         try:
             return super().invoke(context)
         except GyriflowError as error:
@@ -69,24 +54,24 @@ class Commands(click.Group):
 
 
 def _one_by_one(args: Sequence[str]) -> list[str]:
-    """Returns the arguments of a BIDS app with each label under an option of its own."""
-    found, option = [], ""
+    """Return the arguments of a BIDS app with each label under an option of its own."""
+    single, option = [], ""
     for argument in args:
         if argument.startswith("-"):
             option = argument if argument in LABELS else ""
-            found += [] if option else [argument]
+            single += [] if option else [argument]
         else:
-            found += [option, argument] if option else [argument]
-    return found
+            single += [option, argument] if option else [argument]
+    return single
 
 
 def command_name() -> str:
-    """Returns what a user types to get this command: in a checkout that is not installed, `./run gyriflow`."""
+    """Return what a user types to get this command: in a checkout that is not installed, `./run gyriflow`."""
     return "gyriflow" if shutil.which("gyriflow") or not (SHIPPED / "run").is_file() else "./run gyriflow"
 
 
 def version(context: click.Context, parameter: click.Parameter, value: bool) -> None:
-    """Prints the version, with the commit where there is one, and ends."""
+    """Print the version and end."""
     if value and not context.resilient_parsing:
         from ..version import version as own
 
@@ -119,7 +104,7 @@ def main() -> None:
 
 
 @main.command()
-@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("folder", type=THERE)
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
 @click.option("--force", is_flag=True, help="Replace a configuration that is there.")
 @click.option("--quick", is_flag=True, help="With a coarse mesh: minutes on a laptop, to see that all goes well.")
@@ -166,7 +151,7 @@ def check(
 @directory_option
 @cores_option
 @stages_option
-@click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
+@dry_run_option
 @click.option("-v", "--verbose", is_flag=True, help="All that Snakemake says, on the terminal.")
 @click.argument("further", nargs=-1, type=click.UNPROCESSED, metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]")
 def run(
@@ -177,7 +162,7 @@ def run(
     CONFIG is gyriflow.yaml where none is named. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
     """
     named = bool(further) and further[0].endswith(CONFIG_SUFFIXES)
-    chosen = _chosen(Path(further[0]) if named else None, directory)
+    config = _chosen(Path(further[0]) if named else None, directory)
     # an option of one value stands before the targets
     arguments = ["--verbose"] if verbose else []
     # the cores of this machine are no limit to a cluster, whose profile says how many jobs it may have
@@ -188,12 +173,18 @@ def run(
     if dry_run:
         from .checking import work_of_study
 
-        for line in work_of_study(chosen, directory, cores, [*arguments, *targets], show=verbose):
+        for line in work_of_study(config, directory, cores, [*arguments, *targets], show=verbose):
             click.echo(line)
     else:
         from .launch import main as launch
 
-        sys.exit(launch(["--configfile", str(chosen.resolve()), *arguments, "--directory", str(directory), *targets]))
+        sys.exit(launch(["--configfile", str(config.resolve()), *arguments, "--directory", str(directory), *targets]))
+
+
+def _run(directory: Path, cores: int, dry_run: bool, *further: str) -> None:
+    """Run a configuration that another command has written."""
+    context = click.get_current_context()
+    context.invoke(run, directory=directory, cores=cores, stages=(), dry_run=dry_run, verbose=False, further=further)
 
 
 @main.command()
@@ -206,17 +197,9 @@ def run(
 @click.option("--accept-licence", "accepted", is_flag=True, help="Accept the atlas' licence, where it asks for it.")
 @directory_option
 @cores_option
-@click.option("-n", "--dry-run", is_flag=True, help="Write the configuration, say what would run, and run nothing.")
-@click.pass_context
+@dry_run_option
 def predict(
-    context: click.Context,
-    labels: Path,
-    week: float,
-    until: float,
-    directory: Path,
-    cores: int,
-    dry_run: bool,
-    **given: Any,
+    labels: Path, week: float, until: float, directory: Path, cores: int, dry_run: bool, **settings: Any
 ) -> None:
     """Predict a brain of later weeks from its tissue LABELS, by the growth of an atlas.
 
@@ -225,16 +208,13 @@ def predict(
     """
     from .beginning import write_prediction
 
-    config = directory / CONFIG
-    for line in write_prediction(config, labels, (week, until), **given):
+    for line in write_prediction(directory / CONFIG, labels, (week, until), **settings):
         click.echo(line)
-    context.invoke(
-        run, directory=directory, cores=cores, stages=(), dry_run=dry_run, verbose=False, further=(str(config),)
-    )
+    _run(directory, cores, dry_run, str(directory / CONFIG))
 
 
 @main.command()
-@click.argument("data", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="BIDS")
+@click.argument("data", type=THERE, metavar="BIDS")
 @click.argument("out", type=FOLDER)
 @click.argument("level", type=click.Choice(LEVELS))
 @click.option(*LABELS[:2], "participants", multiple=True, help="These participants only.")
@@ -243,21 +223,8 @@ def predict(
 @click.option("--settings", type=FILE, help="Configuration without brains: what is folded, how, and how finely.")
 @click.option("-w", "--work-dir", "work", type=FOLDER, help="Folder of results/. [default: OUT/work]")
 @cores_option
-@click.option("-n", "--dry-run", is_flag=True, help="Write the configuration, say what would run, and run nothing.")
-@click.pass_context
-def bids(
-    context: click.Context,
-    data: Path,
-    out: Path,
-    level: str,
-    participants: Sequence[str],
-    sessions: Sequence[str],
-    files: str,
-    settings: Path | None,
-    work: Path | None,
-    cores: int,
-    dry_run: bool,
-) -> None:
+@dry_run_option
+def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_run: bool, **selection: Any) -> None:
     """Run a BIDS data set of tissue labels or surfaces, as a BIDS app: BIDS OUT LEVEL.
 
     The level participant makes surfaces, maps and simulations of each participant in OUT, group the tables and the
@@ -269,12 +236,11 @@ def bids(
 
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
-    brains = write_bids(data, config, participants, sessions, files, settings)
+    brains = write_bids(data, config, **selection)
     click.echo(f"{len(brains)} scans: {', '.join(brains)}; {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     if dry_run:
-        context.invoke(run, directory=work, cores=cores, stages=(), dry_run=True, verbose=False,
-                       further=(str(config), *targets))  # fmt: skip
+        _run(work, cores, True, str(config), *targets)
         return
     options = ["--cores", str(cores), "--keep-going", "--directory", str(work)]
     code = launch(["--configfile", str(config.resolve()), *options, *targets])
@@ -291,8 +257,8 @@ def status(directory: Path, as_json: bool) -> None:
     """How far a study is: done, running, time left, failed and why."""
     from . import status as module
 
-    found = module.status(directory)
-    click.echo(module.as_json(found) if as_json else "\n".join(module.as_text(found)))
+    study = module.status(directory)
+    click.echo(module.as_json(study) if as_json else "\n".join(module.as_text(study)))
 
 
 @main.command()
@@ -309,12 +275,9 @@ def view(directory: Path, only_print: bool) -> None:
 
 
 def _chosen(config: Path | None, directory: Path) -> Path:
-    """Returns the configuration that is meant, the one named or gyriflow.yaml; InputError without one."""
-    found = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)
-    if found is None:
-        raise InputError(
-            "there is no configuration",
-            path=Path(CONFIG).absolute(),
-            remedy=f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}.",
-        )
-    return found
+    """Return the configuration that is meant, the one named or gyriflow.yaml; InputError without one."""
+    chosen = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)
+    if chosen is None:
+        remedy = f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}."
+        raise InputError("there is no configuration", path=Path(CONFIG).absolute(), remedy=remedy)
+    return chosen

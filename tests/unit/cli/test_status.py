@@ -60,14 +60,14 @@ def test_failures_are_told_with_their_cause_and_log(study):
 
 def test_stages_of_brains_and_runs_are_told_from_their_files(study):
     found = status(study)
-    assert found.brains == [["a", "done", "-", "-"], ["b", "-", "-", "-"]]
-    assert found.runs == [["r", "a", "-", "-", "-", "-"]]
+    assert [list(row.values()) for row in found["brains"]] == [["a", "done", "-", "-"], ["b", "-", "-", "-"]]
+    assert [list(row.values()) for row in found["runs"]] == [["r", "a", "-", "-", "-", "-"]]
     progress = study / "results/runs/r/a/logs/simulate.jsonl"
     progress.write_text('{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s": 142.0}\n')
-    assert status(study).runs[0][2] == "GW 21.50 of 23"
+    assert status(study)["runs"][0]["folding"] == "GW 21.50 of 23"
     write_json(study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]})
-    assert status(study).runs[0][2] == "done, GW 23.00"
-    assert found.report is None
+    assert status(study)["runs"][0]["folding"] == "done, GW 23.00"
+    assert found["report"] == ""
 
 
 def test_a_folder_without_a_study_is_named(tmp_path):
@@ -87,6 +87,6 @@ def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(stud
     # the configuration may lie elsewhere
     elsewhere = study / "elsewhere.yaml"
     (study / "gyriflow.yaml").rename(elsewhere)
-    assert [row[0] for row in status(study).runs] == ["r"]
+    assert [row["run"] for row in status(study)["runs"]] == ["r"]
     write_json(study / STUDY, {"configuration": [str(elsewhere)], "brains": []})
-    assert [row[0] for row in status(study).runs] == ["r", "later"]
+    assert [row["run"] for row in status(study)["runs"]] == ["r", "later"]
