@@ -1,21 +1,14 @@
-"""The brains of a study: the data of their pial surfaces, tables of them, and regions given on them."""
+"""The brains of a study: the data of their pial surfaces, and regions given on them."""
 
-import difflib
-import re
-from collections import Counter
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field
 
-from ..errors import InputError
 from ..parameters.schemes import Label
-from ..parameters.settings import InputFile, Problem, Settings, beside, located
+from ..parameters.settings import InputFile, Problem, Settings
 from ..parameters.synthetic import ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
 from ..parameters.varying import Week
-from .scans import AGE, IDS, NOTHING, SESSION, UNIT_OF_AGE, Scan, read_scans
 
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """The keys of which a brain has exactly one."""
@@ -168,145 +161,6 @@ class Brain(Settings):
                     yield Problem(f"has no meaning with {self._kind}; only with {' or '.join(kinds)}", (key,))
             if self._kind in OF_LABELS and self.scheme is None:
                 yield Problem("is missing; it says what the labels mean", ("scheme",))
-
-
-# tables of brains
-
-FILES = ("file", "files")
-SIDE = "side"
-NESTED: Mapping[str, tuple[str, ...]] = {
-    "hemispheres": (*(f"hemispheres.{key}" for key in HemisphereFiles.model_fields if key != "white"),
-                    *(f"hemispheres.white.{key}" for key in WhiteFiles.model_fields)),
-    "hemisphere": tuple(f"hemisphere.{key}" for key in OneHemisphere.model_fields),
-}  # fmt: skip
-NOT_OF_TABLES = ("id", "shape", "covariates")
-COLUMNS = (
-    *(key for key in Brain.model_fields if key not in (*NESTED, *NOT_OF_TABLES)),
-    *(column for columns in NESTED.values() for column in columns),
-)
-"""The columns that are keys of brains; any others are covariates."""
-PATHS = ("labels", "image", "pial", "white", *NESTED["hemispheres"], "hemisphere.file")
-ALMOST = 0.85
-"""How like the name of a key an unknown column has to be to be taken for a mistyped one."""
-
-
-class ParticipantsSettings(Settings):
-    """A table with a brain in each row. `participants: FILE` is short for a section.
-
-    Columns are `participant_id` (or `id`); the gestational age, `gestational_age` or `week`, as `24.3`, `24+2` or
-    `24w2d` (or `age_weeks`, `age_days`, or `age` with its unit in the sidecar); and keys of brains, inner ones with a
-    dot (`hemispheres.left`). Instead of keys, `files` may name labels, a pial surface, or left and right surfaces with
-    a semicolon between; with `side`, one hemisphere. `n/a` is no value. Other columns are covariates. A participant
-    with a `sub-01/sub-01_sessions.tsv` beside the table has a brain for each of its sessions, with that one's age.
-    """
-
-    model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
-
-    file: str
-    """Tab-separated file; paths in it are relative to it."""
-    columns: dict[str, str] = Field({})
-    """Columns that the table lacks, with one value for all rows, in which `{subject}`, `{session}` and `{id}`,
-    such as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme:
-    feta-7}`."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _short_form(cls, value: Any) -> Any:
-        return {"file": value} if isinstance(value, str) else value
-
-
-def participants_brains(
-    settings: ParticipantsSettings, folder: Path
-) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], list[str]]:
-    """Returns the entries of `brains` that a table stands for, by id the rows that can't be used, and problems.
-
-    Of the rows, `week` is the age if it is known, and `cause` what is missing. Problems are those that can't be left
-    out with a row: a row that can't be used has the id of another one. `folder` is that of the configuration.
-    InputError where the table cannot be read or lacks what every row needs.
-    """
-    path = located(folder, settings.file)
-    scans = read_scans(path, settings.columns)
-    _require_known_columns(path, list(scans[0].values))
-    counts = Counter(scan.id for scan in scans)
-    entries: list[dict[str, Any]] = []
-    refused: dict[str, dict[str, Any]] = {}
-    problems: list[str] = []
-    for scan in scans:
-        values = {key: value for key, value in scan.values.items() if value not in NOTHING}
-        entry, problem = _entry(values, path.parent)
-        text = f"{path}: {scan.id}: {scan.cause or problem}"
-        if not (scan.cause or problem):
-            subject = {} if scan.subject is None else {"subject": scan.subject}
-            further = covariates(scan)
-            entries.append({"id": scan.id, "week": scan.week} | subject | further | entry)
-        elif counts[scan.id] > 1 and scan.id not in NOTHING:
-            problems.append(f"{text} (the id is that of {counts[scan.id]} rows; ids are unique)")
-        else:
-            refused[scan.id] = {"week": scan.week, "cause": text}
-    return entries, refused, problems
-
-
-def covariates(scan: Scan) -> dict[str, dict[str, str]]:
-    """Returns the key `covariates` of a scan's brain: the columns of its table that mean nothing else."""
-    known = {*IDS, SESSION, *FILES, SIDE, *COLUMNS, scan.age_column}
-    found = {key: value for key, value in scan.values.items() if key not in known and value not in NOTHING}
-    return {"covariates": found} if found else {}
-
-
-def _require_known_columns(path: Path, columns: list[str]) -> None:
-    known = {*IDS, SESSION, *UNIT_OF_AGE, AGE, *FILES, SIDE, *COLUMNS}
-    for column in set(columns) - known:
-        nearest = difflib.get_close_matches(column, known, n=1, cutoff=ALMOST)
-        if nearest:
-            raise InputError(
-                "has a column that seems mistyped",
-                path=path,
-                found=column,
-                expected=nearest[0],
-                remedy="Rename it; columns with quite other names are covariates.",
-            )
-
-
-def _entry(values: Mapping[str, str], folder: Path) -> tuple[dict[str, Any], str]:
-    """Returns the entry of a row without id and week, and what it lacks, empty where nothing is missing."""
-    values = dict(values)
-    files = next((values[name] for name in FILES if name in values), None)
-    if files is not None:
-        parts, side = [part.strip() for part in files.split(";")], values.get(SIDE)
-        most, expected = (2, "a left and a right hemisphere at most") if side is None else (1, "the one of its side")
-        if len(parts) > most:
-            return {}, f"files: found {len(parts)}, {'; '.join(parts)}; expected {expected}"
-        values |= _of_files(parts, side)
-    entry: dict[str, Any] = {}
-    for column in COLUMNS:
-        if column not in values or column == "week":
-            continue
-        value = values[column]
-        if column in PATHS:
-            place = beside(folder, value).resolve()
-            if not place.is_file():
-                return {}, f"{column}: no such file: {place}"
-            value = str(place)
-        *outer, last = column.split(".")
-        section = entry
-        for key in outer:
-            section = section.setdefault(key, {})
-        section[last] = value
-    if not set(SOURCES) & set(entry):
-        return {}, f"found no data; expected files, or one of {', '.join(key for key in COLUMNS if key in PATHS)}"
-    return entry, ""
-
-
-def _of_files(files: list[str], side: str | None) -> dict[str, str]:
-    """Returns the columns that files stand for, by their number and kind."""
-    if side is not None:
-        return {"hemisphere.file": files[0], "hemisphere.side": side}
-    if len(files) == 2:
-        left, right = files
-        if re.search(r"\bright\b|\brh\b|hemi-R", left) and re.search(r"\bleft\b|\blh\b|hemi-L", right):
-            left, right = right, left
-        return {"hemispheres.left": left, "hemispheres.right": right}
-    return {"labels" if files[0].lower().endswith(VOLUME_SUFFIXES) else "pial": files[0]}
 
 
 # regions

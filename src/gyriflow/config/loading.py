@@ -11,8 +11,8 @@ from ..io.yaml_files import read_keys
 from ..parameters.folding import VARYING
 from ..parameters.settings import PROBLEM, Key, line, messages
 from .atlas import Atlas, AtlasSettings, UsedAtlas, atlas_brains, atlas_problems
-from .brains import ParticipantsSettings, participants_brains
 from .checks import problems_between
+from .participants import ParticipantsSettings, participants_brains
 from .root import Config
 from .runs import PRESETS
 

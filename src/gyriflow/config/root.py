@@ -15,7 +15,8 @@ from ..parameters.settings import Settings
 from ..parameters.varying import Varying, files_of
 from ..units import week_tag
 from .atlas import Atlas, AtlasSettings, UsedAtlas
-from .brains import Brain, ParticipantsSettings
+from .brains import Brain
+from .participants import ParticipantsSettings
 from .runs import (
     ALL,
     FIRST,
