@@ -80,20 +80,6 @@ def bounds_estimated(krylov):
     return bool(address.value)
 
 
-@pytest.mark.one_rank
-def test_the_smoother_keeps_its_bounds_and_takes_no_more_iterations(monkeypatch):
-    folding, state = closing_sulcus("global", **TIGHT)
-    kept = after_steps(folding, state, 8)
-    assert not bounds_estimated(folding.solver.ladder._cg)
-
-    monkeypatch.setattr(ladder, "keep_bounds", lambda krylov: None)
-    folding, state = closing_sulcus("global", **TIGHT)
-    anew = after_steps(folding, state, 8)
-    assert bounds_estimated(folding.solver.ladder._cg)
-    iterations = [sum(row["krylov"] for row in state.rows) for state in (kept, anew)]
-    assert iterations[0] <= 1.1 * iterations[1]
-
-
 def test_a_smoother_that_elements_have_outgrown_estimates_its_bounds_anew(monkeypatch):
     folding, state = closing_sulcus("global", **TIGHT)
     state = after_steps(folding, state, 1)

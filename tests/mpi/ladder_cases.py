@@ -8,8 +8,6 @@ from boxes import (
     everywhere_known,
     problem_on,
     set_layers,
-    smooth_displacement,
-    taylor_errors,
     zones_of,
 )
 from petsc4py import PETSc
@@ -148,17 +146,6 @@ def test_gmres_takes_a_tangent_that_is_not_symmetric(monkeypatch):
 def test_what_no_rung_solves_in_time_is_told():
     with pytest.raises(NotConvergedError, match="no linear solver"):
         solved(clamped_box(), krylov_tolerance=1e-8, max_krylov=2)
-
-
-def test_a_contribution_enters_energy_residual_and_tangent():
-    problem = clamped_box()
-    springs = Springs(problem, 0.3)
-    problem.contributions.append(springs)
-    domain = problem.domain
-    u, v = smooth_displacement(domain, 2e-4), smooth_displacement(domain, 1e-4)[:, [2, 0, 1]].copy()
-    v[domain.local(domain.positions)[:, 2] <= -2.99e-3] = 0.0
-    errors, _ = taylor_errors(problem, u, v)
-    assert np.log2(errors[0] / errors[1]) == pytest.approx([2.0, 2.0], abs=0.15)
 
 
 def test_a_contribution_holds_the_body_and_limits_the_steps():

@@ -8,8 +8,6 @@ from boxes import (
     distorted_box,
     everywhere_known,
     problem_on,
-    smooth_displacement,
-    taylor_errors,
     zones_of,
 )
 from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stress_at, two_blocks
@@ -191,25 +189,3 @@ def test_the_preconditioner_sees_contact():
         tangent.products.mult(x, whole)
         tangent.smoothing.mult(x, bound)
         assert bound.dot(x) >= whole.dot(x)
-
-
-def test_forces_fit_the_energy_and_stiffness_the_forces():
-    problem, contact, _ = pressed_blocks(COMM, growth=0.0, distance=0.15)
-    domain = problem.domain
-    # shaken along the surfaces: where edges are parallel, which parts are nearest changes at once
-    shaken = np.random.default_rng(4).uniform(-1e-4, 1e-4, (len(domain.positions), 3)) * [1.0, 1.0, 0.0]
-    u = approach(domain) + domain.local(shaken)
-    v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
-    v[domain.local(problem_fixed(problem))] = 0.0
-    errors, linear = taylor_errors(problem, u, v)
-    assert contact.pair_count() > 0
-    assert np.log2(errors[0][0] / errors[1][0]) == pytest.approx(2.0, abs=0.1)
-    # the second derivative of the barrier jumps where other parts become the nearest
-    assert errors[1][1] < 2e-3 * linear
-
-
-def problem_fixed(problem):
-    """Returns which of the (n, 3) components of all vertices are fixed."""
-    fixed = np.zeros(3 * problem.domain.owned)
-    fixed[problem._fixed_owned] = 1.0
-    return problem.domain.gathered(fixed.reshape(-1, 3)) > 0

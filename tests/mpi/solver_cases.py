@@ -4,18 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import COMM, curved_box, distorted_box, problem_on, smooth_displacement, zones_of
-from petsc4py import PETSc
+from boxes import COMM, curved_box, distorted_box, problem_on, zones_of
 from shapes import box_mesh
 
 from gyriflow.folding.ladder import NotConvergedError
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-
-AFFINE = np.array([[0.06, 0.02, -0.01], [0.03, -0.05, 0.02], [0.0, 0.04, 0.03]])
-
-
-def everywhere(centre):
-    return np.ones(len(centre), bool)
 
 
 def at_the_bottom(centre):
@@ -33,73 +26,6 @@ def growing_problem(contact=False, **changes):
         "dr": 0.002,
     } | changes
     return problem_on(mesh, zones, **layers)
-
-
-def test_affine_displacement_of_a_uniform_body_is_in_equilibrium_inside():
-    mesh = distorted_box()
-    problem = problem_on(mesh, zones_of(mesh, everywhere))
-    x = problem.domain.local(problem.domain.positions)
-    problem.set_displacement(x @ AFFINE.T)
-    residual = problem.new_vector()
-    # all boundary nodes are clamped, so only inner forces are left; compare with the traction on a free body
-    inner = problem.residual(residual)
-    free = problem_on(mesh, zones_of(mesh))
-    free.set_displacement(free.domain.local(free.domain.positions) @ AFFINE.T)
-    assert inner <= 1e-10 * free.residual(free.new_vector())
-
-
-def test_newton_finds_the_affine_displacement_again():
-    mesh = distorted_box()
-    problem = problem_on(mesh, zones_of(mesh, everywhere))
-    domain = problem.domain
-    exact = domain.local(domain.positions) @ AFFINE.T
-    inner = np.ones(len(domain.positions), bool)
-    inner[np.unique(zones_of(mesh).facets)] = False
-    moved = exact + domain.local(inner)[:, None] * smooth_displacement(domain, 1e-4)
-    problem.set_displacement(moved)
-    residual, direction = problem.new_vector(), problem.new_vector()
-    krylov = PETSc.KSP().create(COMM)
-    krylov.setType("preonly")
-    krylov.getPC().setType("lu")
-    krylov.getPC().setFactorSolverType("mumps")
-    for _ in range(6):
-        problem.residual(residual)
-        krylov.setOperators(problem.tangent().whole())
-        krylov.solve(residual, direction)
-        problem.vector.axpy(-1.0, direction)
-        problem.vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
-    error = np.abs(problem.displacement - exact).max()
-    assert error <= 1e-10 * np.abs(exact).max()
-
-
-@pytest.mark.parametrize("degree", [1, 3])
-def test_residual_is_the_derivative_of_the_energy_and_tangent_that_of_the_residual(degree):
-    problem = growing_problem(contact=True, degree=degree)
-    domain = problem.domain
-    u = smooth_displacement(domain, 2e-4)  # small beside the penetration: contact acts at either side of a difference
-    v = np.ascontiguousarray(smooth_displacement(domain, 1e-4)[:, [2, 0, 1]])
-    v[domain.local(domain.positions)[:, 2] <= -2.99e-3] = 0.0
-    direction, residual, other = (problem.new_vector() for _ in range(3))
-    direction.array[:] = v[: domain.owned].ravel()
-    problem.set_displacement(u)
-    energy = problem.energy()
-    problem.residual(residual)
-    slope = residual.dot(direction)
-    tangent = problem.tangent().whole()
-    change = problem.new_vector()
-    tangent.mult(direction, change)
-    steps = np.array([0.4, 0.2, 0.1, 0.05])
-    energy_error, residual_error = [], []
-    for h in steps:
-        problem.set_displacement(u + h * v)
-        energy_error.append(abs(problem.energy() - energy - h * slope))
-        problem.residual(other)
-        other.axpy(-1.0, residual)
-        other.axpy(-h, change)
-        residual_error.append(other.norm())
-    for error in (energy_error, residual_error):
-        rates = np.diff(np.log(error)) / np.diff(np.log(steps))
-        assert rates == pytest.approx(2.0, abs=0.15), (error, rates)
 
 
 @pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
@@ -189,19 +115,6 @@ def test_a_rebuilt_preconditioner_is_as_good_as_a_new_one():
     new = NewtonSolver(problem, settings, residual_floor=0.0)
     fresh = new.solve(np.zeros_like(problem.displacement))
     assert count.krylov / count.newton <= 1.2 * fresh.krylov / fresh.newton + 1
-
-
-def test_the_tangent_for_products_is_the_tangent():
-    problem = growing_problem(contact=True)
-    for size in (1e-4, 3e-4):  # the second time into the same places
-        problem.set_displacement(smooth_displacement(problem.domain, size))
-        tangent = problem.tangent()
-        x, one, other = (problem.new_vector() for _ in range(3))
-        x.array[:] = smooth_displacement(problem.domain, 1.0)[: problem.domain.owned].ravel()
-        tangent.whole().mult(x, one)
-        tangent.products.mult(x, other)
-        other.axpy(-1.0, one)
-        assert other.norm() <= 1e-13 * one.norm()
 
 
 def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monkeypatch):

@@ -1,6 +1,5 @@
 """Growth towards known shapes: they are met, whatever their pose, and a run that was stopped meets them as well."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -105,18 +104,6 @@ def test_a_step_across_a_target_goes_on_towards_the_next_one():
     assert away(across, shapes[21.5]) > 0.1
     assert away(across, 6 / 7 * shapes[21.5] + 1 / 7 * shapes[22.0]) < 0.05
     assert away(grown(folding, across, 3), shapes[22.0]) < 0.05
-
-
-@pytest.mark.one_rank
-def test_a_run_that_was_stopped_within_a_week_ends_where_another_ends():
-    folding, start = towards({22.0: bent(1), 23.0: bent(2)}, **TIGHT)
-    middle = grown(folding, start, 3)
-    whole = grown(folding, middle, 5)
-    # nothing is learnt on the way that a checkpoint would have to keep
-    again, _ = towards({22.0: bent(1), 23.0: bent(2)}, **TIGHT)
-    resumed = grown(again, replace(middle, learnt=None, rows=()), 5)
-    furthest = np.abs(whole.positions - start.positions).max()
-    np.testing.assert_allclose(resumed.positions, whole.positions, atol=1e-8 * furthest)
 
 
 def test_growth_of_an_even_stretch_is_that_stretch():

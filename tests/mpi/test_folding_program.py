@@ -76,12 +76,6 @@ def test_the_result_does_not_depend_on_the_number_of_ranks(mesh, tight_run, tmp_
     assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
 
 
-def test_two_ranks_give_the_same_numbers_twice(mesh, default_run, tmp_path):
-    assert fold(mesh, tmp_path / "out", 2).returncode == 0
-    once, again = (read_positions(out / "frames.h5", 21.5) for out in (default_run[0], tmp_path / "out"))
-    assert np.array_equal(once, again)
-
-
 def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, default_run):
     one, other = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, default_run[0]))
     assert np.linalg.norm(other - one, axis=1).max() <= 1e-3

@@ -13,10 +13,6 @@ def new_one(per_power):
     return lifetime
 
 
-def test_before_the_first_there_is_none():
-    assert PreconditionerLifetime().over
-
-
 def test_one_that_serves_as_well_as_when_it_was_new_is_kept():
     lifetime = new_one(10)
     for _ in range(1000):

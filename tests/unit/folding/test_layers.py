@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from shapes import box_mesh, ellipsoid_mesh
 
-from gyriflow.folding.layers import WEIGHT_REACH, PialSearch, cortical_weight, normals_between
+from gyriflow.folding.layers import PialSearch, cortical_weight, normals_between
 from gyriflow.folding.points import IntegrationPoints
 from gyriflow.geometry.jacobians import NODES
 from gyriflow.geometry.tetrahedra import boundary_faces
@@ -22,21 +22,11 @@ def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
     np.testing.assert_allclose(weight, [1 / (1 + np.exp(-10)), 0.5, 1 / (1 + np.exp(10)), 0.0], rtol=1e-12, atol=1e-300)
 
 
-def test_weight_beyond_its_reach_does_not_matter():
-    assert cortical_weight(np.array([WEIGHT_REACH * 2.0]), 2.0)[0] < 1e-8
-
-
 def test_distance_is_to_the_triangles_not_to_the_vertices():
     # one coarse cell: the middle of a wall is far from every vertex
     search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
     points = np.array([[0.0, 0.0, 0.0], [4.0, 1.0, 2.0], [0.0, -3.0, 0.0]])
     np.testing.assert_allclose(search.distance(points), [5.0, 1.0, 2.0], atol=1e-12)
-
-
-def test_pial_vertices_have_distance_zero():
-    mesh = ellipsoid_mesh(4, (20.0, 30.0, 25.0))
-    search = search_of(mesh)
-    assert (search.distance(mesh.vertices)[search.pial] == 0).all()
 
 
 def test_far_beyond_reach_the_distance_is_that_of_the_nearest_vertex():

@@ -10,9 +10,9 @@ from gyriflow.errors import SolverError
 from gyriflow.folding import simulation
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.ladder import NotConvergedError
-from gyriflow.folding.run import seconds_to, shortened_steps
+from gyriflow.folding.run import shortened_steps
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
-from gyriflow.parameters.folding import output_weeks, parameters_from
+from gyriflow.parameters.folding import parameters_from
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 
@@ -81,17 +81,3 @@ def test_a_short_remainder_is_halved_as_often_as_a_whole_step():
     # 43 200 s and 800 s: what is left over is far below the smallest part of a whole step
     stepper = Stepper(lambda time_s: 1e9 if time_s < 43_000 else 300.0, solver={"max_halvings": 3})
     assert steps_to(stepper, 44_000.0) == pytest.approx([43_200.0, 200.0, 200.0, 200.0, 200.0])
-
-
-def test_frames_of_every_step_need_no_other_steps():
-    weeks = output_weeks(21.0, 22.0, 1 / 14)
-    parameters = parameters_from(RUN | {"output_weeks": weeks})
-    assert len(weeks) == 15
-    assert shortened_steps(parameters) == ""
-    stepper, lengths = Stepper(lambda time_s: 1e9), []
-    state = State.at_start(np.zeros((1, 3)), 43_200.0)
-    for week in weeks[1:]:
-        while state.time_s < seconds_to(week, parameters) * (1 - 1e-12):
-            state = advance(stepper, state, seconds_to(week, parameters))
-            lengths.append(state.last_s)
-    assert lengths == pytest.approx([43_200.0] * 14, rel=1e-6)

@@ -65,25 +65,3 @@ def test_each_pair_is_one_ranks_with_the_weight_it_has_on_the_whole_surface(rank
     assert together.keys() == whole.keys()
     for key, weight in whole.items():
         assert together[key] == pytest.approx(weight, rel=1e-12), key
-
-
-def test_vertices_are_shared_out_evenly_in_boxes_that_lie_apart():
-    places = np.random.default_rng(4).uniform(0.0, 1.0, (1001, 3)) * [4.0, 2.0, 1.0]
-    assert (shared_out(places, 1) == 0).all()
-    for ranks in (2, 3, 7):
-        owner = shared_out(places, ranks)
-        assert np.ptp(np.bincount(owner, minlength=ranks)) <= 3
-        boxes = [(places[owner == rank].min(axis=0), places[owner == rank].max(axis=0)) for rank in range(ranks)]
-        for i, (low, high) in enumerate(boxes):
-            assert all((low > other[1]).any() or (high < other[0]).any() for other in boxes[:i])
-
-
-def test_a_part_is_what_is_near_and_what_adjoins_it():
-    vertices, faces = sheets()
-    part = part_of_surface(vertices, faces, shared_out(vertices, 2) == 0, 0.5)
-    assert part.owned.sum() == len(vertices) // 2
-    # every second face, and some columns more
-    assert len(faces) / 2 < len(part.faces) < 0.65 * len(faces)
-    whole = {tuple(face) for face in faces.tolist()}
-    assert {tuple(face) for face in part.vertices[part.faces].tolist()} < whole
-    assert (np.diff(part.vertices) > 0).all()

@@ -17,14 +17,6 @@ def test_growth_that_slows_down_is_met():
     assert fit.weights == pytest.approx(np.ones(10), abs=0.05)
 
 
-def test_rates_are_the_derivative():
-    fit = fitted(WEEKS, VOLUMES)
-    middle = np.arange(21.5, 30)
-    small = 0.01
-    slope = np.log(value(fit.curve, middle + small) / value(fit.curve, middle - small)) / (2 * small)
-    assert rate(fit.curve, middle) == pytest.approx(slope, abs=1e-3)
-
-
 @pytest.mark.parametrize("leaping", [0, 4, 9])
 @pytest.mark.parametrize("factor", [0.8, 1.3])
 def test_a_week_that_leaps_does_not_leap(leaping, factor):
@@ -101,10 +93,3 @@ def test_tables_go_through_their_values_and_are_written_out():
     assert table["value"].tolist() == pytest.approx([50, 60, 90])
     again = tabulated(table["week"], table["value"])
     assert value(again, 23.3) == pytest.approx(value(curve, 23.3))
-
-
-def test_a_straight_curve_goes_through_few_uneven_weeks():
-    weeks = [25.0, 26.0, 27.0, 29.0]
-    for sizes in ([143.5, 165.1, 181.5, 247.6], [88.0, 109.0, 125.8, 181.9]):
-        fit = fitted(weeks, sizes)
-        np.testing.assert_allclose(value(fit.curve, weeks), sizes, rtol=0.03)
