@@ -2,9 +2,8 @@
 
 import subprocess
 import sys
-from contextlib import suppress
 
-import psutil
+import processes
 import yaml
 
 from gyriflow.folding.ladder import NotConvergedError
@@ -48,9 +47,4 @@ def failing_after(steps):
 
 def kill(process):
     """Kills a program with its ranks, which Open MPI's daemon puts into groups of their own."""
-    ranks = psutil.Process(process.pid).children(recursive=True)
-    process.kill()
-    for rank in ranks:
-        with suppress(psutil.NoSuchProcess):
-            rank.kill()
-    psutil.wait_procs(ranks, timeout=10)
+    processes.kill([process.pid, *processes.below(process.pid)])

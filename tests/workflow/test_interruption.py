@@ -5,10 +5,9 @@ import re
 import signal
 import subprocess
 import time
-from contextlib import suppress
 
-import psutil
 import pytest
+from processes import all_end, below, command_of, kill
 
 from gyriflow.io.files import read_json
 
@@ -48,27 +47,16 @@ def started(workflow, until):
     return process
 
 
-def ranks_of(process):
-    """Returns the folding programs below a process."""
-    found = []
-    for child in psutil.Process(process.pid).children(recursive=True):
-        with suppress(psutil.NoSuchProcess):
-            if child.cmdline()[1:3] == ["-m", "gyriflow.folding"]:
-                found.append(child)
-    return found
-
-
 @pytest.mark.fault(33)
 @pytest.mark.promise(3)
 def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
     process = started(meshed, until="step    3")
-    below = psutil.Process(process.pid).children(recursive=True)
+    started_by_it = below(process.pid)
     os.killpg(process.pid, signal.SIGINT)
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
     assert "interrupted; the same command resumes from here" in printed
-    _, alive = psutil.wait_procs(below, timeout=10)
-    assert alive == []
+    assert all_end(started_by_it)
     assert list((meshed.directory / "results/runs/reference/a/folding").glob("checkpoint-*/state.h5"))
     again = meshed.run("--cores", "2", SUMMARY, "--configfile", "study.yaml")
     assert again.returncode == 0, again.stdout + again.stderr
@@ -81,7 +69,8 @@ def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
 @pytest.mark.fault(38)
 def test_a_killed_rank_is_reported_as_memory_that_ran_out(meshed):
     process = started(meshed, until="step    2")
-    ranks_of(process)[-1].kill()
+    ranks = [pid for pid in below(process.pid) if command_of(pid)[1:3] == ["-m", "gyriflow.folding"]]
+    kill(ranks[-1:])
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 137, printed
     assert re.search(r"\d+ elements, .* about \d+ MiB", printed)

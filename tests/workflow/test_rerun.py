@@ -1,4 +1,4 @@
-"""Which rules run again after a change of code, environment, brains, runs or files; of settings: test_dag.py."""
+"""Which stages run again after a change of settings, brains, code or files, and that no other does."""
 
 import copy
 import os
@@ -8,16 +8,39 @@ from contextlib import contextmanager
 
 import pytest
 
-from .conftest import SMALL_STUDY, labelled
-from .test_dag import BOTH_RUNS, CARRIED, CONFIGURATION, NEW_RESULTS, ONE_RUN, RESOURCES, SHAPE
+from .conftest import SMALL_STUDY, Workflow, labelled
 
 pytestmark = pytest.mark.slow
 
-OTHER = b"\n# changed\n"
+STAGES = (
+    *("pial_from_labels", "label_volumes", "cortical_thickness", "growth_curves", "growth_rates", "growth_figure"),
+    *("register", "carried_mesh", "tetrahedralise", "parameters", "regions", "simulate", "folded_surface", "measure"),
+    *("similarity", "validation", "registration_ceiling", "study_resources", "html_report"),
+)
+"""The rules that stand for all: tables and figures follow what they are made of."""
+REPORT = {"html_report": 1}
+RESULTS = REPORT | {"study_resources": 1}
+ONE_RUN = RESULTS | {
+    "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "similarity": 1, "validation": 1,
+}  # fmt: skip
+BOTH_RUNS = RESULTS | {rule: 2 * count for rule, count in ONE_RUN.items() if rule not in RESULTS}
+CARRIED = {"carried_mesh": 1, "registration_ceiling": 1}
+MESH = CARRIED | {"tetrahedralise": 1}
+CURVES = {"growth_curves": 1, "growth_rates": 1, "growth_figure": 1}
+# of the surface of a measured brain that starts no run: its own, and what compares others with it
+OF_THE_OTHER_BRAIN = RESULTS | CARRIED | CURVES | {
+    "pial_from_labels": 1, "label_volumes": 1, "cortical_thickness": 1, "register": 1, "measure": 1, "similarity": 2,
+    "validation": 2,
+}  # fmt: skip
+
+
+def planned(workflow: Workflow, *arguments: str) -> dict[str, int]:
+    """Returns the jobs of `STAGES` that a dry run plans."""
+    return {rule: count for rule, count in workflow.jobs(*arguments).items() if rule in STAGES}
 
 
 @contextmanager
-def changed_files(root, *names, content=OTHER):
+def changed_files(root, *names, content=b"\n# changed\n"):
     """Has something else at the end of files of a checkout or study for as long as the block lasts."""
     kept = {root / name: ((root / name).read_bytes(), (root / name).stat()) for name in names}
     try:
@@ -31,125 +54,88 @@ def changed_files(root, *names, content=OTHER):
             os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
 
 
-# what is made of the surface of a measured brain that starts no run: its own, and what compares others with it
-OF_THE_OTHER_BRAIN = SHAPE | CARRIED | {
-    "cortical_thickness": 1, "growth_curves": 1, "growth_rates": 1, "growth_figure": 1, "measure": 1, "study_table": 9,
-    "similarity": 2, "displacement_agreement": 2, "onset": 2, "onset_figure": 1, "validation": 2, "register": 1,
-    "weekly_figure": 1, "shape_maps": 1, "pial_from_labels": 1, "label_volumes": 1, "named_sulci": 1,
-    "quality_page": 1, "quality_table": 1, "outlines_figure": 1, "ready_surfaces": 1,
-}  # fmt: skip
-# a table of the study is shown by the report
-NEW_TABLE = NEW_RESULTS | {"study_table": 1, "report_provenance": 1, "methods": 1}
-OF_THE_SOLVER = {
-    rule: count for rule, count in BOTH_RUNS.items() if rule not in ("parameters", "regions", "zones_figure")
+SETTINGS = {
+    "metric": (
+        {"metrics": {"curvature_radius_mm": 4.0}},
+        RESULTS | {"measure": 6, "validation": 2, "registration_ceiling": 1},
+    ),
+    "run": ({"runs": {"thick": {"thickness_mm": 3.5}}}, ONE_RUN),
+    "growth": ({"folding": {"growth_rate_per_s": 1e-7}}, BOTH_RUNS | {"growth_figure": 1}),
+    "mesh": (
+        {"mesh": {"surface_edge_mm": 0.9}},
+        {rule: count for rule, count in (BOTH_RUNS | MESH).items() if rule != "parameters"},
+    ),
+    "surface": (
+        {"surface": {"edge_length_mm": 1.5}},
+        BOTH_RUNS | MESH | CURVES | {"pial_from_labels": 2, "cortical_thickness": 2, "measure": 6},
+    ),
+    "later end": ({"folding": {"end_week": 22.5}}, BOTH_RUNS | {"folded_surface": 6, "measure": 6}),
+    "new run": ({"runs": {"third": {"thickness_mm": 2.0}}}, ONE_RUN),
+    # the number of ranks changes no result: the report alone, as it shows the configuration
+    "ranks": ({"folding": {"ranks": 1}}, REPORT),
+    "new brain": (
+        {"brains": [{"id": "c", "week": 23, **labelled(23)}]},
+        RESULTS
+        | CURVES
+        | {"pial_from_labels": 1, "label_volumes": 1, "cortical_thickness": 1, "measure": 1, "validation": 2},
+    ),
 }
 
 
 @pytest.mark.fault(39)
-@pytest.mark.parametrize(
-    ("names", "expected"),
-    [
-        (["src/gyriflow/metrics/similarity.py"], NEW_TABLE | {"similarity": 2}),
-        (["src/gyriflow/report/growth.py"], NEW_RESULTS | {"growth_figure": 1}),
-        (["src/gyriflow/folding/contact.py"], OF_THE_SOLVER),
-        (["workflow/scripts/quality_table.py"], RESOURCES | {"quality_table": 1, "study_warnings": 1}),
-        # what the terminal says, the command line, comments in rules and the environment make no result
-        (
-            ["src/gyriflow/cli/status.py", "src/gyriflow/cli/commands.py", "src/gyriflow/cli/launch.py"]
-            + ["workflow/rules/metrics.smk", "profiles/default/config.yaml", "envs/gyriflow.yaml"],
-            {},
-        ),
-    ],
-    ids=["metric", "figure", "solver", "script", "around"],
-)
-def test_a_change_of_code_runs_again_what_uses_it(finished, names, expected):
-    with changed_files(finished.checkout, *names):
-        assert finished.jobs("--configfile", "study.yaml") == expected
-
-
-def with_brain(study):
-    study["brains"].append({"id": "c", "week": 23, **labelled(23)})
-
-
-def with_run(study):
-    study["runs"]["third"] = {"thickness_mm": 2.0}
-
-
-def with_other_labels(study):
-    study["brains"][1] |= labelled(23)
-
-
-def with_later_end(study):
-    study["folding"]["end_week"] = 22.5
-
-
-@pytest.mark.fault(39)
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        (
-            with_brain,
-            SHAPE
-            | {"pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "study_table": 5}
-            | {
-                "validation": 2,
-                "growth_curves": 1,
-                "growth_rates": 1,
-                "growth_figure": 1,
-                "label_volumes": 1,
-                "quality_page": 1,
-                "quality_table": 1,
-            },
-        ),
-        (with_run, ONE_RUN),
-        (with_other_labels, OF_THE_OTHER_BRAIN),
-        (with_later_end, BOTH_RUNS | {"folded_surface": 6, "measure": 6}),
-    ],
-    ids=["brain", "run", "input", "end"],
-)
-def test_a_change_of_brains_and_runs_makes_what_is_new_and_what_compares(finished, change, expected):
+@pytest.mark.parametrize("change", SETTINGS)
+def test_exactly_what_depends_on_a_change_of_the_configuration_runs_again(finished, change):
+    values, expected = SETTINGS[change]
     study = copy.deepcopy(SMALL_STUDY)
-    change(study)
-    name = finished.write(f"{change.__name__}.yaml", study)
-    assert finished.jobs("--configfile", name) == expected | CONFIGURATION
+    for section, content in values.items():
+        study[section] = [*study[section], *content] if section == "brains" else study.get(section, {}) | content
+    assert planned(finished, "--configfile", finished.write("changed.yaml", study)) == expected
+
+
+CODE = {
+    "metric": (["src/gyriflow/metrics/similarity.py"], RESULTS | {"similarity": 2}),
+    "figure": (["src/gyriflow/report/growth.py"], RESULTS | {"growth_figure": 1}),
+    "solver": (
+        ["src/gyriflow/folding/contact.py"],
+        {rule: count for rule, count in BOTH_RUNS.items() if rule not in ("parameters", "regions")},
+    ),
+    # what the terminal says, comments in rules and the environment make no result
+    "around": (["src/gyriflow/cli/launch.py", "workflow/rules/metrics.smk", "envs/gyriflow.yaml"], {}),
+}
 
 
 @pytest.mark.fault(39)
+@pytest.mark.parametrize("change", CODE)
+def test_a_change_of_code_runs_again_what_uses_it(finished, change):
+    names, expected = CODE[change]
+    with changed_files(finished.checkout, *names):
+        assert planned(finished, "--configfile", "study.yaml") == expected
+
+
+@pytest.mark.fault(39)
+@pytest.mark.promise(6)
 def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(finished):
+    assert finished.jobs("--configfile", "study.yaml") == {}
     labels = "phantom-22.nii.gz"
     with changed_files(finished.directory, labels):
-        assert finished.jobs("--configfile", "study.yaml") == OF_THE_OTHER_BRAIN
+        assert planned(finished, "--configfile", "study.yaml") == OF_THE_OTHER_BRAIN
         said = finished.run("-n", "--configfile", "study.yaml").stdout
     (reason,) = re.findall(r"rule pial_from_labels:\n(?: +.*\n)*? +reason: (.*)\n", said)
-    assert reason == f"Updated input files: {labels}"
+    assert reason == f"Updated input files: {finished.directory / labels}"
 
 
-def test_a_lost_table_is_made_again(finished):
-    lost = finished.directory / "results" / "study" / "similarity.csv"
-    kept = lost.rename(lost.with_suffix(".kept"))
-    try:
-        jobs = finished.jobs("--configfile", "study.yaml")
-    finally:
-        kept.rename(lost)
-    assert jobs == NEW_TABLE
-
-
-@pytest.fixture
-def surfaced(workflow):
-    """A study with a file of labels whose surface counts as made, and the arguments that ask for it."""
-    (workflow.directory / "l.nii.gz").write_text("one brain")
+def test_inputs_are_known_by_their_content_not_their_date(workflow):
+    labels, other = workflow.directory / "l.nii.gz", workflow.directory / "other.nii.gz"
+    labels.write_text("one brain")
     brain = {"id": "a", "week": 21, "labels": "l.nii.gz", "scheme": "binary"}
     study = {"brains": [brain], "start": "a", "folding": {"end_week": 22}}
     arguments = ("surface", "--configfile", workflow.write("study.yaml", study))
     workflow.lay_out(*arguments)
     workflow.count_as_made(*arguments, "--forceall")
+    # a copy with its date is the same input
+    shutil.copy2(labels, other)
+    other.rename(labels)
     assert workflow.jobs(*arguments) == {}
-    return workflow, arguments
-
-
-def test_an_input_replaced_by_an_older_one_runs_again_what_was_made_of_it(surfaced):
-    workflow, arguments = surfaced
-    labels, other = workflow.directory / "l.nii.gz", workflow.directory / "other.nii.gz"
     other.write_text("another 1")
     an_hour_ago = labels.stat().st_mtime_ns - 3600 * 10**9
     os.utime(other, ns=(an_hour_ago, an_hour_ago))
@@ -157,10 +143,3 @@ def test_an_input_replaced_by_an_older_one_runs_again_what_was_made_of_it(surfac
     other.rename(labels)
     assert workflow.jobs(*arguments) == {"pial_from_labels": 1, "surface": 1}
     assert "input with the content" in workflow.run("-n", *arguments).stdout
-
-
-def test_a_copy_of_an_input_with_its_date_is_the_same_input(surfaced):
-    workflow, arguments = surfaced
-    copy = shutil.copy2(workflow.directory / "l.nii.gz", workflow.directory / "copy.nii.gz")
-    copy.rename(workflow.directory / "l.nii.gz")
-    assert workflow.jobs(*arguments) == {}
