@@ -61,9 +61,9 @@ def weekly(out: Path):
     """Returns what there is to say of a run, a row a week."""
     from gyriflow.geometry.matching import crossing_faces
     from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, signed_volumes
-    from gyriflow.geometry.triangles import area, signed_volume
+    from gyriflow.geometry.triangles import area, convex_hull, signed_volume
     from gyriflow.io.frames import read_positions, read_tets, read_weeks
-    from gyriflow.metrics.gyrification import convex_hull, envelope, gyrification_index, pieces_over
+    from gyriflow.metrics.gyrification import envelope, gyrification_index, pieces_over
 
     tets, steps = read_tets(out / "frames.h5"), pd.read_csv(out / "steps.csv")
     rows = []

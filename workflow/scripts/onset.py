@@ -4,13 +4,13 @@ import pandas as pd
 
 from gyriflow.compare.onset import named, onset, regions_on, relief, sulcal_regions
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.triangles import transformed
+from gyriflow.geometry.triangles import convex_hull, transformed
 from gyriflow.growth.carrying import carry_surface
 from gyriflow.io.files import write_table
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_labels
 from gyriflow.metrics.curvature import curvature
-from gyriflow.metrics.gyrification import convex_hull, sulcal_depth
+from gyriflow.metrics.gyrification import sulcal_depth
 from gyriflow.step import step
 
 files, params, tables = snakemake.input, snakemake.params, []

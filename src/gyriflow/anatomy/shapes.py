@@ -2,11 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from ..errors import InputError
 from ..geometry.remeshing import remesh
-from ..geometry.triangles import TriangleMesh, unit
+from ..geometry.triangles import TriangleMesh, convex_hull, unit
 from ..parameters.synthetic import ShapeSettings
 
 Floats = NDArray[np.float64]
@@ -42,7 +41,7 @@ def shape_surface(
             remedy="Set a smaller surface.edge_length_mm, or make the shape larger.",
         )
     points = size * _directions(int(np.ceil(np.pi * size.max() / edge_length_mm)))
-    mesh = remesh(TriangleMesh(points, _hull_faces(points)), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG)
+    mesh = remesh(convex_hull(TriangleMesh(points, np.empty((0, 3)))), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG)
     vertices = mesh.vertices / np.linalg.norm(mesh.vertices / size, axis=1, keepdims=True)
     heights = noise_mm * _pattern(vertices, seed)
     return TriangleMesh(vertices + heights[:, None] * unit(vertices / size**2), mesh.faces)
@@ -54,15 +53,6 @@ def _directions(count: int) -> Floats:
     lattice = np.stack([i, j, count - i - j], axis=-1)[i + j <= count].astype(float)
     signs = np.array([(x, y, z) for x in (1, -1) for y in (1, -1) for z in (1, -1)])
     return unit(np.unique((lattice * signs[:, None]).reshape(-1, 3), axis=0))
-
-
-def _hull_faces(points: Floats) -> NDArray[np.int64]:
-    hull = ConvexHull(points)
-    faces = hull.simplices.astype(np.int64)
-    a, b, c = points[faces].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    return faces
 
 
 def _pattern(points: Floats, seed: int) -> Floats:

@@ -44,17 +44,17 @@ class Searched:
     normals: Floats
 
     def nearest(self, points: Floats) -> tuple[Floats, Floats]:
-        """Returns per point the nearest point of the surface with the normal there."""
+        """Return per point the nearest point of the surface with the normal there."""
         _, face, on = self.tree.squared_distance(self.mesh.vertices, self.mesh.faces, points)
         return on, self.normals[face]
 
     def spread(self) -> Floats:
-        """Returns about `POINTS` points spread over the surface, the same in every call."""
+        """Return about `POINTS` points spread over the surface, the same in every call."""
         return self.mesh.vertices[:: max(1, len(self.mesh.vertices) // POINTS)]
 
 
 def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) -> Floats:
-    """Returns the (4, 4) motion p → rotation p + shift; without one of the two, the identity in its place."""
+    """Return the (4, 4) motion p → rotation p + shift; without one of the two, the identity in its place."""
     matrix = np.eye(4)
     if rotation is not None:
         matrix[:3, :3] = rotation
@@ -64,12 +64,12 @@ def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) ->
 
 
 def angle_deg(rotation: Floats) -> float:
-    """Returns the angle of a (3, 3) rotation in degrees."""
+    """Return the angle of a (3, 3) rotation in degrees."""
     return float(np.degrees(Rotation.from_matrix(rotation).magnitude()))
 
 
 def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
-    """Returns the (4, 4) rigid motion of (n, 3) points onto matched ones by weighted least squares.
+    """Return the (4, 4) rigid motion of (n, 3) points onto matched ones by weighted least squares.
 
     Kabsch 1976, doi 10.1107/S0567739476001873.
     """
@@ -79,7 +79,7 @@ def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
 
 
 def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floats:
-    """Returns the (n, 3) displacement from `first` to `second`, the latter moved rigidly onto the former."""
+    """Return the (n, 3) displacement from `first` to `second`, the latter moved rigidly onto the former."""
     back = rigid_fit(second, first, weights)
     return np.asarray(second @ back[:3, :3].T + back[:3, 3] - first)
 
@@ -87,7 +87,7 @@ def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floa
 def step_towards_planes(
     points: Floats, normals: Floats, ahead: Floats, weights: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Returns the rotation and shift by which points come nearest to planes in the least-squares sense.
+    """Return the rotation and shift by which points come nearest to planes in the least-squares sense.
 
     One step of the point-to-plane iteration (Chen and Medioni 1992): a turn w and a shift t move a point p by
     w × (p − c) + t. Directions in which nothing pulls, such as the turns of a sphere, stay.
@@ -110,7 +110,7 @@ def follow_planes(
     rounds: int,
     arrived: Callable[[Floats, Floats, Floats], bool],
 ) -> tuple[Floats, Floats]:
-    """Returns the rotation and shift that iterative closest points lead to from given ones, in at most `rounds` steps.
+    """Return the rotation and shift that iterative closest points lead to from given ones, in at most `rounds` steps.
 
     `planes` leads from rotation and shift to the moved points and the planes that they are to reach, `arrived` from the
     points of a step, its turn and its move to whether it is the last one.
@@ -127,14 +127,14 @@ def follow_planes(
 
 
 def searched(mesh: TriangleMesh) -> Searched:
-    """Returns a surface with its search tree."""
+    """Return a surface with its search tree."""
     tree = igl.AABB()
     tree.init(mesh.vertices, mesh.faces)
     return Searched(mesh, tree, face_normals(mesh))
 
 
 def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
-    """Returns the (4, 4) rigid motion of a surface onto another in nearly the same pose, by iterative closest points.
+    """Return the (4, 4) rigid motion of a surface onto another in nearly the same pose, by iterative closest points.
 
     It begins with the surfaces as they are, centroids of the vertices together. Each round moves points of both
     surfaces towards the planes of their nearest faces on the other one.
@@ -166,7 +166,7 @@ def fits_from_all_sides(
     candidates: int,
     apart_deg: float,
 ) -> list[Fit]:
-    """Returns the fits that an alignment without a known start leads to, that from the first start first.
+    """Return the fits that an alignment without a known start leads to, that from the first start first.
 
     An iteration finds the nearest pose that fits, which need not be the best. It is therefore begun `roughly` from
     each of the (3, 3) rotations `starts`; the best few of the poses that differ, and that from the first start, are
@@ -182,7 +182,7 @@ def fits_from_all_sides(
 
 
 def margin(fits: Iterable[Fit], chosen: Fit, apart_deg: float) -> float:
-    """Returns how many times more the best fit of another pose leaves than the chosen one; infinity without any.
+    """Return how many times more the best fit of another pose leaves than the chosen one; infinity without any.
 
     Near 1 the shapes fit as well in another pose.
     """

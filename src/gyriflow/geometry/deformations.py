@@ -49,12 +49,12 @@ Correspondence = Deformation | MatchedSurfaces
 
 
 def transform_points(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
-    """Returns (n, 3) points under a (4, 4) affine map."""
+    """Return (n, 3) points under a (4, 4) affine map."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
 
 
 def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Correspondence:
-    """Returns what two brains' correspondence is after (4, 4) rigid motions of the first and of the second."""
+    """Return what two brains' correspondence is after (4, 4) rigid motions of the first and of the second."""
     if isinstance(pair, MatchedSurfaces):
         return MatchedSurfaces(transformed(pair.first, first), transform_points(pair.second, second))
     turned = (pair.displacement @ first[:3, :3].T).astype(pair.displacement.dtype)
@@ -62,19 +62,19 @@ def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Corres
 
 
 def displacement_at(deformation: Deformation, points: Floats) -> Floats:
-    """Returns the (n, 3) displacement u in mm at points in mm."""
+    """Return the (n, 3) displacement u in mm at points in mm."""
     index = transform_points(points, np.linalg.inv(deformation.affine)).T
     parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
     return np.stack(parts, axis=1).astype(np.float64)
 
 
 def carry(deformation: Deformation, points: Floats) -> Floats:
-    """Returns where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
+    """Return where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
     return transform_points(points + displacement_at(deformation, points), deformation.matrix)
 
 
 def determinants(deformation: Deformation) -> Floats:
-    """Returns the (i, j, k) determinant of the map's gradient at the points of its grid: local growth of volume.
+    """Return the (i, j, k) determinant of the map's gradient at the points of its grid: local growth of volume.
 
     By central differences of the displacement; 0 or less where the map folds.
     """

@@ -14,14 +14,14 @@ STEPS = 8
 
 
 def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
-    """Returns the (m,) areas in mm² of (m, 3) triangles, or signed volumes in mm³ of (m, 4) tetrahedra."""
+    """Return the (m,) areas in mm² of (m, 3) triangles, or signed volumes in mm³ of (m, 4) tetrahedra."""
     if cells.shape[1] == 3:
         return face_areas(TriangleMesh(vertices, cells.astype(np.int64)))
     return volumes_between(vertices, cells)
 
 
 def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
-    """Returns the (n,) areas or volumes that belong to the vertices: equal parts of the cells around."""
+    """Return the (n,) areas or volumes that belong to the vertices: equal parts of the cells around."""
     share = np.repeat(cell_sizes(vertices, cells) / cells.shape[1], cells.shape[1])
     return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
 
@@ -29,7 +29,7 @@ def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
 def diffuse(
     vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float, *, steps: int = STEPS
 ) -> Floats:
-    """Returns (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
+    """Return (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
 
     Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2. The integral of
     the values over the mesh stays as it is. 0 returns them as they are. `vertices` are (n, 3) in mm, `cells` (m, 3)
@@ -57,7 +57,7 @@ def diffuse(
 def continue_harmonically(
     vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats
 ) -> Floats:
-    """Returns (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
+    """Return (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
     stiffness = stiffness_matrix(vertices, cells)
     unknown = np.setdiff1d(np.unique(cells), known)
     found = np.zeros((len(vertices), values.shape[1]))
@@ -74,6 +74,6 @@ def continue_harmonically(
 
 
 def stiffness_matrix(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:
-    """Returns the (n, n) stiffness matrix of linear finite elements, positive semidefinite."""
+    """Return the (n, n) stiffness matrix of linear finite elements, positive semidefinite."""
     cotangents = igl.cotmatrix(np.ascontiguousarray(vertices), np.ascontiguousarray(cells, dtype=np.int64))
     return sparse.csr_matrix(-cotangents)

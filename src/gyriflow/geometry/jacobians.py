@@ -31,21 +31,21 @@ CHUNK = 4096
 
 
 def shape_values(places: Floats) -> Floats:
-    """Returns the (p, 10) shape functions of the nodes at (p, 4) barycentric coordinates."""
+    """Return the (p, 10) shape functions of the nodes at (p, 4) barycentric coordinates."""
     corner = places * (2 * places - 1)
     middle = np.stack([4 * places[:, a] * places[:, b] for a, b in EDGES], axis=1)
     return np.concatenate([corner, middle], axis=1)
 
 
 def shape_slopes(places: Floats) -> Floats:
-    """Returns the (p, 10, 3) gradients of the shape functions in the regular element."""
+    """Return the (p, 10, 3) gradients of the shape functions in the regular element."""
     corner = (4 * places - 1)[:, :, None] * SLOPES
     middle = np.stack([4 * (places[:, a, None] * SLOPES[b] + places[:, b, None] * SLOPES[a]) for a, b in EDGES], axis=1)
     return np.concatenate([corner, middle], axis=1)
 
 
 def bernstein(places: Floats) -> Floats:
-    """Returns the (p, 20) Bernstein polynomials of third degree at (p, 4) barycentric coordinates."""
+    """Return the (p, 20) Bernstein polynomials of third degree at (p, 4) barycentric coordinates."""
     factors = [6 / math.prod(math.factorial(int(power)) for power in powers) for powers in POWERS]
     return np.asarray((places[:, None, :] ** POWERS).prod(axis=2) * factors)
 
@@ -59,7 +59,7 @@ AT_CORNERS = np.flatnonzero(POWERS.max(axis=1) == 3)
 
 
 def determinants(matrices: Floats) -> Floats:
-    """Returns the determinants of (..., 3, 3) matrices, written out: many times faster than a factorisation of each."""
+    """Return the determinants of (..., 3, 3) matrices, written out: many times faster than a factorisation of each."""
     a, b, c = matrices[..., 0, :], matrices[..., 1, :], matrices[..., 2, :]
     return np.asarray(
         a[..., 0] * (b[..., 1] * c[..., 2] - b[..., 2] * c[..., 1])
@@ -69,7 +69,7 @@ def determinants(matrices: Floats) -> Floats:
 
 
 def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Floats:
-    """Returns the (m, p) determinants of the maps of (m, 10) elements where shape functions have (p, 10, 3) slopes."""
+    """Return the (m, p) determinants of the maps of (m, 10) elements where shape functions have (p, 10, 3) slopes."""
     found = np.empty((len(tets), len(slopes)))
     by_node = slopes.transpose(0, 2, 1).reshape(-1, 10)
     for first in range(0, len(tets), CHUNK):
@@ -80,7 +80,7 @@ def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Fl
 
 
 def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Returns the (m, 20) Bernstein coefficients of the determinants of the maps of (m, 10) elements.
+    """Return the (m, 20) Bernstein coefficients of the determinants of the maps of (m, 10) elements.
 
     Their mean is six times the element's volume.
     """
@@ -88,7 +88,7 @@ def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
 
 
 def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Returns for (m, 10) elements a number that the determinant of the map is nowhere below.
+    """Return for (m, 10) elements a number that the determinant of the map is nowhere below.
 
     It is positive only where the element is folded over nowhere. Elements for which it might be so, though the
     coefficients do not show it, are subdivided up to three times; a smaller part's bounds are closer.
@@ -102,7 +102,6 @@ def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
 
 
 def _parted_bounds(whole: Floats, depth: int) -> Floats:
-    """Returns lower bounds of polynomials with (k, 20) coefficients from those on their elements' parts."""
     parts = np.einsum("sij,kj->ksi", ON_PARTS, whole)
     least = parts.min(axis=2)
     open_ = (least <= 0) & (parts[:, :, AT_CORNERS].min(axis=2) > 0)

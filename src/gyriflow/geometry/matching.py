@@ -34,7 +34,7 @@ class Match:
 
 
 def nearest_on(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Floats]:
-    """Returns the (n,) distances of points from a surface, and the faces and (n, 3) positions of its nearest points."""
+    """Return the (n,) distances of points from a surface, and the faces and (n, 3) positions of its nearest points."""
     squared, face, place = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces)
     return np.sqrt(squared), face.astype(np.int64), place
 
@@ -51,7 +51,7 @@ def surface_distance(ways: Iterable[tuple[Floats, Floats]], share: float = 0.95)
 
 
 def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
-    """Returns the (n,) thickness in mm at the vertices of the outer surface of the layer between two surfaces.
+    """Return the (n,) thickness in mm at the vertices of the outer surface of the layer between two surfaces.
 
     It is the mean of two distances: from the vertex to the nearest point of the inner surface, and from there to the
     nearest point of the outer one (Fischl and Dale 2000, doi 10.1073/pnas.200033797).
@@ -62,7 +62,7 @@ def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
 
 
 def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None) -> tuple[NDArray[np.int32], Floats]:
-    """Returns a label volume with 1 inside a closed surface, and its (4, 4) affine: what a brain without labels has.
+    """Return a label volume with 1 inside a closed surface, and its (4, 4) affine: what a brain without labels has.
 
     The volume holds the surface with a margin of four voxels, or else the (2, 3) corners of a box with that margin.
     """
@@ -77,7 +77,7 @@ def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None)
 
 
 def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], affine: Floats) -> NDArray[np.int32]:
-    """Returns an (i, j, k) label volume with 2 in the layer of (n,) thickness in mm below a closed surface, 1 deeper.
+    """Return an (i, j, k) label volume with 2 in the layer of (n,) thickness in mm below a closed surface, 1 deeper.
 
     `affine` (4, 4) leads from voxels to mm; what lies beyond the volume is not in it.
     """
@@ -94,18 +94,18 @@ def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], 
 
 
 def faces_that_cross(mesh: TriangleMesh) -> Ints:
-    """Returns the faces that cut other faces, ascending, found with exact predicates."""
+    """Return the faces that cut other faces, ascending, found with exact predicates."""
     _, pairs, _ = igl.predicates.find_self_intersections(mesh.vertices, mesh.faces)
     return np.unique(pairs).astype(np.int64)
 
 
 def crossing_faces(mesh: TriangleMesh) -> int:
-    """Returns the number of faces that cut other faces."""
+    """Return the number of faces that cut other faces."""
     return len(faces_that_cross(mesh))
 
 
 def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
-    """Returns for (n, 3) points with unit normals the nearest points of a surface whose normal agrees.
+    """Return for (n, 3) points with unit normals the nearest points of a surface whose normal agrees.
 
     So the other wall of a sulcus or of the fissure is not taken. It is the nearest point of all where the face there
     agrees; else the nearest of the 256 nearest vertices that does.
@@ -133,19 +133,19 @@ def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
 
 
 def values_at(match: Match, values: NDArray) -> Floats:
-    """Returns (n,) or (n, k) values at matched points from those at the surface's vertices, linear in each face."""
+    """Return (n,) or (n, k) values at matched points from those at the surface's vertices, linear in each face."""
     weights = match.weights if values.ndim == 1 else match.weights[..., None]
     return np.asarray((values[match.corners] * weights).sum(axis=1))
 
 
 def labels_at(match: Match, labels: NDArray[np.integer]) -> Ints:
-    """Returns the (n,) labels at matched points: those of the nearest corner of the face."""
+    """Return the (n,) labels at matched points: those of the nearest corner of the face."""
     nearest = match.weights.argmax(axis=1)
     return np.asarray(labels[match.corners[np.arange(len(nearest)), nearest]], dtype=np.int64)
 
 
 def barycentric(points: Floats, triangles: Floats) -> Floats:
-    """Returns the (n, 3) coordinates of points in the planes of (n, 3, 3) triangles; flat triangles give a corner."""
+    """Return the (n, 3) coordinates of points in the planes of (n, 3, 3) triangles; flat triangles give a corner."""
     a, b, c = triangles.transpose(1, 0, 2)
     u, v, w = b - a, c - a, points - a
     uu, uv, vv = (np.einsum("ij,ij->i", *pair) for pair in ((u, u), (u, v), (v, v)))

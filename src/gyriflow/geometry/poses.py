@@ -40,11 +40,11 @@ class Pose:
         return np.asarray(np.linalg.inv(self.world))
 
     def of_file(self, side: str = "whole") -> Floats:
-        """Returns the (4, 4) motion from the coordinates of a surface file to the surface."""
+        """Return the (4, 4) motion from the coordinates of a surface file to the surface."""
         return self.files.get(side, self.files.get("whole", self.world))
 
     def of_volume(self, path: str) -> Floats:
-        """Returns the (4, 4) motion from the brain's volumes to its surface.
+        """Return the (4, 4) motion from the brain's volumes to its surface.
 
         InputError, with the path of the volume, where the hemispheres were posed separately: it cannot follow two
         motions.
@@ -60,16 +60,16 @@ class Pose:
         )
 
     def then(self, matrix: Floats) -> "Pose":
-        """Returns the pose with a (4, 4) motion after it."""
+        """Return the pose with a (4, 4) motion after it."""
         files = {name: matrix @ one for name, one in self.files.items()}
         return replace(self, world=matrix @ self.world, files=files)
 
     def each(self, files: Mapping[str, Floats]) -> "Pose":
-        """Returns the pose with the motions of some files in the place of theirs."""
+        """Return the pose with the motions of some files in the place of theirs."""
         return replace(self, files={**self.files, **files})
 
     def plain(self) -> dict[str, Any]:
-        """Returns the pose in plain values for JSON."""
+        """Return the pose in plain values for JSON."""
         return {
             "by": self.by,
             "together": self.together,
@@ -81,7 +81,7 @@ class Pose:
 
 
 def pose_from(plain: Mapping[str, Any]) -> Pose:
-    """Returns the pose that plain values hold; InputError where they are a refusal, for its reason."""
+    """Return the pose that plain values hold; InputError where they are a refusal, for its reason."""
     if "refused" in plain:
         raise InputError(plain["refused"])
     return Pose(
@@ -95,7 +95,7 @@ def pose_from(plain: Mapping[str, Any]) -> Pose:
 
 
 def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) -> Pose:
-    """Returns the pose of a file that a (3, 3) rotation about the origin brings to RAS+.
+    """Return the pose of a file that a (3, 3) rotation about the origin brings to RAS+.
 
     Volumes of the brain are in RAS+, whatever the `coordinates` of its surface file.
     """

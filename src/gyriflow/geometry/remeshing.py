@@ -19,7 +19,7 @@ SHARP_DEG = 30.0
 
 
 def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """Returns the (m,) mask of the faces that cut other faces."""
+    """Return the (m,) mask of the faces that cut other faces."""
     document = in_meshlab(mesh)
     document.compute_selection_by_self_intersections_per_face()
     return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
@@ -28,7 +28,7 @@ def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
 def remesh(
     mesh: TriangleMesh, edge_length_mm: float, rounds: int = REMESHING_ROUNDS, sharp_deg: float = SHARP_DEG
 ) -> TriangleMesh:
-    """Returns the surface with triangles close to equilateral, edges of about `edge_length_mm`.
+    """Return the surface with triangles close to equilateral, edges of about `edge_length_mm`.
 
     Edges at which faces meet at more than `sharp_deg` stay where they are.
     """
@@ -40,7 +40,7 @@ def remesh(
 
 
 def untangle(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns the surface with places that cut each other relaxed (Laplacian smoothing of these places alone).
+    """Return the surface with places that cut each other relaxed (Laplacian smoothing of these places alone).
 
     The number of vertices and the topology stay; each round takes in a wider neighbourhood.
     """
@@ -59,13 +59,13 @@ def untangle(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def in_meshlab(mesh: TriangleMesh) -> pymeshlab.MeshSet:
-    """Returns a MeshLab document that holds the surface alone."""
+    """Return a MeshLab document that holds the surface alone."""
     document = pymeshlab.MeshSet(verbose=False)
     document.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces))
     return document
 
 
 def from_meshlab(document: pymeshlab.MeshSet) -> TriangleMesh:
-    """Returns the current surface of a MeshLab document."""
+    """Return the current surface of a MeshLab document."""
     mesh = document.current_mesh()
     return TriangleMesh(mesh.vertex_matrix(), mesh.face_matrix())

@@ -83,12 +83,12 @@ class TetrahedralMesh:
 
 
 def order_of(tets: NDArray[np.integer]) -> int:
-    """Returns the order of the elements whose nodes are the rows of an array."""
+    """Return the order of the elements whose nodes are the rows of an array."""
     return 1 if tets.shape[1] == NODES_OF_ORDER[1] else 2
 
 
 def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Returns the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the given unit."""
+    """Return the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the given unit."""
     if order_of(tets) == 2:
         return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
     a, b, c, d = (np.take(vertices, tets[:, i], axis=0) for i in range(4))
@@ -98,12 +98,12 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
 
 
 def signed_volumes(mesh: TetrahedralMesh) -> Floats:
-    """Returns the (m,) volumes in mm³, negative for inverted elements."""
+    """Return the (m,) volumes in mm³, negative for inverted elements."""
     return volumes_between(mesh.vertices, mesh.tets)
 
 
 def radius_ratios(mesh: TetrahedralMesh) -> Floats:
-    """Returns the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
+    """Return the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
 
     Of quadratic elements they are those of the corners.
     """
@@ -120,14 +120,14 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
 
 
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
-    """Returns for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
+    """Return for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
     pairs = np.stack(np.broadcast_arrays(mesh.tets[:, :1], mesh.tets[:, 1:]), axis=-1).reshape(-1, 2)
     graph = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
-    """Returns a box of six tetrahedra per cell on the grid of three ascending arrays of coordinates in mm."""
+    """Return a box of six tetrahedra per cell on the grid of three ascending arrays of coordinates in mm."""
     points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
     x, y, z = points.shape[:3]
     number = np.arange(x * y * z).reshape(x, y, z)
@@ -139,7 +139,7 @@ def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
 
 
 def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
-    """Returns a mesh of linear elements with a node on the middle of each edge: quadratic elements, not yet curved.
+    """Return a mesh of linear elements with a node on the middle of each edge: quadratic elements, not yet curved.
 
     Corners keep their numbers.
     """
@@ -151,7 +151,7 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
 
 
 def linear_pieces(mesh: TetrahedralMesh) -> Ints:
-    """Returns the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight of each quadratic one.
+    """Return the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight of each quadratic one.
 
     Positive volumes stay positive where the sides are straight.
     """
@@ -159,7 +159,7 @@ def linear_pieces(mesh: TetrahedralMesh) -> Ints:
 
 
 def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
-    """Returns the (f, 3) triangles of the faces that belong to one element only, outward, and the (f,) element of each.
+    """Return the (f, 3) triangles of the faces that belong to one element only, outward, and the (f,) element of each.
 
     Outward holds for elements of positive volume. The four triangles of one quadratic element's face follow each other:
     with corners a, b, c, these are (a, ab, ca), (ab, b, bc), (ca, bc, c) and (ab, bc, ca).
@@ -175,27 +175,27 @@ def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
 
 
 def whole_faces(triangles: NDArray[np.integer], order: int) -> NDArray[np.integer]:
-    """Returns the (f, 3) corners of the faces whose triangles are those of `boundary_faces`."""
+    """Return the (f, 3) corners of the faces whose triangles are those of `boundary_faces`."""
     if order == 1:
         return triangles
     return triangles.reshape(-1, PIECES_OF_ORDER[2], 3)[:, [0, 1, 2], [0, 1, 2]]
 
 
 def on_whole_faces(chosen: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
-    """Returns which of the (f,) triangles of `boundary_faces` belong to a face of which all triangles are chosen."""
+    """Return which of the (f,) triangles of `boundary_faces` belong to a face of which all triangles are chosen."""
     pieces = PIECES_OF_ORDER[order]
     return np.repeat(chosen.reshape(-1, pieces).all(axis=1), pieces)
 
 
 def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
-    """Returns the outward surface of the mesh and its vertices' indices in the mesh."""
+    """Return the outward surface of the mesh and its vertices' indices in the mesh."""
     faces, _ = boundary_faces(mesh)
     used, local = np.unique(faces, return_inverse=True)
     return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3)), used
 
 
 def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
-    """Returns a finer surface of curved faces: weights (t, n) of the nodes at its vertices, and its (16 f, 3) faces.
+    """Return a finer surface of curved faces: weights (t, n) of the nodes at its vertices, and its (16 f, 3) faces.
 
     Its first n vertices are the nodes. The (4 f, 3) triangles are those between the nodes 0 to n − 1, each face's four
     as `boundary_faces` has them.

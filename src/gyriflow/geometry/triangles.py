@@ -6,12 +6,14 @@ import numpy as np
 import scipy  # its parts are imported where they are used, which a dry run need not wait for
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import MeshError
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
-    """Returns a read-only (n, width) copy of `values`; ValueError for another shape."""
+    """Return a read-only (n, width) copy of `values`; ValueError for another shape."""
     array: NDArray = np.array(values, dtype=dtype, order="C")
     if array.ndim != 2 or array.shape[1] != width:
         raise ValueError(f"expected an (n, {width}) array, found shape {array.shape}")
@@ -34,45 +36,45 @@ class TriangleMesh:
 
 
 def corners(mesh: TriangleMesh) -> Floats:
-    """Returns the (m, 3, 3) corner positions of the faces in mm."""
+    """Return the (m, 3, 3) corner positions of the faces in mm."""
     return mesh.vertices[mesh.faces]
 
 
 def area_vectors(mesh: TriangleMesh) -> Floats:
-    """Returns the (m, 3) face normals with the face areas (mm²) as lengths."""
+    """Return the (m, 3) face normals with the face areas (mm²) as lengths."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
     return 0.5 * np.cross(b - a, c - a)
 
 
 def face_areas(mesh: TriangleMesh) -> Floats:
-    """Returns the (m,) face areas in mm²."""
+    """Return the (m,) face areas in mm²."""
     return np.linalg.norm(area_vectors(mesh), axis=1)
 
 
 def area(mesh: TriangleMesh) -> float:
-    """Returns the area in mm²."""
+    """Return the area in mm²."""
     return float(face_areas(mesh).sum())
 
 
 def signed_volume(mesh: TriangleMesh) -> float:
-    """Returns the enclosed volume in mm³, negative where the faces look inwards (divergence theorem)."""
+    """Return the enclosed volume in mm³, negative where the faces look inwards (divergence theorem)."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
 def unit(vectors: Floats) -> Floats:
-    """Returns (n, 3) vectors scaled to length one; zero vectors stay zero."""
+    """Return (n, 3) vectors scaled to length one; zero vectors stay zero."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1.0)
 
 
 def face_normals(mesh: TriangleMesh) -> Floats:
-    """Returns the (m, 3) unit face normals."""
+    """Return the (m, 3) unit face normals."""
     return unit(area_vectors(mesh))
 
 
 def scatter_to_vertices(mesh: TriangleMesh, face_values: NDArray) -> Floats:
-    """Returns per vertex the sum of (m,) or (m, k) values over its faces."""
+    """Return per vertex the sum of (m,) or (m, k) values over its faces."""
     corner = np.repeat(np.arange(len(mesh.faces)), 3)
     incidence = scipy.sparse.csr_matrix(
         (np.ones(corner.size), (mesh.faces.ravel(), corner)), shape=(len(mesh.vertices), len(mesh.faces))
@@ -81,17 +83,17 @@ def scatter_to_vertices(mesh: TriangleMesh, face_values: NDArray) -> Floats:
 
 
 def vertex_normals(mesh: TriangleMesh) -> Floats:
-    """Returns the (n, 3) unit vertex normals, the area-weighted mean of the faces around."""
+    """Return the (n, 3) unit vertex normals, the area-weighted mean of the faces around."""
     return unit(scatter_to_vertices(mesh, area_vectors(mesh)))
 
 
 def vertex_areas(mesh: TriangleMesh) -> Floats:
-    """Returns the (n,) areas in mm² that belong to the vertices: a third of each face around."""
+    """Return the (n,) areas in mm² that belong to the vertices: a third of each face around."""
     return np.asarray(scatter_to_vertices(mesh, face_areas(mesh)) / 3.0, dtype=np.float64)
 
 
 def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
-    """Returns the (e, 2) undirected edges, each once and sorted, and the (e,) number of faces at each."""
+    """Return the (e, 2) undirected edges, each once and sorted, and the (e,) number of faces at each."""
     pairs = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     # one number per edge: much faster than comparing rows
     count = len(mesh.vertices)
@@ -100,17 +102,17 @@ def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
 
 
 def mean_edge_length(mesh: TriangleMesh) -> float:
-    """Returns the mean edge length in mm."""
+    """Return the mean edge length in mm."""
     return mean_length(mesh.vertices, edges(mesh)[0])
 
 
 def mean_length(vertices: Floats, pairs: NDArray[np.integer]) -> float:
-    """Returns the mean length of edges that are known, (e, 2) vertex indices, in the vertices' unit."""
+    """Return the mean length of edges that are known, (e, 2) vertex indices, in the vertices' unit."""
     return float(np.linalg.norm(np.diff(vertices[pairs], axis=1), axis=-1).mean())
 
 
 def is_closed(mesh: TriangleMesh) -> bool:
-    """Returns whether every edge has exactly two faces that run along it in opposite directions."""
+    """Return whether every edge has exactly two faces that run along it in opposite directions."""
     directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     if not len(directed) or len(np.unique(directed @ [len(mesh.vertices), 1])) != len(directed):
         return False
@@ -119,12 +121,12 @@ def is_closed(mesh: TriangleMesh) -> bool:
 
 
 def euler_number(mesh: TriangleMesh) -> int:
-    """Returns vertices − edges + faces, counting used vertices only: 2 for each closed surface without handles."""
+    """Return vertices − edges + faces, counting used vertices only: 2 for each closed surface without handles."""
     return int(len(np.unique(mesh.faces)) - len(edges(mesh)[0]) + len(mesh.faces))
 
 
 def face_components(mesh: TriangleMesh) -> Ints:
-    """Returns the (m,) number of the connected component of each face, the largest area first (0)."""
+    """Return the (m,) number of the connected component of each face, the largest area first (0)."""
     graph = scipy.sparse.coo_matrix(
         (np.ones(2 * len(mesh.faces)), (mesh.faces[:, [0, 1]].ravel(), mesh.faces[:, [1, 2]].ravel())),
         shape=(len(mesh.vertices),) * 2,
@@ -137,14 +139,28 @@ def face_components(mesh: TriangleMesh) -> Ints:
     return rank[component]
 
 
+def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
+    """Return the convex hull, its faces outward; MeshError for a flat surface."""
+    try:
+        hull = scipy.spatial.ConvexHull(mesh.vertices)
+    except scipy.spatial.QhullError as error:
+        raise MeshError("the surface has no convex hull", remedy="It has to enclose a volume") from error
+    faces = np.asarray(hull.simplices, dtype=np.int64)
+    a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    used, local = np.unique(faces, return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3))
+
+
 def submesh(mesh: TriangleMesh, keep: NDArray[np.bool_]) -> tuple[TriangleMesh, Ints]:
-    """Returns the surface of the faces where the (m,) mask `keep` holds, and its vertices' indices in `mesh`."""
+    """Return the surface of the faces where the (m,) mask `keep` holds, and its vertices' indices in `mesh`."""
     used, faces = np.unique(mesh.faces[keep], return_inverse=True)
     return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3)), used
 
 
 def merged(*meshes: TriangleMesh) -> TriangleMesh:
-    """Returns the surfaces side by side in one, without joining vertices."""
+    """Return the surfaces side by side in one, without joining vertices."""
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     return TriangleMesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
@@ -153,12 +169,12 @@ def merged(*meshes: TriangleMesh) -> TriangleMesh:
 
 
 def flipped(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns the surface with every face turned round."""
+    """Return the surface with every face turned round."""
     return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
 
 
 def transformed(mesh: TriangleMesh, matrix: ArrayLike) -> TriangleMesh:
-    """Returns the surface moved by a (4, 4) affine matrix; faces are turned where it mirrors."""
+    """Return the surface moved by a (4, 4) affine matrix; faces are turned where it mirrors."""
     matrix = np.asarray(matrix, dtype=float)
     moved = TriangleMesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces)
     return flipped(moved) if np.linalg.det(matrix[:3, :3]) < 0 else moved

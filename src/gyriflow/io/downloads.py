@@ -18,20 +18,15 @@ Say = Callable[[str], None]
 
 
 def require_checksums(known: Mapping[str, tuple[str, str]]) -> None:
-    """Raises InputError where a file is not that of an atlas: by its path `known` has the atlas and the SHA-256."""
+    """Raise InputError where a file is not that of an atlas: by its path `known` has the atlas and the SHA-256."""
     for path, (atlas, sha256) in known.items():
         if sha256_of(path) != sha256:
-            raise InputError(
-                f"is not the file of {atlas}",
-                path=path,
-                found="another SHA-256",
-                expected=sha256,
-                remedy="Delete it, and it is fetched; or give a changed file as a brain of your own under brains",
-            )
+            remedy = "Delete it, and it is fetched; or give a changed file as a brain of your own under brains."
+            raise InputError(f"is not the file of {atlas}", path=path, expected=f"the SHA-256 {sha256}", remedy=remedy)
 
 
 def fetch(path: AnyPath, url: str, say: Say, *, sha256: str | None = None, size: int | None = None) -> None:
-    """Fetches a file, or checks the one that is there, which is never replaced.
+    """Fetch a file, or checks the one that is there, which is never replaced.
 
     It comes from the URL, is checked, and put under `path`; missing folders are made. `say` is called with a line on
     what was found. Where no checksum is known, a GIFTI or NIfTI file has to be readable to its end. There has to be
@@ -66,7 +61,6 @@ def fetch(path: AnyPath, url: str, say: Say, *, sha256: str | None = None, size:
 
 
 def _check(path: Path, name: str, sha256: str | None) -> None:
-    """Raises ValueError where a file is not the one of a checksum or, where none is known, no whole one of its kind."""
     content = path.read_bytes()
     start = content[:40]
     if name.endswith(".gz"):
@@ -94,44 +88,25 @@ def _check(path: Path, name: str, sha256: str | None) -> None:
 
 @contextmanager
 def _refused(path: Path, url: str) -> Iterator[None]:
-    """Turns what goes wrong with a file, or on the way from its URL, into a StorageError."""
     import requests
 
     try:
         yield
     except requests.RequestException as error:
-        raise StorageError(
-            "cannot be fetched",
-            path=url,
-            found=_cause(error),
-            remedy="Check the address, the network, and HTTPS_PROXY where there is a proxy. The same command goes on "
-            f"with what is missing; the file may also be put into {path.parent} by hand.",
-        ) from error
+        remedy = f"The same command goes on with what is missing; or put the file into {path.parent} by hand."
+        raise StorageError("cannot be fetched", path=url, found=_cause(error), remedy=remedy) from error
     except ValueError as error:
         if path.exists():
-            raise StorageError(
-                "is not the file of the atlas",
-                path=path,
-                found=error,
-                remedy="It was left as it is. Move it away, and the file is fetched.",
-            ) from error
-        raise StorageError(
-            "the server sent something else than the file",
-            path=url,
-            found=error,
-            expected=path.name,
-            remedy="It was not kept. Check the address, and whether the network asks for a login.",
-        ) from error
+            remedy = "It was left as it is. Move it away, and the file is fetched."
+            raise StorageError("is not the file of the atlas", path=path, found=error, remedy=remedy) from error
+        remedy = "Check the address, and whether the network asks for a login."
+        problem = "the server sent something else than the file"
+        raise StorageError(problem, path=url, found=error, expected=path.name, remedy=remedy) from error
     except OSError as error:
-        raise StorageError(
-            f"cannot be written or read: {error.strerror or error}",
-            path=path,
-            remedy="Free disk space or choose a folder that can be written.",
-        ) from error
+        raise StorageError(f"cannot be written or read: {error.strerror or error}", path=path) from error
 
 
 def _cause(error: Exception) -> str:
-    """Returns the innermost reason that the network libraries give."""
     reason: object = error
     while isinstance(reason, Exception):
         inner = getattr(reason, "reason", None) or (reason.args[0] if reason.args else None)

@@ -59,8 +59,11 @@ PEOPLE = {
     "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
     "brain": {"Description": "Name of the brain in gyriflow's own results"},
 }
+TISSUES = ((1, "cerebrum within the cortex"), (2, "cortex"))
 OF_INPUT = {"Description": "As in the tables of the input"}
 SESSION = re.compile(r"_ses-([A-Za-z0-9]+)")
+Names = Mapping[str, tuple[str, str | None]]
+"""Subject and session of each measured brain, None where the study needs no sessions."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,15 @@ class ExportedBrain:
     volume: Mapping[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class _Place:
+    """Where the files of a brain go: its folder, the beginning of their names, and the entity of its simulation."""
+
+    folder: Path
+    stem: str
+    desc: str
+
+
 def export_bids(
     folder: AnyPath,
     brains: Sequence[ExportedBrain],
@@ -97,7 +109,7 @@ def export_bids(
     version: str,
     units: Mapping[str, str],
 ) -> None:
-    """Writes a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
+    """Write a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
 
     Subjects and sessions keep their names. Brains of no named session have their week's, where a subject has several.
     Surfaces lie in the world of the brain's own volumes, unless its hemispheres were posed separately. `tables`
@@ -105,63 +117,26 @@ def export_bids(
     those that BEP011 proposes. InputError where two brains have the same names.
     """
     folder = Path(folder)
-    names = _subjects_and_sessions([brain for brain in brains if brain.run == MEASURED])
-    described: dict[str, dict[str, Any]] = {
-        kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"}
-        for kind, there in {"pial": True, "white": any(brain.white for brain in brains)}.items()
-        if there
-    }
-    space, reference = _template(brains, names)
-    descriptions: dict[str, str] = {}
-    taken: dict[tuple[str, str], ExportedBrain] = {}
-    for brain in brains:
-        subject, session = names[brain.brain]
-        stem, label = "_".join(filter(None, (subject, session))), ""
-        if brain.run != MEASURED:
-            label = f"{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
-            descriptions[f"desc-{label}"] = f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
-        if (other := taken.setdefault((stem, label), brain)) is not brain:
-            raise InputError(
-                f"two brains have the same BIDS name {stem}",
-                found=" and ".join(f"{one.brain} ({one.run})" for one in (other, brain)),
-                expected="ids and runs that differ in their letters and digits",
-            )
+    measured = [brain for brain in brains if brain.run == MEASURED]
+    names = _subjects_and_sessions(measured)
+    space, reference = _template(measured, names)
+    places = _places(folder, brains, names)
+    sidecars: dict[str, dict[str, Any]] = {}
+    for brain, place in zip(brains, places, strict=True):
         pose = read_pose(brain.report)
-        desc = f"_desc-{label}" if label else ""
-        place = folder / subject / (session or "") / "anat"
-        back = pose.inverse if pose.together else np.eye(4)
-        if brain.white:
-            descriptions["desc-white"] = "Map on the white surface; those without it are on the pial one"
-        for side, surface in brain.surfaces.items():
-            named = f"{place / stem}_hemi-{side[0].upper()}"
-            write_surface(f"{named}{desc}_pial.surf.gii", transformed(read_surface(surface), back), STRUCTURES[side])
-            if side in brain.white:
-                white = transformed(read_surface(brain.white[side]), back)
-                write_surface(f"{named}_white.surf.gii", white, STRUCTURES[side])
-            if side in brain.regions:
-                _copy(brain.regions[side], f"{named}{desc or '_desc-regions'}_dseg.label.gii")
-            for files, entities in ((brain.maps, ""), (brain.template_maps, space), (brain.white_maps, "")):
-                maps = read_vertex_maps(files[side]) if side in files else {}
-                for quantity, values in maps.items():
-                    suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
-                    known = {"Description": text, "Units": unit}
-                    described["_".join(filter(None, (entities, suffix)))] = known | (reference if entities else {})
-                    density = f"_{entities}_den-{len(values)}" if entities else ""
-                    of_white = "_desc-white" if files is brain.white_maps else desc
-                    path = f"{named}{density}{of_white}_{suffix}.shape.gii"
-                    write_vertex_maps(path, {quantity: values}, STRUCTURES[side])
+        sidecars |= _write_surfaces(place, brain, pose.inverse if pose.together else np.eye(4))
+        sidecars |= _write_maps(place, brain, space, reference)
         if brain.volume and pose.together:
-            write_label_volume(place / f"{stem}{desc}_dseg.nii.gz", _labels(brain, pose.inverse))
-            lookup = pd.DataFrame({"index": [1, 2], "name": ["cerebrum within the cortex", "cortex"]})
-            _write_tsv(folder / "dseg.tsv", lookup)
-    for suffix, sidecar in described.items():
+            write_label_volume(place.folder / f"{place.stem}{place.desc}_dseg.nii.gz", _labels(brain, pose.inverse))
+            _write_tsv(folder / "dseg.tsv", pd.DataFrame(TISSUES, columns=["index", "name"]))
+    for suffix, sidecar in sidecars.items():
         write_json(folder / f"{suffix}.json", sidecar)
-    ignored = "\n".join(f"/{suffix}.json" for suffix in sorted(described))
-    write_text(folder / ".bidsignore", IGNORED.format(kinds=ignored))
+    kinds = "\n".join(f"/{suffix}.json" for suffix in sorted(sidecars))
+    write_text(folder / ".bidsignore", IGNORED.format(kinds=kinds))
     write_text(folder / "README.md", README.format(version=version))
-    if descriptions:
+    if descriptions := _descriptions(brains, places):
         _write_tsv(folder / "descriptions.tsv", pd.DataFrame(descriptions.items(), columns=["desc_id", "description"]))
-    _write_people(folder, [brain for brain in brains if brain.run == MEASURED], names)
+    _write_people(folder, measured, names)
     for name, table in tables.items():
         ids = [names[brain] for brain in table["subject"]]
         table = table.rename(columns={"subject": "brain"})
@@ -169,29 +144,88 @@ def export_bids(
         table.insert(1, "session_id", [session for _, session in ids])
         _write_tsv(folder / f"{name}.tsv", table)
     write_json(folder / "metrics_wide.json", {column: {"Units": unit} for column, unit in units.items()})
-    made_by = [
-        {"Name": "gyriflow", "Version": version, "Description": "Pial surfaces, maps and simulations of folding"}
-    ]
-    dataset = {"Name": "gyriflow", "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative", "GeneratedBy": made_by}
+    made_by = {"Name": "gyriflow", "Version": version, "Description": "Pial surfaces, maps and simulations of folding"}
+    dataset = {"Name": "gyriflow", "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative", "GeneratedBy": [made_by]}
     # the last file: where it is there, all is
     write_json(folder / "dataset_description.json", dataset)
 
 
-def _template(
-    brains: Sequence[ExportedBrain], names: Mapping[str, tuple[str, str | None]]
-) -> tuple[str, dict[str, Any]]:
-    """Returns the entity of BIDS of a study's template, and what sidecars say of its surfaces."""
-    known = next((brain for brain in brains if brain.run == MEASURED and brain.brain == brain.template), None)
-    if known is None:
+def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list[_Place]:
+    """Return where each brain goes; InputError where two have the same names."""
+    taken: dict[tuple[str, str], ExportedBrain] = {}
+    places = []
+    for brain in brains:
+        subject, session = names[brain.brain]
+        stem = "_".join(filter(None, (subject, session)))
+        simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
+        places.append(
+            _Place(folder / subject / (session or "") / "anat", stem, "" if brain.run == MEASURED else simulated)
+        )
+        if (other := taken.setdefault((stem, places[-1].desc), brain)) is not brain:
+            found = f"{other.brain} ({other.run}) and {brain.brain} ({brain.run})"
+            expected = "ids and runs that differ in their letters and digits"
+            raise InputError(f"two brains have the same BIDS name {stem}", found=found, expected=expected)
+    return places
+
+
+def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[_Place]) -> dict[str, str]:
+    """Return what each entity `desc-` of the names of files means."""
+    descriptions = {
+        place.desc[1:]: f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
+        for brain, place in zip(brains, places, strict=True)
+        if place.desc
+    }
+    if any(brain.white for brain in brains):
+        descriptions["desc-white"] = "Map on the white surface; those without it are on the pial one"
+    return descriptions
+
+
+def _write_surfaces(place: _Place, brain: ExportedBrain, back: Floats) -> dict[str, dict[str, Any]]:
+    """Write surfaces, moved by a (4, 4) motion, and regions; return the sidecars of the kinds of surface."""
+    kinds = {"pial": (brain.surfaces, place.desc)} | ({"white": (brain.white, "")} if brain.white else {})
+    for kind, (files, desc) in kinds.items():
+        for side, path in files.items():
+            named = f"{place.folder / place.stem}_hemi-{side[0].upper()}{desc}_{kind}.surf.gii"
+            write_surface(named, transformed(read_surface(path), back), STRUCTURES[side])
+    for side, path in brain.regions.items():
+        _copy(path, f"{place.folder / place.stem}_hemi-{side[0].upper()}{place.desc or '_desc-regions'}_dseg.label.gii")
+    return {kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"} for kind in kinds}
+
+
+def _write_maps(
+    place: _Place, brain: ExportedBrain, space: str, reference: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
+    """Write a file for each map, those at the template's vertices with its `space`; return their sidecars."""
+    sidecars = {}
+    # files by side, the entities `space-` and `desc-`, and what sidecars say of the space
+    kinds = (
+        (brain.maps, "", place.desc, {}),
+        (brain.template_maps, space, place.desc, reference),
+        (brain.white_maps, "", "_desc-white", {}),
+    )
+    for files, entity, desc, more in kinds:
+        for side, path in files.items():
+            for quantity, values in read_vertex_maps(path).items():
+                suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
+                sidecars["_".join(filter(None, (entity, suffix)))] = {"Description": text, "Units": unit} | more
+                density = f"_{entity}_den-{len(values)}" if entity else ""
+                named = f"{place.folder / place.stem}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
+                write_vertex_maps(named, {quantity: values}, STRUCTURES[side])
+    return sidecars
+
+
+def _template(measured: Sequence[ExportedBrain], names: Names) -> tuple[str, dict[str, Any]]:
+    """Return the entity of BIDS of a study's template, and what sidecars say of its surfaces; nothing without one."""
+    template = next((brain for brain in measured if brain.brain == brain.template), None)
+    if template is None:
         return "", {}
-    stem = "_".join(filter(None, names[known.brain]))
-    place = "/".join(filter(None, (*names[known.brain], "anat", stem)))
-    surfaces = {side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii" for side in known.surfaces}
+    stem = "_".join(filter(None, names[template.brain]))
+    place = "/".join(filter(None, (*names[template.brain], "anat", stem)))
+    surfaces = {side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii" for side in template.surfaces}
     return f"space-{_alphanumeric(stem)}", {"SpatialReference": surfaces}
 
 
 def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
-    """Returns the labels of a simulated brain in the grid of its start's, whose world a (4, 4) motion leads back to."""
     start = read_label_volume(brain.volume["labels"], brain.volume["affine_from"])
     mesh = transformed(read_surface(brain.volume["surface"]), back)
     (thickness,) = read_vertex_maps(brain.volume["thickness"]).values()
@@ -199,7 +233,7 @@ def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
 
 
 def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool) -> None:
-    """Brings the BIDS derivative of a study to another folder, where what it has of other subjects stays.
+    """Bring the BIDS derivative of a study to another folder, where what it has of other subjects stays.
 
     Beside each subject's files come the quality pages of its `brains`, with the `whole` study its tables, report and
     methods. `source` is the data set that it was made of, which `SourceDatasets` then names by its DOI or its folder.
@@ -226,8 +260,7 @@ def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Seque
     write_json(folder / "dataset_description.json", described | {"SourceDatasets": [{"URL": url}]})
 
 
-def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> dict[str, tuple[str, str | None]]:
-    """Returns the subject and the session of each measured brain, None where the study needs no sessions."""
+def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> Names:
     subjects = {brain.brain: f"sub-{_alphanumeric(brain.subject.removeprefix('sub-'))}" for brain in brains}
     own = {brain.brain: match and f"ses-{match[1]}" for brain in brains for match in [SESSION.search(brain.brain)]}
     # two subjects whose names differ in other characters only are told by their equal sessions
@@ -236,8 +269,8 @@ def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> dict[str, tuple[s
     return {brain.brain: (subjects[brain.brain], own[brain.brain] or week[brain.brain]) for brain in brains}
 
 
-def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Mapping[str, tuple[str, str | None]]) -> None:
-    """Writes participants.tsv, and sessions.tsv of each participant where there are any, with their sidecars.
+def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> None:
+    """Write participants.tsv, and sessions.tsv of each participant where there are any, with their sidecars.
 
     Covariates that differ between a subject's brains are those of sessions.
     """
@@ -260,14 +293,12 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Mapping[
 
 
 def _described(quantity: str) -> tuple[str, str, str]:
-    """Returns suffix, unit and description of a map by its name, such as `distance_to_pial_mm`."""
     first, *others = quantity.removesuffix("_mm").split("_")
     suffix = _alphanumeric(first + "".join(word.capitalize() for word in others))
     return suffix, "mm" if quantity.endswith("_mm") else "arbitrary", " ".join((first.capitalize(), *others))
 
 
 def _alphanumeric(text: str) -> str:
-    """Returns the letters and digits of a text, which is what BIDS labels may have."""
     return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
 
 

@@ -25,7 +25,7 @@ TABLE_LOOK = (
 
 
 def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure, *, dpi: int) -> None:
-    """Writes a figure twice, as pixels of `dpi` dots per inch and as vectors.
+    """Write a figure twice, as pixels of `dpi` dots per inch and as vectors.
 
     Pictures within the vectors keep all of their pixels.
     """
@@ -39,13 +39,13 @@ def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure, *, dpi: int) -> Non
 
 
 def write_html(path: AnyPath, body: str) -> None:
-    """Writes a page with the given content, tables first of all."""
+    """Write a page with the given content, tables first of all."""
     head = f'<!DOCTYPE html>\n<html lang="en">\n<meta charset="utf-8">\n<style>{TABLE_LOOK}</style>'
     write_text(path, f"{head}\n{body}\n</html>\n")
 
 
 def picture_addresses(paths: Sequence[AnyPath], budget_bytes: float) -> list[tuple[str, float]]:
-    """Returns pictures as data addresses for a page, WebP coded, each with the width in inches that it has in print.
+    """Return pictures as data addresses for a page, WebP coded, each with the width in inches that it has in print.
 
     All have as many pixels as fit into a number of bytes.
     """
@@ -72,7 +72,7 @@ def _coded(path: AnyPath, width: int) -> str:
 
 
 def read_body(path: AnyPath) -> str:
-    """Returns the content of a page that `write_html` has written."""
+    """Return the content of a page that `write_html` has written."""
     text = Path(path).read_text(encoding="utf-8")
     body = re.fullmatch(r"<!DOCTYPE html>.*?</style>\n(.*)\n</html>\n", text, re.DOTALL)
     return body[1] if body else text

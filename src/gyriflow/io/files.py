@@ -27,7 +27,7 @@ AGAIN = "The file may be truncated or of another kind: copy or export it again."
 
 @contextmanager
 def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN) -> Iterator[None]:
-    """Turns what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`."""
+    """Turn what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`."""
     try:
         yield
     except InputError:
@@ -40,7 +40,7 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
 
 
 def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> None:
-    """Raises InputError where some of a file's (n,) or (n, k) values, such as the coordinates of vertices, are none."""
+    """Raise InputError where some of a file's (n,) or (n, k) values, such as the coordinates of vertices, are none."""
     bad = int(np.count_nonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
     if bad:
         raise InputError(f"has NaN or infinite {what}", path=path, found=f"{bad} {of}", expected="none")
@@ -48,7 +48,7 @@ def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> Non
 
 @contextmanager
 def replaced(path: AnyPath) -> Iterator[Path]:
-    """Yields a temporary path beside `path` that takes its place when the block ends well.
+    """Yield a temporary path beside `path` that takes its place when the block ends well.
 
     The temporary name is hidden and has the same suffixes. After an error it is removed and an earlier file
     stays as it was. Missing folders are made. StorageError where the system refuses to write.
@@ -60,24 +60,20 @@ def replaced(path: AnyPath) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise StorageError(
-            f"cannot be written: {error.strerror or error}",
-            path=path,
-            remedy="Free disk space or choose a folder that can be written (--directory); earlier files are unchanged.",
-        ) from error
+        remedy = "Free disk space or choose a folder that can be written (--directory); earlier files are unchanged."
+        raise StorageError(f"cannot be written: {error.strerror or error}", path=path, remedy=remedy) from error
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
 
 
 def emptied(folder: AnyPath) -> Path:
-    """Returns the path of a folder that is removed with all in it, so that nothing of an earlier run is left there."""
+    """Return the path of a folder that is removed with all in it, so that nothing of an earlier run is left there."""
     shutil.rmtree(folder, ignore_errors=True)
     return Path(folder)
 
 
 def _plain(value: Any) -> Any:
-    """Returns `value` in the types of JSON: numpy scalars and arrays unwrapped, non-finite numbers as null."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | set | np.ndarray):
@@ -92,36 +88,36 @@ def _plain(value: Any) -> Any:
 
 
 def write_json(path: AnyPath, content: Any) -> None:
-    """Writes plain Python and numpy values as JSON; NaN and infinity become null."""
+    """Write plain Python and numpy values as JSON; NaN and infinity become null."""
     write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + "\n")
 
 
 def read_json(path: AnyPath) -> Any:
-    """Returns the content of a JSON file; InputError where it is missing or torn."""
+    """Return the content of a JSON file; InputError where it is missing or torn."""
     with reading(path, "JSON", remedy=None):
         return json.loads(Path(path).read_text(encoding="utf-8"))
 
 
 def read_text(path: AnyPath) -> str:
-    """Returns a text file; InputError where it is missing."""
+    """Return a text file; InputError where it is missing."""
     with reading(path, "text", remedy=None):
         return Path(path).read_text(encoding="utf-8")
 
 
 def write_text(path: AnyPath, text: str) -> None:
-    """Writes a text file."""
+    """Write a text file."""
     with replaced(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
-    """Writes a table as CSV without its index, ten significant digits."""
+    """Write a table as CSV without its index, ten significant digits."""
     with replaced(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.10g")
 
 
 def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
-    """Returns the rows of a tab-separated table with a heading, as texts by column; InputError where it is none."""
+    """Return the rows of a tab-separated table with a heading, as texts by column; InputError where it is none."""
     import pandas as pd  # takes half a second, as h5py does below, which most readers need not wait for
 
     with reading(path, "a tab-separated table", remedy=None):
@@ -134,12 +130,8 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     for number, row in enumerate(rows, start=2):
         for name, value in row.items():
             if not value.isprintable():
-                raise InputError(
-                    f"has a line break or another character that is not printed in row {number}, {name}",
-                    path=path,
-                    found=repr(value),
-                    expected="one line of text in each cell",
-                )
+                problem = f"has a line break or another character that is not printed in row {number}, {name}"
+                raise InputError(problem, path=path, found=repr(value), expected="one line of text in each cell")
     if not rows:
         raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
     return rows
@@ -152,7 +144,7 @@ def _read_texts(path: AnyPath, index_col: Literal[False] | None = None) -> "pd.D
 
 
 def read_table(path: AnyPath) -> "pd.DataFrame":
-    """Returns a CSV table; InputError where it is missing or torn."""
+    """Return a CSV table; InputError where it is missing or torn."""
     import pandas as pd
 
     with reading(path, "a CSV table", remedy=None):
@@ -161,7 +153,7 @@ def read_table(path: AnyPath) -> "pd.DataFrame":
 
 @contextmanager
 def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
-    """Yields an HDF5 file to be filled, which takes its place when the block ends well; StorageError where it can't."""
+    """Yield an HDF5 file to be filled, which takes its place when the block ends well; StorageError where it can't."""
     import h5py
 
     with replaced(path) as temporary:
@@ -175,7 +167,7 @@ def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
 
 @contextmanager
 def reading_hdf5(path: AnyPath, what: str, expected: str, remedy: str | None = None) -> Iterator["h5py.File"]:
-    """Yields an HDF5 file to be read; InputError for whatever goes wrong in the block, with what it should be."""
+    """Yield an HDF5 file to be read; InputError for whatever goes wrong in the block, with what it should be."""
     import h5py
 
     with reading(path, what, expected, remedy), h5py.File(path) as file:
@@ -183,7 +175,7 @@ def reading_hdf5(path: AnyPath, what: str, expected: str, remedy: str | None = N
 
 
 def sha256_of(path: AnyPath) -> str:
-    """Returns the SHA-256 of a file; StorageError where it cannot be read."""
+    """Return the SHA-256 of a file; StorageError where it cannot be read."""
     try:
         with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -192,7 +184,7 @@ def sha256_of(path: AnyPath) -> str:
 
 
 def contents(files: Iterable[AnyPath], known: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Returns for each file that can be read its SHA-256, size in bytes, and last writing and last change of any kind.
+    """Return for each file that can be read its SHA-256, size in bytes, and last writing and last change of any kind.
 
     A file whose size and times (ns, of the epoch) are those in `known`, an earlier answer, is not read again.
     """
@@ -207,18 +199,16 @@ def contents(files: Iterable[AnyPath], known: Mapping[str, Any]) -> dict[str, li
 
 
 def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
-    """Returns for each file that is there its SHA-256, its size in bytes and when it was last written (UTC)."""
+    """Return for each file that is there its SHA-256, its size in bytes and when it was last written (UTC)."""
     found = {}
-    for path in map(Path, files):
-        if path.is_file():
-            state = path.stat()
-            written = datetime.fromtimestamp(state.st_mtime, UTC).isoformat(timespec="seconds")
-            found[str(path)] = {"sha256": sha256_of(path), "bytes": state.st_size, "written": written}
+    for path, (sha256, size, written_ns, _) in contents(files, {}).items():
+        written = datetime.fromtimestamp(written_ns // 10**9, UTC).isoformat(timespec="seconds")
+        found[path] = {"sha256": sha256, "bytes": size, "written": written}
     return found
 
 
 def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
-    """Returns the files of a folder and those in it, in order, without hidden ones and folders of some names."""
+    """Return the files of a folder and those in it, in order, without hidden ones and folders of some names."""
 
     def wanted(path: Path) -> bool:
         return not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)

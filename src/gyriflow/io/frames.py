@@ -23,7 +23,7 @@ CELL_FIELDS = "cell_fields"
 
 
 def group_name(week: float) -> str:
-    """Returns the name of the group of a week."""
+    """Return the name of the group of a week."""
     return f"week_{week_tag(week)}"
 
 
@@ -33,7 +33,7 @@ def write_frame(
     vertex_fields: Mapping[str, NDArray],
     cell_fields: Mapping[str, NDArray] | None = None,
 ) -> None:
-    """Writes the frame of a gestational week to a file of its own.
+    """Write the frame of a gestational week to a file of its own.
 
     Fields at the vertices are `positions` (n, 3) in mm and further arrays (n,) or (n, 3); those of the elements, in the
     order of the run's mesh, are (m,), (m, 3) or (m, 9). ValueError where those at the vertices differ in length.
@@ -57,7 +57,7 @@ def _lengths(fields: Mapping[str, NDArray]) -> str:
 
 
 def join_frames(path: AnyPath, tets: NDArray, frames: Sequence[AnyPath]) -> None:
-    """Joins the files of single frames, in the order of time, into `path` (.h5) with a .xdmf beside it.
+    """Join the files of single frames, in the order of time, into `path` (.h5) with a .xdmf beside it.
 
     ValueError where fields of the elements do not fit the (m, 4) or (m, 10) tetrahedra.
     """
@@ -95,19 +95,19 @@ def _time_series(data_name: str, file: h5py.File) -> str:
 
 
 def read_weeks(path: AnyPath) -> list[float]:
-    """Returns the gestational weeks of the frames, ascending."""
+    """Return the gestational weeks of the frames, ascending."""
     with h5py.File(path) as file:
         return sorted(float(name.removeprefix("week_")) for name in file if name.startswith("week_"))
 
 
 def read_tets(path: AnyPath) -> NDArray[np.int64]:
-    """Returns the (m, 4) or (m, 10) tetrahedra."""
+    """Return the (m, 4) or (m, 10) tetrahedra."""
     with h5py.File(path) as file:
         return file["tets"][:].astype(np.int64)
 
 
 def read_field(path: AnyPath, week: float, field: str) -> NDArray:
-    """Returns a field at the vertices at a week; InputError, which names the weeks there are, where there is none."""
+    """Return a field at the vertices at a week; InputError, which names the weeks there are, where there is none."""
     with h5py.File(path) as file:
         name = f"{group_name(week)}/{field}"
         if name not in file:
@@ -116,5 +116,5 @@ def read_field(path: AnyPath, week: float, field: str) -> NDArray:
 
 
 def read_positions(path: AnyPath, week: float) -> NDArray[np.float64]:
-    """Returns the (n, 3) positions in mm at a week."""
+    """Return the (n, 3) positions in mm at a week."""
     return read_field(path, week, POSITIONS)

@@ -49,7 +49,7 @@ class Message(NamedTuple):
 
 
 def messages_in(text: str) -> Iterator[Message]:
-    """Yields the warnings and errors in a log or a piece of it, but for warnings of libraries."""
+    """Yield the warnings and errors in a log or a piece of it, but for warnings of libraries."""
     for found in MESSAGE.finditer(text):
         logger = found["logger"] or ""
         if logger != OF_LIBRARIES:
@@ -59,7 +59,7 @@ def messages_in(text: str) -> Iterator[Message]:
 
 
 def cause(text: str) -> str:
-    """Returns why a job failed, from its log: gyriflow's own message, else the exception, else the last lines.
+    """Return why a job failed, from its log: gyriflow's own message, else the exception, else the last lines.
 
     A step that fails says so. Where its log ends without a word, it was killed.
     """
@@ -78,7 +78,7 @@ def cause(text: str) -> str:
 
 
 def events_in(text: str) -> list[dict[str, Any]]:
-    """Returns the events in the progress file of a folding, or a piece of it: `event`, and what it tells."""
+    """Return the events in the progress file of a folding, or a piece of it: `event`, and what it tells."""
     events = []
     for line in text.splitlines():
         # a full disk may have left half a line
@@ -95,7 +95,7 @@ class GrowingFile:
     read: int = 0
 
     def new_text(self) -> str:
-        """Returns what was written since the last call, in whole lines."""
+        """Return what was written since the last call, in whole lines."""
         try:
             with self.path.open("rb") as file:
                 # a job that is tried again begins its file anew
@@ -110,7 +110,7 @@ class GrowingFile:
 
 
 def read_log(path: AnyPath) -> str:
-    """Returns a whole log; nothing where it cannot be read."""
+    """Return a whole log; nothing where it cannot be read."""
     try:
         return Path(path).read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -118,7 +118,7 @@ def read_log(path: AnyPath) -> str:
 
 
 def read_messages(path: AnyPath) -> list[tuple[str, str]]:
-    """Returns ("warning" or "error", its first line) for each message of a step's log, each once; none without one."""
+    """Return ("warning" or "error", its first line) for each message of a step's log, each once; none without one."""
     found = [(message.level, message.text.partition("\n")[0]) for message in messages_in(read_log(path))]
     return list(dict.fromkeys(found))
 
@@ -126,7 +126,7 @@ def read_messages(path: AnyPath) -> list[tuple[str, str]]:
 def gather_messages(
     folder: AnyPath, brains: Iterable[str], runs: Iterable[tuple[str, str]], *, since_s: float = 0.0
 ) -> pd.DataFrame:
-    """Returns the warnings and errors of a study in a folder: its own, and those of brains and (run, brain) pairs.
+    """Return the warnings and errors of a study in a folder: its own, and those of brains and (run, brain) pairs.
 
     Columns are subject, run (both empty where there is none), step, level ("warning" or "error"), message. Only logs
     that were written since a time, in s of the epoch, are read.
@@ -149,7 +149,7 @@ MEASURED = {"s": "wall_s", "cpu_time": "cpu_s", "max_rss": "memory_MiB"}
 
 
 def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
-    """Returns what Snakemake measured of the jobs of rules, in a working directory, in the order of the rules.
+    """Return what Snakemake measured of the jobs of rules, in a working directory, in the order of the rules.
 
     `patterns` are regular expressions of the paths of each rule's files in folders `benchmarks`, with groups `run` and
     `brain`. Columns are rule, run and brain (None where there is none), wall_s, cpu_s, memory_MiB; values are NaN where

@@ -16,7 +16,7 @@ AGAIN = "Register the brains, or match their surfaces, again."
 
 
 def write_deformation(path: AnyPath, deformation: Deformation, report: Mapping[str, Any]) -> None:
-    """Writes the data sets matrix (4, 4), displacement (i, j, k, 3) in mm, float32, and affine (4, 4) of its grid.
+    """Write the data sets matrix (4, 4), displacement (i, j, k, 3) in mm, float32, and affine (4, 4) of its grid.
 
     A point p goes to matrix (p + displacement(p)). The `report` is kept as JSON in an attribute of that name.
     """
@@ -29,19 +29,12 @@ def write_deformation(path: AnyPath, deformation: Deformation, report: Mapping[s
         file.attrs["report"] = json.dumps(dict(report))
 
 
-def read_deformation(path: AnyPath) -> tuple[Deformation, dict[str, Any]]:
-    """Returns the deformation and the report of a file of `write_deformation`; InputError where it is none."""
-    expected = "an HDF5 file with matrix, displacement and affine"
-    with reading_hdf5(path, "a deformation", expected, AGAIN) as file:
-        return _deformation(file), json.loads(file.attrs["report"])
-
-
 def _deformation(file: h5py.File) -> Deformation:
     return Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
 
 
 def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapping[str, Any]) -> None:
-    """Writes the data sets first (n, 3) and second (n, 3) in mm, and faces (m, 3); the `report` as a deformation's."""
+    """Write the data sets first (n, 3) and second (n, 3) in mm, and faces (m, 3); the `report` as a deformation's."""
     with new_hdf5(path) as file:
         for name, points in (("first", matched.first.vertices), ("second", matched.second)):
             file.create_dataset(name, data=points, compression="gzip", shuffle=True)
@@ -50,7 +43,7 @@ def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapp
 
 
 def read_correspondence(path: AnyPath) -> Correspondence:
-    """Returns what `write_deformation` or `write_matched_surfaces` has written; InputError for other files."""
+    """Return what `write_deformation` or `write_matched_surfaces` has written; InputError for other files."""
     expected = "an HDF5 file with matrix, displacement and affine, or with first, second and faces"
     with reading_hdf5(path, "a correspondence of brains", expected, AGAIN) as file:
         if "faces" in file:
@@ -60,29 +53,21 @@ def read_correspondence(path: AnyPath) -> Correspondence:
 
 @dataclass(frozen=True, eq=False)
 class CarriedMesh:
-    """A mesh carried over weeks.
-
-    Attributes
-    ----------
-    weeks : (w,) float
-        Gestational weeks, ascending.
-    positions : (w, n, 3) float
-        Of the vertices, in mm.
-    """
+    """The (w, n, 3) positions in mm of a mesh's vertices at (w,) ascending gestational weeks."""
 
     weeks: Floats
     positions: Floats
 
 
 def write_carried_mesh(path: AnyPath, carried: CarriedMesh) -> None:
-    """Writes the data sets weeks and positions."""
+    """Write the data sets weeks and positions."""
     with new_hdf5(path) as file:
         file["weeks"] = np.asarray(carried.weeks, dtype=np.float64)
         file.create_dataset("positions", data=carried.positions.astype(np.float32), compression="gzip", shuffle=True)
 
 
 def read_carried_mesh(path: AnyPath) -> CarriedMesh:
-    """Returns what `write_carried_mesh` has written; InputError where the file is none of it."""
+    """Return what `write_carried_mesh` has written; InputError where the file is none of it."""
     expected = "an HDF5 file with weeks and positions"
     with reading_hdf5(path, "a carried mesh", expected, "Carry the mesh again.") as file:
         return CarriedMesh(file["weeks"][:], file["positions"][:].astype(np.float64))
@@ -90,18 +75,10 @@ def read_carried_mesh(path: AnyPath) -> CarriedMesh:
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """The shapes that a mesh is to have.
+    """The shapes that a mesh is to have at (w,) ascending gestational weeks, its own first.
 
-    Attributes
-    ----------
-    weeks : (w,) float
-        Gestational weeks, ascending, the mesh's own first.
-    positions : (w, n, 3) float
-        Of the vertices, in mm, in any pose.
-    sizes : {"area_cm2" or "volume_ml": (w,) float}
-        Of the mesh's boundary.
-    surfaces : {name: w arrays (m, 3) of float}
-        Where simpler ways to foretell the brain put the boundary's vertices, in mm.
+    `positions` (w, n, 3) of its vertices are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of its
+    boundary; `surfaces` by name w arrays (m, 3) of where simpler predictions put the boundary's vertices, in mm.
     """
 
     weeks: Floats
@@ -111,7 +88,7 @@ class Targets:
 
 
 def write_targets(path: AnyPath, targets: Targets) -> None:
-    """Writes the data sets weeks, positions, sizes/{area_cm2, volume_ml} and surfaces/{name}."""
+    """Write the data sets weeks, positions, sizes/{area_cm2, volume_ml} and surfaces/{name}."""
     with new_hdf5(path) as file:
         file["weeks"] = np.asarray(targets.weeks, dtype=np.float64)
         places = {"positions": targets.positions} | {f"surfaces/{name}": at for name, at in targets.surfaces.items()}
@@ -122,7 +99,7 @@ def write_targets(path: AnyPath, targets: Targets) -> None:
 
 
 def read_targets(path: AnyPath) -> Targets:
-    """Returns what `write_targets` has written; InputError where the file is none of it."""
+    """Return what `write_targets` has written; InputError where the file is none of it."""
     expected = "an HDF5 file with weeks, positions and sizes"
     with reading_hdf5(path, "shapes to grow towards", expected, "Make them again.") as file:
         sizes = {name: values[:] for name, values in file["sizes"].items()}

@@ -11,7 +11,7 @@ IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^
 
 
 def code_hash(program: Path, *modules: Path, function: str | None = None) -> str:
-    """Returns a hash of all modules of this package that a Python program imports, the program itself left out.
+    """Return a hash of all modules of this package that a Python program imports, the program itself left out.
 
     Data files beside the modules count too, and further `modules`, which the program imports by a name that it is
     given. Of its functions, a single one counts where each job calls another one. As a parameter of a rule the hash
@@ -24,7 +24,7 @@ def code_hash(program: Path, *modules: Path, function: str | None = None) -> str
 
 
 def modules_behind(program: Path, function: str | None = None) -> set[Path]:
-    """Returns the files of all modules of this package that a Python program imports, directly or through others."""
+    """Return the files of all modules of this package that a Python program imports, directly or through others."""
     reached: set[Path] = set()
     waiting = set(imported_modules(program, function))
     while waiting:
@@ -36,7 +36,7 @@ def modules_behind(program: Path, function: str | None = None) -> set[Path]:
 
 @cache
 def imported_modules(source: Path, function: str | None = None) -> frozenset[Path]:
-    """Returns the files of the modules of this package that a source file imports, at the top or inside functions.
+    """Return the files of the modules of this package that a source file imports, at the top or inside functions.
 
     With a `function`, other functions of the file do not count.
     """
@@ -55,13 +55,12 @@ def imported_modules(source: Path, function: str | None = None) -> frozenset[Pat
 
 
 def room_of(module: Path) -> str:
-    """Returns the room that a source file belongs to: the folder, or the single module, directly under the package."""
+    """Return the room that a source file belongs to: the folder, or the single module, directly under the package."""
     return module.resolve().relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
 @cache
 def _files_of(name: str) -> list[Path]:
-    """Returns the file of a module and those of the packages around it; none for other packages' modules."""
     package, *parts = name.split(".")
     if package != PACKAGE.name:
         return []

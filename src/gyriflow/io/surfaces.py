@@ -48,7 +48,7 @@ System = tuple[str, str, Floats]
 
 
 def read_surface(path: AnyPath) -> TriangleMesh:
-    """Returns the surface of a GIFTI, VTK, STL, PLY, OBJ or FreeSurfer file, in the order of corners of the file.
+    """Return the surface of a GIFTI, VTK, STL, PLY, OBJ or FreeSurfer file, in the order of corners of the file.
 
     Coordinates are the file's; where a GIFTI or FreeSurfer file says how they lie in scanner space, they are brought
     there. InputError for missing, truncated or empty files, NaN or infinite coordinates, faces that name missing
@@ -66,28 +66,24 @@ def read_surface(path: AnyPath) -> TriangleMesh:
         else:
             vertices, faces = _read_freesurfer_surface(path)
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
+        found = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
         raise InputError(
-            "holds no surface",
-            path=path,
-            found=f"points of shape {vertices.shape}, faces of shape {faces.shape}",
-            expected="three coordinates for each point and three corners for each face",
-            remedy=AGAIN,
+            "holds no surface", path=path, found=found, expected="(n, 3) points and (m, 3) faces", remedy=AGAIN
         )
     require_finite(vertices, path, "coordinates", "vertices")
     if not (np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)) or (
         np.abs(faces - np.rint(faces)).max() > 1e-3
     ):
-        raise InputError(
-            "has faces that name vertices which do not exist",
-            path=path,
-            found=f"indices {faces.min():.6g} to {faces.max():.6g}",
-            expected=f"whole numbers from 0 to {len(vertices) - 1}",
+        found, expected = (
+            f"indices {faces.min():.6g} to {faces.max():.6g}",
+            f"whole numbers from 0 to {len(vertices) - 1}",
         )
+        raise InputError("has faces that name vertices which do not exist", path=path, found=found, expected=expected)
     return TriangleMesh(vertices, np.rint(faces).astype(np.int64))
 
 
 def declared(path: AnyPath) -> tuple[str | None, str | None]:
-    """Returns what a surface's file says of itself: the space its coordinates are read in, and its structure.
+    """Return what a surface's file says of itself: the space its coordinates are read in, and its structure.
 
     Both are None where it does not say so. The space is a NIfTI transform code's name, such as
     "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
@@ -101,7 +97,7 @@ def declared(path: AnyPath) -> tuple[str | None, str | None]:
 
 
 def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
-    """Returns the surfaces of two hemispheres, and whether both files name one and the same coordinate system.
+    """Return the surfaces of two hemispheres, and whether both files name one and the same coordinate system.
 
     InputError as for `read_surface`, and where a file names the other hemisphere as its structure.
     """
@@ -111,22 +107,16 @@ def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, Trian
 
 
 def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
-    """Returns the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
+    """Return the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
     found, expected = _structure(path), STRUCTURES[side]
     if found in STRUCTURES.values() and found != expected:
-        raise InputError(
-            "is of the other hemisphere",
-            path=path,
-            found=found,
-            expected=expected,
-            remedy="Swap `left` and `right`, or set the other `side`, in the configuration; or mend what the file says "
-            "of itself (AnatomicalStructurePrimary, lh or rh in its name), if that is wrong.",
-        )
+        remedy = "Swap `left` and `right`, or mend what the file says of itself (AnatomicalStructurePrimary, lh or rh)."
+        raise InputError("is of the other hemisphere", path=path, found=found, expected=expected, remedy=remedy)
     return read_surface(path)
 
 
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
-    """Writes a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
+    """Write a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
     suffix = Path(path).suffix.lower()
     if suffix in MESH_SUFFIXES:
         import trimesh  # takes a second, as pyvista does below, which most readers need not wait for
@@ -153,7 +143,7 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
 
 
 def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, right: TriangleMesh | None) -> None:
-    """Writes a brain's pial surface and its hemispheres, None for one that is not there.
+    """Write a brain's pial surface and its hemispheres, None for one that is not there.
 
     `files` has the paths `whole`, those of the hemispheres that are there by their names, and `stl` if it is wanted.
     """
@@ -167,7 +157,7 @@ def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, righ
 
 
 def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Structure | None = None) -> None:
-    """Writes named (n,) per-vertex values as a GIFTI shape file (.shape.gii, float32)."""
+    """Write named (n,) per-vertex values as a GIFTI shape file (.shape.gii, float32)."""
     arrays = [
         GiftiDataArray(np.asarray(values, np.float32), intent="NIFTI_INTENT_SHAPE", meta=GiftiMetaData({"Name": name}))
         for name, values in maps.items()
@@ -181,13 +171,13 @@ def _named(structure: Structure | None) -> dict[str, str]:
 
 
 def read_vertex_maps(path: AnyPath) -> dict[str, NDArray[np.float64]]:
-    """Returns the named per-vertex values of a GIFTI shape file."""
+    """Return the named per-vertex values of a GIFTI shape file."""
     arrays = enumerate(load_gifti(path).darrays)
     return {array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float) for n, array in arrays}
 
 
 def load_gifti(path: AnyPath) -> GiftiImage:
-    """Returns the image of a GIFTI file; InputError where it is missing, truncated or of another kind."""
+    """Return the image of a GIFTI file; InputError where it is missing, truncated or of another kind."""
     with reading(path, "GIFTI", "a whole .gii file"):
         image = nib.load(path)
     if not isinstance(image, GiftiImage):
@@ -200,7 +190,6 @@ def _is_gifti(path: AnyPath) -> bool:
 
 
 def _structure(path: AnyPath) -> str | None:
-    """Returns the structure that a surface's file names, such as "CortexLeft"; None where it names none."""
     if Path(path).suffix.lower() in (*MESH_SUFFIXES, *VTK_SUFFIXES):
         return None
     if not _is_gifti(path):
@@ -218,12 +207,8 @@ def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
     if len(points) != 1 or len(triangles) != 1 or not len(points[0].data) or not len(triangles[0].data):
-        raise InputError(
-            "holds no surface",
-            path=path,
-            found=f"{len(points)} arrays of points, {len(triangles)} of triangles",
-            expected="one of each (.surf.gii)",
-        )
+        found = f"{len(points)} arrays of points, {len(triangles)} of triangles"
+        raise InputError("holds no surface", path=path, found=found, expected="one of each (.surf.gii)")
     vertices = np.asarray(points[0].data, dtype=float)
     matrix, space = to_scanner_space(coordinate_systems(path), path)
     if space is None:
@@ -244,7 +229,6 @@ def _read_with_pyvista(path: Path) -> tuple[NDArray[np.float64], NDArray]:
 
 
 def _require_sound_cells(data: "pv.UnstructuredGrid | pv.PolyData", path: Path) -> None:
-    """Raises InputError where cells name points that are not there, on which VTK's filters end the whole process."""
     import pyvista as pv
 
     arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else []
@@ -257,13 +241,9 @@ def _require_sound_cells(data: "pv.UnstructuredGrid | pv.PolyData", path: Path) 
             starts[0] == 0 and starts[-1] == len(corners) and np.all(np.diff(starts.astype(np.int64)) >= 0)
         )
         if not (named and whole):
-            raise InputError(
-                "has cells that name points which do not exist",
-                path=path,
-                found=f"points {corners.min()} to {corners.max()}" if len(corners) else "cells without points",
-                expected=f"0 to {data.n_points - 1}",
-                remedy=AGAIN,
-            )
+            found = f"points {corners.min()} to {corners.max()}" if len(corners) else "cells without points"
+            problem, expected = "has cells that name points which do not exist", f"0 to {data.n_points - 1}"
+            raise InputError(problem, path=path, found=found, expected=expected, remedy=AGAIN)
     require_finite(np.asarray(data.points), path, "coordinates", "vertices")
 
 
@@ -285,7 +265,7 @@ def read_pose(path: AnyPath) -> Pose:
 
 
 def connectivity(path: Path) -> tuple[int, int, str]:
-    """Returns the numbers of vertices and of triangles of a surface file, and a digest of its triangles.
+    """Return the numbers of vertices and of triangles of a surface file, and a digest of its triangles.
 
     Neither the order of the triangles nor that of their corners matters. InputError as for `read_surface`.
     """
@@ -295,7 +275,6 @@ def connectivity(path: Path) -> tuple[int, int, str]:
 
 @cache
 def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]:
-    """Returns the same, once for each state of a file."""
     mesh = read_surface(path)
     triangles = np.sort(mesh.faces, axis=1)
     triangles = triangles[np.lexsort(triangles.T)]
@@ -313,19 +292,15 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 
 
 def read_vertex_labels(path: AnyPath) -> tuple[NDArray[np.int64], dict[int, str]]:
-    """Returns the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
+    """Return the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
 
     InputError for missing or truncated files, another number of arrays than one, and values that are no whole numbers.
     """
     image = load_gifti(path)
     arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
-        raise InputError(
-            "is no label file of one array",
-            path=path,
-            found=", ".join(str(array.data.shape) for array in arrays) or "no arrays",
-            expected="one label for each vertex (.label.gii)",
-        )
+        found = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
+        raise InputError("is no label file", path=path, found=found, expected="one label for each vertex (.label.gii)")
     values = np.asarray(arrays[0].data)
     labels = np.rint(values).astype(np.int64)
     if not np.isfinite(values).all() or np.abs(values - labels).max(initial=0.0) > 1e-3:
@@ -337,7 +312,7 @@ def read_vertex_labels(path: AnyPath) -> tuple[NDArray[np.int64], dict[int, str]
 def write_vertex_labels(
     path: AnyPath, labels: NDArray[np.integer], names: Mapping[int, str], structure: Structure | None = None
 ) -> None:
-    """Writes (n,) labels, 0 for no region, with their names as a GIFTI label file (.label.gii)."""
+    """Write (n,) labels, 0 for no region, with their names as a GIFTI label file (.label.gii)."""
     table = GiftiLabelTable()
     for number, name in {NO_REGION: "???", **names}.items():
         colour = "#FFFFFF" if number == NO_REGION else COLOURS[(number - 1) % len(COLOURS)]
@@ -363,7 +338,7 @@ C_RAS = ("VolGeomC_R", "VolGeomC_A", "VolGeomC_S")
 
 
 def coordinate_systems(path: AnyPath) -> list[System]:
-    """Returns the coordinate systems of the points of a GIFTI file, all of them, in the file's order.
+    """Return the coordinate systems of the points of a GIFTI file, all of them, in the file's order.
 
     nibabel keeps one only. InputError where a matrix has not 16 finite numbers.
     """
@@ -386,7 +361,7 @@ def coordinate_systems(path: AnyPath) -> list[System]:
 
 
 def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str | None]:
-    """Returns the (4, 4) matrix that brings coordinates to scanner space, and the space they are in then.
+    """Return the (4, 4) matrix that brings coordinates to scanner space, and the space they are in then.
 
     A rigid matrix into scanner or aligned space is applied. None is where the coordinates are in one of these already.
     Those that lead to Talairach or MNI space are not, since these have other sizes; each that is not applied is logged.
@@ -406,13 +381,8 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
                 continue
             rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)
             if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
-                raise InputError(
-                    f"has a coordinate-system matrix from {data} to {to} that changes sizes or mirrors",
-                    path=path,
-                    found=f"\n{matrix}\n",
-                    expected="a rigid motion",
-                    remedy="Give the surface in the coordinates of its scanner.",
-                )
+                problem = f"has a coordinate-system matrix from {data} to {to} that changes sizes or mirrors"
+                raise InputError(problem, path=path, found=f"\n{matrix}\n", expected="a rigid motion")
             log.warning("%s: the coordinate-system matrix of the file was applied, to %s", path, to)
             return matrix, to
     for _, to, matrix in moving:
@@ -426,7 +396,7 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
 
 
 def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
-    """Warns where points whose space a file does not say may be relative to the centre of a volume (tkr RAS).
+    """Warn where points whose space a file does not say may be relative to the centre of a volume (tkr RAS).
 
     `metadata` are those of the points. FreeSurfer's converter gives the volume's centre there, whichever space it
     writes the points in.
@@ -436,17 +406,16 @@ def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
     except (KeyError, ValueError):
         return
     if any(abs(place) > 1e-3 for place in centre):
-        log.warning(
+        said = (
             "%s: does not say the space of its coordinates: they may be relative to the centre of FreeSurfer's volume "
             "(tkr RAS), off volumes in scanner space by C_RAS = (%g, %g, %g) mm. Before volumes of regions or maps are "
-            "used with it, convert it anew with mris_convert --to-scanner",
-            path,
-            *centre,
+            "used with it, convert it anew with mris_convert --to-scanner"
         )
+        log.warning(said, path, *centre)
 
 
 def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, NDArray[np.int64]]:
-    """Returns vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, in scanner space.
+    """Return vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, in scanner space.
 
     Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file.
     Without it they stay relative to that centre, and a warning says so. InputError for any other kind of file.
@@ -459,7 +428,6 @@ def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def _volume(path: AnyPath) -> tuple[Floats, NDArray[np.int64], Floats | None]:
-    """Returns vertices, faces and the (4, 4) matrix to scanner space, or None where the file does not say it."""
     # the warnings are about missing geometry, which is reported
     with reading(path, "a surface", SURFACE_KINDS), warnings.catch_warnings(action="ignore", category=UserWarning):
         vertices, faces, info = read_geometry(str(path), read_metadata=True)

@@ -24,37 +24,37 @@ XDMF_TOPOLOGY = {3: "Triangle", 4: "Tetrahedron", 10: "Tet_10"}
 
 
 def data_item(values: NDArray, where: str) -> str:
-    """Returns the XDMF element that points to `values` stored at `where` ("file.h5:/name")."""
+    """Return the XDMF element that points to `values` stored at `where` ("file.h5:/name")."""
     shape = " ".join(map(str, values.shape))
     kind, size = XDMF_NUMBER[values.dtype.kind], values.dtype.itemsize
     return f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="{size}" Format="HDF">{where}</DataItem>'
 
 
 def attribute(name: str, centre: str, values: NDArray, where: str) -> str:
-    """Returns the XDMF element of a field; `centre` is "Node" or "Cell"."""
+    """Return the XDMF element of a field; `centre` is "Node" or "Cell"."""
     kind = XDMF_ATTRIBUTE[1 if values.ndim == 1 else values.shape[1]]
     item = data_item(values, where)
     return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{item}</Attribute>'
 
 
 def topology(cells: NDArray, where: str) -> str:
-    """Returns the XDMF element of the tetrahedra (of 4 or 10 nodes) or triangles stored at `where`."""
+    """Return the XDMF element of the tetrahedra (of 4 or 10 nodes) or triangles stored at `where`."""
     item = data_item(cells, where)
     return f'<Topology TopologyType="{XDMF_TOPOLOGY[cells.shape[1]]}" NumberOfElements="{len(cells)}">{item}</Topology>'
 
 
 def geometry(points: NDArray, where: str) -> str:
-    """Returns the XDMF element of the points stored at `where`."""
+    """Return the XDMF element of the points stored at `where`."""
     return f'<Geometry GeometryType="XYZ">{data_item(points, where)}</Geometry>'
 
 
 def grid(name: str, parts: Iterable[str]) -> str:
-    """Returns the XDMF grid of a mesh, from its elements."""
+    """Return the XDMF grid of a mesh, from its elements."""
     return f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>'
 
 
 def document(*domains: str) -> str:
-    """Returns a whole XDMF document around the grids of its domains."""
+    """Return a whole XDMF document around the grids of its domains."""
     inside = "".join(f"<Domain>{grids}</Domain>" for grids in domains)
     return f'<?xml version="1.0"?>\n<Xdmf Version="3.0">{inside}</Xdmf>\n'
 
@@ -65,7 +65,7 @@ def write_tetrahedral_mesh(
     vertex_fields: Mapping[str, NDArray] | None = None,
     cell_fields: Mapping[str, NDArray] | None = None,
 ) -> None:
-    """Writes `path` (.xdmf) and the .h5 beside it: a mesh in mm, with fields (n,) or (n, 3) by name."""
+    """Write `path` (.xdmf) and the .h5 beside it: a mesh in mm, with fields (n,) or (n, 3) by name."""
     path = Path(path)
     data = path.with_suffix(".h5")
     fields = [("Node", name, np.asarray(values)) for name, values in (vertex_fields or {}).items()]
@@ -104,18 +104,10 @@ Tags = Mapping[str, NDArray[np.int32]]
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """A tetrahedral mesh with tags and fields.
+    """A tetrahedral mesh in mm with (f, 3) facets of its boundary, and fields (n,) or (n, 3) at its vertices by name.
 
-    Attributes
-    ----------
-    mesh
-        Vertices in mm.
-    facets : (f, 3) int
-        Facets of the boundary as vertex indices.
-    fields : {name: (n,) or (n, 3)}
-        Fields at the vertices.
-    cell_tags, facet_tags : {name: (m,) int}, {name: (f,) int}
-        A name in both is read by dolfinx from the grid `facet_NAME` for the facets.
+    Tags are (m,) of the elements and (f,) of the facets, by name; a name in both is read by dolfinx from the grid
+    `facet_NAME` for the facets.
     """
 
     mesh: TetrahedralMesh
@@ -126,7 +118,7 @@ class Regions:
 
 
 def write_regions(path: AnyPath, regions: Regions) -> None:
-    """Writes `path` (.xdmf) and the .h5 beside it."""
+    """Write `path` (.xdmf) and the .h5 beside it."""
     path = Path(path)
     data = path.with_suffix(".h5")
     cells = {"tets": regions.mesh.tets, "facets": regions.facets}
@@ -162,7 +154,7 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
 
 
 def read_regions(path: AnyPath) -> Regions:
-    """Returns what `write_regions` has written to `path`; InputError where the .h5 beside it was not written so."""
+    """Return what `write_regions` has written to `path`; InputError where the .h5 beside it was not written so."""
     data = Path(path).with_suffix(".h5")
     with reading_hdf5(data, "regions", "regions.h5 of a run") as file:
         mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])

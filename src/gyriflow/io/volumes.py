@@ -12,7 +12,7 @@ from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .files import AnyPath, reading, replaced, require_finite
+from .files import AGAIN, AnyPath, reading, replaced, require_finite
 
 log = logging.getLogger(__name__)
 
@@ -22,28 +22,21 @@ MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 # two header matrices that place every corner within this part of a voxel say the same thing
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
+WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform."
 MOST_PACKED = 1100
 """How many times shorter gzip makes a file at most (1032 times), with some room."""
 
 
 @dataclass(frozen=True, eq=False)
 class LabelVolume:
-    """A volume of tissue labels.
-
-    Attributes
-    ----------
-    labels : (i, j, k) int32
-        Tissue label of each voxel.
-    affine : (4, 4) float
-        Voxel index to RAS+ position in mm.
-    """
+    """The (i, j, k) tissue label of each voxel, and the (4, 4) affine from voxel indices to RAS+ positions in mm."""
 
     labels: NDArray[np.int32]
     affine: NDArray[np.float64]
 
 
 def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:
-    """Returns the label volume of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
+    """Return the label volume of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
 
     A `cropped` one ends a voxel beyond its labels, so that an empty border takes no memory.
 
@@ -71,7 +64,7 @@ def _without_empty_border(
 
 
 def voxels_of(path: AnyPath) -> tuple[int, float]:
-    """Returns the number of voxels of a volume and the volume of one in mm³, from its header alone."""
+    """Return the number of voxels of a volume and the volume of one in mm³, from its header alone."""
     with reading(path, "an image"):
         image = nib.load(path)
         if not isinstance(image, SpatialImage):
@@ -84,7 +77,7 @@ def voxels_of(path: AnyPath) -> tuple[int, float]:
 def read_values(
     path: AnyPath, affine_from: AffineSource, content: str
 ) -> tuple[NDArray[np.number], NDArray[np.float64]]:
-    """Returns the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
+    """Return the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
 
     `content` says in messages what the values are: "labels". InputError for missing or truncated files, other numbers
     of axes, unclear orientation.
@@ -100,7 +93,7 @@ def read_values(
 
 
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
-    """Writes a label volume as NIfTI in mm, in the smallest integer type that holds its labels."""
+    """Write a label volume as NIfTI in mm, in the smallest integer type that holds its labels."""
     labels = volume.labels
     kind = np.min_scalar_type(int(labels.max(initial=0))) if labels.min(initial=0) >= 0 else np.int32
     image = nib.Nifti1Image(labels.astype(kind), volume.affine)
@@ -116,19 +109,15 @@ def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
 
 
 def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
-    """Raises InputError where a header asks for more values than its file can hold, before memory is taken for them."""
     needed = math.prod(map(int, image.shape)) * image.get_data_dtype().itemsize
     # of a pair of files the one with the values, not the header
     data = Path(image.file_map["image"].filename or path)
     packed = data.name.lower().endswith((".gz", ".mgz", ".bz2"))
     size = data.stat().st_size
     if needed < 0 or needed > size * (MOST_PACKED if packed else 1):
+        expected = f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}"
         raise InputError(
-            "is shorter than its header says",
-            path=data,
-            found=f"{size} bytes{' (packed)' if packed else ''}",
-            expected=f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}",
-            remedy="The file is truncated or its header is damaged: copy or download it again.",
+            "is shorter than its header says", path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN
         )
 
 
@@ -137,13 +126,8 @@ def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> ND
     if isinstance(image, nib.Nifti1Pair):
         return _nifti_affine(image, affine_from, path)
     if isinstance(image, nib.AnalyzeImage):
-        raise InputError(
-            "is in the Analyze format, which holds no orientation, so left and right are unknown",
-            path=path,
-            found=type(image).__name__,
-            expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)",
-            remedy="Convert it to NIfTI from the images that it was made of, and check its left and right.",
-        )
+        problem = "is in the Analyze format, which holds no orientation, so left and right are unknown"
+        raise InputError(problem, path=path, expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)")
     return image.affine
 
 
@@ -163,47 +147,31 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
         return scale * matrices[affine_from]
     given = [name for name, code in codes.items() if code > 0]
     if not given:
-        raise InputError(
-            "neither qform nor sform is set, so left and right are unknown",
-            path=path,
-            expected="a qform or sform code > 0",
-            remedy="Write the orientation into the file, or say which matrix holds with the brain's affine_from.",
-        )
+        problem = "neither qform nor sform is set, so left and right are unknown"
+        raise InputError(problem, path=path, expected="a code > 0 of one", remedy=WHICH_MATRIX)
     if len(given) == 2:
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
         distance = _farthest_corner(matrices["sform"] - matrices["qform"], image.shape)
         if not distance <= AGREEMENT_VOXELS * voxel:
-            raise InputError(
-                f"qform and sform disagree by up to {distance:.3g} {unit}",
-                path=path,
-                found=f"\nqform (code {codes['qform']})\n{matrices['qform']}\n"
-                f"sform (code {codes['sform']})\n{matrices['sform']}\n",
-                expected="the same position of every voxel",
-                remedy="Say which one holds with the brain's affine_from: qform or sform.",
-            )
+            problem = f"qform and sform disagree by up to {distance:.3g} {unit}"
+            found = "".join(f"\n{name} (code {codes[name]})\n{matrices[name]}" for name in ("qform", "sform"))
+            raise InputError(problem, path=path, found=f"{found}\n", remedy=WHICH_MATRIX)
     return scale * matrices[given[0]]
 
 
 def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
-    """Returns the header's unit of length: a key of MM_PER_NIFTI_UNIT."""
     code = int(header["xyzt_units"])
     try:
         unit = str(header.get_xyzt_units()[0])
     except KeyError:
         unit = ""
     if unit not in MM_PER_NIFTI_UNIT:
-        raise InputError(
-            "has a unit of length that NIfTI does not know",
-            path=path,
-            found=f"xyzt_units {code}",
-            expected="2 (mm), 1 (metres), 3 (micrometres) or 0 (not said), with a unit of time added or not",
-            remedy="Write the unit into the header, for example with nibabel's set_xyzt_units('mm').",
-        )
+        problem, expected = "has a unit of length that NIfTI does not know", "2 (mm), 1 (metres), 3 (micrometres) or 0"
+        raise InputError(problem, path=path, found=f"xyzt_units {code}", expected=expected)
     return unit
 
 
 def _farthest_corner(difference: NDArray[np.float64], shape: tuple[int, ...]) -> float:
-    """Returns by how much two affines, whose difference is given, set the corners of a volume apart at most."""
     ends = np.array(np.meshgrid(*[[0, n - 1] for n in shape[:3]])).reshape(3, -1)
     return float(np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max())
 
@@ -221,43 +189,22 @@ def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
     shape = values.shape
     kept = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
     if len(kept) != 3 or values.dtype.kind not in "biuf":
-        raise InputError(
-            f"is not a volume of {content}",
-            path=path,
-            found=f"shape {shape}, type {values.dtype}",
-            expected="three axes (further ones of length 1) of numbers",
-            remedy="Give a single volume, not the images of a time series or of a colour map.",
-        )
+        found, expected = f"shape {shape}, type {values.dtype}", "three axes (further ones of length 1) of numbers"
+        raise InputError(f"is not a volume of {content}", path=path, found=found, expected=expected)
     return values.reshape(kept)
 
 
 def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
-    if values.dtype.kind != "f":
-        return _in_range(values, path)
-    require_finite(values.ravel(), path, "values", "voxels")
-    rounded = np.rint(values)
-    broken = int(np.count_nonzero(np.abs(values - rounded) > 1e-3))
-    if broken:
-        raise InputError(
-            "has values that are no whole numbers",
-            path=path,
-            found=f"{broken} voxels, for example {values[np.abs(values - rounded) > 1e-3].flat[0]:.4g}",
-            expected="tissue labels",
-            remedy="gyriflow does not segment images: give a tissue label volume.",
-        )
-    return _in_range(rounded, path)
-
-
-def _in_range(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
-    """Returns whole numbers as int32; InputError where they are larger than any label."""
-    least, largest = values.min(initial=0), values.max(initial=0)
-    bounds = np.iinfo(np.int32)
+    if values.dtype.kind == "f":
+        require_finite(values.ravel(), path, "values", "voxels")
+        broken = np.abs(values - np.rint(values)) > 1e-3
+        if broken.any():
+            found = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
+            remedy = "gyriflow does not segment images: give a tissue label volume."
+            raise InputError("has values that are no whole numbers", path=path, found=found, remedy=remedy)
+        values = np.rint(values)
+    least, largest, bounds = values.min(initial=0), values.max(initial=0), np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:
-        raise InputError(
-            "has values that are no tissue labels",
-            path=path,
-            found=f"{least:.6g} to {largest:.6g}",
-            expected=f"whole numbers up to {bounds.max}",
-            remedy="The header may be damaged, or its scaling (scl_slope, scl_inter) wrong: export the labels again.",
-        )
+        found, expected = f"{least:.6g} to {largest:.6g}", f"whole numbers up to {bounds.max}"
+        raise InputError("has values that are no tissue labels", path=path, found=found, expected=expected)
     return values.astype(np.int32)

@@ -20,7 +20,6 @@ class _StrictLoader(yaml.SafeLoader):
 
 
 def _size(value: Any, known: dict[int, int]) -> int:
-    """Returns the number of values in nested lists and mappings, those that aliases share counted each time."""
     if id(value) not in known:
         inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
         known[id(value)] = 1 + sum(_size(item, known) for item in inner)
@@ -46,7 +45,7 @@ _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _m
 
 
 def read_yaml(path: AnyPath) -> Any:
-    """Returns the content of a YAML (or JSON) file; InputError where it is missing, malformed or names a key twice."""
+    """Return the content of a YAML (or JSON) file; InputError where it is missing, malformed or names a key twice."""
     try:
         content = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
         size = _size(content, {})
@@ -61,16 +60,15 @@ def read_yaml(path: AnyPath) -> Any:
         raise InputError(f"is not valid YAML{line}: {problem}", path=path) from error
     except (ValueError, LookupError, TypeError, AttributeError) as error:
         # words that look like a date or a number and are none, such as 2001-99-99 or 0b
-        raise InputError(
-            f"has a value that YAML cannot read: {error}", path=path, remedy="Put texts in quotes."
-        ) from error
+        problem = f"has a value that YAML cannot read: {error}"
+        raise InputError(problem, path=path, remedy="Put texts in quotes.") from error
     if size > MOST_VALUES:
         raise InputError("has too many values, aliases written out", path=path, found=size, expected=MOST_VALUES)
     return content
 
 
 def read_keys(path: AnyPath) -> dict[str, Any]:
-    """Returns the keys of a YAML (or JSON) file with their values; InputError where it has none."""
+    """Return the keys of a YAML (or JSON) file with their values; InputError where it has none."""
     content = read_yaml(path)
     if not isinstance(content, dict):
         found = "nothing" if content is None else "a list" if isinstance(content, list) else repr(content)
@@ -79,12 +77,12 @@ def read_keys(path: AnyPath) -> dict[str, Any]:
 
 
 def yaml_text(content: Any) -> str:
-    """Returns content as YAML."""
+    """Return content as YAML."""
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
 
 
 def write_yaml(path: AnyPath, content: Any) -> None:
-    """Writes plain dictionaries, lists and numbers, keys in their order."""
+    """Write plain dictionaries, lists and numbers, keys in their order."""
     write_text(path, yaml_text(content))
 
 

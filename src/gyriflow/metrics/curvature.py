@@ -13,16 +13,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from ..errors import MeshError
-from ..geometry.triangles import (
-    Floats,
-    Ints,
-    TriangleMesh,
-    edges,
-    mean_edge_length,
-    unit,
-    vertex_areas,
-    vertex_normals,
-)  # fmt: skip
+from ..geometry.triangles import Floats, Ints, TriangleMesh, edges, mean_edge_length, unit, vertex_areas, vertex_normals
 from ..parameters.terms import CURVATURE_RADIUS_MM
 
 RESOLVED_RADII = 4.0
@@ -49,16 +40,10 @@ _NORMAL_EQUATIONS = np.array([[_MONOMIALS.index((a + c, b + d)) for a, b in _POW
 
 @dataclass(frozen=True, eq=False)
 class Curvature:
-    """Curvature per vertex of a surface with n vertices.
+    """Curvature per vertex of a surface with n vertices, and the (n,) radius of the ball that each is fitted in.
 
-    Attributes
-    ----------
-    maximum, minimum : (n,) float
-        Principal curvatures κ1 ≥ κ2 in 1/mm; both are 1/R on a sphere of radius R.
-    reliable : (n,) bool
-        False where the ball round a vertex reaches the boundary of an open surface, or no quadric could be fitted.
-    radius_mm : (n,) float
-        Radius of the ball that each vertex's curvature is fitted in.
+    `maximum` and `minimum` (n,) are the principal curvatures κ1 ≥ κ2 in 1/mm, both 1/R on a sphere of radius R.
+    `reliable` (n,) is False where the ball reaches the boundary of an open surface, or no quadric could be fitted.
     """
 
     maximum: Floats
@@ -91,7 +76,7 @@ class Curvature:
 
 
 def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> Curvature:
-    """Returns the curvature from quadrics fitted to the surface within `radius_mm` of each vertex.
+    """Return the curvature from quadrics fitted to the surface within `radius_mm` of each vertex.
 
     The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
     curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
@@ -101,36 +86,25 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
     """
     finest = EDGES_PER_RADIUS * mean_edge_length(mesh)
     if finest > radius_mm:
-        log.warning(
-            "curvature at a radius of %.3g mm is finer than the mesh: %.3g mm is the finest it supports",
-            radius_mm,
-            finest,
-        )
+        said = "curvature at a radius of %.3g mm is finer than the mesh: %.3g mm is the finest it supports"
+        log.warning(said, radius_mm, finest)
     radii = np.maximum(radius_mm, EDGES_PER_RADIUS * _edge_lengths(mesh))
     coefficients, fitted, one_sided = _quadrics(mesh, radii)
     failed = int(np.count_nonzero(~fitted))
     if failed > MAX_FAILED_SHARE * len(mesh.vertices):
-        raise MeshError(
-            "no curvature can be fitted",
-            found=f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood",
-            remedy="Repair or remesh the surface",
-        )
+        found = f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood"
+        raise MeshError("no curvature can be fitted", found=found, remedy="Repair or remesh the surface.")
     a, b, c, d, e, _ = coefficients.T
     # first and second fundamental form of the height function; outward normals make a cap negative
     stretch = 1.0 + d**2 + e**2
     mean = -((1.0 + e**2) * a - d * e * b + (1.0 + d**2) * c) / stretch**1.5
     gaussian = (4.0 * a * c - b**2) / stretch**2
     half_difference = np.sqrt(np.maximum(mean**2 - gaussian, 0.0))
-    return Curvature(
-        maximum=mean + half_difference,
-        minimum=mean - half_difference,
-        reliable=fitted & ~one_sided,
-        radius_mm=radii,
-    )
+    return Curvature(mean + half_difference, mean - half_difference, fitted & ~one_sided, radii)
 
 
 def continue_smoothly(values: Floats, known: NDArray[np.bool_], stiffness: sparse.csc_matrix) -> Floats:
-    """Returns (n,) values with the unknown ones replaced by the smoothest continuation of the known ones.
+    """Return (n,) values with the unknown ones replaced by the smoothest continuation of the known ones.
 
     The continuation is harmonic (K f = 0 with the (n, n) stiffness matrix K) with a free boundary.
     """
@@ -144,7 +118,7 @@ def continue_smoothly(values: Floats, known: NDArray[np.bool_], stiffness: spars
 
 
 def curvature_integrals(bend: Curvature, areas: Floats) -> dict[str, float]:
-    """Returns integrals over a surface with (n,) areas of the vertices in mm², |k₁| the larger principal curvature.
+    """Return integrals over a surface with (n,) areas of the vertices in mm², |k₁| the larger principal curvature.
 
     intrinsic_curvature_index
         1/4π ∫ max(K, 0) dA; 1 for all convex surfaces (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102).
@@ -166,19 +140,18 @@ def curvature_integrals(bend: Curvature, areas: Floats) -> dict[str, float]:
 
 
 def mean_curvature_quantiles(bend: Curvature, areas: Floats) -> dict[str, float]:
-    """Returns the mean curvatures in 1/mm below which 5, 25, 50, 75 and 95 % of the area are, by name."""
+    """Return the mean curvatures in 1/mm below which 5, 25, 50, 75 and 95 % of the area are, by name."""
     values = np.quantile(bend.mean, QUANTILES, weights=areas, method="inverted_cdf")
     names = (f"mean_curvature_q{round(100 * share):02d}" for share in QUANTILES)
     return dict(zip(names, map(float, values), strict=True))
 
 
 def join(bends: list[Curvature]) -> Curvature:
-    """Returns the curvature of surfaces side by side."""
+    """Return the curvature of surfaces side by side."""
     return Curvature(*(np.concatenate([getattr(bend, one.name) for bend in bends]) for one in fields(Curvature)))
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
-    """Returns the (n,) mean length in mm of the edges at each vertex, 0 without edges."""
     pairs, _ = edges(mesh)
     lengths = np.repeat(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2)
     size = len(mesh.vertices)
@@ -189,7 +162,7 @@ type Quadrics = tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]
 
 
 def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
-    """Returns quadrics over the tangent planes of n vertices, by weighted least squares in a ball round each.
+    """Return quadrics over the tangent planes of n vertices, by weighted least squares in a ball round each.
 
     The ball takes in what is linked to its centre by edges inside it: not the other wall of a sulcus. The weight is
     area × cosine × (1 − d²/radius²): area of the vertex, turned into the tangent plane, so that the sum stands for an
@@ -217,7 +190,6 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
 
 
 def _links(mesh: TriangleMesh) -> tuple[sparse.csr_matrix, NDArray[np.bool_]]:
-    """Returns the (n, n) matrix of a vertex's links to itself and its neighbours, and the (n,) mask of the boundary."""
     pairs, uses = edges(mesh)
     size = len(mesh.vertices)
     boundary = np.zeros(size, dtype=bool)
@@ -227,7 +199,6 @@ def _links(mesh: TriangleMesh) -> tuple[sparse.csr_matrix, NDArray[np.bool_]]:
 
 
 def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
-    """Yields indices of (c,) centres and the (c, n) pattern of the vertices in their balls, grown ring by ring."""
     for start in range(0, len(vertices), CHUNK):
         centres = np.arange(start, min(start + CHUNK, len(vertices)))
         ball = links[centres]
@@ -254,7 +225,6 @@ def _fit(
     balls: sparse.csr_matrix,
     boundary: NDArray[np.bool_],
 ) -> Quadrics:
-    """Returns what `_quadrics` does for some centres and the patterns of their balls."""
     near, starts, counts = balls.indices, balls.indptr[:-1], np.diff(balls.indptr)
     scale = np.repeat(radii_mm[centres], counts)
     away = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[:, None]

@@ -7,10 +7,11 @@ import numpy as np
 import trimesh
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial import cKDTree
 
 from ..errors import MeshError
-from ..geometry.remeshing import pymeshlab
+from ..geometry.matching import nearest_on
+from ..geometry.remeshing import from_meshlab, in_meshlab, pymeshlab
 from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, vertex_normals
 
 ENVELOPE_RADIUS_MM = 5.0
@@ -27,7 +28,7 @@ LOCAL_RADIUS_MM = 10.0
 
 
 def cap(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns the surface with every boundary closed, the faces that close it after its own.
+    """Return the surface with every boundary closed, the faces that close it after its own.
 
     Each boundary gets a fan of faces from its centroid. A cut in a plane is closed by that part of the plane. A closed
     surface is returned as it is. MeshError where a boundary is not a closed line.
@@ -50,36 +51,19 @@ def cap(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def envelope(mesh: TriangleMesh, *, radius_mm: float = ENVELOPE_RADIUS_MM) -> TriangleMesh:
-    """Returns a closed surface that follows the outer folds and bridges sulci narrower than twice `radius_mm`.
+    """Return a closed surface that follows the outer folds and bridges sulci narrower than twice `radius_mm`.
 
     It is an alpha wrap (Portaneri et al. 2022, in pymeshlab) of the capped surface, moved back onto it by the offset
     that the wrap needs. The area of a sphere comes out 0.3 % small.
     """
-    closed = cap(mesh)
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(closed.vertices, closed.faces))
-    meshes.generate_alpha_wrap(alpha=pymeshlab.PureValue(radius_mm), offset=pymeshlab.PureValue(ENVELOPE_OFFSET_MM))
-    wrap = meshes.current_mesh()
-    outside = TriangleMesh(wrap.vertex_matrix(), wrap.face_matrix())
+    document = in_meshlab(cap(mesh))
+    document.generate_alpha_wrap(alpha=pymeshlab.PureValue(radius_mm), offset=pymeshlab.PureValue(ENVELOPE_OFFSET_MM))
+    outside = from_meshlab(document)
     return TriangleMesh(outside.vertices - ENVELOPE_OFFSET_MM * vertex_normals(outside), outside.faces)
 
 
-def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns the convex hull, its faces outward; MeshError for a flat surface."""
-    try:
-        hull = ConvexHull(mesh.vertices)
-    except QhullError as error:
-        raise MeshError("the surface has no convex hull", remedy="It has to enclose a volume") from error
-    faces = np.asarray(hull.simplices, dtype=np.int64)
-    a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    used, local = np.unique(faces, return_inverse=True)
-    return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3))
-
-
 def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
-    """Returns the (n,) straight distance in mm from each vertex outwards to the closed surface around; 0 outside it.
+    """Return the (n,) straight distance in mm from each vertex outwards to the closed surface around; 0 outside it.
 
     Around is the convex hull of the hemisphere: of the measures that were compared it is nearest to the
     known depths of shapes, and does not jump when the lips of a fissure close.
@@ -92,22 +76,14 @@ def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A surface around a pial surface in small pieces, without those that lie over a cut.
-
-    Attributes
-    ----------
-    centres : (k, 3) float
-        In mm.
-    areas : (k,) float
-        In mm².
-    """
+    """A surface around a pial surface in small pieces, without those over a cut: (k, 3) centres in mm, areas in mm²."""
 
     centres: Floats
     areas: Floats
 
 
 def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
-    """Returns a surface around `mesh` in pieces of 2 mm, without what lies over the cuts that `mesh` is open at.
+    """Return a surface around `mesh` in pieces of 2 mm, without what lies over the cuts that `mesh` is open at.
 
     A piece is left out where its nearest point of the capped mesh is on a cap.
     """
@@ -117,13 +93,12 @@ def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     closed = cap(mesh)
     if len(closed.faces) == len(mesh.faces):
         return Pieces(centres, areas)
-    _, nearest, _ = igl.point_mesh_squared_distance(centres, closed.vertices, closed.faces)
-    kept = nearest < len(mesh.faces)
+    kept = nearest_on(centres, closed)[1] < len(mesh.faces)
     return Pieces(centres[kept], areas[kept])
 
 
 def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> float:
-    """Returns the area of surfaces over that of the hulls or envelopes around them, cuts left out of both.
+    """Return the area of surfaces over that of the hulls or envelopes around them, cuts left out of both.
 
     The index of a brain is that of its two hemispheres, each in its own hull: a hull around both would bridge the
     fissure between them and count it as folding.
@@ -132,7 +107,7 @@ def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> floa
 
 
 def local_gyrification_index(mesh: TriangleMesh, around: Pieces, *, radius_mm: float = LOCAL_RADIUS_MM) -> Floats:
-    """Returns the (n,) area of the pial surface over that of the envelope, round each vertex.
+    """Return the (n,) area of the pial surface over that of the envelope, round each vertex.
 
     As Schaer et al. 2008 (IEEE Trans. Med. Imaging 27, 161-170), a patch of the envelope, here all within `radius_mm`
     of the point nearest to the vertex, is compared with the pial surface that belongs to it: what is nearest to that

@@ -18,6 +18,8 @@ TOLERANCE = 1e-11
 MODES_PER_SLICE = 100
 """Eigenvalues that SLEPc looks for round each shift; from 60 to 200 it matters little."""
 
+SLIVERS = "Remesh the surface: slivers make its spectrum inexact."
+
 DENSE_VERTICES = 600
 DENSE_VERTICES_MANY_MODES = 3000
 """Up to these sizes LAPACK solves the problem as a whole; the second where over a third of all modes are wanted."""
@@ -25,14 +27,9 @@ DENSE_VERTICES_MANY_MODES = 3000
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The lowest modes of a surface.
+    """The lowest modes of a surface: (k,) ascending eigenvalues λ in mm⁻², the first 0, and (n, k) functions in mm⁻¹.
 
-    Attributes
-    ----------
-    eigenvalues : (k,) float
-        λ in mm⁻², ascending; the first is 0.
-    functions : (n, k) float
-        Eigenfunctions per vertex as columns, in mm⁻¹, M-orthonormal: φᵢᵀ M φⱼ = δᵢⱼ.
+    The functions, as columns, are M-orthonormal: φᵢᵀ M φⱼ = δᵢⱼ.
     """
 
     eigenvalues: Floats
@@ -40,7 +37,7 @@ class Modes:
 
 
 def laplacian(mesh: TriangleMesh) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
-    """Returns the (n, n) stiffness K (no unit) and mass M (mm²) of linear finite elements.
+    """Return the (n, n) stiffness K (no unit) and mass M (mm²) of linear finite elements.
 
     The boundary of an open surface is free (Neumann). MeshError where a vertex has no face.
     """
@@ -53,7 +50,7 @@ def laplacian(mesh: TriangleMesh) -> tuple[sparse.csc_matrix, sparse.csc_matrix]
 
 
 def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int) -> Modes:
-    """Returns the `count` lowest modes of K φ = λ M φ, by `modes_below` a limit that has at least as many below it.
+    """Return the `count` lowest modes of K φ = λ M φ, by `modes_below` a limit that has at least as many below it.
 
     SolverError for a count that the surface does not have, and where a mode is missed.
     """
@@ -72,7 +69,7 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
 
 
 def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> Modes:
-    """Returns all modes of K φ = λ M φ with λ below `value` (mm⁻²).
+    """Return all modes of K φ = λ M φ with λ below `value` (mm⁻²).
 
     SLEPc's spectrum slicing with shift-and-invert Krylov-Schur (Campos and Roman 2012, Numer. Algorithms 60, 279-295):
     the inertia of K − σM at each shift gives the number of eigenvalues between shifts, so that none can be missed.
@@ -109,25 +106,16 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
         solver.solve()
         return _converged_modes(solver, operators[0], count_below(stiffness, mass, value))
     except PETSc.Error as error:
-        raise SolverError(
-            f"the modes up to λ = {value:g} mm⁻² could not be found",
-            found=f"SLEPc's error {error.ierr}",
-            remedy="Remesh the surface: slivers make its spectrum inexact",
-        ) from error
+        problem = f"the modes up to λ = {value:g} mm⁻² could not be found"
+        raise SolverError(problem, found=f"SLEPc's error {error.ierr}", remedy=SLIVERS) from error
     finally:
         for thing in (solver, *operators):
             thing.destroy()
 
 
 def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
-    """Returns the modes on which a solver has converged; SolverError where their number is not `number`."""
     if (found := solver.getConverged()) != number:
-        raise SolverError(
-            "the number of modes is wrong",
-            found=found,
-            expected=number,
-            remedy="Remesh the surface: slivers make its spectrum inexact",
-        )
+        raise SolverError("the number of modes is wrong", found=found, expected=number, remedy=SLIVERS)
     vector, _ = operator.createVecs()
     values, functions = np.empty(number), np.empty((vector.getSize(), number), order="F")
     for i in range(number):
@@ -139,12 +127,11 @@ def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
 
 
 def _spacing(mass: sparse.csc_matrix) -> float:
-    """Returns the mean distance between eigenvalues in mm⁻² by Weyl's law."""
     return float(4.0 * np.pi / mass.sum())
 
 
 def count_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> int:
-    """Returns the number of eigenvalues below `value` (mm⁻²), from the inertia of K − value·M.
+    """Return the number of eigenvalues below `value` (mm⁻²), from the inertia of K − value·M.
 
     With pivots on the diagonal, P(K − value·M)Pᵀ = L U with U = D Lᵀ, so D has the signs of the eigenvalues.
     """

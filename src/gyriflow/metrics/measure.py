@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import MeshError
 from ..geometry.matching import crossing_faces
-from ..geometry.triangles import Floats, TriangleMesh, area, mean_edge_length, signed_volume, vertex_areas
+from ..geometry.triangles import Floats, TriangleMesh, area, convex_hull, mean_edge_length, signed_volume, vertex_areas
 from ..parameters.terms import (
     CURVATURE_RADIUS_MM,
     SPANGY_MODES,
@@ -36,7 +36,6 @@ from .curvature import (
 from .gyrification import (
     Pieces,
     cap,
-    convex_hull,
     envelope,
     gyrification_index,
     local_gyrification_index,
@@ -85,7 +84,7 @@ class Folds:
     local_gyrification: Floats
 
     def maps(self) -> dict[str, NDArray]:
-        """Returns the arrays per vertex by name, of those in `BrainMetrics.maps`."""
+        """Return the arrays per vertex by name, of those in `BrainMetrics.maps`."""
         return {
             "shape_index": self.bend.shape_index,
             "curvedness": self.bend.curvedness,
@@ -112,13 +111,13 @@ class Hemisphere(Folds):
     weyl: int
 
     def maps(self) -> dict[str, NDArray]:
-        """Returns the arrays per vertex by name, as in `BrainMetrics.maps`."""
+        """Return the arrays per vertex by name, as in `BrainMetrics.maps`."""
         known = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
         return {**super().maps(), **known, "spangy_dominant_band": self.spectrum.dominant_band}
 
 
 def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
-    """Returns the folds of a hemisphere's surface; see `curvature.curvature` for the radius."""
+    """Return the folds of a hemisphere's surface; see `curvature.curvature` for the radius."""
     hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
     return Folds(
         mesh=mesh,
@@ -131,7 +130,7 @@ def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
 
 
 def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, settings: Settings) -> Hemisphere:
-    """Returns what is measured on a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
+    """Return what is measured on a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
     folds = measure_folds(mesh, settings.curvature_radius_mm)
     bend = folds.bend
     stiffness, mass = laplacian(mesh)
@@ -151,7 +150,7 @@ def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, 
 
 
 def size_rows(mesh: TriangleMesh, crossing: int) -> list[Row]:
-    """Returns the rows of size of a hemisphere or of the whole, and the number of faces that cut others."""
+    """Return the rows of size of a hemisphere or of the whole, and the number of faces that cut others."""
     return [
         ("volume", signed_volume(cap(mesh)) * ML_PER_MM3, "mL"),
         ("area", area(mesh) * CM2_PER_MM2, "cm2"),
@@ -160,7 +159,7 @@ def size_rows(mesh: TriangleMesh, crossing: int) -> list[Row]:
 
 
 def folding_rows(sides: Sequence[Folds]) -> list[Row]:
-    """Returns the rows of folding of one hemisphere, or of a brain's two together; what is near cuts is left out.
+    """Return the rows of folding of one hemisphere, or of a brain's two together; what is near cuts is left out.
 
     Indices are of both hemispheres' areas, each in its own hull; means are over the vertices of both, by area.
     """
@@ -196,7 +195,7 @@ def folding_rows(sides: Sequence[Folds]) -> list[Row]:
 
 
 def thickness_rows(values: Floats, areas: Floats) -> list[Row]:
-    """Returns the rows of thickness at (n,) vertices, NaN where it was not measured; weights by area."""
+    """Return the rows of thickness at (n,) vertices, NaN where it was not measured; weights by area."""
     known = np.isfinite(values)
     if not known.any():
         return []
@@ -213,7 +212,7 @@ def thickness_rows(values: Floats, areas: Floats) -> list[Row]:
 
 
 def spectrum_rows(side: Hemisphere) -> list[Row]:
-    """Returns the rows of a hemisphere's spectrum.
+    """Return the rows of a hemisphere's spectrum.
 
     A band that is cut off has NaN, and relative powers are NaN where a band that they are shares of is cut off:
     `spectra` has all values with their flags.
@@ -277,7 +276,7 @@ def measure_brain(
     threads: int = 1,
     **settings: Any,
 ) -> BrainMetrics:
-    """Returns the metrics of a brain.
+    """Return the metrics of a brain.
 
     Parameters
     ----------
@@ -359,7 +358,7 @@ def measure_brain(
 def measure_white(
     sides: Mapping[str, TriangleMesh], curvature_radius_mm: float = CURVATURE_RADIUS_MM
 ) -> tuple[pd.DataFrame, dict[str, dict[str, NDArray]]]:
-    """Returns the metrics and the maps of the white surfaces of "left" and "right", or of the only hemisphere.
+    """Return the metrics and the maps of the white surfaces of "left" and "right", or of the only hemisphere.
 
     They are measured as pial ones are. The table has hemisphere, metric, value and unit of their area and of
     `OF_WHITE`, the names with `white_` in front; the maps are those of `Folds` per hemisphere.

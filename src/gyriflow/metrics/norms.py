@@ -60,7 +60,7 @@ class PublishedNorm:
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
-    """Returns the norms of a file of `norms/`, by structure; InputError where a standard deviation is not positive."""
+    """Return the norms of a file of `norms/`, by structure; InputError where a standard deviation is not positive."""
     norms = {}
     first, last = data["weeks"]
     shared = {"unit": data["unit"], "subjects": data["subjects"], "scheme": data.get("scheme", "")}
@@ -80,7 +80,7 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
 def structure_volumes(
     volumes: Mapping[int, float], scheme: LabelScheme, norms: Mapping[str, PublishedNorm]
 ) -> tuple[dict[str, float], list[str]]:
-    """Returns the volumes of the structures that norms are of, and those that are of labels of another scheme.
+    """Return the volumes of the structures that norms are of, and those that are of labels of another scheme.
 
     Volumes are by label, in the norms' unit. A brain of another scheme has those of its nearest tissues, such as its
     cortex; a structure that it has no list for, or no voxel of, is left out.
@@ -103,7 +103,7 @@ def published_scores(
     others: Sequence[str] = (),
     sides: Sequence[Side] = SIDES,
 ) -> pd.DataFrame:
-    """Returns where the volumes of a brain stand among published ones.
+    """Return where the volumes of a brain stand among published ones.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def published_scores(
 
 
 def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    """Returns the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
+    """Return the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
 
     Metrics have the columns subject, run, week, hemisphere, metric, value, unit; the reference are subjects whose
     measured brains are the norm. Columns hemisphere, metric, unit, week, brains (at most half a week away), mean, sd
@@ -160,7 +160,7 @@ def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFr
 
 
 def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    """Returns where brains stand among the measured brains of a reference, at their own week.
+    """Return where brains stand among the measured brains of a reference, at their own week.
 
     A quadratic of the week (a line for three weeks, their mean for fewer) is put through the reference brains by least
     squares. The centile is that of a further brain's value under Student's distribution, which is the wider the fewer
@@ -196,7 +196,7 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
 
 
 def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
-    """Returns for each row of a table of metrics whether its brain has the hemispheres of a reference's brains.
+    """Return for each row of a table of metrics whether its brain has the hemispheres of a reference's brains.
 
     The whole of a brain with one hemisphere is that hemisphere: its volume and area are half of what others have.
     """
@@ -211,7 +211,6 @@ def _reference(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
 
 
 def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
-    """Returns the rows of the reference's measured brains by (hemisphere, metric)."""
     return list(_reference(metrics, reference).groupby(["hemisphere", "metric"], sort=False))
 
 
@@ -225,7 +224,6 @@ class _Curve(NamedTuple):
 
 
 def _curve(weeks: Floats, values: Floats, at: Floats) -> _Curve | None:
-    """Returns the curve through reference brains at some weeks; None where there are too few for a scatter."""
     distinct = len(np.unique(weeks))
     degree = 2 if distinct > 3 else 1 if distinct == 3 else 0
     freedom = len(weeks) - degree - 1
@@ -240,7 +238,7 @@ def _curve(weeks: Floats, values: Floats, at: Floats) -> _Curve | None:
 
 
 def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, points: int = 41) -> pd.DataFrame:
-    """Returns the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
+    """Return the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
 
     Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
     Student's distribution.
@@ -261,7 +259,6 @@ def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, points: int 
 def _score(
     week: float, value: float, weeks: Floats, values: Floats
 ) -> tuple[float, float, float, float, int, int, str]:
-    """Returns expected, sd, z, centile, brains, brains_of_week and flag of `measured_scores`."""
     counts = len(weeks), int(np.count_nonzero(np.abs(weeks - week) <= WINDOW_GW))
     curve = _curve(weeks, values, np.array([week])) if len(weeks) else None
     if curve is None or not weeks.min() - WINDOW_GW <= week <= weeks.max() + WINDOW_GW:

@@ -33,7 +33,7 @@ def region_metrics(
     labels: Mapping[str, Ints],
     names: Mapping[int, str],
 ) -> pd.DataFrame:
-    """Returns area and means of maps by region of each hemisphere, weighted by area.
+    """Return area and means of maps by region of each hemisphere, weighted by area.
 
     Parameters
     ----------

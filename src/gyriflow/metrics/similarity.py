@@ -8,7 +8,7 @@ from ..geometry.triangles import TriangleMesh, transformed, vertex_areas
 
 
 def brain_distances(simulated: dict[str, TriangleMesh], real: dict[str, TriangleMesh]) -> pd.DataFrame:
-    """Returns the distances between two brains: a row per part (such as whole, left and right) and metric.
+    """Return the distances between two brains: a row per part (such as whole, left and right) and metric.
 
     Each part is aligned by itself. Columns hemisphere, metric, value, unit; the metrics are those of
     `aligned_distance`.
@@ -22,7 +22,7 @@ def brain_distances(simulated: dict[str, TriangleMesh], real: dict[str, Triangle
 
 
 def aligned_distance(a: TriangleMesh, b: TriangleMesh) -> dict[str, float]:
-    """Returns the distances in mm between two surfaces in RAS+ mm, `a` moved rigidly onto `b` first.
+    """Return the distances in mm between two surfaces in RAS+ mm, `a` moved rigidly onto `b` first.
 
     symmetric_mean is the mean over both directions of the area-weighted mean distance of the vertices to the other
     surface, hausdorff95 the larger of the two 95 % quantiles.

@@ -64,7 +64,7 @@ class Spectrum:
 
 
 def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> float:
-    """Returns λ1, the lowest eigenvalue above 0, in mm⁻²; MeshError where the surface is not in one piece."""
+    """Return λ1, the lowest eigenvalue above 0, in mm⁻²; MeshError where the surface is not in one piece."""
     values = lowest_modes(stiffness, mass, 3).eigenvalues
     # the constant is the only mode at 0 of a connected surface; Weyl's spacing gives the scale
     if values[1] < 1e-6 * 4.0 * np.pi / mass.sum():
@@ -73,7 +73,7 @@ def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> f
 
 
 def weyl_number(area_mm2: float, first: float) -> int:
-    """Returns the number of modes up to band B6 by Weyl's law, N = A·λmax/4π.
+    """Return the number of modes up to band B6 by Weyl's law, N = A·λmax/4π.
 
     WL6 = WL0/2⁶ with WL0 = 2π/√λ1, and λmax = 2π/WL6², the formula printed in the FetalFoldSim paper; it is 2π times
     smaller than (2π/WL6)² = 4⁶·λ1, the upper limit of B6.
@@ -84,7 +84,7 @@ def weyl_number(area_mm2: float, first: float) -> int:
 
 
 def band_limits(first: float) -> Floats:
-    """Returns the (7,) limits of the bands B1 to B6 in mm⁻²: Bk holds λ1·4^(k−1) ≤ λ < λ1·4^k."""
+    """Return the (7,) limits of the bands B1 to B6 in mm⁻²: Bk holds λ1·4^(k−1) ≤ λ < λ1·4^k."""
     return first * 4.0 ** np.arange(BANDS + 1)
 
 
@@ -94,7 +94,7 @@ def modes_of(
     mass: sparse.csc_matrix,
     first: float,
 ) -> tuple[Modes, float]:
-    """Returns the modes that a hemisphere's spectrum is made of, and the λ in mm⁻² below which none is missing.
+    """Return the modes that a hemisphere's spectrum is made of, and the λ in mm⁻² below which none is missing.
 
     The name of a band stands for all modes up to its end; that none is missing there is known by inertia, so that no
     mode of the next band is needed to show it. They are at most half as many as there are vertices. A number is taken
@@ -110,7 +110,7 @@ def modes_of(
 
 
 def bands_of_modes(eigenvalues: Floats) -> Ints:
-    """Returns the (k,) band of each mode: 0 for the constant alone, −1 beyond B6."""
+    """Return the (k,) band of each mode: 0 for the constant alone, −1 beyond B6."""
     limits = band_limits(eigenvalues[1])
     band = np.searchsorted(limits, eigenvalues, side="right")
     band[0] = 0
@@ -127,7 +127,7 @@ def spectrum(
     reach: float | None = None,
     weyl: int | None = None,
 ) -> Spectrum:
-    """Returns the band spectrum of a folding proxy, (n,) values per vertex.
+    """Return the band spectrum of a folding proxy, (n,) values per vertex.
 
     `reach` is the λ in mm⁻² below which no mode is missing; that of the highest mode where it is not given. `weyl` is
     Weyl's number, where known.
@@ -151,12 +151,10 @@ def spectrum(
 
 
 def _powers(band: Ints, coefficients: Floats) -> Floats:
-    """Returns the (7,) powers of the bands, NaN of those without modes."""
     return np.array([np.sum(coefficients[own] ** 2) if (own := band == k).any() else np.nan for k in range(BANDS + 1)])
 
 
 def _relative(power: Floats) -> Floats:
-    """Returns the (7,) shares in the power of B1 to B6, NaN for B0 and for bands without modes."""
     total = np.nansum(power[1:])
     return np.concatenate([[np.nan], power[1:] / total if total > 0 else 0 * power[1:]])
 
@@ -186,7 +184,7 @@ def _band_table(
 
 
 def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
-    """Returns how far the spectrum of each hemisphere is from those of the same side of all measured brains.
+    """Return how far the spectrum of each hemisphere is from those of the same side of all measured brains.
 
     The distance up to band Bk is √Σ(s − s′)² over the fold bands B4 to Bk, where s is the share that a band has of the
     power of B1 to Bk: 0 for equal shares, at most √2. Neither the size of the brain nor the number of modes enters it.
@@ -222,7 +220,6 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
 
 
 def _distances(a: Floats, b: Floats, resolved: NDArray[np.bool_]) -> list[tuple[str, float, str]]:
-    """Returns metric, value and flag for the powers of B1 to B6, NaN where a band is not complete."""
     rows = []
     for last in FOLD_BANDS:
         fold = slice(FOLD_BANDS[0] - 1, last)

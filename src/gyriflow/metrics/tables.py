@@ -23,7 +23,7 @@ SAME_WEEK_GW = 0.005
 
 
 def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Returns tables of metrics, of whole hemispheres and of regions, as one, a row per number.
+    """Return tables of metrics, of whole hemispheres and of regions, as one, a row per number.
 
     Columns subject, run, week, hemisphere, region ("" for whole hemispheres), metric, value, unit.
     """
@@ -33,7 +33,7 @@ def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
 
 def wide_names(table: pd.DataFrame) -> list[str]:
-    """Returns the column of the wide table that each row of one as of `long_table` belongs in.
+    """Return the column of the wide table that each row of one as of `long_table` belongs in.
 
     They are named by hemisphere, region, metric and unit, such as `left_frontal_area_cm2`; numbers without a unit have
     none in their name.
@@ -44,7 +44,7 @@ def wide_names(table: pd.DataFrame) -> list[str]:
 
 
 def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]]) -> pd.DataFrame:
-    """Returns a table as of `long_table` with a row per brain, run and week, and the columns of `wide_names`.
+    """Return a table as of `long_table` with a row per brain, run and week, and the columns of `wide_names`.
 
     Before these stand the covariates of each brain, by its id; of a simulated one, its start's.
     """
@@ -59,7 +59,7 @@ def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]])
 
 
 def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
-    """Returns the asymmetry index 2 (left − right)/(|left| + |right|) of each metric, of each region where there are.
+    """Return the asymmetry index 2 (left − right)/(|left| + |right|) of each metric, of each region where there are.
 
     Between −2 and 2, positive where the left side has more; NaN where both are 0 or one is not known. Metrics have the
     columns hemisphere, metric, value, and any others that rows of both sides have alike, such as region; these stay.
@@ -75,7 +75,7 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
 
 
 def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str]]) -> pd.DataFrame:
-    """Returns how metrics change between successive scans of a subject, and between the same weeks of simulations.
+    """Return how metrics change between successive scans of a subject, and between the same weeks of simulations.
 
     Metrics have the columns subject (the brain), run, week, hemisphere, metric, value, unit, and region where they are
     of regions; scans are the brains of each subject, by week.
@@ -119,7 +119,7 @@ def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str
 
 
 def weekly_norms(weeks: Sequence[float], positions: Sequence[Floats], pial: Ints) -> pd.DataFrame:
-    """Returns the largest and the mean length of the displacement between successive weeks, as in the paper's table.
+    """Return the largest and the mean length of the displacement between successive weeks, as in the paper's table.
 
     Positions in mm are (n, 3) of the same nodes in each of the ascending weeks, `pial` the (k,) indices of the nodes on
     the pial surface. Columns from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm; two rows per pair of weeks.

@@ -16,7 +16,7 @@ SAME_POINT_MM = 1e-3
 
 
 def depth_of_weight(weight: Floats) -> Floats:
-    """Returns the depth in cortical thicknesses, d/H, at which the cortical weight has (m,) values.
+    """Return the depth in cortical thicknesses, d/H, at which the cortical weight has (m,) values.
 
     The inverse of the folding model's w = 1/(1 + exp(10 (d/H − 1))), which is ½ at the border of cortex and core.
     """
@@ -26,7 +26,7 @@ def depth_of_weight(weight: Floats) -> Floats:
 
 
 def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats, pial: TriangleMesh) -> Floats:
-    """Returns the (n,) cortical thickness in mm at the vertices of a simulated pial surface.
+    """Return the (n,) cortical thickness in mm at the vertices of a simulated pial surface.
 
     The border between cortex and core is where the depth at the start is the cortical thickness, which is where the
     cortical weight is ½. It is made of material points and carried with the tissue: the cortex of a later week is what
@@ -62,7 +62,7 @@ def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats
 
 
 def at_part(values: NDArray, whole: TriangleMesh, part: TriangleMesh) -> NDArray:
-    """Returns the values (n, ...) at the vertices of a surface for the vertices of a part of it, such as a hemisphere.
+    """Return the values (n, ...) at the vertices of a surface for the vertices of a part of it, such as a hemisphere.
 
     InputError where the part has a vertex that the whole has not.
     """

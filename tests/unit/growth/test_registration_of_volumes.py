@@ -9,7 +9,7 @@ from gyriflow.geometry.deformations import Deformation, carry, transform_points
 from gyriflow.growth.channels import Channels, channels
 from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.registration_quality import judge, require_good
-from gyriflow.io.registrations import read_deformation, write_deformation
+from gyriflow.io.registrations import read_correspondence, write_deformation
 
 VOXEL = 1.0
 CORTEX, WHITE, OTHER = 2, 1, 7
@@ -183,10 +183,9 @@ def test_a_grid_that_needs_no_resampling_gets_none():
 
 def test_deformations_are_read_as_written(tmp_path, found):
     write_deformation(tmp_path / "a.h5", found.deformation, {"dice": 0.9})
-    read, report = read_deformation(tmp_path / "a.h5")
+    read = read_correspondence(tmp_path / "a.h5")
     assert np.array_equal(read.matrix, found.deformation.matrix)
     assert read.displacement == pytest.approx(found.deformation.displacement, abs=1e-6)
-    assert report == {"dice": 0.9}
     (tmp_path / "b.h5").write_bytes(b"torn")
-    with pytest.raises(InputError, match=r"b\.h5: cannot be read as a deformation"):
-        read_deformation(tmp_path / "b.h5")
+    with pytest.raises(InputError, match=r"b\.h5: cannot be read as a correspondence"):
+        read_correspondence(tmp_path / "b.h5")

@@ -125,7 +125,6 @@ def test_no_server_is_said_once_and_leaves_nothing(tmp_path):
         url = f"http://127.0.0.1:{free.getsockname()[1]}/a.gii"
         with pytest.raises(StorageError, match=r"a\.gii: cannot be fetched; found .*Connection refused") as caught:
             fetch(tmp_path / "new" / "a.gii", url, lambda _: None)
-    assert "the network" in str(caught.value)
     assert caught.value.exit_code == 5
     assert files_in(tmp_path) == {}
 

@@ -73,7 +73,7 @@ def test_none_or_several_maps_in_a_file_are_refused(tmp_path, ball, arrays):
 
 
 def test_a_surface_in_the_place_of_a_map_is_refused(tmp_path, ball):
-    with pytest.raises(InputError, match=r"POINTSET \(162, 3\), TRIANGLE \(320, 3\)"):
+    with pytest.raises(InputError, match=r"POINTSET \(162, 3\), NIFTI_INTENT_TRIANGLE \(320, 3\)"):
         read_surface_map(tmp_path / "ball.surf.gii", tmp_path / "ball.surf.gii")
 
 

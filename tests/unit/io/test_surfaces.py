@@ -257,7 +257,7 @@ def test_labels_and_names_come_back(tmp_path):
 
 @pytest.mark.parametrize(
     ("arrays", "said"),
-    [([np.array([1.0, 2.5], np.float32)], "no whole numbers"), ([np.array([1, 2], np.int32)] * 2, "one array")],
+    [([np.array([1.0, 2.5], np.float32)], "no whole numbers"), ([np.array([1, 2], np.int32)] * 2, "is no label file")],
 )
 def test_what_is_no_array_of_labels_is_refused(tmp_path, arrays, said):
     nib.save(GiftiImage(darrays=[GiftiDataArray(array) for array in arrays]), tmp_path / "a.gii")

@@ -10,6 +10,7 @@ from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
+    convex_hull,
     is_closed,
     merged,
     signed_volume,
@@ -19,7 +20,6 @@ from gyriflow.geometry.triangles import (
 )
 from gyriflow.metrics.gyrification import (
     cap,
-    convex_hull,
     envelope,
     gyrification_index,
     local_gyrification_index,
