@@ -50,7 +50,7 @@ def test_check_says_what_will_run_and_what_it_takes(workflow):
     assert outcome.returncode == 0, outcome.stderr
     said = outcome.stdout
     assert said.startswith("gyriflow.yaml: 2 brains, 2 simulations (reference, thick)")
-    assert "\n  not made yet: " in said
+    assert "\n  Missing output files: " in said
     for rule in ("pial_from_labels", "tetrahedralise", "simulate", "html_report"):
         assert f"{rule}" in said
     for need in ("\ntime    about ", "\nmemory  about ", "\ndisk    about "):

@@ -36,19 +36,6 @@ NAMED_RUNS = 6
 THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1): 0.67, ("tetgen", 2): 0.27}
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as found on the shipped brains."""
 FOLDINGS = ("simulate", "simulate_member")
-REASONS = {
-    "input with the content": "other content",
-    "Params have changed": "settings changed",
-    "Code has changed": "code changed",
-    "Updated input files": "newer input",
-    "Set of input files has changed": "other inputs",
-    "Software environment definition has changed": "environment changed",
-    "Missing output files": "not made yet",
-    "Input files updated by another job": "follows another step",
-    "Forced execution": "asked for",
-    "Incomplete": "left incomplete",
-}
-"""What Snakemake's reasons contain, and what they are called here; the first that fits counts."""
 
 
 @dataclass(frozen=True)
@@ -61,21 +48,11 @@ class PlannedJob:
     output: list[str]
     reason: str
 
-    @property
-    def why(self) -> str:
-        """The reason in few words."""
-        return next((words for part, words in REASONS.items() if part in self.reason), self.reason)
-
 
 def check_study(
-    path: Path,
-    directory: Path,
-    cores: int,
-    read_files: bool = True,
-    stages: Sequence[str] = (),
-    price: float | None = None,
+    path: Path, directory: Path, cores: int, stages: Sequence[str] = (), price: float | None = None
 ) -> Iterator[tuple[str, bool]]:
-    """Yield lines on a study up to some stages, each with whether it is a problem.
+    """Yield lines on a study and its files, and on what would run up to some stages, each with whether it is a problem.
 
     With a price of a core hour they say what the study costs, too. InputError for a configuration that is not valid,
     with all its problems.
@@ -83,29 +60,38 @@ def check_study(
     config = load(read_keys(path), path.resolve().parent)
     study = resolve(config)
     yield f"{path}: {_contents(study)}", False
-    problems = list(input_problems(config)) if read_files else []
+    problems = list(input_problems(config))
     yield from ((f"  {line}", bad) for line, bad in problems)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     bad = any(bad for _, bad in problems)
-    if read_files and not bad:
+    if not bad:
         yield "  input files: all can be read and fit their schemes", False
     if missing := sum(len(atlas.missing) for atlas in config.atlases):
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
     if not bad:
-        yield from _work(plan(path, directory, ["--cores", str(cores), *stages]), study, directory, cores, price)
+        yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], price=price)
 
 
-def work_of_study(
-    path: Path, directory: Path, cores: int, further: Sequence[str], *, show: bool = False
-) -> Iterator[str]:
-    """Yield lines on what would run and what it takes; `further` are arguments of Snakemake's.
+def work_of(
+    path: Path, directory: Path, cores: int, further: Sequence[str], *, price: float | None = None, show: bool = False
+) -> Iterator[tuple[str, bool]]:
+    """Yield lines on what would run and what it takes, each with whether that is more than what is there.
 
-    With `show`, Snakemake lists every job on the terminal first.
+    `further` are arguments of Snakemake's. With `show`, it lists every job on the terminal first.
     """
-    jobs = plan(path, directory, further, show=show)
+    making = [job for job in plan(path, directory, further, show=show) if job.output]
+    if not making:
+        yield "nothing to run: all results that this asks for are up to date", False
+        return
+    yield f"to run: {len(making)} step{'s' if len(making) > 1 else ''}", False
+    rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
+    for job in making:
+        rules_by_reason[job.reason.partition(":")[0]][job.rule] += 1
+    for reason, rules in rules_by_reason.items():
+        words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
+        yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     study = resolve(load(read_keys(path), path.resolve().parent))
-    for line, _ in _work(jobs, study, directory, cores, None):
-        yield line
+    yield from _needs(making, study, directory, cores, price)
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
@@ -217,29 +203,17 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
         yield from require_plausible_size(float(size), extents, brain.week)
 
 
-def _work(
+def _needs(
     jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int, price: float | None
 ) -> Iterator[tuple[str, bool]]:
-    """Yield what will run, by rule, and what it will take of time, memory and disk."""
-    making = [job for job in jobs if job.output]
-    if not making:
-        nothing = "the configuration asks for no results of this stage" if jobs else "all results are up to date"
-        yield f"nothing to run: {nothing}", False
-        return
-    yield f"to run: {len(making)} step{'s' if len(making) > 1 else ''}", False
-    rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
-    for job in making:
-        rules_by_reason[job.why][job.rule] += 1
-    for why, rules in rules_by_reason.items():
-        words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
-        yield fill(f"{why}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
+    """Yield what jobs will take of time, memory and disk."""
     foldings = [
         (job, folding_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
-        for job in making
+        for job in jobs
         if job.rule in FOLDINGS
     ]
     folding_s = sum(needs.seconds for _, needs in foldings)
-    other_s = SECONDS_PER_JOB * (len(making) - len(foldings))
+    other_s = SECONDS_PER_JOB * (len(jobs) - len(foldings))
     longest_s = max((needs.seconds / min(job.threads, cores) for job, needs in foldings), default=0.0)
     seconds = max((folding_s + other_s) / cores, longest_s)
     hours = (folding_s + other_s) / 3600
@@ -250,7 +224,7 @@ def _work(
         yield f"cost    about {hours * price:.2g} at {price:g} a core hour", False
     side_by_side = sorted((needs.memory_mib for _, needs in foldings), reverse=True)
     memory = sum(side_by_side[: max(cores // max((job.threads for job, _ in foldings), default=1), 1)])
-    disk = sum(needs.disk_mib for _, needs in foldings) + len(making)
+    disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
     # the memory of this machine says nothing of a cluster's
     here = cores <= (os.cpu_count() or 1)
     yield from _fits("memory", memory or LEAST_SURFACE_MIB / 4, _memory_mib() if here else None)

@@ -127,11 +127,8 @@ def init(folder: Path, output: Path | None, force: bool, quick: bool) -> None:
 @directory_option
 @cores_option
 @stages_option
-@click.option("--no-files", is_flag=True, help="Check the configuration only, not what is in the input files.")
 @click.option("--price", type=click.FloatRange(0), metavar="PRICE", help="Price of a core hour, for the study's cost.")
-def check(
-    config: Path | None, directory: Path, cores: int, stages: Sequence[str], no_files: bool, price: float | None
-) -> None:
+def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str], price: float | None) -> None:
     """Check a configuration and its files; say what will run and what it will take.
 
     Nothing is run or written. CONFIG is gyriflow.yaml where none is named.
@@ -139,7 +136,7 @@ def check(
     from .checking import check_study
 
     problems = 0
-    for line, bad in check_study(_chosen(config, directory), directory, cores, not no_files, stages, price):
+    for line, bad in check_study(_chosen(config, directory), directory, cores, stages, price):
         click.echo(line)
         problems += bad
     if problems:
@@ -171,9 +168,9 @@ def run(
         arguments += ["--cores", str(cores)]
     targets = [*stages, *further[int(named) :]]
     if dry_run:
-        from .checking import work_of_study
+        from .checking import work_of
 
-        for line in work_of_study(config, directory, cores, [*arguments, *targets], show=verbose):
+        for line, _ in work_of(config, directory, cores, [*arguments, *targets], show=verbose):
             click.echo(line)
     else:
         from .launch import main as launch

@@ -5,7 +5,7 @@ import pytest
 from configurations import LABELLED
 from shapes import hemisphere
 
-from gyriflow.cli.checking import coarse_cortices, input_problems, plan, work_of_study
+from gyriflow.cli.checking import coarse_cortices, input_problems, plan, work_of
 from gyriflow.config import load
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
@@ -79,6 +79,6 @@ def test_a_look_leaves_nothing_behind(tmp_path):
         "brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\nstart: a\nfolding: {end_week: 24}\n"
     )
     assert plan(config, tmp_path / "new" / "study", ["surface"])
-    (said,) = work_of_study(config, tmp_path / "new" / "study", 1, ["calibrate"])
-    assert said == "nothing to run: the configuration asks for no results of this stage"
+    ((said, _),) = work_of(config, tmp_path / "new" / "study", 1, ["calibrate"])
+    assert said == "nothing to run: all results that this asks for are up to date"
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
