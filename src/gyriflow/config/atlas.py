@@ -353,11 +353,9 @@ def atlas_problems(used: UsedAtlas) -> Iterator[Problem]:
         text = f"found false; true accepts the licence of {atlas.name} ({name}): {licence.terms}"
         yield Problem(text, ("accept_licence",))
     known = set.union(*map(used.known_weeks, used.series))
-    if unknown_weeks := sorted(set(settings.weeks or ()) - known):
+    if unknown_weeks := set(settings.weeks or ()) - known:
         of = atlas.name if settings.series is None else f"{atlas.name} ({', '.join(used.series)})"
-        text = (
-            f"{of} has no files of {_listed(unknown_weeks)}; it has {_listed(sorted(known))}. A week is never rounded"
-        )
+        text = f"{of} has no files of {_listed(unknown_weeks)}; it has {_listed(known)}. A week is never rounded"
         yield Problem(text, ("weeks",))
     for file in used.files:
         if len(file.copies) > 1:
@@ -382,14 +380,5 @@ def retrieval_note(used: UsedAtlas) -> str:
     return "\n  ".join([*lines, f"licence: {atlas.licence.name}{address}. {atlas.licence.terms}"])
 
 
-def _listed(weeks: list[float]) -> str:
-    """Return weeks as text, three or more in a row as a range: "21-29, 30.5"."""
-    rows: list[list[float]] = []
-    for week in weeks:
-        if rows and week == rows[-1][-1] + 1:
-            rows[-1].append(week)
-        else:
-            rows.append([week])
-    return ", ".join(
-        f"{row[0]:g}-{row[-1]:g}" if len(row) > 2 else ", ".join(f"{week:g}" for week in row) for row in rows
-    )
+def _listed(weeks: Iterable[float]) -> str:
+    return ", ".join(f"{week:g}" for week in sorted(weeks))

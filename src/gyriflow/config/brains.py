@@ -96,7 +96,6 @@ class Brain(Settings):
 
     @property
     def source(self) -> str:
-        """The key that the surface is made from."""
         return next(name for name in SOURCES if self.gives(name))
 
     @property
@@ -106,7 +105,6 @@ class Brain(Settings):
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """The hemispheres that the brain has."""
         return SIDES if self.hemisphere is None else (self.hemisphere.side,)
 
     @property
@@ -118,31 +116,27 @@ class Brain(Settings):
 
     @property
     def has_labels(self) -> bool:
-        """Whether the surface is made from a label volume."""
         return self.label_volume is not None
 
     @property
     def has_vertices(self) -> bool:
-        """Whether the surface is made from surface files, whose vertices may be those of other brains too."""
+        # they may be those of other brains too
         return not self.has_labels and self.source in ("hemispheres", "hemisphere", "pial")
 
     @property
     def files(self) -> list[str]:
-        """The files that the surface is made from, the left hemisphere's first."""
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
         one = None if self.hemisphere is None else self.hemisphere.file
         return [path for path in (self.labels, self.pial, *sides, one) if path is not None]
 
     @property
     def white_files(self) -> dict[str, str]:
-        """The white surfaces by what they are of: left, right, whole."""
         pair = self.hemispheres.white if self.hemispheres else None
         sides = {} if pair is None else {"left": pair.left, "right": pair.right}
         return sides if self.white is None else {"whole": self.white}
 
     @property
     def _kind(self) -> str:
-        """The source, with what it is where that may be either."""
         if self.hemisphere is None:
             return self.source
         volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
@@ -204,7 +198,6 @@ class GivenRegions(Settings):
 
     @property
     def files(self) -> dict[str, str]:
-        """The files by what they are."""
         if self.volume is not None:
             return {"volume": self.volume}
         pairs = {"left": self.left, "right": self.right}

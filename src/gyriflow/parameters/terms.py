@@ -78,9 +78,6 @@ CURVATURE_RADIUS_MM = 3.0
 """At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
 SPANGY_MODES: LastBand = "B5"
 
-MEASURED = "real"
-"""The run of measured brains, in tables."""
-
 FOLD_BANDS = (4, 5, 6)
 """Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
 
