@@ -4,6 +4,7 @@ import pytest
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.study.study import Study
 
 LABELLED = {"labels": __file__, "scheme": "spina-bifida-atlas"}
 """The source of a brain whose file is there, and not read."""
@@ -49,3 +50,13 @@ def problems(raw, folder="."):
 def keys(raw, folder="."):
     """Returns the keys of these problems."""
     return [line.partition(": ")[0] for line in problems(raw, folder)]
+
+
+def series_of(study: Study) -> dict[str, list[str]]:
+    """Returns the ids of the brains of each growth series."""
+    return {name: [brain.id for brain in brains] for name, brains in study.series.brains.items()}
+
+
+def series_for(study: Study, brain: str) -> str | None:
+    """Returns the growth series whose curves a brain follows."""
+    return study.series.for_sizes(study.brains[brain])

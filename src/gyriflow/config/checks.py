@@ -11,7 +11,20 @@ from ..parameters.settings import Key, Problem, messages, nearest
 from ..parameters.terms import AMPLITUDE, STIFFNESS_RATIO
 from ..parameters.varying import Varying
 from .root import Config
-from .runs import ALL, CURVES, FIRST, NOT_VARIED, Compared, Run, Start, Study, changed, variants
+from .runs import (
+    ALL,
+    CURVES,
+    FIRST,
+    NOT_VARIED,
+    Compared,
+    Run,
+    Start,
+    Study,
+    changed,
+    growth_series,
+    starts_of,
+    variants,
+)
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Names that stand for something else in results, tables and settings."""
@@ -89,8 +102,9 @@ def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[Problem]:
 
 def runs(config: Config) -> Iterator[Problem]:
     """Yield what is wrong between the settings of each run and its start brains."""
+    known = {brain.id: brain for brain in config.brains}
     for name, run in config.runs.items():
-        brains = [config.brain(brain) for brain in config.starts(name)]
+        brains = [known[brain] for brain in starts_of(config.start, run, list(known))]
         weeks = [(brain.week, f"the week of the start brain {brain.id}") for brain in brains]
         # without a start, what holds at the end is checked
         for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
@@ -128,7 +142,7 @@ def growth(config: Config) -> Iterator[Problem]:
         mixed = sorted({brain.population or "of no known population" for brain in brains})
         if named and len(mixed) > 1:
             yield Problem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", key)
-    series, wanted = config.growth_series, config.growth.estimated_from
+    series, wanted = growth_series(config.brains, config.growth.brains), config.growth.estimated_from
     if wanted is not None and series and wanted not in series:
         yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))
 

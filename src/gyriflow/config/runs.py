@@ -156,16 +156,6 @@ def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
     return known if len(known) == 1 or all(_ages(members) > 1 for members in known.values()) else {"all": brains}
 
 
-def estimated_from(series: Mapping[str, Sequence[str]], given: str | None, start: str) -> str | None:
-    """Returns the name of the series that gives the measured curves; None if it is not determined.
-
-    It is the given one, or the only one, or the one with the start brain.
-    """
-    if given is not None:
-        return given if given in series else None
-    return next((name for name, ids in series.items() if len(series) == 1 or start in ids), None)
-
-
 def _ages(brains: Sequence[Brain]) -> int:
     return len({brain.week for brain in brains})
 

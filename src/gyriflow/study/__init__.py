@@ -1,6 +1,5 @@
-"""What a study consists of: from a configuration to its brains, runs, comparisons, and where results lie."""
+"""What a study consists of: a configuration is resolved once into its brains, runs and comparisons, and their files."""
 
-from .plan import Plan
 from .resolve import resolve
 
-__all__ = ["Plan", "resolve"]
+__all__ = ["resolve"]

@@ -4,13 +4,15 @@ from pathlib import Path
 
 import pytest
 import yaml
-from configurations import LABELLED, problems
+from configurations import LABELLED, problems, series_for, series_of
 
 from gyriflow.config import load
 from gyriflow.config.atlas import ATLASES, Atlas, retrieval_note, shipped_atlases
 from gyriflow.errors import InputError
 from gyriflow.io.downloads import require_checksums, sha256_of
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.study import resolve
+from gyriflow.study.figures import measured_name
 
 UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, operated"
 SURFACES = "atlas/fetal.week{}.{}.pial.surf.gii"
@@ -100,16 +102,16 @@ def test_images_are_fetched_where_they_are_wanted(tmp_path):
 
 
 def test_populations_are_named_and_never_share_a_curve(tmp_path):
-    config = load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path)
+    found = resolve(load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path))
     unoperated = [f"spina-bifida-unoperated-{week}" for week in range(21, 26)]
     operated = [f"spina-bifida-operated-{week}" for week in range(25, 35)]
-    assert config.measured_name(unoperated) == UNOPERATED
-    assert config.measured_name(operated[:1]) == OPERATED
-    both = f"{UNOPERATED} (21–25 GW) or {OPERATED} (25 GW)"
-    assert config.measured_name([*unoperated, operated[0]]) == both
-    assert config.growth_series == {UNOPERATED: unoperated, OPERATED: operated}
-    assert config.estimated_from("spina-bifida-unoperated-21") == UNOPERATED
-    assert config.norm_reference == unoperated
+    assert measured_name(found.brains[brain] for brain in unoperated) == UNOPERATED
+    assert measured_name([found.brains[operated[0]]]) == OPERATED
+    both = f"{UNOPERATED} (21-25 GW) or {OPERATED} (25 GW)"
+    assert measured_name(found.brains[brain] for brain in [*unoperated, operated[0]]) == both
+    assert series_of(found) == {UNOPERATED: unoperated, OPERATED: operated}
+    assert series_for(found, "spina-bifida-unoperated-21") == UNOPERATED
+    assert found.norm_reference == unoperated
 
 
 def test_a_growth_curve_across_populations_is_refused(tmp_path):
@@ -119,7 +121,8 @@ def test_a_growth_curve_across_populations_is_refused(tmp_path):
         f"growth.brains.mixed: found brains {OPERATED} and {UNOPERATED}; a growth curve is of one population"
     ]
     # without a name the two are series of one week each, which is none
-    assert load(study("spina-bifida", mixed[0], growth={"brains": mixed}), tmp_path).growth_series == {}
+    found = resolve(load(study("spina-bifida", mixed[0], growth={"brains": mixed}), tmp_path))
+    assert series_of(found) == {}
 
 
 def test_a_population_of_a_brain_of_ones_own(tmp_path):
@@ -130,9 +133,9 @@ def test_a_population_of_a_brain_of_ones_own(tmp_path):
         {"id": "c", "week": 22, "shape": {"semi_axes_mm": [23, 23, 23]}},
     ]
     raw = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
-    config = load(raw, tmp_path)
-    assert config.measured_name(["a"]) == "sheep"
-    assert config.measured_name(["a", "b", "c"]) == "sheep (21 GW) or real brain (22 GW) or sphere"
+    known = resolve(load(raw, tmp_path)).brains
+    assert measured_name([known["a"]]) == "sheep"
+    assert measured_name(known.values()) == "sheep (21 GW) or real brain (22 GW) or sphere"
     brains[2]["population"] = "sheep"
     assert problems(raw, tmp_path) == [
         "brains[2].population: has no meaning with shape; only with labels or labels of a hemisphere or hemispheres or "
@@ -168,7 +171,7 @@ def test_surfaces_of_hemispheres_and_labels(tmp_path):
 def test_a_dump_has_the_brains_in_the_place_of_the_atlas(tmp_path):
     config = load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path)
     again = load(config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}))
-    assert (again.brains, again.growth_series, again.atlas) == (config.brains, config.growth_series, ())
+    assert (again.brains, again.atlas) == (config.brains, ())
 
 
 # files in a folder

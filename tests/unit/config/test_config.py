@@ -15,14 +15,16 @@ from gyriflow.config.root import Config
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import output_weeks, parameters_from
 from gyriflow.report.style import REAL_BRAIN
+from gyriflow.study import resolve
+from gyriflow.study.figures import measured_name
 
 
 def test_defaults_are_the_reference_values():
     config = load(study())
     run = config.runs["reference"]
     assert (run.thickness_mm, run.poisson_ratio, run.growth_rate_per_s, run.step_s) == (1.5, 0.45, 2e-7, 43200)
-    assert config.folded == [("reference", "a")]
-    assert config.weeks("reference", "a") == [21, 22, 23, 24]
+    (one,) = resolve(config).folded
+    assert (one.run, one.start.id, one.weeks) == ("reference", "a", (21, 22, 23, 24))
     assert [brain.source for brain in config.brains] == ["labels", "labels"]
 
 
@@ -99,21 +101,14 @@ def test_what_stands_for_measured_brains_is_no_name_of_a_run():
 
 def test_a_run_folds_the_brains_that_it_names():
     runs = {"one": {"start": "b"}, "some": {"start": ["b", "a"]}, "every": {"start": "all"}, "default": None}
-    config = load(study(runs=runs))
-    assert {name: config.starts(name) for name in config.runs} == {
-        "one": ["b"],
-        "some": ["a", "b"],
-        "every": ["a", "b"],
-        "default": ["a"],
-    }
-    assert config.folded[:3] == [("one", "b"), ("some", "a"), ("some", "b")]
-    assert config.start_brains == ["a", "b"]
-    assert config.weeks("some", "b") == [22.5, 23.5, 24]
-    assert load(study(runs={"one": {"start": "b"}})).start_brains == ["b"]
-    assert load(study(start="all")).starts("reference") == ["a", "b"]
+    found = resolve(load(study(runs=runs)))
+    pairs = [("one", "b"), ("some", "a"), ("some", "b"), ("every", "a"), ("every", "b"), ("default", "a")]
+    assert found.pairs == pairs
+    assert found.simulations["some", "b"].weeks == (22.5, 23.5, 24)
+    assert resolve(load(study(start="all"))).pairs == [("reference", "a"), ("reference", "b")]
     without = study(runs={"one": {"start": "b"}})
     del without["start"]
-    assert load(without).folded == [("one", "b")]
+    assert resolve(load(without)).pairs == [("one", "b")]
 
 
 def test_starts_that_cannot_be_are_all_named():
@@ -252,19 +247,19 @@ def test_only_real_brains_are_called_so(tmp_path, shown, name):
         {"id": "ball", "week": 21, "shape": {"semi_axes_mm": [23, 23, 23]}},
         {"id": "egg", "week": 21, "shape": {}},
     ]
-    assert load(study(brains, start="ball"), tmp_path).measured_name(shown) == name
+    known = resolve(load(study(brains, start="ball"), tmp_path)).brains
+    assert measured_name(known[brain] for brain in shown) == name
 
 
 def test_parameters_of_a_run_are_what_the_folding_program_reads():
-    config = load(study(folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}))
-    weeks = config.weeks("reference", "a")
-    known = {"start_week": weeks[0], "output_weeks": weeks, "fissure_x_mm": 0.0}
-    read = parameters_from(known | config.parameters("reference"))
+    (one,) = resolve(load(study(folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}))).folded
+    known = {"start_week": one.weeks[0], "output_weeks": one.weeks, "fissure_x_mm": 0.0}
+    read = parameters_from(known | one.parameters)
     assert read.stress_memory_gw == math.inf
-    assert config.parameters("reference")["stress_memory_gw"] == "infinite"
+    assert one.parameters["stress_memory_gw"] == "infinite"
     assert read.output_weeks == (21.0, 22.0, 23.0, 24.0)
-    assert not {"ranks", "start"} & set(config.parameters("reference"))
-    given = config.run("reference").model_dump(exclude={"ranks", "start"})
+    assert not {"ranks", "start"} & set(one.parameters)
+    given = one.settings.model_dump(exclude={"ranks", "start"})
     assert read.model_dump(exclude={"ranks", "side", "targets", *known}) == given
 
 

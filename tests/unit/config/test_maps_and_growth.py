@@ -1,9 +1,10 @@
 """Maps and growth in a configuration: what the steps of the workflow are handed."""
 
 import pytest
-from configurations import LABELLED, problems
+from configurations import LABELLED, problems, series_for, series_of
 
 from gyriflow.config import load
+from gyriflow.study import resolve
 
 BRAINS = [
     {"id": "a", "week": 21, **LABELLED},
@@ -26,8 +27,10 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
         "shear_modulus_core_pa": {"map": "soft.nii.gz"},
         "radial_growth_rate_per_s": {"weeks": {25: 1e-7}},
     }
-    config = load(study(mapped, runs={"mapped": {}, "plain": dict.fromkeys(mapped, 1e-8)}), tmp_path)
-    settings = config.parameters("mapped")
+    with_maps, plain = resolve(
+        load(study(mapped, runs={"mapped": {}, "plain": dict.fromkeys(mapped, 1e-8)}), tmp_path)
+    ).folded
+    settings = with_maps.parameters
     assert {name: settings[name] for name in mapped} == {
         "thickness_mm": {"map": "thickness_mm"},
         "growth_rate_per_s": {"weeks": {21.0: 1.0, 30.0: 0.5}, "map": "growth_rate_per_s"},
@@ -36,7 +39,7 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     }
     assert list(settings["growth_rate_per_s"]["weeks"]) == [21.0, 30.0]
     assert "ranks" not in settings
-    assert config.maps("mapped") == {
+    assert with_maps.map_sources == {
         "thickness_mm": {
             "map": [str(tmp_path / "left.gii"), str(tmp_path / "right.gii")],
             "surface": [str(tmp_path / "left.surf.gii"), str(tmp_path / "right.surf.gii")],
@@ -44,8 +47,8 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
         "growth_rate_per_s": {"map": [str(tmp_path / "left.gii")], "surface": [str(tmp_path / "left.surf.gii")]},
         "shear_modulus_core_pa": {"map": [str(tmp_path / "soft.nii.gz")], "surface": []},
     }
-    assert config.maps("plain") == {}
-    assert config.parameters("plain")["thickness_mm"] == 1e-8
+    assert plain.map_sources == {}
+    assert plain.parameters["thickness_mm"] == 1e-8
 
 
 @pytest.mark.parametrize(
@@ -53,7 +56,7 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     [({}, ["a", "b", "c"]), ({"brains": ["c", "a"]}, ["a", "c"]), ({"brains": None}, ["a", "b", "c"])],
 )
 def test_growth_is_estimated_from_all_brains_or_those_named(growth, brains):
-    assert load(study({}, growth=growth)).growth_series == {"volume": brains}
+    assert series_of(resolve(load(study({}, growth=growth)))) == {"volume": brains}
 
 
 def both_kinds(tmp_path, weeks):
@@ -66,26 +69,28 @@ def both_kinds(tmp_path, weeks):
 
 def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_estimated_from(tmp_path):
     raw = both_kinds(tmp_path, (21, 22))
-    config = load(raw, tmp_path)
-    assert config.growth_series == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
-    assert (config.estimated_from("s21"), config.estimated_from("v21")) == ("surface", "volume")
-    assert load(raw | {"growth": {"estimated_from": "volume"}}, tmp_path).estimated_from("s21") == "volume"
-    assert load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path).growth_series == {"volume": ["v21", "v22"]}
+    found = resolve(load(raw, tmp_path))
+    assert series_of(found) == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
+    assert (series_for(found, "s21"), series_for(found, "v21")) == ("surface", "volume")
+    named = resolve(load(raw | {"growth": {"estimated_from": "volume"}}, tmp_path))
+    assert series_for(named, "s21") == "volume"
+    chosen = resolve(load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path))
+    assert series_of(chosen) == {"volume": ["v21", "v22"]}
 
 
 def test_kinds_of_which_one_has_a_single_week_are_one_series(tmp_path):
     raw = both_kinds(tmp_path, (21, 22))
-    assert load(raw | {"growth": {"brains": ["s21", "v22"]}}, tmp_path).growth_series == {"all": ["v22", "s21"]}
-    chosen = {"brains": ["s21", "v21", "v22"]}
-    assert load(raw | {"growth": chosen}, tmp_path).growth_series == {"all": ["v21", "v22", "s21"]}
+    for chosen, series in ((["s21", "v22"], ["v22", "s21"]), (["s21", "v21", "v22"], ["v21", "v22", "s21"])):
+        found = resolve(load(raw | {"growth": {"brains": chosen}}, tmp_path))
+        assert series_of(found) == {"all": series}
 
 
 def test_series_may_be_named(tmp_path):
     raw = both_kinds(tmp_path, (21, 22, 23))
     named = {"early": ["s21", "s22"], "late": ["v22", "s23"]}
-    config = load(raw | {"growth": {"brains": named, "estimated_from": "late"}}, tmp_path)
-    assert config.growth_series == {"early": ["s21", "s22"], "late": ["v22", "s23"]}
-    assert config.estimated_from("s21") == "late"
+    found = resolve(load(raw | {"growth": {"brains": named, "estimated_from": "late"}}, tmp_path))
+    assert series_of(found) == {"early": ["s21", "s22"], "late": ["v22", "s23"]}
+    assert series_for(found, "s21") == "late"
 
 
 @pytest.mark.parametrize(
@@ -155,7 +160,7 @@ def test_rates_are_refused_with_another_model():
 def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
     runs = {"smooth": {"growth": {"smoothing_mm": 3}}, "sizes": {"growth": "sizes"}, "same": {"growth": "shapes"}}
     config = load(study({"preset": "expected", "growth": {"smoothing_mm": 2}}, runs=runs))
-    found = {name: config.run(name).growth for name in runs}
+    found = {name: config.runs[name].growth for name in runs}
     assert [(growth.model, growth.of, growth.smoothing_mm) for growth in found.values()] == [
         ("shapes", "atlas", 3),
         ("sizes", "self", 1.5),

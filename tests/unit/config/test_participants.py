@@ -1,10 +1,11 @@
 """A cohort's table becomes brains; rows that can't be used are problems, or left out with their cause."""
 
 import pytest
-from configurations import LABELLED, refusal, study
+from configurations import LABELLED, refusal, series_for, series_of, study
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.study import resolve
 
 FOLDING = {"end_week": 26}
 
@@ -145,7 +146,7 @@ def test_a_participant_has_a_brain_for_each_session(folder):
         ("sub-2_ses-1", 22.5, "sub-2"),
         ("sub-2_ses-2", 23.5, "sub-2"),
     ]
-    assert found.scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
+    assert resolve(found).scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
 
 
 def test_rows_of_one_id_are_problems_where_one_cannot_be_used(folder):
@@ -193,13 +194,13 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
         for week in (24, 25)
     ]
     brains += [{"id": f"p{week}", "week": week, **LABELLED} for week in (24, 25)]
-    found = load({"brains": brains, "start": "left24", "folding": FOLDING}, folder / "bids")
-    assert found.growth_series == {
+    found = resolve(load({"brains": brains, "start": "left24", "folding": FOLDING}, folder / "bids"))
+    assert series_of(found) == {
         "left hemisphere, surface": ["left24", "left25"],
         "right hemisphere, surface": ["right24", "right25"],
         "volume": ["p24", "p25"],
     }
-    assert found.estimated_from("left24") == "left hemisphere, surface"
+    assert series_for(found, "left24") == "left hemisphere, surface"
 
 
 def test_regions_need_both_hemispheres(folder):

@@ -5,6 +5,7 @@ from configurations import LABELLED
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.study import resolve
 
 BRAINS = [{"id": f"p{week}", "week": week, **LABELLED} for week in (21, 22, 25)]
 NAMES = {"names": {1: "frontal", 2: "frontal", 3: "parietal"}}
@@ -24,9 +25,8 @@ def volume(tmp_path) -> str:
 
 def test_brains_get_the_regions_of_the_nearest_week(volume):
     given = {"volume": volume, **NAMES}
-    config = load(study(regions={"p21": given, "p25": given}))
-    assert [config.regions_from(brain) for brain in ("p21", "p22", "p25")] == ["p21", "p21", "p25"]
-    assert load(study()).regions_from("p21") is None
+    found = resolve(load(study(regions={"p21": given, "p25": given})))
+    assert [found.giver_of_regions(brain).id for brain in ("p21", "p22", "p25")] == ["p21", "p21", "p25"]
 
 
 @pytest.mark.parametrize(
@@ -60,23 +60,23 @@ def test_scans_of_a_subject_by_week():
     brains = [{"id": "b", "week": 24, "subject": "one", **LABELLED}, *BRAINS]
     brains += [{"id": "a", "week": 22.5, "subject": "one", **LABELLED}]
     brains += [{"id": "c", "week": 22.5, "subject": "two", **LABELLED}]
-    assert load(study(brains)).scans == {"one": ["a", "b"]}
+    assert resolve(load(study(brains))).scans == {"one": ["a", "b"]}
     with pytest.raises(InputError, match="2 scans of the subject one are of week 24"):
         load(study([*brains, {"id": "d", "week": 24, "subject": "one", **LABELLED}]))
 
 
 def test_the_norm_is_of_all_measured_brains_of_one_kind():
-    assert load(study()).norm_reference == ["p21", "p22", "p25"]
-    assert load(study(norm_reference=["p22"])).norm_reference == ["p22"]
+    assert resolve(load(study())).norm_reference == ["p21", "p22", "p25"]
+    assert resolve(load(study(norm_reference=["p22"]))).norm_reference == ["p22"]
 
 
 def test_the_norm_is_of_real_brains_where_there_are_any_and_never_of_simple_shapes(tmp_path):
     (tmp_path / "a.stl").touch()
     real = [{"id": f"r{week}", "week": week, "pial": str(tmp_path / "a.stl")} for week in (21, 22)]
     shapes = [{"id": f"s{week}", "week": week, "shape": {"semi_axes_mm": [23, 23, 23]}} for week in (21, 22)]
-    assert load(study([*shapes, *real]) | {"start": "s21"}).norm_reference == ["r21", "r22"]
-    assert load(study([*BRAINS, *real], norm_reference=["p22", "r21"])).norm_reference == ["p22", "r21"]
-    assert load(study(shapes) | {"start": "s21"}).norm_reference == []
+    assert resolve(load(study([*shapes, *real]) | {"start": "s21"})).norm_reference == ["r21", "r22"]
+    assert resolve(load(study([*BRAINS, *real], norm_reference=["p22", "r21"]))).norm_reference == ["p22", "r21"]
+    assert resolve(load(study(shapes) | {"start": "s21"})).norm_reference == []
 
 
 def test_the_norm_is_of_brains_with_the_hemispheres_of_the_start(volume):
@@ -85,8 +85,8 @@ def test_the_norm_is_of_brains_with_the_hemispheres_of_the_start(volume):
     for side in ("left", "right"):
         brains.append({"id": side, "week": 21, "hemisphere": {"file": volume, "side": side}, **labels})
     for start, norm in (("w21", ["w21", "w22"]), ("left", ["left"])):
-        assert load(study(brains) | {"start": start}).norm_reference == norm
-    assert load(study(brains, norm_reference=["w22", "left"]) | {"start": "w21"}).norm_reference == ["w22"]
+        assert resolve(load(study(brains) | {"start": start})).norm_reference == norm
+    assert resolve(load(study(brains, norm_reference=["w22", "left"]) | {"start": "w21"})).norm_reference == ["w22"]
 
 
 def test_named_sulci_stand_in_for_regions_only_where_none_are_given(volume):

@@ -5,6 +5,7 @@ from configurations import LABELLED
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.study import resolve
 
 BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 25, **LABELLED}]
 RUNS = {"reference": {"preset": "fetalfoldsim"}, "short": {"end_week": 22}}
@@ -27,6 +28,14 @@ def config(**sections):
     return load({"brains": BRAINS, "start": "first", "folding": {"end_week": 26}, "runs": RUNS, **sections})
 
 
+def resolved(**sections):
+    return resolve(config(**sections))
+
+
+def members(study, name):
+    return [one.run for one, _ in study.comparisons[name].members]
+
+
 def refusal(**sections):
     with pytest.raises(InputError) as error:
         config(**sections)
@@ -34,35 +43,33 @@ def refusal(**sections):
 
 
 def test_a_study_makes_a_run_of_each_combination():
-    study = config(studies={"both": THICKNESS | {"vary": {"thickness_mm": [1, 2], "contact.gap_mm": [2, 3]}}})
-    runs = {member.run: member.settings for member in study.members["both"]}
+    found = resolved(studies={"both": THICKNESS | {"vary": {"thickness_mm": [1, 2], "contact.gap_mm": [2, 3]}}})
+    runs = {one.run: one.settings for one, _ in found.comparisons["both"].members}
     assert list(runs) == ["both-1-2", "both-1-3", "both-2-2", "both-2-3"]
     assert [(run.thickness_mm, run.contact.gap_mm) for run in runs.values()] == [(1, 2), (1, 3), (2, 2), (2, 3)]
     assert {run.shear_modulus_cortex_pa for run in runs.values()} == {3000}
     assert {run.end_week for run in runs.values()} == {25}
-    assert study.run("both-1-3") == runs["both-1-3"]
-    assert study.parameters("both-1-3")["contact"]["gap_mm"] == 3
     # they are no runs that everything is made of
-    assert study.folded == [("reference", "a"), ("short", "a")]
+    assert found.pairs == [("reference", "a"), ("short", "a")]
 
 
 def test_equal_runs_are_solved_once():
-    study = config(studies={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS})
+    found = resolved(studies={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS})
     # 1500 Pa is the reference, 3000 Pa stands in the other study too
-    assert [member.run for member in study.members["stiffness"]] == ["stiffness-300", "reference", "thickness-1.5"]
-    assert list(study.study_runs) == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
+    assert members(found, "stiffness") == ["stiffness-300", "reference", "thickness-1.5"]
+    assert found.may_diverge == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
 
 
 def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
     brains = [*BRAINS, {"id": "c", "week": 24.5, **LABELLED}]
     studies = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
-    study = config(brains=brains, studies=studies)
-    assert study.run("thickness-1.5").end_week == 25
-    assert study.weeks("thickness-1.5", "a") == [21, 22, 23, 24, 24.5, 25]
-    assert study.weeks("thickness-0.8", "a")[-1] == 24.5
+    simulations = resolved(brains=brains, studies=studies).simulations
+    assert simulations["thickness-1.5", "a"].settings.end_week == 25
+    assert simulations["thickness-1.5", "a"].weeks == (21, 22, 23, 24, 24.5, 25)
+    assert simulations["thickness-0.8", "a"].weeks[-1] == 24.5
     # the reference itself has no surface of that week, so that it cannot stand in
-    other = config(brains=brains, studies={"stiffness": STIFFNESS | {"compare_week": 24.5}})
-    assert [member.run for member in other.members["stiffness"]][1] == "stiffness-1500"
+    other = resolved(brains=brains, studies={"stiffness": STIFFNESS | {"compare_week": 24.5}})
+    assert members(other, "stiffness")[1] == "stiffness-1500"
 
 
 def test_comparison_prefers_the_starts_population(tmp_path):
@@ -70,12 +77,9 @@ def test_comparison_prefers_the_starts_population(tmp_path):
     for name, week, population in (("a", 21, "one"), ("b", 25, "two"), ("c", 25, "one")):
         (tmp_path / f"{name}.stl").touch()
         brains.append({"id": name, "week": week, "pial": str(tmp_path / f"{name}.stl"), "population": population})
-    study = config(brains=brains, studies={"thickness": THICKNESS})
-    assert study.compared_with(study.studies["thickness"], "a") == ["c"]
-    others = config(brains=brains[:2], studies={"thickness": THICKNESS})
-    assert others.compared_with(others.studies["thickness"], "a") == ["b"]
-    named = config(brains=brains, studies={"thickness": THICKNESS | {"compare_with": ["b"]}})
-    assert named.compared_with(named.studies["thickness"], "a") == ["b"]
+    for known, asked, real in ((brains, {}, "c"), (brains[:2], {}, "b"), (brains, {"compare_with": ["b"]}, "b")):
+        found = resolved(brains=known, studies={"thickness": THICKNESS | asked})
+        assert [brain.id for brain in found.comparisons["thickness"].real["a"]] == [real]
 
 
 def test_the_run_of_a_single_value_may_differ_further():
@@ -83,9 +87,11 @@ def test_the_run_of_a_single_value_may_differ_further():
         "fixed": {"shear_modulus_cortex_pa": 3000, "step_s": 86400},
         "fixed_at": {1.5: {"step_s": 43200}},
     }
-    members = config(studies={"s": study}).members["s"]
-    assert [(member.run, member.settings.step_s) for member in members] == [("s-0.8", 86400), ("s-1.5", 43200)]
-    assert [dict(member.values) for member in members] == [{"thickness_mm": 0.8}, {"thickness_mm": 1.5}]
+    found = [
+        (one.run, one.settings.step_s, values)
+        for one, values in resolved(studies={"s": study}).comparisons["s"].members
+    ]
+    assert found == [("s-0.8", 86400, {"thickness_mm": 0.8}), ("s-1.5", 43200, {"thickness_mm": 1.5})]
 
 
 @pytest.mark.parametrize(

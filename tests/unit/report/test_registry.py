@@ -22,7 +22,7 @@ from gyriflow.units import SECONDS_PER_GW
 CHECKOUT = Path(__file__).parents[3]
 DRAW = CHECKOUT / "workflow" / "scripts" / "draw.py"
 WORDS = yaml.safe_load((CHECKOUT / "workflow" / "report" / "figures.yaml").read_text())
-SHAPE = {"kind": "ellipsoid", "semi_axes_mm": [20, 26, 18]}
+SHAPE = {"semi_axes_mm": [20, 26, 18]}
 BRAINS = [{"id": name, "week": week, "shape": SHAPE} for name, week in (("a", 21), ("b", 22), ("c", 23))]
 STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}
 STUDY |= {"studies": {"rate": {"base": "thin", "vary": {"growth_rate_per_s": [1e-7, 2e-7]}, "compare_week": 22}}}

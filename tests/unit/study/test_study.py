@@ -14,7 +14,7 @@ from gyriflow.study.paths import CURVES, FOLDING, READY, THICKNESS, job_files, o
 EXAMPLES = Path(__file__).parents[3] / "config" / "examples"
 CURVE = {21: 99, 24: 150}
 SIZES = {"model": "sizes", "area_cm2": CURVE, "volume_ml": CURVE}
-SPHERE = {"shape": {"kind": "sphere"}}
+SPHERE = {"shape": {}}
 EXPECTED = {"runs": {"a": {"preset": "expected"}}}
 
 

@@ -7,6 +7,7 @@ import trimesh
 from gyriflow.config import load
 from gyriflow.geometry.triangles import TriangleMesh, flipped
 from gyriflow.io.surfaces import write_surface
+from gyriflow.study import resolve
 
 BALL = trimesh.creation.icosphere(subdivisions=2, radius=30.0)
 SURFACE = TriangleMesh(BALL.vertices, BALL.faces)
@@ -31,18 +32,18 @@ def folder(tmp_path):
     return tmp_path
 
 
-def config(folder, *files, **changes):
+def series(folder, *files, **changes):
     brains = [
         {"id": name, "week": 21 + number, **({"pial": file} if isinstance(file, str) else file)}
         for number, (name, file) in enumerate(zip("abcdef", files, strict=False))
     ]
-    return load(RUN | {"brains": brains} | changes, folder)
+    return resolve(load(RUN | {"brains": brains} | changes, folder)).series
 
 
 def test_equal_triangles_in_any_order_are_matched(folder):
-    found = config(folder, "a.gii", "b.gii", "a.gii")
-    assert found.matched_surfaces == {"surface": {"a", "b", "c"}}
-    assert found.unmatched_surfaces == {}
+    found = series(folder, "a.gii", "b.gii", "a.gii")
+    assert found.matched == {"surface": {"a", "b", "c"}}
+    assert found.unmatched == {}
 
 
 @pytest.mark.parametrize(
@@ -55,37 +56,37 @@ def test_equal_triangles_in_any_order_are_matched(folder):
     ],
 )
 def test_others_are_not_and_say_why(folder, file, cause):
-    found = config(folder, "a.gii", file, "b.gii")
-    assert found.matched_surfaces == {}
-    assert cause in found.unmatched_surfaces["surface"]
+    found = series(folder, "a.gii", file, "b.gii")
+    assert found.matched == {}
+    assert cause in found.unmatched["surface"]
 
 
 def test_the_setting_says_no(folder):
-    found = config(folder, "a.gii", "b.gii", growth={"matched_surfaces": False})
-    assert found.unmatched_surfaces == {"surface": "growth.matched_surfaces is false"}
+    found = series(folder, "a.gii", "b.gii", growth={"matched_surfaces": False})
+    assert found.unmatched == {"surface": "growth.matched_surfaces is false"}
 
 
 def test_hemispheres_match_side_by_side(folder):
     pair = {"hemispheres": {"left": "a.gii", "right": "fine.gii"}}
-    assert config(folder, pair, pair).matched_surfaces == {"surface": {"a", "b"}}
+    assert series(folder, pair, pair).matched == {"surface": {"a", "b"}}
     swapped = {"hemispheres": {"left": "fine.gii", "right": "a.gii"}}
-    assert "b has 642 vertices" in config(folder, pair, swapped).unmatched_surfaces["surface"]
+    assert "b has 642 vertices" in series(folder, pair, swapped).unmatched["surface"]
 
 
 def test_an_atlas_is_believed_until_its_files_are_there(folder):
     named = {"name": "dhcp-surface", "weeks": [21, 22], "folder": str(folder)}
-    found = load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)
-    assert list(found.matched_surfaces.values()) == [{"dhcp-surface-21", "dhcp-surface-22"}]
+    found = resolve(load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)).series
+    assert list(found.matched.values()) == [{"dhcp-surface-21", "dhcp-surface-22"}]
     for week, file in ((21, "a.gii"), (22, "fine.gii")):
         for side in ("left", "right"):
             (folder / f"fetal.week{week}.{side}.pial.surf.gii").write_bytes((folder / file).read_bytes())
-    found = load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)
-    assert found.matched_surfaces == {}
-    assert np.all(["dhcp-surface-22 has 642 vertices" in cause for cause in found.unmatched_surfaces.values()])
+    found = resolve(load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)).series
+    assert found.matched == {}
+    assert np.all(["dhcp-surface-22 has 642 vertices" in cause for cause in found.unmatched.values()])
 
 
 def test_label_volumes_are_none_of_it(folder):
     (folder / "a.nii.gz").write_bytes(b"")
     labels = {"labels": "a.nii.gz", "scheme": "binary"}
-    found = config(folder, labels, labels)
-    assert found.matched_surfaces == found.unmatched_surfaces == {}
+    found = series(folder, labels, labels)
+    assert found.matched == found.unmatched == {}
