@@ -9,7 +9,7 @@ from boxes import COMM
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
-from verification_cases.modes import Slab, amplifications, critical_growth, growth_rates
+from verification_cases.modes import Slab, critical_growth, growth_rates
 from verification_cases.slab import Waved, amplified
 
 pytestmark = [pytest.mark.slow, pytest.mark.one_rank]
@@ -50,15 +50,6 @@ def test_where_stress_is_kept_a_half_space_wrinkles_at_biots_stretch():
     slab = Slab(1.0, 0.4999, depth=6.0, memory=np.inf, thickness=np.inf, finest=0.05)
     found = critical_growth(slab, 2 * np.pi / np.array([1.0, 2.0]), 0.02, 1.0)
     np.testing.assert_allclose(1 / (1 + found), BIOT_STRETCH, rtol=0.01)
-
-
-def test_memory_leads_from_none_to_all():
-    k = np.array([0.3, 0.6])
-    ends = [amplifications(Slab(20.0, memory=memory), k, 0.005, 3)[-1] for memory in (0.0, 1e-7, 0.05, 1e7, np.inf)]
-    np.testing.assert_allclose(ends[1], ends[0], rtol=1e-12)
-    np.testing.assert_allclose(ends[3], ends[4], rtol=1e-6)
-    assert (ends[0] < ends[2]).all()
-    assert (ends[2] < ends[4]).all()
 
 
 def rate_error(order, cells):

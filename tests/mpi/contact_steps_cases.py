@@ -156,15 +156,6 @@ def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_t
     assert errors[1:, 2] / errors[:-1, 2] == pytest.approx([0.5, 0.5], abs=0.1)
 
 
-@pytest.mark.one_rank
-def test_stress_that_is_remembered_is_written_as_it_is():
-    pressures = []
-    for step_s in (86400.0, 43200.0):
-        folding, _ = pressed(step_s, stress_memory_gw=2.0)
-        pressures.append(np.median(folding.fields.of_elements(["stress"])["pressure_pa"]))
-    assert pressures[0] == pytest.approx(pressures[1], rel=0.03)
-
-
 def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
     tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
     state = after_steps(*closing_sulcus("global", **tight), 10)

@@ -4,31 +4,11 @@ import ctypes
 
 import numpy as np
 import pytest
-from boxes import COMM
 from contact_bodies import after_steps, closing_sulcus
-from shapes import ellipsoid_mesh
 
-from gyriflow.folding import ladder
-from gyriflow.folding.checkpoint import State
 from gyriflow.folding.krylov import _PETSC, _finest_smoother
-from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import zones_of_run
-from gyriflow.parameters.folding import parameters_from
-from gyriflow.units import M_PER_MM
 
 TIGHT = {"solver": {"newton_tolerance": 1e-9, "krylov_tolerance": 1e-3}}
-FREE = {
-    "start_week": 21.0,
-    "end_week": 30.0,
-    "output_weeks": [21.0, 30.0],
-    "fissure_x_mm": 0.0,
-    "thickness_mm": 2.5,
-    "growth_rate_per_s": 4e-7,
-    "step_s": 172800.0,
-    "support": "free",
-    "contact": {"kind": "none"},
-    "no_growth": {"kind": "none"},
-}
 
 
 def counted(monkeypatch, problem):
@@ -103,17 +83,3 @@ def test_newtons_method_begins_at_the_first_good_guess(support):
     assert folding.solver.solve(-found, found, 0.5 * found).newton == 0
     assert np.abs(folding.problem.displacement - found).max() <= 1e-9 * np.abs(found).max()
     assert folding.solver.solve(0.5 * found).newton > 0
-
-
-def test_a_preconditioner_kept_for_a_free_body_is_good_for_the_shapes_that_follow(monkeypatch):
-    mesh = ellipsoid_mesh(3, (12.0, 16.0, 10.0))
-    p = parameters_from(FREE)
-
-    def iterations():
-        folding = Folding(COMM, mesh, zones_of_run(mesh, p), p)
-        state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
-        return sum(row["krylov"] for row in after_steps(folding, state, 4).rows)
-
-    kept = iterations()
-    monkeypatch.setattr(ladder.PreconditionerLifetime, "over", True)
-    assert kept <= 1.5 * iterations()

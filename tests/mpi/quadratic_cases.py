@@ -5,7 +5,6 @@ import pytest
 from boxes import (
     COMM,
     curved_box,
-    distorted_box,
     everywhere_known,
     problem_on,
     zones_of,
@@ -18,10 +17,8 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import ContactSettings, SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.ladder import KEPT
-from gyriflow.folding.multigrid import linear_in_quadratic
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.simulation import Folding
-from gyriflow.geometry.jacobians import lower_bounds
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic, signed_volumes
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
@@ -75,29 +72,6 @@ def test_iterations_do_not_grow_with_the_mesh():
     assert taken[2] <= 1.5 * taken[1]
 
 
-def test_the_prolongation_leads_linear_functions_on_and_leaves_fixed_components_apart():
-    mesh = quadratic(distorted_box((2, 2, 2)))
-    domain = Domain(COMM, mesh)
-    rng = np.random.default_rng(2)
-    fixed = rng.random((len(mesh.vertices), 3)) < 0.1
-    for held in (np.zeros_like(fixed), fixed):
-        own = domain.local(held)[: domain.owned]
-        prolongation, corners = linear_in_quadratic(domain, own)
-        matrix, offset = np.array([[1.0, 2.0, -1.0], [0.5, 0.0, 3.0], [2.0, 1.0, 1.0]]), [1.0, -2.0, 0.3]
-        values = (domain.local(domain.positions) * MM_PER_M @ matrix + offset)[: domain.owned]
-        coarse, fine = prolongation.createVecRight(), prolongation.createVecLeft()
-        coarse.array[:] = values[corners].ravel()
-        prolongation.mult(coarse, fine)
-        if not held.any():
-            np.testing.assert_allclose(fine.array.reshape(-1, 3), values, atol=1e-12)
-            continue
-        # what a fixed corner has reaches no other node, and a fixed node on an edge has nothing
-        coarse.array[:] = own[corners].ravel().astype(float)
-        prolongation.mult(coarse, fine)
-        is_corner = np.isin(np.arange(domain.owned), corners)[:, None]
-        np.testing.assert_array_equal(fine.array.reshape(-1, 3), (own & is_corner).astype(float))
-
-
 def test_an_element_that_folds_over_between_its_points_is_seen():
     mesh = quadratic(box_mesh((1, 1, 1), (2.0, 2.0, 2.0)))
     problem = problem_on(mesh, zones_of(mesh))
@@ -112,16 +86,6 @@ def test_an_element_that_folds_over_between_its_points_is_seen():
         inside = np.linalg.det(problem.outcome("deformation"))
         assert problem.domain.minimum(inside) > 0
     assert bounds[0] > 0 >= bounds[1]
-
-
-def test_what_is_moved_inside_out_is_not_accepted():
-    problem = growing_problem()
-    guess = np.zeros_like(problem.displacement)
-    guess[:, 2] = -2.0 * problem.domain.local(problem.domain.positions)[:, 2]
-    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
-    assert solver.solve(guess).residual <= NewtonSettings().newton_tolerance
-    after = problem.domain.positions + everywhere_known(problem)
-    assert lower_bounds(after, curved_box().tets).min() > 0
 
 
 def folding_of(mesh, zones, comm=COMM, **changes):

@@ -107,18 +107,3 @@ def test_parts_that_touch_are_joined_wherever_a_rank_sees_it():
         domain, _, contact = contact_in(COMM, type(mesh)(vertices, mesh.tets), distance=0.15)
         assert domain.part.max() == 1
         assert len(np.unique(contact.joined(domain.part))) == parts
-
-
-@pytest.mark.parametrize("part", [0.44, 0.47, 0.8])
-def test_a_step_leaves_a_part_of_the_gap_whether_it_is_swept_or_not(part):
-    # below 0.45 of the gap on either side nothing is swept
-    mesh = two_blocks()
-    domain, displacement, contact = contact_in(COMM, mesh, distance=0.3)
-    way = np.zeros_like(mesh.vertices)
-    way[:, 2] = -np.sign(mesh.vertices[:, 2]) * part * GAP_MM * M_PER_MM
-    length = contact.largest_step(domain.local(way))
-    assert (length == 1.0) == (part < 0.5)
-    displacement[:] = length * domain.local(way)
-    left = contact.smallest_distance_mm() / GAP_MM
-    assert left == pytest.approx(1 - 2 * part * length, rel=1e-6)
-    assert left > 0.05

@@ -166,23 +166,3 @@ def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tm
     run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path, may_diverge=True)
     summary = read_json(tmp_path / "summary.json")
     assert (summary["steps"], summary["weeks"], summary["reached_week"]) == (0, [21.0], 21.0)
-
-
-@pytest.mark.fault(33)
-def test_stress_is_remembered_across_an_interruption(mesh, tmp_path, monkeypatch, capsys):
-    brain = read_tetrahedral_mesh(mesh)
-    parameters = parameters_from(WEEK | {"stress_memory_gw": 0.5, "solver": TIGHT})
-    zones = zones_of_run(brain, parameters)
-    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "whole")
-    monkeypatch.setattr(Folding, "step", failing_after(4))
-    with pytest.raises(SolverError):
-        run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "cut")
-    monkeypatch.undo()
-    run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path / "cut")
-    assert "going on from the checkpoint after step 4" in capsys.readouterr().out
-    whole, cut = (read_positions(tmp_path / name / "frames.h5", 21.5) for name in ("whole", "cut"))
-    forgetful = parameters_from(WEEK | {"solver": TIGHT})
-    run(MPI.COMM_SELF, brain, zones, forgetful, {}, tmp_path / "forgetful")
-    other = read_positions(tmp_path / "forgetful" / "frames.h5", 21.5)
-    assert np.abs(cut - whole).max() <= 1e-8 * np.abs(whole - brain.vertices).max()
-    assert np.abs(other - whole).max() > 1e-3

@@ -11,8 +11,7 @@ import yaml
 from ellipsoid import RUN, SEMI_AXES
 from shapes import ellipsoid_mesh
 
-from gyriflow.anatomy.fissure import nearer_left
-from gyriflow.geometry.triangles import TriangleMesh, corners, merged, submesh
+from gyriflow.geometry.triangles import TriangleMesh, corners, submesh
 from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import read_regions, write_tetrahedral_mesh
@@ -99,15 +98,3 @@ def test_the_folded_hemispheres_are_the_facets_that_were_theirs_at_the_start(mad
         theirs = positions[regions.facets[regions.facet_tags["hemisphere"] == tag]]
         np.testing.assert_allclose(corners(side), theirs, atol=1e-4)
     np.testing.assert_allclose(corners(whole), positions[regions.facets], atol=1e-4)
-
-
-def test_walls_close_to_each_other_are_told_apart():
-    # the left hemisphere bulges far over the middle, half a millimetre in front of the right one's hollow
-    ball = trimesh.creation.icosphere(subdivisions=4, radius=10.0)
-    left = TriangleMesh(ball.vertices, ball.faces)
-    shell = trimesh.creation.icosphere(subdivisions=4, radius=10.5)
-    right = TriangleMesh(
-        shell.vertices, shell.faces[:, ::-1][corners(TriangleMesh(shell.vertices, shell.faces)).mean(axis=1)[:, 0] > -5]
-    )
-    both = merged(left, right)
-    np.testing.assert_array_equal(nearer_left(both, left, right), np.arange(len(both.faces)) < len(left.faces))

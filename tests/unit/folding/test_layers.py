@@ -2,15 +2,21 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ellipsoid import RUN, SEMI_AXES
 from shapes import box_mesh, ellipsoid_mesh
 
+from gyriflow.folding.growth import GrowthByRates, StepStart
 from gyriflow.folding.layers import PialSearch, cortical_weight, normals_between
+from gyriflow.folding.output import layer_fields
 from gyriflow.folding.points import IntegrationPoints
+from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.jacobians import NODES
 from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.parameters.folding import parameters_from
 
 
 def search_of(mesh):
@@ -20,6 +26,30 @@ def search_of(mesh):
 def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
     weight = cortical_weight(np.array([0.0, 1.5, 3.0, 1e6]), 1.5)
     np.testing.assert_allclose(weight, [1 / (1 + np.exp(-10)), 0.5, 1 / (1 + np.exp(10)), 0.0], rtol=1e-12, atol=1e-300)
+
+
+def test_the_cortex_has_its_own_thickness_at_the_start_and_grows_from_there():
+    mesh = ellipsoid_mesh(8, SEMI_AXES)
+    p = parameters_from(RUN | {"thickness_mm": 2.0, "thickness_growth_mm_per_gw": 0.5})
+    zones = zones_of_run(mesh, p)
+    for week, thickness in ((21.0, 2.0), (23.0, 3.0)):
+        fields = layer_fields(mesh.vertices, zones, p, {}, week, ["distance", "cortex_weight"])
+        np.testing.assert_allclose(
+            fields["cortex_weight"], cortical_weight(fields["distance_to_pial_mm"], thickness), rtol=1e-12
+        )
+
+
+def test_rates_that_change_with_the_weeks_are_those_of_the_middle_of_a_step():
+    day = 86_400.0
+    p = parameters_from(RUN | {"growth_rate_per_s": {"weeks": {21.0: 0.0, 22.0: 1e-6}}})
+    one = np.ones(1)
+    tissue = SimpleNamespace(
+        weight=one, growing=one, maps={}, at_points=lambda values: values[None],
+        normals=lambda wanted: (wanted, np.array([[[0.0, 0.0, 1.0]]])),
+    )  # fmt: skip
+    inverse = GrowthByRates(p, StepStart(np.empty((0, 3)), 2 * day, day)).inverse(tissue)
+    # two days and a half after the start
+    np.testing.assert_allclose(inverse[0, 0], np.diag([1 / (1 + 2.5 / 7 * 1e-6 * day)] * 2 + [1.0]), rtol=1e-12)
 
 
 def test_distance_is_to_the_triangles_not_to_the_vertices():

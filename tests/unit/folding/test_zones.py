@@ -249,10 +249,3 @@ def test_cortex_is_the_outer_layer_of_its_thickness(tagged):
     inner = np.prod([axis - 4.0 for axis in SEMI_AXES]) / np.prod(SEMI_AXES)
     assert volumes[tags["layer"] == CORE].sum() / volumes.sum() == pytest.approx(inner, abs=0.05)
     assert set(tags["layer"]) == {CORTEX, CORE}
-
-
-def test_an_element_grows_where_one_of_its_vertices_does(tagged):
-    mesh, zones, tags = tagged
-    growing = zones.growth[mesh.tets]
-    np.testing.assert_array_equal(tags["growing"] == 0, (growing == 0).all(axis=1))
-    assert 0 < tags["growing"].sum() < len(mesh.tets)

@@ -3,7 +3,6 @@ import pytest
 from shapes import ellipsoid_mesh, rigid, sphere
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import Deformation, carry
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.growth.carrying import carry_over_weeks, carry_regions, maps_on_template
@@ -70,16 +69,3 @@ def test_maps_come_to_the_vertices_of_a_template():
     assert maps_on_template({"x": brain.vertices[:, 0]}, brain, brain, [])["x"] == pytest.approx(brain.vertices[:, 0])
     with pytest.raises(InputError, match="beyond the grid"):
         maps_on_template(maps, brain, transformed(template, scaled(1, (60, 0, 0))), [between])
-
-
-def test_rigid_motion_is_no_displacement():
-    surface = sphere()
-    turn = rigid(0, 0, 37, shift=(4, 5, 6))
-    moved_points = transformed(surface, turn).vertices
-    sizes = np.ones(len(moved_points))
-    assert without_rigid_motion(surface.vertices, moved_points, sizes) == pytest.approx(
-        np.zeros_like(moved_points), abs=1e-9
-    )
-    grown = transformed(surface, turn @ scaled(1.2)).vertices
-    grown_by = without_rigid_motion(surface.vertices, grown, sizes)
-    assert grown_by == pytest.approx(0.2 * surface.vertices, abs=1e-9)

@@ -30,12 +30,6 @@ def test_rates_are_those_the_areas_were_made_with() -> None:
     assert row["area_ratio"] == pytest.approx(areas[1] / areas[0])
 
 
-def test_a_gap_uses_the_true_time() -> None:
-    table = growth_rates([21, 23.5], [100.0, 144.0], [1000.0, 1728.0])
-    assert table["rate_per_s"][0] == pytest.approx(0.2 / (2.5 * WEEK_S))
-    assert table["core_rate_per_s"][0] == pytest.approx(0.2 / (2.5 * WEEK_S))
-
-
 def test_weeks_in_any_order() -> None:
     table = growth_rates([23, 21, 22], [144.0, 100.0, 121.0], [3.0, 1.0, 2.0])
     assert table["from_week"].tolist() == [21, 22]

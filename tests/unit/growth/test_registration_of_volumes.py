@@ -108,10 +108,6 @@ def test_quality_of_a_good_registration(pair, found):
     require_good(quality, pair="21-22")
 
 
-def test_the_same_input_gives_the_same_result(pair, found):
-    assert np.array_equal(register(*pair).deformation.displacement, found.deformation.displacement)
-
-
 def test_a_brain_in_another_pose_is_turned_first(pair):
     half_turn = np.diag([-1.0, -1.0, 1.0])
     affine = centred(at=(4.0, -3.0, 2.0))
@@ -168,17 +164,6 @@ def test_images_are_compared_where_both_brains_have_one(pair):
         channels(labels, affine, cerebrum=(WHITE, CORTEX), image=(np.zeros_like(image), affine))
     found = register(replace(shown, cortex=pair[0].cortex), replace(pair[1], intensity=None))
     assert found.channels == ("cerebrum", "cortex")
-
-
-def test_a_grid_that_needs_no_resampling_gets_none():
-    affine = centred()
-    labels = volume(affine, later=False)
-    brain = channels(labels, affine, cerebrum=(WHITE, CORTEX), cortex=(CORTEX,))
-    at = np.rint(
-        transform_points(transform_points(np.argwhere(brain.tissue > 0), brain.affine), np.linalg.inv(affine))
-    ).astype(int)
-    assert (labels[tuple(at.T)] > 0).all()
-    assert np.count_nonzero(brain.tissue) == np.count_nonzero(labels)
 
 
 def test_deformations_are_read_as_written(tmp_path, found):
