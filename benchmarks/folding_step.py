@@ -46,7 +46,7 @@ def relaxed_lu_step(problem, krylov, residual, direction, start: np.ndarray) -> 
     problem.set_displacement(start)
     first = norm = problem.residual(residual)
     for iteration in range(1, 51):
-        krylov.setOperators(problem.tangent().whole())
+        krylov.setOperators(problem.tangent().elastic.matrix.products)
         krylov.solve(residual, direction)
         problem.vector.axpy(-0.8, direction)
         problem.vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
@@ -95,7 +95,7 @@ def measure(arguments: argparse.Namespace) -> None:
     paper = Folding(comm, mesh, zones, p, quadrature_degree=3)
     solver = PETSc.KSP().create(comm)
     solver.setType("preonly")
-    solver.getPC().setType("lu")
+    solver.getPC().setType("cholesky")
     solver.getPC().setFactorSolverType("mumps")
     residual, direction = paper.problem.new_vector(), paper.problem.new_vector()
     domain, start = paper.domain, np.zeros_like(paper.problem.displacement)

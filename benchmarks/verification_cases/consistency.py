@@ -92,7 +92,7 @@ def remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Remainders:
     problem.set_displacement(u)
     energy = problem.energy()
     problem.residual(residual)
-    problem.tangent().whole().mult(direction, change)
+    problem.tangent().matrix.mult(direction, change)
     by_energy, by_residual = [], []
     for h in LENGTHS:
         problem.set_displacement(u + h * v)

@@ -83,7 +83,7 @@ def taylor_errors(problem, u, v):
     problem.set_displacement(u)
     energy = problem.energy()
     problem.residual(residual)
-    problem.tangent().whole().mult(direction, change)
+    problem.tangent().matrix.mult(direction, change)
     errors = []
     for h in (0.2, 0.1):
         problem.set_displacement(u + h * v)

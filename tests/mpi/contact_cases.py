@@ -65,23 +65,6 @@ def test_forces_have_no_sum_and_no_moment():
     assert np.abs(np.cross(places, forces).sum(axis=0)).max() <= 1e-12 * size * np.abs(places).max()
 
 
-def test_the_preconditioner_sees_contact_and_the_forms_of_the_tangent_agree():
-    mesh = two_blocks()
-    problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
-    for part in (1.0, 0.9):  # the second time into the same places
-        problem.set_displacement(part * approach(problem.domain))
-        tangent = problem.tangent()
-        x, one, other, bound = (problem.new_vector() for _ in range(4))
-        x.array[:] = smooth_displacement(problem.domain, 1.0)[: problem.domain.owned].ravel()
-        tangent.products.mult(x, one)
-        tangent.whole().mult(x, other)
-        tangent.smoothing.mult(x, bound)
-        other.axpy(-1.0, one)
-        assert other.norm() <= 1e-12 * one.norm()
-        assert contact.pair_count() > 0
-        assert bound.dot(x) >= one.dot(x)
-
-
 @pytest.mark.parametrize("other", [pytest.param((5, 5, 3), marks=pytest.mark.one_rank), (4, 3, 3)])
 def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance(other):
     growth, gaps = 0.2, []

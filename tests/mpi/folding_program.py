@@ -6,7 +6,7 @@ import sys
 import processes
 import yaml
 
-from gyriflow.folding.ladder import NotConvergedError
+from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.simulation import Folding
 
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}

@@ -15,9 +15,7 @@ SPARE = 2
 
 
 def alive(folding, path):
-    """Returns how many objects of each class PETSc has made and not destroyed, without those of multigrid."""
-    # one multigrid may have a level more than the next
-    folding.solver.ladder.renew_cg()
+    """Returns how many objects of each class PETSc has made and not destroyed, so far."""
     # what was let go of waits for the next clean-up, and how much that is differs from step to step
     gc.collect()
     folding.problem.tangent()

@@ -7,7 +7,7 @@ import pytest
 from boxes import COMM, curved_box, distorted_box, problem_on, zones_of
 from shapes import box_mesh
 
-from gyriflow.folding.ladder import NotConvergedError
+from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 
 
@@ -101,20 +101,6 @@ def test_a_rank_on_which_nothing_moves_does_not_stop_the_others():
     solver.solve(np.zeros_like(problem.displacement))
     again = problem.displacement.copy()
     assert solver.solve(again).residual <= NewtonSettings().newton_tolerance
-
-
-def test_a_rebuilt_preconditioner_is_as_good_as_a_new_one():
-    problem = growing_problem()
-    settings = NewtonSettings(1e-10, krylov_tolerance=1e-8)
-    solver = NewtonSolver(problem, settings, residual_floor=0.0)
-    solver.solve(np.zeros_like(problem.displacement))
-    stretched = problem.domain.positions * [12.0, 1.0, 0.3]
-    problem.domain.place(stretched)
-    solver.ladder.lifetime.end()
-    count = solver.solve(np.zeros_like(problem.displacement))
-    new = NewtonSolver(problem, settings, residual_floor=0.0)
-    fresh = new.solve(np.zeros_like(problem.displacement))
-    assert count.krylov / count.newton <= 1.2 * fresh.krylov / fresh.newton + 1
 
 
 def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monkeypatch):

@@ -1,4 +1,4 @@
-"""Newton's method for the displacement of one step: linear solves by the ladder, each guarded by a line search."""
+"""Newton's method for the displacement of one step: linear solves, each guarded by a line search."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from .ladder import KEPT, LinearLadder, NotConvergedError
+from .linear_solver import PLAIN, LinearSolver, NotConvergedError
 from .problem import Problem
 from .tangent import Tangent
 
@@ -36,20 +36,20 @@ class NewtonSettings:
     newton_tolerance: float = 1e-4
     krylov_tolerance: float = 1e-3
     max_newton: int = 20
-    max_krylov: int = 300
+    max_krylov: int = 1000
     max_backtracks: int = 8
 
 
 @dataclass
 class StepCount:
-    """What a step took: iterations, the furthest rung of the linear ladder, and the residual relative to that at u = 0.
+    """What a step took: iterations, the furthest rung of a linear solve, the residual relative to that at rest.
 
     It has `converged` where that is below the tolerance: not where nothing but round-off was left to gain.
     """
 
     newton: int = 0
     krylov: int = 0
-    rung: int = KEPT
+    rung: int = PLAIN
     residual: float = np.inf
     converged: bool = False
 
@@ -94,7 +94,7 @@ class NewtonSolver:
         self.problem = problem
         self.settings = settings
         self.residual_floor = residual_floor
-        self.ladder = LinearLadder(problem, settings.max_krylov)
+        self.linear_solver = LinearSolver(problem, settings.max_krylov)
         self._residual = problem.new_vector()
         self._first_left = 0.0  # part of the residual that the first iteration of the step before left
         self._trial = problem.new_vector()
@@ -150,7 +150,7 @@ class NewtonSolver:
     def _iterate(
         self, iterate: Iterate, tangent: Tangent, reduction: float, count: StepCount, *, convexify: bool
     ) -> Iterate:
-        linear = self.ladder.solve(tangent, self._residual, self._direction, reduction, convexify=convexify)
+        linear = self.linear_solver.solve(tangent, self._residual, self._direction, reduction, convexify=convexify)
         count.krylov += linear.iterations
         count.rung = max(count.rung, linear.rung)
         return self._advance(iterate, convex=linear.convex)

@@ -1,6 +1,6 @@
 """The discrete problem of one step: energy, residual and tangent on the updated reference.
 
-With `domain` and `block_matrix`, the only files that use dolfinx: what differs between its versions is kept to them.
+With `domain` and `tangent`, the only files that use dolfinx: what differs between its versions is kept to them.
 """
 
 from typing import Literal, Protocol
@@ -10,20 +10,17 @@ import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
 import ufl
-from dolfinx.la import BlockMode
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..mechanics.materials import Material
 from ..parameters.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
-from .block_matrix import BlockMatrix
 from .compilation import form_compiler
 from .domain import Domain
-from .multigrid import OrderHierarchy
 from .points import IntegrationPoints
 from .rigid import RigidMotions
-from .tangent import NODES_PER_TERM, KeptTangent, Operator, Tangent
+from .tangent import ElasticMatrix, KeptTangent, Tangent
 from .zones import Zones
 
 Floats = NDArray[np.float64]
@@ -37,9 +34,9 @@ class Contribution(Protocol):
     """A further part of the energy at the problem's present displacement, such as contact between folds.
 
     `energy` is in J and the same on every rank; `add_residual` adds its derivative in N to the owned components;
-    `stiffness` is the second derivative in N/m, or one made positive semidefinite, None where it is zero: a sum of
-    terms that couple few nodes each (`NODES_PER_TERM`), where fixed components need no care. `largest_step` is the part
-    of (k, 3) local displacements that can safely be added, at most 1, equal on all ranks.
+    `stiffness` is the second derivative in N/m, or one made positive semidefinite, None where it is zero; fixed
+    components need no care. `largest_step` is the part of (k, 3) local displacements that can safely be added, at most
+    1, equal on all ranks.
     """
 
     def energy(self) -> float: ...
@@ -56,8 +53,7 @@ class Problem:
     integrated exactly; None takes what the elements' order needs.
 
     Attributes: the unknown displacement `u` in m, further `contributions` to the energy, whether the body is `free`,
-    the linear level `hierarchy` below quadratic elements, and the q `points` of each element at which stiffness, growth
-    and kept stretch are taken.
+    and the q `points` of each element at which stiffness, growth and kept stretch are taken.
     """
 
     def __init__(
@@ -114,7 +110,7 @@ class Problem:
         residual = ufl.derivative(energy, self.u)
         tangent = ufl.derivative(residual, self.u)
         with form_compiler(domain.comm) as options:
-            self._energy, self._residual, self._tangent = (
+            self._energy, self._residual, stiffness = (
                 dolfinx.fem.form(form, jit_options=options) for form in (energy, residual, tangent)
             )
 
@@ -122,15 +118,10 @@ class Problem:
         self._fixed_owned = np.flatnonzero(fixed.ravel())
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
-        blocks = BlockMatrix(dolfinx.fem.create_matrix(self._tangent, block_mode=BlockMode.compact), fixed)
-        self.hierarchy = OrderHierarchy(domain, fixed) if domain.order == 2 else None
-        self._present: Tangent | None = None
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
-        self._elastic = KeptTangent(blocks, self._tangent, self.vector)
-        self._motions: RigidMotions | None = None
-        self._sum = Operator(self.vector)
-        self._free_operator = Operator(self.vector) if self.free else None
+        self._elastic = KeptTangent(ElasticMatrix(stiffness, fixed), self.vector)
+        self._tangent = Tangent(self._elastic, self.vector)
         self.mesh_moved(domain.part)
 
     def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
@@ -144,22 +135,17 @@ class Problem:
         all vertices name.
         """
         self._elastic.forget()
-        if self._free_operator is not None:
-            self._motions = RigidMotions(self.domain, part)
-            self._free_operator.remove(self._motions)
+        if self.free:
+            self._tangent.remove(RigidMotions(self.domain, part))
 
     def admissible(self, values: Floats) -> Floats:
         """Returns (k, 3) displacements of the local nodes in m without the rigid motions of an unconstrained body."""
-        if self._motions is None:
+        if self._tangent.motions is None:
             return values
         self.displacement[:] = values
-        self._motions.remove(self.displacement[: self.domain.owned].reshape(-1))
+        self._tangent.motions.remove(self.displacement[: self.domain.owned].reshape(-1))
         self.u.x.scatter_forward()
         return self.displacement.copy()
-
-    def near_null_space(self) -> PETSc.NullSpace:
-        """Returns the rigid motions of the present mesh as a whole."""
-        return RigidMotions(self.domain, np.zeros_like(self.domain.part)).null_space(self.vector)
 
     def set_shear_modulus(self, mu: Floats) -> None:
         """Sets the shear modulus (c, q) in Pa at the integration points."""
@@ -214,8 +200,8 @@ class Problem:
         for part in self.contributions:
             part.add_residual(out)
         out.array[self._fixed_owned] = 0.0
-        if self._motions is not None:
-            self._motions.remove(out.array_w)
+        if self._tangent.motions is not None:
+            self._tangent.motions.remove(out.array_w)
         return out.norm()
 
     def tangent(self, *, within: float = 0.0) -> Tangent:
@@ -227,16 +213,9 @@ class Problem:
         """
         # petsc4py keeps what several ranks share until all of them agree to let go of it
         PETSc.garbage_cleanup(self.domain.comm)
-        if self._present is not None:
-            self._present.set_parts(())  # else its further blocks would stay on the diagonal
-        matrix, products = self._elastic.at(self.vector, within)
-        if not self.contributions:
-            self._present = Tangent(matrix, products, ())
-            return self._present
-        self._sum.parts = (products,)
-        parts = self._further_parts(convex=False)
-        self._present = Tangent(matrix, self._sum.matrix, parts, NODES_PER_TERM[self.domain.order])
-        return self._present
+        self._elastic.move_to(self.vector, within)
+        self._set_parts(convex=False)
+        return self._tangent
 
     @property
     def kept_tangent(self) -> bool:
@@ -248,28 +227,19 @@ class Problem:
         """Whether the energy is convex but for what large rotations make of it: not with contributions."""
         return not self.contributions
 
-    def convexify(self, tangent: Tangent) -> None:
+    def convexify(self) -> None:
         """Makes the contributions' terms in the present tangent positive semidefinite."""
-        tangent.set_parts(self._further_parts(convex=True))
+        self._set_parts(convex=True)
 
-    def _further_parts(self, *, convex: bool) -> list[PETSc.Mat]:
+    def _set_parts(self, *, convex: bool) -> None:
         parts = [part for part in (part.stiffness(convex=convex) for part in self.contributions) if part is not None]
         for part in parts:
             part.zeroRowsColumns(self._fixed_global, diag=0.0)
-        self._sum.parts = (self._sum.parts[0], *parts)
-        return parts
+        self._tangent.parts = parts
 
     def apply_boundary_conditions(self, direction: PETSc.Vec) -> None:
         """Sets the fixed components of a direction to exactly 0, which preconditioners miss by their tolerance."""
         direction.array[self._fixed_owned] = 0.0
-
-    def operator(self, tangent: PETSc.Mat) -> PETSc.Mat:
-        """Returns what a tangent does to admissible displacements: for a free body, without rigid motions."""
-        if self._free_operator is None:
-            return tangent
-        self._free_operator.parts = (tangent,)
-        self._free_operator.matrix.stateIncrease()
-        return self._free_operator.matrix
 
     def largest_step(self, direction: Floats) -> float:
         """Returns the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""

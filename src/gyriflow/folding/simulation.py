@@ -27,8 +27,8 @@ from .diagnosis import (
 from .domain import Domain
 from .growth import Growth, GrowthInputs, StepStart
 from .growth_models import growth_model
-from .ladder import RUNGS, NotConvergedError
 from .layers import PialSearch, Tissue, shear_modulus
+from .linear_solver import RUNGS, NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, StepCount
 from .output import say, warn
 from .problem import Problem

@@ -28,9 +28,7 @@ from .style import (
 
 FALLBACKS = {
     "cg": "conjugate gradients",
-    "cg, preconditioner rebuilt": "preconditioner rebuilt",
     "cg, tangent shifted": "tangent made definite",
-    "gmres": "GMRES in place of CG",
 }
 """What is said of steps by the linear solver that they needed, from the usual one on."""
 _PAPER = "FetalFoldSim"

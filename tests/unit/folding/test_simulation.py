@@ -9,7 +9,7 @@ from mpi4py import MPI
 from gyriflow.errors import SolverError
 from gyriflow.folding import simulation
 from gyriflow.folding.checkpoint import State
-from gyriflow.folding.ladder import NotConvergedError
+from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.run import shortened_steps
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
 from gyriflow.parameters.folding import parameters_from

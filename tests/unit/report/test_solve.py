@@ -103,7 +103,7 @@ def test_steps_are_drawn_and_those_that_needed_another_solver_are_marked():
             "min_J": np.linspace(0.99, 0.7, count),
             "max_u_mm": 0.3,
             "mean_u_mm": 0.05,
-            "rung": ["cg", "cg", "cg", "gmres", "cg", "cg"],
+            "rung": ["cg", "cg", "cg", "cg, tangent shifted", "cg", "cg"],
             "elements_through_cortex": np.linspace(2.3, 1.7, count),
             "radius_ratio_01": np.linspace(0.4, 0.3, count),
             "seconds": np.arange(1.0, count + 1),
@@ -113,7 +113,7 @@ def test_steps_are_drawn_and_those_that_needed_another_solver_are_marked():
     newton, krylov, jacobian, displacement, through, quality, seconds = figure.axes
     assert newton.lines[0].get_ydata().tolist() == [2, 1, 1, 3, 1, 1]
     assert newton.lines[1].get_xydata().tolist() == [[steps["week"][3], 3]]
-    assert newton.lines[1].get_label() == "GMRES in place of CG"
+    assert newton.lines[1].get_label() == "tangent made definite"
     assert krylov.lines[0].get_ydata().tolist() == steps["krylov"].tolist()
     assert jacobian.lines[0].get_ydata().min() == pytest.approx(0.7)
     assert [line.get_label() for line in displacement.lines] == ["max", "mean"]

@@ -1,0 +1,215 @@
+"""The linear systems of Newton's method: conjugate gradients with a preconditioner of two levels.
+
+At tolerances of a hundredth every good method needs about thirty products with the tangent, and setting up multigrid
+costs more than that. So the preconditioner is one that is set up in the time of a few products: the inverse blocks on
+the diagonal, and the rigid motions of some hundred parts of the mesh as the coarse level.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
+from ..errors import SolverError
+from .domain import Domain
+from .problem import Problem
+from .rigid import rigid_motions
+from .surface_parts import shared_out
+from .tangent import Tangent
+
+Floats = NDArray[np.float64]
+
+RUNGS = ("cg", "cg, tangent shifted")
+PLAIN, SHIFTED = range(2)
+PARTS = 128
+"""Parts of the mesh whose rigid motions are the coarse level."""
+LIFETIME = 8
+"""Tangents that a coarse level serves."""
+REGULARISED = 1e-6
+"""Part of its mean diagonal that is added to the coarse matrix."""
+INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
+SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
+"""Parts of its diagonal that are added to a tangent until it is positive definite."""
+
+
+class NotConvergedError(SolverError):
+    """The step was not solved; a smaller one may be."""
+
+
+@dataclass(frozen=True)
+class LinearCount:
+    """What a linear solve took, and whether the tangent was positive definite as it was."""
+
+    iterations: int
+    rung: int = PLAIN
+    convex: bool = True
+
+
+class TwoLevelPreconditioner:
+    """The sum D⁻¹ + Q (QᵀAQ)⁻¹ Qᵀ of block Jacobi and a coarse level: a two-level additive Schwarz method.
+
+    Q holds the rigid motions of parts of the mesh (Nicolaides 1987, for elasticity), A is the elastic part alone.
+
+    Parameters
+    ----------
+    domain
+        The mesh, whose positions are those of the present step.
+    tangent
+        What is preconditioned.
+    """
+
+    def __init__(self, domain: Domain, tangent: Tangent) -> None:
+        self._domain, self._tangent = domain, tangent
+        count = min(PARTS, max(len(domain.positions) // 50, 1))
+        owned_vertices = domain.vertex_of_node[: domain.owned]
+        # by global nodes, as the matrix' columns are
+        self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
+        self._part = shared_out(domain.positions, count)[self._vertex]
+        self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.owned)
+        self._made_at = -LIFETIME
+        self._set_diagonal()
+
+    def renew(self) -> None:
+        """Takes over the tangent's diagonal, and its coarse level where that has served its time."""
+        self._set_diagonal()
+        if self._tangent.elastic.assembled >= self._made_at + LIFETIME:
+            self._made_at = self._tangent.elastic.assembled
+            self._set_coarse_level()
+
+    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Sets y to the preconditioned x."""
+        coarse = self._restriction @ x.array_r
+        self._domain.comm.Allreduce(MPI.IN_PLACE, coarse)
+        y.array_w[:] = self._inverse_diagonal @ x.array_r + self._prolongation @ (self._inverse_coarse @ coarse)
+
+    def _set_diagonal(self) -> None:
+        inverse = positive_inverses(self._tangent.diagonal())
+        count = len(inverse)
+        self._inverse_diagonal = sparse.bsr_matrix((inverse, np.arange(count), np.arange(count + 1)))
+
+    def _set_coarse_level(self) -> None:
+        matrix = self._tangent.elastic.matrix
+        modes = rigid_motions(self._domain.positions[self._vertex], self._part)
+        modes[matrix.fixed] = 0.0
+        size = 6 * (int(self._part.max()) + 1)
+        all_nodes = np.arange(len(modes) + 1)
+        prolongation = sparse.bsr_matrix((modes, self._part, all_nodes), shape=(3 * len(modes), size))
+        rows = sparse.bsr_matrix(
+            (matrix.values, matrix.columns, matrix.row_ends), shape=(3 * self._domain.owned, 3 * len(modes))
+        )
+        own_nodes = all_nodes[: self._domain.owned + 1]
+        self._prolongation = sparse.bsr_matrix(
+            (modes[self._own], self._part[self._own], own_nodes), shape=(3 * self._domain.owned, size)
+        )
+        self._restriction = self._prolongation.T.tobsr((6, 3))
+        coarse = (self._restriction @ (rows @ prolongation)).toarray()
+        self._domain.comm.Allreduce(MPI.IN_PLACE, coarse)
+        scale = np.trace(coarse) / size
+        coarse[np.diag_indices(size)] += REGULARISED * scale
+        motions = self._tangent.motions
+        if motions is not None:
+            # stiff against what is taken out of all products, and would make it singular
+            held = self._restriction @ motions.modes
+            self._domain.comm.Allreduce(MPI.IN_PLACE, held)
+            coarse += 10 * scale / np.linalg.norm(held, 2) ** 2 * held @ held.T
+        self._inverse_coarse = positive_inverses((coarse + coarse.T) / 2)
+
+
+def positive_inverses(matrices: Floats) -> Floats:
+    """Returns inverses of (..., k, k) symmetric matrices, made positive definite: eigenvalues below 0 change sign."""
+    try:
+        np.linalg.cholesky(matrices)
+    except np.linalg.LinAlgError:
+        values, directions = np.linalg.eigh(matrices)
+        sizes = np.abs(values)
+        sizes = np.maximum(sizes, REGULARISED * sizes.max(axis=-1, keepdims=True))
+        return (directions / sizes[..., None, :]) @ directions.swapaxes(-1, -2)
+    return np.linalg.inv(matrices)
+
+
+class LinearSolver:
+    """Finds descent directions from one tangent after the other.
+
+    What it keeps from one solve to the next decides how a direction is found.
+
+    Parameters
+    ----------
+    problem
+        Whose tangents are solved with.
+    max_iterations
+        Iterations after which a solve has failed.
+    """
+
+    def __init__(self, problem: Problem, max_iterations: int) -> None:
+        self._problem = problem
+        self._preconditioner: TwoLevelPreconditioner | None = None
+        self._level = 0  # of the shift that the last tangent needed
+        self._cg = PETSc.KSP().create(problem.domain.comm)
+        self._cg.setType("cg")
+        # the norm that Newton's method is judged by
+        self._cg.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+        self._cg.setTolerances(atol=0.0, max_it=max_iterations)
+
+    def solve(
+        self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
+    ) -> LinearCount:
+        """Leaves in `direction` a solution of J d = −r that descends.
+
+        Parameters
+        ----------
+        tangent
+            J; where it is indefinite, it may be made convex, and is shifted.
+        residual
+            r.
+        reduction
+            Part of the right-hand side that may be left.
+        convexify
+            Whether its further parts may be made convex where conjugate gradients fail with the true ones.
+
+        Raises
+        ------
+        NotConvergedError
+            Where no shift helps.
+        """
+        iterations = 0
+        self._cg.setTolerances(rtol=reduction)
+        # where the tangent was not positive definite before, it may still not be
+        first = max(self._level - 1, 0)
+        if convexify and not self._problem.convex:
+            # parts that are pressed together tend to slide aside, which makes the tangent indefinite; made convex, it
+            # rarely is, but it is no longer exact
+            if first == 0:
+                reason, iterations = self._run(tangent, residual, direction)
+                if reason > 0:
+                    self._level = 0
+                    return LinearCount(iterations)
+            self._problem.convexify()
+        for level in range(first, len(SHIFTS)):
+            tangent.raise_diagonal(SHIFTS[level])
+            reason, taken = self._run(tangent, residual, direction)
+            tangent.raise_diagonal(0.0)
+            iterations += taken
+            if reason > 0:
+                self._level = level
+                return LinearCount(iterations, SHIFTED if level else PLAIN, level == 0)
+            if reason not in INDEFINITE:
+                break
+        raise NotConvergedError("the linear solver found no descent direction")
+
+    def _run(self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec) -> tuple[int, int]:
+        """Solves into the direction; returns PETSc's reason for the end, 0 without a descent, and the iterations."""
+        if self._preconditioner is None:
+            self._preconditioner = TwoLevelPreconditioner(self._problem.domain, tangent)
+            multilevel = self._cg.getPC()
+            multilevel.setType("python")
+            multilevel.setPythonContext(self._preconditioner)
+        self._preconditioner.renew()
+        self._cg.setOperators(tangent.matrix)
+        self._cg.solve(residual, direction)
+        direction.scale(-1.0)
+        self._problem.apply_boundary_conditions(direction)
+        descends = direction.dot(residual) < 0  # false where it is not a number
+        return self._cg.getConvergedReason() if descends else 0, self._cg.getIterationNumber()
