@@ -9,13 +9,13 @@ from gyriflow.errors import GyriflowError
 
 # drawn from a fixed seed; the machine's speed does not decide
 BOUNDED = settings(
-    max_examples=60,
+    max_examples=20,
     derandomize=True,
     deadline=None,
     database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
-MANY = settings(BOUNDED, max_examples=200)
+MANY = settings(BOUNDED, max_examples=40)
 
 # what numbers and words in headers are likely to be mistaken for
 ODD_BYTES = st.one_of(

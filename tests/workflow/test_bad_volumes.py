@@ -130,7 +130,7 @@ def test_images_are_shown_where_they_are_given(workflow):
         {"id": "a", "week": 22, "image": "t2w.nii.gz", "labels": "labels.nii.gz", "scheme": "feta-7"},
         {"id": "b", "week": 23, "labels": "labels.nii.gz", "scheme": "binary"},
     ]
-    study = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
+    study = {"brains": brains, "start": "a", "folding": {"end_week": 23}}
     jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
     assert (jobs["overlay_figure"], jobs["pial_from_labels"], jobs["cortical_thickness"]) == (1, 2, 1)
 
@@ -138,7 +138,7 @@ def test_images_are_shown_where_they_are_given(workflow):
 def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):
     (workflow.directory / "torn.nii.gz").write_text("no volume")
     brain = {"id": "a", "week": 21, "labels": "torn.nii.gz", "scheme": "binary"}
-    name = workflow.write("study.yaml", {"brains": [brain], "start": "a", "folding": {"end_week": 22}})
+    name = workflow.write("study.yaml", {"brains": [brain], "start": "a", "folding": {"end_week": 23}})
     outcome = workflow.run("--keep-going", "--cores", "1", "--configfile", name)
     assert outcome.returncode == 2
     assert "torn.nii.gz: cannot be read as an image" in outcome.stderr

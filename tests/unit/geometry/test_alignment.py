@@ -30,15 +30,6 @@ def test_a_small_motion_is_taken_back_in_one_step():
     np.testing.assert_allclose(POINTS @ found.T + shift, targets, atol=1e-5)
 
 
-def test_points_without_weight_do_not_count():
-    ahead = np.full(len(POINTS), 0.1)
-    weights = np.ones(len(POINTS))
-    ahead[:20], weights[:20] = 7.0, 0.0
-    with_them = step_towards_planes(POINTS, np.tile([0.0, 0.0, 1.0], (200, 1)), ahead, weights)
-    np.testing.assert_allclose(with_them[0], np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(with_them[1], [0.0, 0.0, 0.1], atol=1e-12)
-
-
 def test_a_sphere_is_not_turned():
     ball = NORMALS - NORMALS.mean(axis=0)
     rotation, _ = step_towards_planes(ball, ball, RANDOM.normal(size=200) * 0.01)

@@ -1,7 +1,6 @@
-import igl
 import numpy as np
 import pytest
-from shapes import box, box_mesh, ellipsoid_mesh, rigid, sphere
+from shapes import box, box_mesh, rigid, sphere
 
 from gyriflow.geometry.deformations import (
     Deformation,
@@ -107,11 +106,6 @@ def test_diffusion_in_a_bar_spreads_with_the_variance_of_the_gaussian_and_keeps_
     smooth = diffuse(bar.vertices, bar.tets, peak, 5.0)
     assert smooth @ mass == pytest.approx(peak @ mass)
     assert (smooth * mass) @ bar.vertices[:, 0] ** 2 / (smooth @ mass) == pytest.approx(25.0, rel=0.02)
-
-
-def test_sizes_of_vertices_add_up():
-    mesh = ellipsoid_mesh(8, (10, 10, 10))
-    assert vertex_sizes(mesh.vertices, mesh.tets).sum() == pytest.approx(igl.volume(mesh.vertices, mesh.tets).sum())
 
 
 def test_labels_of_a_layer_below_a_surface():

@@ -47,10 +47,6 @@ def test_measures_of_a_ball_near_those_of_the_sphere(ball):
     np.testing.assert_allclose(vertex_normals(ball), ball.vertices / 5.0, atol=0.01)
 
 
-def test_a_torus_has_euler_number_zero():
-    assert euler_number(shapes.torus(3.0, 1.0)) == 0
-
-
 def test_edges_count_their_faces(box):
     pairs, faces = edges(box)
     assert len(pairs) == 18

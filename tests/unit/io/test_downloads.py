@@ -1,6 +1,5 @@
 """Files from a server: whole or not there, checked; what is there is left as it is."""
 
-import gzip
 import hashlib
 import socket
 
@@ -60,13 +59,6 @@ def test_without_a_checksum_a_file_has_to_be_readable(tmp_path, server, name, co
     assert said[-1].endswith("as it came; no checksum is known")
 
 
-def test_a_whole_gzip_file_that_is_no_volume_is_refused(tmp_path, server):
-    server.files[LONG] = gzip.compress(b"no volume at all" * 100)
-    with pytest.raises(StorageError, match="something else than the file; found a file that cannot be read"):
-        fetched(tmp_path, server, LONG)
-    assert files_in(tmp_path) == {}
-
-
 def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     (tmp_path / "atlas").mkdir()
     own = gifti(seed=5)
@@ -110,12 +102,6 @@ def test_a_page_in_the_place_of_a_file_is_refused(tmp_path, server, name):
     with pytest.raises(StorageError, match="the server sent something else than the file; found no whole") as caught:
         fetched(tmp_path, server, name, sha256="0" * 64)
     assert "it begins with b'<!DOCTYPE html>" in str(caught.value)
-    assert files_in(tmp_path) == {}
-
-
-def test_a_file_that_the_server_lacks_is_named(tmp_path, server):
-    with pytest.raises(StorageError, match=r"b\.gii: cannot be fetched; found 404"):
-        fetched(tmp_path, server, "b.gii")
     assert files_in(tmp_path) == {}
 
 

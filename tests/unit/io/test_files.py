@@ -6,12 +6,11 @@ import json
 import os
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from gyriflow.errors import InputError, StorageError
 from gyriflow.io import files
-from gyriflow.io.files import contents, read_json, read_tab_separated, read_table, replaced, write_json, write_table
+from gyriflow.io.files import contents, read_json, read_tab_separated, read_table, replaced, write_json
 
 
 @pytest.mark.promise(1)
@@ -51,13 +50,6 @@ def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
     assert caught.value.exit_code == 5
 
 
-@pytest.mark.fault(36)
-def test_folder_that_cannot_be_made_is_a_storage_error(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(StorageError):
-        write_json(tmp_path / "file" / "a.json", {})
-
-
 def test_json_unwraps_numpy_and_has_no_nan(tmp_path):
     path = tmp_path / "a.json"
     write_json(path, {"n": np.int64(3), "x": [np.float32(0.5), np.nan, np.inf], "m": np.eye(2), "ok": np.True_})
@@ -72,12 +64,6 @@ def test_torn_or_missing_json_and_table_are_input_errors(tmp_path):
             read_json(tmp_path / name)
     with pytest.raises(InputError, match=r"b\.csv"):
         read_table(tmp_path / "b.csv")
-
-
-def test_table_comes_back(tmp_path):
-    table = pd.DataFrame({"subject": ["a", "b"], "value": [1 / 3, 1e-12]})
-    write_table(tmp_path / "a.csv", table)
-    pd.testing.assert_frame_equal(read_table(tmp_path / "a.csv"), table, rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ Nothing else is raised, and nothing is left beside the file.
 """
 
 import gzip
-from functools import partial
 
 import nibabel as nib
 import numpy as np
@@ -18,7 +17,7 @@ from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, read_tab_separated, read_table, read_text
-from gyriflow.io.maps import read_maps, read_surface_map, read_volume_map, write_maps
+from gyriflow.io.maps import read_maps, read_volume_map, write_maps
 from gyriflow.io.surfaces import (
     declared,
     read_surface,
@@ -103,14 +102,6 @@ def test_volumes(tmp_path, wholes, name, header, data):
 
 
 @BOUNDED
-@given(data=st.data())
-def test_packed_volumes(tmp_path, wholes, data):
-    content = data.draw(damaged(gzip.compress(wholes["a.nii"]), 16))
-    found = tried(tmp_path, "a.nii.gz", content, read_volume_map)
-    assert found is None or found.values.ndim == 3
-
-
-@BOUNDED
 @given(code=st.sampled_from([2, 4, 8, 16, 64, 256, 512, 768]), value=st.floats(width=32), place=st.integers(0, 209))
 @example(code=16, value=1e30, place=0)
 @example(code=16, value=float("nan"), place=0)
@@ -139,13 +130,6 @@ def test_surfaces(tmp_path, wholes, name, header, data):
 
 
 @BOUNDED
-@given(data=st.data())
-def test_surfaces_of_vtks_xml(tmp_path, wholes, data):
-    found = tried(tmp_path, "a.vtp", data.draw(damaged(wholes["a.vtp"], 1000)), read_surface)
-    assert found is None or is_sound(found)
-
-
-@BOUNDED
 @given(
     vertex=st.tuples(st.integers(0, 41), st.floats(width=32)),
     corner=st.tuples(st.integers(0, 79), st.integers(-(2**31), 2**31 - 1)),
@@ -168,15 +152,6 @@ def test_vertices_and_faces_with_wrong_numbers(tmp_path, vertex, corner):
 @given(data=st.data())
 def test_values_at_vertices(tmp_path, wholes, name, read, data):
     tried(tmp_path, name, data.draw(damaged(wholes[name], 800)), read)
-
-
-@BOUNDED
-@given(data=st.data())
-def test_maps_of_a_surface(tmp_path, wholes, data):
-    (tmp_path / "a.surf.gii").write_bytes(wholes["a.surf.gii"])
-    read = partial(read_surface_map, surface_path=tmp_path / "a.surf.gii")
-    found = tried(tmp_path, "a.shape.gii", data.draw(damaged(wholes["a.shape.gii"], 800)), read)
-    assert found is None or (np.isfinite(found[1]).all() and len(found[1]) == len(found[0].vertices))
 
 
 @BOUNDED

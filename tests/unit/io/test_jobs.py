@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from gyriflow.io.jobs import KILLED, GrowingFile, cause, events_in, gather_messages, read_benchmarks, read_messages
+from gyriflow.io.jobs import KILLED, GrowingFile, cause, gather_messages, read_benchmarks, read_messages
 
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 PATTERNS = {
@@ -111,10 +111,6 @@ def test_a_growing_file_gives_each_whole_line_once(tmp_path):
     # the job is tried again
     log.path.write_text("new\n")
     assert log.new_text() == "new\n"
-
-
-def test_an_event_that_is_torn_is_left_out():
-    assert events_in('{"event": "size", "elements": 3}\n{"event": "st\n') == [{"event": "size", "elements": 3}]
 
 
 def write(folder, name, *lines, head=HEAD):

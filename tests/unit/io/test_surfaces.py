@@ -103,14 +103,6 @@ def test_other_matrices_leave_the_coordinates_and_that_is_said(tmp_path, ball, c
     assert declared(tmp_path / "a.gii")[0] == space
 
 
-def test_of_several_matrices_the_one_into_scanner_space_counts_wherever_it_stands(tmp_path, ball):
-    for number, systems in enumerate(
-        ([(U, SCANNER, TURN), (U, TALAIRACH, SCALE)], [(U, MNI, SCALE), (U, SCANNER, TURN)])
-    ):
-        back = read_surface(in_spaces(tmp_path / f"{number}.gii", ball, *systems))
-        assert back.vertices == pytest.approx(ball.vertices @ TURN[:3, :3].T + TURN[:3, 3], abs=1e-3)
-
-
 @pytest.mark.parametrize("matrix", [SCALE, np.diag([-1.0, 1, 1, 1])])
 def test_matrix_into_scanner_space_that_is_not_rigid_is_refused(tmp_path, ball, matrix):
     with pytest.raises(InputError, match=r"a\.gii.*changes sizes or mirrors"):
@@ -198,12 +190,6 @@ def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
     # the matrix of a file is told once
     read_one_hemisphere(in_spaces(tmp_path / "b.gii", ball, (U, SCANNER, TURN)), "left")
     assert caplog.text.count("was applied") == 1
-
-
-def test_file_of_no_known_kind_is_refused_with_those_known(tmp_path):
-    (tmp_path / "lh.pial").write_bytes(b"something else")
-    with pytest.raises(InputError, match=r"lh\.pial: cannot be read as a surface.*FreeSurfer"):
-        read_surface(tmp_path / "lh.pial")
 
 
 def test_triangles_stored_as_floats_are_read(tmp_path, ball):

@@ -115,13 +115,6 @@ def test_frames_are_joined_into_one_time_series(frames):
         read_field(path, 21.0, "stress")
 
 
-def test_positions_are_kept_as_they_are_and_fields_in_single_precision(frames):
-    path, _ = frames
-    assert read_positions(path, 21.5).dtype == np.float64
-    assert read_field(path, 21.5, "u").dtype == element_field(path, 21.5, "stress").dtype == np.float32
-    assert element_field(path, 21.5, "zone").dtype == np.int64
-
-
 def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):
     path, mesh = frames
     reader = pyvista.get_reader(path.with_suffix(".xdmf"))
@@ -218,14 +211,6 @@ def test_dolfinx_reads_every_tag_where_it_belongs(written, domain, grid, dimensi
     assert tags.dim == dimension
     assert len(tags.values) == (len(facets) if dimension == 2 else len(mesh.tets))
     np.testing.assert_array_equal(tags.values, expected(midpoints(tags, domain)))
-
-
-def test_dolfinx_finds_the_zones_on_the_facets_that_paraview_shows(written, domain):
-    with XDMFFile(MPI.COMM_SELF, written[0], "r") as file:
-        zones = file.read_meshtags(domain, "facets")
-    assert (midpoints(zones, domain)[zones.values == 3][:, 2] == 1.0).all()
-    # two triangles in each of the upper side's 4 x 3 squares
-    assert (zones.values == 3).sum() == 24
 
 
 def test_paraview_opens_elements_and_facets_at_once(written):

@@ -5,7 +5,7 @@ import pytest
 import shapes
 
 from gyriflow.geometry.triangles import Floats, vertex_areas
-from gyriflow.metrics.curvature import Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
+from gyriflow.metrics.curvature import Curvature, curvature, curvature_integrals, mean_curvature_quantiles
 
 LARGE, SMALL = 18.0, 7.0
 ANGLES = 2 * np.pi * (np.arange(400) + 0.5) / 400
@@ -65,9 +65,3 @@ def test_quantiles_go_by_area() -> None:
     found = mean_curvature_quantiles(bend, np.array([10.0, 40.0, 40.0, 10.0]))
     assert list(found.values()) == [-0.2, 0.0, 0.0, 0.1, 0.3]
     assert list(found) == [f"mean_curvature_q{share}" for share in ("05", "25", "50", "75", "95")]
-
-
-def test_two_surfaces_add_up() -> None:
-    bend, areas = torus()
-    both = curvature_integrals(join([bend, bend]), np.tile(areas, 2))
-    assert both["folding_index"] == pytest.approx(2 * curvature_integrals(bend, areas)["folding_index"])

@@ -29,11 +29,6 @@ def test_a_motion_is_no_distance() -> None:
     assert result["hausdorff95"] < 0.05
 
 
-def test_distance_does_not_depend_on_the_triangles() -> None:
-    result = aligned_distance(brain_like(3), brain_like(4))
-    assert result["symmetric_mean"] < 0.25  # the coarse one lies inside by the sag of its triangles
-
-
 def test_spheres_of_different_radius() -> None:
     result = aligned_distance(sphere(20.0), sphere(22.0))
     assert result["symmetric_mean"] == pytest.approx(2.0, abs=0.05)
@@ -48,13 +43,6 @@ def test_hausdorff_sees_what_the_mean_does_not() -> None:
     result = aligned_distance(TriangleMesh(tall, smooth.faces), smooth)
     assert result["symmetric_mean"] < 1.0
     assert result["hausdorff95"] > 3.0
-
-
-def test_same_in_both_orders() -> None:
-    a, b = brain_like(), transformed(sphere(22.0), motion(0.0, [5.0, 0.0, 0.0]))
-    there, back = aligned_distance(a, b), aligned_distance(b, a)
-    assert there["symmetric_mean"] == pytest.approx(back["symmetric_mean"], rel=0.02)
-    assert there["hausdorff95"] == pytest.approx(back["hausdorff95"], rel=0.02)
 
 
 def test_parts_of_a_brain_are_aligned_by_themselves() -> None:

@@ -44,10 +44,6 @@ def test_change_of_scans_and_of_the_simulation_from_the_first() -> None:
     assert set(table["subject"]) == {"one"}
 
 
-def test_without_scans_the_table_is_empty() -> None:
-    assert len(change_between_scans(long_table([METRICS]), {})) == 0
-
-
 def test_wide_has_a_row_per_brain_and_week() -> None:
     table = wide_table(long_table([METRICS, REGIONS]), {})
     assert len(table) == 6
@@ -88,9 +84,3 @@ def test_norms_per_week_of_all_and_pial_nodes() -> None:
         [22.0, 23.5, "all", 0.5, 0.5],
         [22.0, 23.5, "pial", 0.5, 0.5],
     ]
-
-
-def test_single_week_has_no_rows_but_columns() -> None:
-    table = weekly_norms([21.0], [np.zeros((3, 3))], np.array([0]))
-    assert len(table) == 0
-    assert "mean_mm" in table

@@ -54,14 +54,6 @@ def test_the_border_is_carried_with_the_tissue(ball) -> None:
     assert found.mean() == pytest.approx(RADIUS - np.sqrt(RADIUS * (RADIUS - CORTEX)), abs=0.15)
 
 
-def test_thickness_may_vary(ball) -> None:
-    mesh, pial = ball
-    local = np.where(mesh.vertices[:, 2] > 0, 2.0, 4.0)
-    found = simulated_thickness(mesh, depth_of(mesh) * CORTEX / local, mesh.vertices, pial)
-    assert found[pial.vertices[:, 2] > 8].mean() == pytest.approx(2.0, abs=0.2)
-    assert found[pial.vertices[:, 2] < -8].mean() == pytest.approx(4.0, abs=0.25)
-
-
 def test_a_brain_that_is_all_cortex_has_no_border(ball) -> None:
     mesh, pial = ball
     with pytest.raises(MeshError, match="no core"):
