@@ -16,13 +16,6 @@ def gyriflow(workflow, *arguments):
     )  # fmt: skip
 
 
-def test_help_names_every_command_and_how_a_study_goes(workflow):
-    said = gyriflow(workflow, "--help").stdout
-    assert said.startswith("Usage: gyriflow")
-    for command in ("init", "check", "run", "status", "view"):
-        assert f"\n  {command} " in said
-
-
 @pytest.mark.fault(27)
 def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflow):
     name = workflow.write("bad.yaml", SMALL_STUDY | {"folding": {"end_week": 50, "poisson_ratio": 0.5}})

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 CUBE = """
 from mpi4py import MPI
 import dolfinx, ufl
@@ -41,7 +43,7 @@ def test_dolfinx_runs_on_three_ranks():
 
 
 # in processes of their own: what is missing (libGL, EGL) may end in a crash
-@pytest.mark.parametrize("package", ["pymeshlab", "pytetwild", "igl", "pyvista", "trimesh", "skimage"])
+@pytest.mark.parametrize("package", ["pymeshlab", "pytetwild", "igl", "pyvista", "skimage"])
 def test_package_imports(package):
     assert python(f"import {package}; print({package}.__name__)") == package
 

@@ -4,9 +4,8 @@ import subprocess
 
 import pytest
 
-from gyriflow.cli.launch import clear_stale_lock, hold_lock
-from gyriflow.errors import StorageError
-from gyriflow.io.files import write_json
+from gyriflow.cli.launch import clear_stale_lock, hold_lock, refuse_bad_configfiles
+from gyriflow.errors import InputError, StorageError
 
 from .conftest import SMALL_STUDY
 
@@ -33,62 +32,33 @@ def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
     ("content", "said"),
     [
         ("runs:\n  x: {}\n  x: {}\n", "line 3: the key 'x' of line 2 is there again"),
-        (None, "study.yaml: cannot be read"),
+        (None, "study.yaml: cannot be read.*Targets stand before --configfile"),
+        ("", "holds no keys; found nothing"),
     ],
 )
-def test_a_file_that_is_no_configuration_ends_in_2(workflow, content, said):
-    if content:
-        (workflow.directory / "study.yaml").write_text(content)
-    outcome = workflow.run("-n", "--configfile", "study.yaml")
-    assert outcome.returncode == 2
-    assert said in message(outcome)
+def test_a_file_that_is_no_configuration_is_refused(tmp_path, content, said):
+    study = tmp_path / "study.yaml"
+    if content is not None:
+        study.write_text(content)
+    with pytest.raises(InputError, match=said):
+        refuse_bad_configfiles([study], tmp_path)
 
 
-def test_an_empty_configuration_of_a_folder_ends_in_2(workflow):
-    (workflow.directory / "config").mkdir()
-    (workflow.directory / "config" / "config.yaml").touch()
-    outcome = workflow.run("-n")
-    assert outcome.returncode == 2
-    assert "config.yaml: holds no keys; found nothing" in message(outcome)
-
-
-def test_the_results_of_another_study_are_not_mixed_with_this_ones(workflow):
-    name = workflow.write("study.yaml", SMALL_STUDY)
-    (workflow.directory / "results" / "brains" / "x").mkdir(parents=True)
-    other = {"configuration": ["/elsewhere/other.yaml"], "brains": [["x", 25, "labels", "x.nii.gz"]]}
-    write_json(workflow.directory / "results" / "study" / "study.json", other)
-    outcome = workflow.run("--cores", "1", "surface", "--configfile", name)
-    assert outcome.returncode == 2
-    assert "the results here are those of another study; found x of /elsewhere/other.yaml" in message(outcome)
-    assert workflow.run("-n", "surface", "--configfile", name, "--directory", "own").returncode == 0
-
-
-def test_a_given_configuration_replaces_the_demo_and_its_files_are_beside_it(workflow, tmp_path):
-    folder = tmp_path / "my study"
-    folder.mkdir()
-    (folder / "labels.nii.gz").touch()
-    brains = [{"id": "x", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"}]
-    name = workflow.write("my study/study.yaml", SMALL_STUDY | {"brains": brains, "start": "x"})
-    outcome = workflow.run("-n", "surface", "--configfile", name, "--directory", "elsewhere")
-    assert outcome.returncode == 0, outcome.stderr
-    assert str(folder / "labels.nii.gz") in outcome.stdout + outcome.stderr
-
-
-def test_a_table_of_participants_is_found_beside_its_configuration(workflow):
+def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(workflow):
     # the working directory has a cohort of its own
-    for folder in ("study", "elsewhere"):
+    for folder in ("my study", "elsewhere"):
         (workflow.directory / folder).mkdir()
         (workflow.directory / folder / "labels.nii.gz").touch()
-        table = f"participant_id\tweek\tlabels\nof-{folder}\t24\tlabels.nii.gz\n"
+        table = f"participant_id\tweek\tlabels\nof-{folder}\t24\tlabels.nii.gz\n".replace(" ", "-")
         (workflow.directory / folder / "participants.tsv").write_text(table)
     table = {"file": "participants.tsv", "columns": {"scheme": "binary"}}
     study = {"participants": table, "start": "all", "folding": {"end_week": 26}}
-    name = workflow.write("study/study.yaml", study)
+    name = workflow.write("my study/study.yaml", study)
     outcome = workflow.run("-n", "surface", "--configfile", name, "--directory", "elsewhere")
     assert outcome.returncode == 0, outcome.stderr
-    said = outcome.stdout + outcome.stderr
-    assert str(workflow.directory / "study" / "labels.nii.gz") in said
-    assert "of-elsewhere" not in said
+    assert str(workflow.directory / "my study" / "labels.nii.gz") in outcome.stdout + outcome.stderr
+    assert "of-my-study" in outcome.stdout + outcome.stderr
+    assert "of-elsewhere" not in outcome.stdout + outcome.stderr
 
 
 def stale(directory):
