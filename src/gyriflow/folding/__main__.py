@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import GyriflowError, InputError, StorageError
+from ..errors import GyriflowError, StorageError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
 from ..io.maps import read_maps
@@ -44,14 +44,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         help="a run that diverges ends well with the weeks that it has reached; its summary says why",
     )
     return parser.parse_args(arguments)
-
-
-def read_parameters(path: Path) -> FoldingParameters:
-    """Returns the parameters of a YAML file; InputError where it cannot be read or does not fit."""
-    values = read_yaml(path)
-    if not isinstance(values, dict):
-        raise InputError("holds no parameters", path=path, expected="keys and values, as in params.yaml of a run")
-    return parameters_from(values)
 
 
 @contextmanager
@@ -88,7 +80,7 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
 
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Reads, checks, prints what is to be solved, and solves it."""
-    parameters = read_parameters(arguments.params)
+    parameters = parameters_from(read_yaml(arguments.params))
     mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
     zones = comm.bcast(zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0)
     maps: Maps = comm.bcast(read_maps(arguments.maps) if comm.rank == 0 and arguments.maps else {}, root=0)

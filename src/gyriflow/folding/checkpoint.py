@@ -12,15 +12,14 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.triangles import Floats
 from ..io.files import new_hdf5
 from ..io.sources import modules_behind, room_of
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
 
-Floats = NDArray[np.float64]
 ROOMS = ("folding", "mechanics", "geometry", "parameters", "units")
 """Where the modules lie on which the course of a run depends."""
 ARRAYS = ("positions", "last", "before_last", "stretch", "grown")

@@ -19,14 +19,13 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError
 from ..geometry.tetrahedra import finer_surface
-from ..geometry.triangles import TriangleMesh, edges, mean_length
+from ..geometry.triangles import Floats, TriangleMesh, edges, mean_length
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
 from .surface_parts import SearchRange, SurfacePart, part_of_surface, shared_out
 
-Floats = NDArray[np.float64]
 DISTANCE_PER_EDGE = 0.2
 """Distance at which contact begins, in mean edge lengths of the surface as it is: well below what the mesh resolves.
 As the surface grows, its edges do; a distance that stayed behind would only make contact harder to solve."""
@@ -134,7 +133,7 @@ class SelfContact:
         self._gathered_rows = np.concatenate(self._rows_by_rank)
         self._counts = [3 * count for count in domain.comm.allgather(len(self._owned_rows))]
         self._columns = domain.node_of_vertex[self._vertices]
-        start = self._at_vertices(domain.positions[self._vertices]) * MM_PER_M
+        start = self._weights @ domain.positions[self._vertices] * MM_PER_M
         self._edges = edges(TriangleMesh(start, faces))[0]
         # ranks on different processors may round differently, but each vertex has one owner
         self._owner = domain.comm.bcast(shared_out(start, domain.comm.size), root=0)
@@ -159,7 +158,7 @@ class SelfContact:
 
     def mesh_moved(self) -> None:
         """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
-        self._start = self._at_vertices(self.domain.positions[self._vertices]) * MM_PER_M
+        self._start = self._weights @ self.domain.positions[self._vertices] * MM_PER_M
         # the same whatever a rank's processor rounds
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
         of_edges = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
@@ -186,10 +185,7 @@ class SelfContact:
         self.domain.comm.Allgatherv(np.ascontiguousarray(local[self._owned_nodes]), (received, self._counts))
         values = np.empty_like(received)
         values[self._gathered_rows] = received
-        return self._at_vertices(values)
-
-    def _at_vertices(self, at_nodes: Floats) -> Floats:
-        return np.asarray(self._weights @ at_nodes)
+        return self._weights @ values
 
     def _surface_at(self, *places: Floats) -> tuple[ipctk.CollisionMesh, SurfacePart]:
         if self._part_range is None or not self._part_range.at(self.distance_mm, *places):

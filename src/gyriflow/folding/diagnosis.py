@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
+from ..geometry.triangles import Floats
 from ..parameters.terms import ELEMENTS_NEEDED
 from ..units import MM_PER_M
 from .contact import SelfContact
@@ -14,7 +14,6 @@ from .domain import Domain
 from .newton import NewtonSolver
 from .zones import Zones
 
-Floats = NDArray[np.float64]
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 WORST = 0.01
 """Part of the elements whose quality the step table tells."""

@@ -20,10 +20,9 @@ from ..geometry.tetrahedra import (
     volumes_between,
     whole_faces,
 )
+from ..geometry.triangles import Floats
 from ..units import M_PER_MM
 from .versions import create_mesh, geometry_nodes
-
-Floats = NDArray[np.float64]
 
 # dolfinx numbers the nodes on edges from the last edge to the first
 TO_DOLFINX = {1: [0, 1, 2, 3], 2: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4]}

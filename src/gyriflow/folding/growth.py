@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
-from ..geometry.triangles import TriangleMesh, area, signed_volume
+from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 from .layers import Tissue
 from .zones import Zones
 
-Floats = NDArray[np.float64]
 NO_GROWTH = 1e-10
 """Growth increment of a step that counts as none, a hundred-millionth of what the cortex grows."""
 
@@ -121,19 +120,9 @@ class GrowthByRates(Growth):
 def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float) -> tuple[Any, Any]:
     """Returns the increments dg along the pial surface and dr across it, as stretches less 1.
 
-    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt.
-
-    Parameters
-    ----------
-    w
-        Cortical weight: 1 in the cortex, 0 in the core.
-    g
-        1 where tissue grows, 0 where it does not.
-    tangential, radial, core
-        The rates α_TAN of the cortex along its surface, α_RAD of the core along the normal, and α_CORE of the core in
-        all directions, in 1/s.
-    step_s
-        Length of the step in s.
+    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt, with the cortical weight w, g 1
+    where tissue grows and else 0, and rates in 1/s: α_TAN of the cortex along its surface, α_RAD of the core along the
+    normal, and α_CORE of the core in all directions.
     """
     isotropic = core * (1 - w)
     return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + isotropic) * (g * step_s)
@@ -153,14 +142,7 @@ def increments_at(
 def layered_inverse(dg: Floats, dr: Floats, chosen: NDArray[np.bool_], normals: Floats) -> Floats:
     """Returns G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
 
-    Parameters
-    ----------
-    dg, dr : (c, q) float
-        Increments along the surface and across it.
-    chosen : (c,) bool
-        The elements with a direction; others grow by dg in all.
-    normals : (w, q, 3) float
-        Unit normals N of those.
+    The (c,) `chosen` elements have unit normals N (w, q, 3); others grow by dg in all directions.
     """
     inverse = (1 / (1 + dg))[..., None, None] * np.eye(3)
     across = normals[..., :, None] * normals[..., None, :]

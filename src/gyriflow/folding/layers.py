@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.matching import barycentric, nearest_on
-from ..geometry.triangles import TriangleMesh, corners, unit, vertex_normals
+from ..geometry.triangles import Floats, TriangleMesh, corners, unit, vertex_normals
 from ..parameters.folding import FoldingParameters
 from ..parameters.terms import CORTICAL_STEEPNESS
 from ..parameters.varying import Maps, value_at
 from ..units import M_PER_MM, MM_PER_M
 from .points import IntegrationPoints
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 WEIGHT_REACH = 3.0

@@ -8,12 +8,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import StorageError
-from ..io.files import write_json, write_table
-from ..io.frames import join_frames, write_frame
+from ..geometry.triangles import Floats
+from ..io.frames import write_frame
 from ..mechanics.materials import MATERIALS
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
@@ -24,8 +23,6 @@ from .stress import unpacked
 from .zones import Zones
 
 log = logging.getLogger(__name__)
-
-Floats = NDArray[np.float64]
 FRAMES = "frames.h5"
 STEPS = "steps.csv"
 SUMMARY = "summary.json"
@@ -159,15 +156,6 @@ def save_frame(
     fields |= layer_fields(fields["positions"], zones, parameters, maps, week, parameters.fields, log_growth)
     fields |= contact
     write_frame(frame_path(folder, week), week, fields, elements)
-
-
-def finish(
-    out: Path, folder: Path, tets: NDArray[np.int64], weeks: Iterable[float], rows: Iterable[dict], summary: dict
-) -> None:
-    """Writes the final files into `out` from the single frames in `folder`."""
-    join_frames(out / FRAMES, tets, [frame_path(folder, week) for week in weeks])
-    write_table(out / STEPS, pd.DataFrame(list(rows)))
-    write_json(out / SUMMARY, summary)
 
 
 def peak_memory_mib() -> float:

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 import basix
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.jacobians import NODES, PARTS, SLOPES, shape_slopes, shape_values
-
-Floats = NDArray[np.float64]
+from ..geometry.triangles import Floats
 
 DEGREE_OF_ORDER = {1: 1, 2: 3}
 """Degree of the polynomials that are integrated exactly, by the order of the elements: 3 is the least with which a

@@ -13,6 +13,7 @@ import ufl
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..geometry.triangles import Floats
 from ..mechanics.materials import Material
 from ..parameters.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
@@ -22,9 +23,6 @@ from .points import IntegrationPoints
 from .rigid import RigidMotions
 from .tangent import ElasticMatrix, KeptTangent, Tangent
 from .zones import Zones
-
-Floats = NDArray[np.float64]
-
 
 FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""

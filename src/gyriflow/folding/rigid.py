@@ -5,9 +5,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..geometry.triangles import Floats
 from .domain import Domain
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 

@@ -8,21 +8,21 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh
+from ..io.files import write_json, write_table
+from ..io.frames import join_frames
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .output import finish, frame_path, peak_memory_mib, progress_line, save_frame, say, warn
+from .output import FRAMES, STEPS, SUMMARY, frame_path, peak_memory_mib, progress_line, save_frame, say, warn
 from .simulation import Folding, advance
 from .steering import missed_curves
 from .zones import Zones
-
-Floats = NDArray[np.float64]
 
 
 def run(
@@ -112,7 +112,9 @@ def run(
             "diverged": diverged,
             "resumed_after_step": first,
         }
-        finish(out, folder, mesh.tets, weeks, state.rows, summary)
+        join_frames(out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks])
+        write_table(out / STEPS, pd.DataFrame(list(state.rows)))
+        write_json(out / SUMMARY, summary)
         shutil.rmtree(folder)
         if diverged is not None:
             warn(f"the run diverges and ends at GW {reached:.3f}: {diverged}")

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..parameters.folding import FoldingParameters, require_maps
 from ..parameters.varying import Maps, value_range
@@ -36,7 +36,6 @@ from .step_fields import StepFields
 from .stress import left_stretch, packed, relaxed, unpacked
 from .zones import Zones
 
-Floats = NDArray[np.float64]
 PENALTY_PA_PER_M = 5.0e5
 """Pressure per depth of penetration at the planes of contact (the paper)."""
 STEPS_BEFORE_GROWING = 4

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..geometry.triangles import Floats
 from ..parameters.folding import FoldingParameters
 from ..parameters.terms import ELEMENT_FIELDS
 from ..units import SECONDS_PER_GW
@@ -21,8 +21,6 @@ from .stress import (
     von_mises,
 )
 from .zones import Zones
-
-Floats = NDArray[np.float64]
 
 
 class StepFields:

@@ -7,7 +7,8 @@ of tensors are (c, 3, 3), of scalars (c,).
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ..geometry.triangles import Floats
+
 Ints = NDArray[np.integer]
 UPPER = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 """Rows and columns of the six values that a symmetric tensor is kept as."""
@@ -16,14 +17,8 @@ UPPER = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 def deformation_gradients(before: Floats, after: Floats, cells: Ints, slopes: Floats) -> Floats:
     """Returns the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
 
-    Parameters
-    ----------
-    before, after : (k, 3) float
-        Positions of the nodes in one unit.
-    cells : (c, n) int
-        Their indices per element; the elements have a volume before.
-    slopes : (q, n, 3) float
-        Gradients of the nodes' shape functions in the regular element, at the points.
+    Positions of the nodes are (k, 3) in one unit, `cells` (c, n) their indices; the elements have a volume before.
+    `slopes` (q, n, 3) are the gradients of the nodes' shape functions in the regular element, at the points.
     """
     # the transposed maps from the regular element: those after = those before · Fᵀ
     first, second = (np.matmul(slopes.transpose(0, 2, 1), x[cells][:, None]) for x in (before, after))

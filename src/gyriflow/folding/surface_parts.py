@@ -11,9 +11,7 @@ import ipctk
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.triangles import TriangleMesh, edges
-
-Floats = NDArray[np.float64]
+from ..geometry.triangles import Floats, TriangleMesh, edges
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
-from ..geometry.triangles import TriangleMesh, face_normals
+from ..geometry.triangles import Floats, TriangleMesh, face_normals
 from ..parameters import terms
 from ..parameters.folding import FoldingParameters, NoGrowth
 from ..parameters.terms import Side
 from .layers import PialSearch
 
-Floats = NDArray[np.float64]
 Tags = dict[str, NDArray[np.int32]]
 FLAT = 0.01
 """Part of the extent within which vertices of a flat base or side lie."""
@@ -47,7 +46,7 @@ class Zones:
 
     facets: NDArray[np.int64]
     facet_zone: NDArray[np.int64]
-    growth: NDArray[np.float64]
+    growth: Floats
     fissure_x_mm: float
     planes_mm: tuple[float, float]
     free: bool = False
@@ -58,7 +57,7 @@ class Zones:
         """Returns the vertices of the facets of some zones, each once."""
         return np.unique(self.facets[np.isin(self.facet_zone, zones)])
 
-    def penetration_mm(self, positions: NDArray[np.float64]) -> float:
+    def penetration_mm(self, positions: Floats) -> float:
         """Returns how far the fissure's walls stand beyond their planes at most, for (n, 3) positions in mm."""
         left = positions[self.vertices_of(terms.LEFT_CONTACT), 0] - self.planes_mm[0]
         right = self.planes_mm[1] - positions[self.vertices_of(terms.RIGHT_CONTACT), 0]
@@ -90,7 +89,7 @@ class Zones:
         return fixed
 
 
-def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floats]:
     """Returns the least and the greatest coordinates (3,) of a brain, for one hemisphere alone with its mirror image.
 
     The mirror is at the innermost place of the hemisphere `side`.
@@ -112,9 +111,7 @@ def medial_wall_facets(mesh: TetrahedralMesh, facets: NDArray[np.int64], side: S
     return on_whole_faces(near & (facing > WALL_COSINE), mesh.order)
 
 
-def _wall_anchors(
-    vertices: NDArray[np.float64], wall: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _wall_anchors(vertices: Floats, wall: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     places = vertices[wall][:, 1:]
     middle = int(((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin())
     away = int(np.abs(places[:, 0] - places[middle, 0]).argmax())
@@ -122,9 +119,7 @@ def _wall_anchors(
     return wall[[middle, away]], np.array([[False, True, True], [False, False, True]])
 
 
-def inside_ellipsoid(
-    vertices: NDArray, ellipsoid: NoGrowth, low: NDArray[np.float64], high: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats) -> NDArray[np.bool_]:
     """Returns which vertices lie in the ellipsoid of no growth of a brain with (3,) ends `low` and `high`."""
     extent = high - low
     centre = (low + high) / 2 + np.array([0.0, ellipsoid.shift_y, ellipsoid.shift_z]) * extent
@@ -217,12 +212,8 @@ def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
     """Returns the (m,) tags of the elements.
 
     `hemisphere` is LEFT or RIGHT by the element's centroid, BRIDGE between the two contact planes. `growing` is 0
-    where the model lets none of an element's vertices grow, else 1. `layer` is CORTEX or CORE.
-
-    Parameters
-    ----------
-    weight : (n,) float
-        Cortical weight at the vertices; an element is cortex where its mean is above a half.
+    where the model lets none of an element's vertices grow, else 1. `layer` is CORTEX where the mean cortical `weight`
+    (n,) of its vertices is above a half, else CORE.
     """
     x = mesh.vertices[mesh.corners, 0].mean(axis=1)
     left, right = zones.planes_mm
@@ -234,12 +225,9 @@ def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
 
 
 def facet_tags(zones: Zones, on_left: NDArray[np.bool_]) -> Tags:
-    """Returns the (f,) tags of `zones.facets`: `zone` as in `zones`, `hemisphere` LEFT or RIGHT.
+    """Returns the (f,) tags of `zones.facets`: `zone`, and `hemisphere` LEFT or RIGHT.
 
-    Parameters
-    ----------
-    on_left : (f,) bool
-        Which facets belong to the left hemisphere. The fissure may be curved, so that no plane tells.
+    The fissure may be curved, so that no plane tells which facets are `on_left`.
     """
     side = np.where(on_left, terms.LEFT, terms.RIGHT)
     return {"zone": zones.facet_zone.astype(np.int32), "hemisphere": side.astype(np.int32)}

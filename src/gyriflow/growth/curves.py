@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, PchipInterpolator
 from scipy.linalg import solve
 from scipy.optimize import brentq, lsq_linear
 
 from ..errors import InputError
+from ..geometry.triangles import Floats
 
 log = logging.getLogger(__name__)
-
-Floats = NDArray[np.float64]
 
 DEGREES_OF_FREEDOM = 4.0
 """Of a fitted curve: a size, a rate of growth, how that rate changes, and a little more."""
