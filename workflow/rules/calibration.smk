@@ -7,31 +7,29 @@ CALIBRATED = study.calibration
 
 rule calibration_design:
     input:
-        scores=lambda wildcards: CALIBRATED.scores_before(int(wildcards.round)),
+        scores=lambda w: CALIBRATED.scores_before(int(w.round)),
     output:
         f"{CALIBRATION}/round-{{round}}.csv",
     wildcard_constraints:
         round=r"\d+",
     params:
-        bounds=lambda wildcards: CONFIG.calibrate.parameters,
-        seed=lambda wildcards: CONFIG.calibrate.seed,
-        runs=lambda wildcards: CALIBRATED.runs_of(int(wildcards.round)),
+        bounds=lambda w: CONFIG.calibrate.parameters,
+        seed=lambda w: CONFIG.calibrate.seed,
+        runs=lambda w: CALIBRATED.runs_of(int(w.round)),
     script:
         "../scripts/calibration_design.py"
 
 
 rule calibration_parameters:
     input:
-        design=lambda wildcards: CALIBRATED.design(wildcards.run),
-        base=lambda wildcards: PARAMETERS.format(
-            run=CONFIG.calibrate.base, brain=wildcards.brain
-        ),
+        design=lambda w: CALIBRATED.design(w.run),
+        base=lambda w: PARAMETERS.format(run=CONFIG.calibrate.base, brain=w.brain),
     output:
         PARAMETERS,
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:
-        week=lambda wildcards: CONFIG.calibrate.compare_week,
+        week=lambda w: CONFIG.calibrate.compare_week,
     script:
         "../scripts/calibration_parameters.py"
 
@@ -49,23 +47,23 @@ def calibrated_surfaces(wildcards):
 rule calibration_score:
     input:
         simulated=calibrated_surfaces,
-        real=lambda wildcards: [
+        real=lambda w: [
             real.pial for brains in CALIBRATED.real.values() for real in brains
         ],
-        summaries=lambda wildcards: [
-            FOLDING["summary"].format(run=wildcards.run, brain=base.start.id)
+        summaries=lambda w: [
+            FOLDING["summary"].format(run=w.run, brain=base.start.id)
             for base in CALIBRATED.base
         ],
-        design=lambda wildcards: CALIBRATED.design(wildcards.run),
+        design=lambda w: CALIBRATED.design(w.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:
         # how many of the real brains belong to each of the simulated ones
-        compared=lambda wildcards: list(map(len, CALIBRATED.real.values())),
-        weights=lambda wildcards: CONFIG.calibrate.score,
-        round=lambda wildcards: CALIBRATED.rounds[wildcards.run],
+        compared=lambda w: list(map(len, CALIBRATED.real.values())),
+        weights=lambda w: CONFIG.calibrate.score,
+        round=lambda w: CALIBRATED.rounds[w.run],
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/calibration_score.py"
@@ -78,8 +76,8 @@ rule calibration_tables:
         runs=f"{CALIBRATION}/runs.csv",
         optimum=f"{CALIBRATION}/optimum.csv",
     params:
-        bounds=lambda wildcards: CONFIG.calibrate.parameters,
-        seed=lambda wildcards: CONFIG.calibrate.seed,
+        bounds=lambda w: CONFIG.calibrate.parameters,
+        seed=lambda w: CONFIG.calibrate.seed,
     script:
         "../scripts/calibration_tables.py"
 

@@ -80,8 +80,6 @@ rule similarity:
         real=lambda w: list(study.brains[w.measured].measured.parts.values()),
     output:
         SIMILARITY,
-    wildcard_constraints:
-        measured=one_of(study.brains),
     params:
         labels=lambda w: {
             "subject": w.brain,

@@ -24,9 +24,6 @@ rule register:
         later=lambda w: study.brains[w.later].registered_volume,
     output:
         REGISTERED,
-    wildcard_constraints:
-        earlier=one_of(study.brains),
-        later=one_of(study.brains),
     params:
         brains=lambda w: [
             study.brains[name].registered for name in (w.earlier, w.later)
@@ -42,8 +39,6 @@ rule matched_surface:
         report=PIAL["report"],
     output:
         MATCHED_SURFACE,
-    wildcard_constraints:
-        brain=one_of(sorted(set().union(*study.series.matched.values()))),
     params:
         files=from_brain("given.files"),
     script:
@@ -58,9 +53,6 @@ rule match_surfaces:
         later_report=PIAL["report"].format(brain="{later}"),
     output:
         MATCHED,
-    wildcard_constraints:
-        earlier=one_of(study.brains),
-        later=one_of(study.brains),
     script:
         "../scripts/match_surfaces.py"
 
@@ -104,8 +96,6 @@ rule carried_mesh:
         later=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
         CARRIED_MESH,
-    wildcard_constraints:
-        brain=one_of(study.carried),
     resources:
         mem_mb=8000,
     params:

@@ -16,7 +16,7 @@ rule study_resources:
         table=f"{STUDY}/resources.html",
     params:
         # by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
-        benchmarks=lambda wildcards: {
+        benchmarks=lambda w: {
             job.name: job.benchmark.regex().pattern
             for job in takewhile(
                 lambda job: job.name != "study_resources", workflow.rules
@@ -78,8 +78,6 @@ rule html_report:
         viewer=f"{PAGE}/viewer.js",
     output:
         "results/report/report.html",
-    resources:
-        runtime=20,
     params:
         figures=[
             (figure.name, figure.path, dict(figure.names))
@@ -131,24 +129,9 @@ rule report:
         rules.provenance.output,
 
 
-# targets, and what only moves text: no jobs of their own on a cluster
+# what only moves text: no jobs of their own on a cluster, as targets
 localrules:
-    all,
     atlas_file,
-    retrieve,
-    surface,
-    mesh,
-    growth,
-    folding,
-    validate,
-    metrics,
-    figures,
-    quality,
-    report,
-    studies,
-    influence_figures,
-    calibrate,
-    paper,
     parameters,
     methods,
     html_report,

@@ -23,9 +23,9 @@ rule atlas_file:
     wildcard_constraints:
         file=one_of(ATLAS_FILES),
     params:
-        url=lambda wildcards: ATLAS_FILES[wildcards.file].url,
-        sha256=lambda wildcards: ATLAS_FILES[wildcards.file].record.sha256,
-        size=lambda wildcards: ATLAS_FILES[wildcards.file].record.bytes,
+        url=lambda w: ATLAS_FILES[w.file].url,
+        sha256=lambda w: ATLAS_FILES[w.file].record.sha256,
+        size=lambda w: ATLAS_FILES[w.file].record.bytes,
     script:
         "../scripts/retrieve.py"
 

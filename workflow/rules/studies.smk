@@ -22,8 +22,6 @@ rule compare_member:
         summary=FOLDING["summary"],
     output:
         COMPARED_MEMBER,
-    wildcard_constraints:
-        study=one_of(study.comparisons),
     params:
         real=lambda w: {
             real.id: real.population
@@ -42,8 +40,6 @@ rule study_tables:
         members=f"{STUDY}/{{study}}/members.csv",
         comparison=f"{STUDY}/{{study}}/comparison.csv",
         nearest=f"{STUDY}/{{study}}/nearest.csv",
-    wildcard_constraints:
-        study=one_of(study.comparisons),
     params:
         members=lambda w: study.comparisons[w.study].rows,
         week=lambda w: study.comparisons[w.study].week,

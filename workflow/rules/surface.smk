@@ -72,23 +72,37 @@ for name, source, sides in (
             "../scripts/pial.py"
 
 
-rule cortical_thickness:
-    input:
-        labels=from_brain("given.label_volume"),
-        surface=PIAL["whole"],
-        report=PIAL["report"],
-    output:
-        **THICKNESS,
-    wildcard_constraints:
-        brain=brains_with(lambda brain: brain.thickness_from == "labels"),
-    resources:
-        mem_mb=surface_memory,
-    params:
-        affine_from=from_brain("given.affine_from"),
-        scheme=from_brain("scheme"),
-        settings=surface_settings("smoothing_voxels"),
-    script:
-        "../scripts/cortical_thickness.py"
+for name, source in (
+    ("cortical_thickness", "labels"),
+    ("thickness_from_white", "white"),
+):
+
+    rule:
+        name:
+            name
+        input:
+            given=lambda w: list(study.brains[w.brain].thickness_from.values()),
+            surface=PIAL["whole"],
+            report=PIAL["report"],
+        output:
+            **THICKNESS,
+        wildcard_constraints:
+            brain=brains_with(
+                lambda brain: brain.thickness_from
+                and ("labels" in brain.thickness_from) == (source == "labels")
+            ),
+        resources:
+            mem_mb=surface_memory,
+        params:
+            # exchanged files are the same inputs to Snakemake
+            given=from_brain("thickness_from"),
+            affine_from=from_brain("given.affine_from"),
+            scheme=from_brain("scheme"),
+            settings=(
+                surface_settings("smoothing_voxels") if source == "labels" else {}
+            ),
+        script:
+            "../scripts/thickness.py"
 
 
 POSED = [brain for brain in study.brains.values() if brain.pose]
@@ -104,21 +118,6 @@ rule poses:
         limits=LIMITS,
     script:
         "../scripts/poses.py"
-
-
-rule thickness_from_white:
-    input:
-        unpack(from_brain("given.white_files")),
-        surface=PIAL["whole"],
-        report=PIAL["report"],
-    output:
-        **THICKNESS,
-    wildcard_constraints:
-        brain=brains_with(lambda brain: brain.thickness_from == "white"),
-    params:
-        white=from_brain("given.white_files"),
-    script:
-        "../scripts/thickness_from_white.py"
 
 
 rule surface:

@@ -1,15 +1,11 @@
 # What simulations are worth: each simulated brain beside the real one of its week, with the scaled start as baseline.
 rule ready_surfaces:
     input:
-        real=lambda wildcards: study.references[wildcards.brain, wildcards.week][0].pial,
-        adjacent=lambda wildcards: study.references[wildcards.brain, wildcards.week][
-            1
-        ].pial,
+        real=lambda w: study.references[w.brain, w.week][0].pial,
+        adjacent=lambda w: study.references[w.brain, w.week][1].pial,
         start=PIAL["whole"],
     output:
         **READY,
-    wildcard_constraints:
-        brain=one_of({one.start.id for one in study.validated}),
     params:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -21,10 +17,8 @@ rule validation:
         unpack(from_simulation("validation_files")),
         params=PARAMETERS,
         # what the errors of runs that follow no curve are errors against
-        curves=lambda wildcards: (
-            CURVES["curves"]
-            if study.simulations[wildcards.run, wildcards.brain].series
-            else []
+        curves=lambda w: (
+            CURVES["curves"] if study.simulations[w.run, w.brain].series else []
         ),
     output:
         VALIDATION,
@@ -32,6 +26,7 @@ rule validation:
         start_week=from_brain("week"),
         series=from_simulation("series"),
         weeks=from_simulation("real_weeks"),
+        run=lambda w: w.run,
         kind=from_simulation("kind"),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -41,7 +36,7 @@ rule validation:
 rule prediction:
     input:
         unpack(from_simulation("validation_files")),
-        atlas=lambda wildcards: study.chains[wildcards.brain, "atlas"].surfaces,
+        atlas=lambda w: study.chains[w.brain, "atlas"].surfaces,
         mesh=MESH["mesh"],
         data=MESH["data"],
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
@@ -49,10 +44,8 @@ rule prediction:
         PREDICTION,
     params:
         start_week=from_brain("week"),
-        weeks=lambda wildcards: list(
-            study.simulations[wildcards.run, wildcards.brain].real
-        ),
-        atlas_weeks=lambda wildcards: study.chains[wildcards.brain, "atlas"].later_weeks,
+        weeks=lambda w: list(study.simulations[w.run, w.brain].real),
+        atlas_weeks=lambda w: study.chains[w.brain, "atlas"].later_weeks,
         of_atlas=from_simulation("from_others_only"),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -69,11 +62,7 @@ def deviation_labels(wildcards):
 
 rule deviation:
     input:
-        unpack(
-            lambda wildcards: study.simulations[
-                wildcards.run, wildcards.brain
-            ].deviation_files(wildcards.week)
-        ),
+        unpack(lambda w: study.simulations[w.run, w.brain].deviation_files(w.week)),
     output:
         **DEVIATION,
     params:
@@ -94,21 +83,21 @@ rule deviation_scores:
 
 rule registration_ceiling:
     input:
-        unpack(lambda wildcards: study.ceiling_files(wildcards.brain)),
+        unpack(lambda w: study.ceiling_files(w.brain)),
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
         carried=CARRIED_MESH,
     output:
         CEILING,
-    wildcard_constraints:
-        brain=one_of(study.carried),
     params:
         start_week=from_brain("week"),
-        weeks=lambda wildcards: study.ceiling_weeks(wildcards.brain),
+        weeks=lambda w: study.ceiling_weeks(w.brain),
+        run="registration",
+        kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
-        "../scripts/registration_ceiling.py"
+        "../scripts/validation.py"
 
 
 rule displacement_agreement:
@@ -117,12 +106,10 @@ rule displacement_agreement:
         carried=CARRIED_MESH,
     output:
         AGREEMENT,
-    wildcard_constraints:
-        brain=one_of(study.carried),
     params:
-        labels=lambda wildcards: {
-            "run": wildcards.run,
-            "start_week": study.brains[wildcards.brain].week,
+        labels=lambda w: {
+            "run": w.run,
+            "start_week": study.brains[w.brain].week,
         },
         registered=from_simulation("follows_registration"),
     script:
@@ -132,18 +119,16 @@ rule displacement_agreement:
 # the weeks in which sulci begin, in a simulated brain and in the real ones that follow its start
 rule onset:
     input:
-        unpack(lambda wildcards: study.onset_files(wildcards.run, wildcards.brain)),
+        unpack(lambda w: study.onset_files(w.run, w.brain)),
     output:
         ONSET,
-    wildcard_constraints:
-        brain=one_of(study.carried),
     params:
         sides=from_brain("sides"),
         radius_mm=CONFIG.metrics.curvature_radius_mm,
-        run=lambda wildcards: wildcards.run,
-        subject=lambda wildcards: wildcards.brain,
+        run=lambda w: w.run,
+        subject=lambda w: w.brain,
         run_weeks=from_simulation("weeks"),
-        real_weeks=lambda wildcards: study.chains[wildcards.brain, "self"].weeks,
+        real_weeks=lambda w: study.chains[w.brain, "self"].weeks,
     script:
         "../scripts/onset.py"
 

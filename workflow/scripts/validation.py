@@ -1,30 +1,44 @@
-"""Each simulated brain of a run beside the real one of its week, and beside the start brain merely scaled up."""
+"""Each simulated brain of a run, or the start carried by registration, beside the real one and the start scaled up."""
+
+import numpy as np
 
 from gyriflow.compare.shapes import Shape, ready
 from gyriflow.compare.validation import Comparison, ordered, validation_row
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.curves import value
 from gyriflow.growth.following import curves_of_run
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.surfaces import read_surface, read_vertex_maps
+from gyriflow.io.registrations import read_carried_mesh
+from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
-files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
+files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    rows, growth = [], read_yaml(files.params)["growth"]
-    curves = curves_of_run(growth, read_table(files.curves) if files.curves else None, params.series)
-    for number, week in enumerate(params.weeks):
-        simulated, real = read_surface(files.simulated[number]), read_surface(files.whole[number])
+    rows, curves = [], []
+    if files.get("carried"):
+        surface, pial = boundary_surface(read_tetrahedral_mesh(files.mesh))
+        pose, carried = read_pose(files.report), read_carried_mesh(files.carried)
+        at = [carried.positions[np.isclose(carried.weeks, week).argmax()][pial] for week in params.weeks]
+        surfaces = [TriangleMesh(transform_points(places, pose.world), surface.faces) for places in at]
+    else:
+        surfaces, growth = map(read_surface, files.simulated), read_yaml(files.params)["growth"]
+        curves = curves_of_run(growth, read_table(files.curves) if files.curves else None, params.series)
+    for number, (week, simulated) in enumerate(zip(params.weeks, surfaces, strict=True)):
         aim = [float(value(curve, week)) for curve in curves]
         aim = (aim[0] / CM2_PER_MM2, aim[1] / ML_PER_MM3) if aim else None
+        real = read_surface(files.whole[number])
         even = ready(simulated, real)
         bend = curvature(even, radius_mm=params.curvature_radius_mm)
         shapes = {"run": Shape(even, bend.mean, bend.shape_index)}
         for name in ("real", "start", "adjacent"):
             maps = read_vertex_maps(files[f"{name}_maps"][number])
             shapes[name] = Shape(read_surface(files[name][number]), **maps)
-        comparison = Comparison(names.run, params.kind, params.start_week, week)
+        comparison = Comparison(params.run, params.kind, params.start_week, week)
         rows.append(validation_row(comparison, simulated=simulated, real_brain=real, curve=aim, **shapes))
     write_table(snakemake.output[0], ordered(rows))

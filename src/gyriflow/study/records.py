@@ -60,15 +60,15 @@ class Measured:
 class Brain:
     """A brain of the study, as `given` by the configuration.
 
-    `scheme` holds the fields of its labels' scheme. Thickness is measured from `labels` or `white` surfaces, and white
-    surfaces from the files `white_from`, if at all. Regions of the cortex are `given`, `carried` from another brain, or
-    `named` sulci, by which its metrics are measured where it `has_regions`. `checksums` are the atlas and the SHA-256
-    of those of its files that are an atlas's, by path.
+    `scheme` holds the fields of its labels' scheme. The files `thickness_from` and `white_from`, by what they are of,
+    give the thickness of its cortex and its white surfaces, if they are measured. Regions of the cortex are `given`,
+    `carried` from another brain, or `named` sulci; its metrics are measured by them where it `has_regions`.
+    `checksums` are the atlas and the SHA-256 of those of its files that are an atlas's, by path.
     """
 
     given: GivenBrain
     scheme: Mapping[str, Any] | None
-    thickness_from: Literal["labels", "white"] | None
+    thickness_from: Mapping[str, str]
     white_from: Mapping[str, str]
     regions_from: Literal["given", "carried", "named"] | None
     has_regions: bool

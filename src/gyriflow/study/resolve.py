@@ -56,12 +56,8 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
 
 def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain:
     scheme = config.scheme(given) if given.has_labels else None
-    thickness_from: Literal["labels", "white"] | None = "white" if given.white_files else None
-    white_from = given.white_files
-    if scheme and LabelScheme(**scheme).cortex:
-        thickness_from = "labels"
-        if config.metrics.white_surfaces == "all":
-            white_from = {"labels": str(given.label_volume)}
+    labels = {"labels": str(given.label_volume)} if scheme and LabelScheme(**scheme).cortex else {}
+    all_white = config.metrics.white_surfaces == "all"
     whole = len(given.sides) == len(SIDES)
     with_regions = [name for name in config.metrics.regions if name not in refused]
     regions_from: Literal["given", "carried", "named"] | None = None
@@ -74,8 +70,8 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
     return Brain(
         given=given,
         scheme=scheme,
-        thickness_from=thickness_from,
-        white_from=white_from,
+        thickness_from=labels or given.white_files,
+        white_from=given.white_files or (labels if all_white else {}),
         regions_from=regions_from,
         has_regions=bool(regions_from) and (bool(with_regions) or config.metrics.named_sulci),
         checksums={path: config.known_files[path] for path in given.files if path in config.known_files},
