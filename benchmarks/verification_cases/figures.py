@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from gyriflow.report.style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, light_grid, new_figure, style
+from gyriflow.report.style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, SETTINGS, new_figure
 
 from .closed_forms import short_wave_rate, thin_film
 from .modes import Slab, amplifications, critical_growth, growth_rates
@@ -24,7 +25,6 @@ def by_length(axes: Axes, shown: list[float], label: str) -> None:
     axes.xaxis.set_major_locator(FixedLocator(shown))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter("{x:g}")
-    light_grid(axes, "both")
 
 
 def log_scales(axes: Axes, ticks: list, xlabel: str, ylabel: str) -> None:
@@ -33,7 +33,6 @@ def log_scales(axes: Axes, ticks: list, xlabel: str, ylabel: str) -> None:
     axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter("{x:g}")
-    light_grid(axes, "both")
 
 
 def slope(axes: Axes, x, at: float, order: float) -> None:
@@ -49,7 +48,7 @@ def slope(axes: Axes, x, at: float, order: float) -> None:
 
 def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
     """Returns Taylor's remainders, and the errors of manufactured solutions and of growing waves by mesh."""
-    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN, synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN)
     taylor, manufactured, waves = figure.subplots(1, 3)
     one = found["consistency"]
     for i, (key, name) in enumerate((("energy_remainders", "energy"), ("residual_remainders", "forces"))):
@@ -88,7 +87,7 @@ def convergence(found: dict, slab_cells: tuple[int, ...]) -> Figure:
 
 def rates(found: dict, slab_cells: tuple[int, ...]) -> Figure:
     """Returns the rates of growth by wavelength where stress is forgotten, a panel for each contrast."""
-    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN, synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN)
     all_axes = figure.subplots(1, len(found["rates"]))
     for axes, (contrast, own) in zip(all_axes, found["rates"].items(), strict=True):
         lengths = np.array(own["lengths"])
@@ -111,7 +110,7 @@ def rates(found: dict, slab_cells: tuple[int, ...]) -> Figure:
 
 def memory(found: dict, cells: tuple[int, ...]) -> Figure:
     """Returns amplifications where stress is kept, by wavelength and by growth."""
-    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN + 0.7, synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, HEIGHT_IN + 0.7)
     by_wave, by_growth = figure.subplots(1, 2)
     contrast, step = found["contrast"], found["growth"]
     runs = found["memory"]
@@ -144,7 +143,6 @@ def memory(found: dict, cells: tuple[int, ...]) -> Figure:
     by_growth.yaxis.set_major_locator(FixedLocator([1, 2, 3, 4, 6]))
     by_growth.yaxis.set_minor_locator(NullLocator())
     by_growth.yaxis.set_major_formatter("{x:g}")
-    light_grid(by_growth, "both")
     for axes, columns in ((by_wave, 2), (by_growth, 1)):
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=columns)
     return figure
@@ -158,5 +156,5 @@ def draw(found: dict, folder: Path) -> None:
         "memory": (memory, found["memory_cells"]),
     }
     for name, (chart, cells) in charts.items():
-        with style():
+        with mpl.rc_context(SETTINGS):
             chart(found, cells).savefig(folder / f"verification-{name}.png", dpi=200)

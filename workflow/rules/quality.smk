@@ -11,7 +11,6 @@ rule quality_page:
         row=f"{BRAIN}/quality.json",
     params:
         week=from_brain("week"),
-        synthetic=from_brain("given.synthetic"),
         white_files=from_brain("given.white_files"),
         affine_from=from_brain("given.affine_from"),
         labels=lambda w: reporting.quality_labels(study.brains[w.brain].given),

@@ -4,6 +4,7 @@ from importlib import import_module
 from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 
 from gyriflow.geometry.poses import pose_from
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
@@ -115,13 +116,14 @@ def norms_figure(metrics, reference, **shown):
 
 params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):
-    module, _, function = params.draw.rpartition(".")
+    name, _, function = params.draw.rpartition(".")
+    module = import_module(f"gyriflow.report.{name}")
     content = {**read(dict(params.inputs)), **params.options}
     if snakemake.rule in globals():
         content = globals()[snakemake.rule](**content)
-    drawn = getattr(import_module(f"gyriflow.report.{module}"), function)(**content)
-    if isinstance(drawn, str):
-        write_html(output[0], drawn)
+    drawn = getattr(module, function)(**content)
+    if isinstance(drawn, pd.DataFrame):
+        write_html(output[0], module.html_table(drawn))
     elif isinstance(drawn, dict):
         write_json(output[0], drawn)
     else:

@@ -10,20 +10,19 @@ from gyriflow.io.maps import read_volume_map
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.report.quality import Brain, Volume, facts, quality_page, quality_row, tissue_groups
+from gyriflow.report.quality import Brain, facts, quality_page, quality_row, tissue_groups
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     surface, report = read_surface(files.surface), read_json(files.report)
-    volumes, pose, thickness = [], read_pose(files.report), None
+    pose, image, tissues, thickness = read_pose(files.report), None, None, None
     if files.image:
-        image = read_volume_map(files.image, params.affine_from)
-        volumes.append(Volume(image.values, None, pose.world @ image.affine))
+        volume = read_volume_map(files.image, params.affine_from)
+        image = volume.values, pose.world @ volume.affine
     if files.labels:
         labels = read_label_volume(files.labels, affine_from=params.affine_from)
-        groups = tissue_groups(labels.labels, LabelScheme(**params.scheme))
-        volumes.append(Volume(None, groups, pose.world @ labels.affine))
+        tissues = tissue_groups(labels.labels, LabelScheme(**params.scheme)), pose.world @ labels.affine
     if files.thickness:
         (thickness,) = read_vertex_maps(files.thickness).values()
     white = posed_whites(pose, {side: read_surface(path) for side, path in params.white_files.items()})
@@ -31,9 +30,11 @@ with step(snakemake.log[0]):
     warnings = list(dict.fromkeys(message for level, message in said if level == "warning"))
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.labels, report, read_json(files.measured) if files.measured else {}, warnings, expected)
-    brain = Brain(surface, report["fissure_x_mm"], thickness, merged(*white.values()) if white else None, volumes)
+    brain = Brain(
+        surface, report["fissure_x_mm"], thickness, merged(*white.values()) if white else None, image, tissues
+    )
     title = f"{snakemake.wildcards.brain}, {params.week:g} GW"
     shown = {"title": title, "verdict": row["verdict"], "facts": facts(row), "warnings": warnings}
-    figure = quality_page(brain, **shown, synthetic=params.synthetic)
+    figure = quality_page(brain, **shown)
     write_figure(output.png, output.pdf, figure, dpi=params.dpi)
     write_json(output.row, row)

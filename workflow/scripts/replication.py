@@ -25,5 +25,5 @@ with step(snakemake.log[0]):
         f"Displacements and cost are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}."
     ]
     said += [comparison_caption(name, study.week, study.comparison) for name, study in studies.items()]
-    body = html_table(table, caption="The FetalFoldSim paper, and the same here")
+    body = html_table(table)
     write_html(snakemake.output.page, Markup("").join(Markup("<p>{}</p>\n").format(line) for line in said) + body)

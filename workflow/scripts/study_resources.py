@@ -19,4 +19,4 @@ with step(snakemake.log[0]):
     ]
     table = resources(jobs, **params.power)
     write_table(output.csv, table)
-    write_html(output.table, html_table(table, digits=3))
+    write_html(output.table, html_table(table))

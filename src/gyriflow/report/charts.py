@@ -1,7 +1,7 @@
 """Charts over the weeks: metrics of brains and of their regions, norms, and the spectra of folds."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Unpack
+from typing import Any, Literal
 
 import pandas as pd
 from matplotlib.artist import Artist
@@ -21,13 +21,11 @@ from .style import (
     REAL_BRAIN,
     REAL_COLOUR,
     RUN_COLOURS,
-    Shown,
     from_zero,
-    light_grid,
+    panel_figure,
+    run_colours,
     run_legend,
-    run_panels,
     runs_by_name,
-    simulated_runs,
     star,
     styled,
     week_axis,
@@ -48,30 +46,25 @@ _HATCH = "//////"
 
 
 def _present(metrics: pd.DataFrame, names: Sequence[str]) -> list[str]:
-    """Returns the names of the metrics that a table has; InputError where it has none of them."""
+    """Return the names of the metrics that a table has; InputError where it has none of them."""
     present = [name for name in names if (metrics["metric"] == name).any()]
     if not present:
         raise InputError("no metric to draw", found=sorted(set(metrics["metric"])), expected=list(names))
     return present
 
 
-def _title(axes: Axes, rows: pd.DataFrame, behind: str = "") -> None:
-    axes.set_title(with_unit(METRICS[rows["metric"].iloc[0]], rows["unit"].iloc[0]) + behind)
+def _title(axes: Axes, rows: pd.DataFrame) -> None:
+    axes.set_title(with_unit(METRICS[rows["metric"].iloc[0]], rows["unit"].iloc[0]))
 
 
-def _name_of_real(rows: pd.DataFrame, shown: Shown) -> str:
-    """Returns what the measured brains of a table are called, nothing where it has none."""
-    return shown.get("measured", REAL_BRAIN) if MEASURED in set(rows["run"]) else ""
-
-
-def _stars(axes: Axes, rows: pd.DataFrame, colour: Any = REAL_COLOUR, *, column: str = "value", **look: Any) -> None:
+def _stars(axes: Axes, rows: pd.DataFrame, colour: Any = REAL_COLOUR, **look: Any) -> None:
     if len(rows):
-        axes.plot(rows["week"], rows[column], "*", **{"color": colour, "markersize": 7, "zorder": 3} | look)
+        axes.plot(rows["week"], rows["value"], "*", **{"color": colour, "markersize": 7, "zorder": 3} | look)
 
 
 @styled
-def metrics_chart(metrics: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
-    """Returns a panel per metric over weeks: runs as lines, measured brains as black stars.
+def metrics_chart(metrics: pd.DataFrame, *, runs: Sequence[str] = (), measured: str = REAL_BRAIN) -> Figure:
+    """Draw a panel per metric over weeks: runs as lines, measured brains as black stars.
 
     A metric that is known for the hemispheres only has dashed lines and full stars for the left one, dotted lines and
     open stars for the right one. Metrics that the table lacks are left out.
@@ -80,10 +73,14 @@ def metrics_chart(metrics: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; InputError if the table has none of the metrics.
+    runs
+        All runs of the study, which settle the colours.
+    measured
+        What the measured brains are called.
     """
     metrics = runs_by_name(metrics)
-    present = _present(metrics, OVERVIEW)
-    figure, panels, colours = run_panels(len(present), metrics["run"], shown)
+    present, colours = _present(metrics, OVERVIEW), run_colours(metrics["run"], runs)
+    figure, panels = panel_figure(len(present))
     drawn: set[str] = set()
     for axes, name in zip(panels, present, strict=True):
         rows = metrics[metrics["metric"] == name]
@@ -98,13 +95,12 @@ def metrics_chart(metrics: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
                 axes.plot(ordered["week"], ordered["value"], color=colours[str(run)], **look)
         _title(axes, rows)
         week_axis(axes, metrics["week"])
-        light_grid(axes)
     extra = [
         Line2D([], [], color=MUTED_COLOUR, linestyle=HEMISPHERE_LINES[side], label=f"{side} hemisphere")
         for side in SIDES
         if side in drawn
     ]
-    run_legend(figure, colours, measured=_name_of_real(metrics, shown), extra=extra)
+    run_legend(figure, colours, measured=measured if (metrics["run"] == MEASURED).any() else "", extra=extra)
     return figure
 
 
@@ -115,9 +111,10 @@ def norms_chart(
     norms: pd.DataFrame,
     *,
     reference: Sequence[str],
-    **shown: Unpack[Shown],
+    runs: Sequence[str] = (),
+    measured: str = REAL_BRAIN,
 ) -> Figure:
-    """Returns a panel per metric of whole brains: reference brains, the curve through them, and the others.
+    """Draw a panel per metric of whole brains: reference brains, the curve through them, and the others.
 
     The band holds 90 % of further brains by Student's distribution; quantiles are drawn as bars where a week has five
     brains or more. Stars are measured brains, of the reference black, others coloured; lines are runs.
@@ -129,12 +126,13 @@ def norms_chart(
     norms : columns hemisphere, metric, week, brains, q05, q50, q95
     reference
         Subjects that the curves go through.
+    runs, measured : as for `metrics_chart`
 
     InputError where none of the metrics is there.
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
-    present = _present(whole, WITH_NORMS)
-    figure, panels, colours = run_panels(len(present), whole["run"], shown, panel_in=2.0, foot_in=0.6)
+    present, colours = _present(whole, WITH_NORMS), run_colours(whole["run"], runs)
+    figure, panels = panel_figure(len(present), panel_in=2.0, foot_in=0.6)
     others = False
     for axes, name in zip(panels, present, strict=True):
         rows = whole[whole["metric"] == name]
@@ -143,30 +141,28 @@ def norms_chart(
             axes.fill_between(band["week"], band["low"], band["high"], color=NEUTRAL_COLOUR, linewidth=0)
             axes.plot(band["week"], band["expected"], color=MUTED_COLOUR)
         bars = norms[(norms["hemisphere"] == "whole") & (norms["metric"] == name)].dropna(subset=["q50"])
-        for low, middle, high, week in bars[["q05", "q50", "q95", "week"]].to_numpy():
-            axes.plot([week, week], [low, high], color=REAL_COLOUR, linewidth=1.0)
-            axes.plot(week, middle, "_", color=REAL_COLOUR, markersize=7)
+        axes.vlines(bars["week"], bars["q05"], bars["q95"], color=REAL_COLOUR, linewidth=1.0)
+        axes.plot(bars["week"], bars["q50"], "_", color=REAL_COLOUR, markersize=7)
         for (run, _), brain in rows[rows["run"] != MEASURED].groupby(["run", "subject"], sort=False):
             ordered = brain.sort_values("week")
             axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
         real = rows[rows["run"] == MEASURED]
-        known = real["subject"].isin(reference)
-        _stars(axes, real[known], markersize=6)
-        _stars(axes, real[~known], RUN_COLOURS[-1])
-        others |= bool((~known).any())
+        within = real["subject"].isin(reference)
+        _stars(axes, real[within], markersize=6)
+        _stars(axes, real[~within], RUN_COLOURS[-1])
+        others |= bool((~within).any())
         _title(axes, rows)
         week_axis(axes, rows["week"])
-        light_grid(axes)
     extra: list[Artist] = [star("other measured brains", RUN_COLOURS[-1])] if others else []
     if len(curves):
         extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
-    run_legend(figure, colours, measured=shown.get("measured", REAL_BRAIN), extra=extra)
+    run_legend(figure, colours, measured=measured, extra=extra)
     return figure
 
 
 @styled
-def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
-    """Returns a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
+def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, measured: str = REAL_BRAIN) -> Figure:
+    """Draw a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
 
     Measured brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
 
@@ -174,17 +170,20 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Unpac
     ----------
     regions : columns subject, run, week, hemisphere, region, metric, value, unit
     asymmetry : columns subject, run, week, region, metric, asymmetry_index
+    measured
+        What the measured brains are called.
     """
     regions, asymmetry = runs_by_name(regions), runs_by_name(asymmetry)
-    colours = region_colours(regions["region"])
-    present = _present(regions, OF_REGIONS)
-    lines = dict(zip(simulated_runs(regions["run"]), LINES, strict=False))
-    figure, panels, _ = run_panels(len(present) + 1, (), shown, foot_in=0.75)
+    colours, present = region_colours(regions["region"]), _present(regions, OF_REGIONS)
+    lines = dict(zip(run_colours(regions["run"]), LINES, strict=False))
+    figure, panels = panel_figure(len(present) + 1, foot_in=0.75)
     for axes, name in zip(panels, present, strict=False):
         rows = regions[regions["metric"] == name]
         sides = rows.groupby(["subject", "run", "week", "region"], sort=False)["value"]
         _region_lines(axes, (sides.sum() if name == "area" else sides.mean()).reset_index(), colours, lines)
-        _title(axes, rows, ", both sides" * (name == "area"))
+        _title(axes, rows)
+        if name == "area":
+            axes.set_title(f"{axes.get_title()}, both sides")
         if name not in NOT_FROM_ZERO:
             from_zero(axes)
     rows = asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)]
@@ -193,14 +192,12 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Unpac
     panels[-1].set_title("asymmetry of area, 2 (L − R)/(L + R)")
     extra = [Line2D([], [], color=c, marker="s", linestyle="none", label=name) for name, c in colours.items()]
     extra += [Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run) for run, line in lines.items()]
-    run_legend(figure, {}, extra=[*extra, star(shown.get("measured", REAL_BRAIN), MUTED_COLOUR)])
+    run_legend(figure, {}, extra=[*extra, star(measured, MUTED_COLOUR)])
     return figure
 
 
-def _region_lines(
-    axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], lines: Mapping[str, Literal["-", "--", ":"]]
-) -> None:
-    """Draws the value of each region over the weeks."""
+def _region_lines(axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], lines: Mapping[str, str]) -> None:
+    """Draw the value of each region over the weeks."""
     for (region, run), rows in values.groupby(["region", "run"], sort=False):
         ordered = rows.sort_values("week")
         if run == MEASURED:
@@ -208,41 +205,40 @@ def _region_lines(
         elif run in lines:
             axes.plot(ordered["week"], ordered["value"], lines[str(run)], color=colours[region], linewidth=1.1)
     week_axis(axes, values["week"])
-    light_grid(axes)
 
 
 def _of_bands(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
-    """Returns the rows of the bands, written as 4 or "B4", with whole numbers and a column `trusted`."""
+    """Return the rows of the bands, written as 4 or "B4", with whole numbers and a column `trusted`."""
     numbers = spectra["band"].astype(str).str.removeprefix("B").astype(int)
     trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
     return spectra.assign(band=numbers, trusted=trusted)[numbers.isin(bands)]
 
 
 def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0) -> None:
-    said = "beyond the\nmodes computed"
-    axes.text(x, 0.5, said, transform=transform, ha="center", va="center", rotation=rotation)
+    words = "beyond the\nmodes computed"
+    axes.text(x, 0.5, words, transform=transform, ha="center", va="center", rotation=rotation)
 
 
 def _spectra_legend(
-    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], shown: Shown, *, bars: bool
+    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], measured: str, *, bars: bool
 ) -> None:
-    """Draws the legend of a chart of bands, with what is drawn of bands that are cut off or not resolved."""
-    untrusted = rows[rows["relative_power"].notna() & ~rows["trusted"]]
-    of_real = set((untrusted["run"] == MEASURED).to_list())
+    """Draw the legend of a chart of bands, with what is drawn of bands that are cut off or not resolved."""
+    untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
     label = "cut off or not resolved, or a share of such"
     extra: list[Artist] = []
-    if False in of_real:
+    if untrusted - {MEASURED}:
         hatched = Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label)
         hollow = star(label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white")
         extra.append(hatched if bars else hollow)
-    if True in of_real:
-        said = "the same, of the real brain" if extra else label
-        extra.append(star(said, markersize=8, markerfacecolor="white"))
-    run_legend(figure, colours, measured=_name_of_real(rows, shown), bars=bars, extra=extra)
+    if MEASURED in untrusted:
+        words = "the same, of the real brain" if extra else label
+        extra.append(star(words, markersize=8, markerfacecolor="white"))
+    name = measured if (rows["run"] == MEASURED).any() else ""
+    run_legend(figure, colours, measured=name, bars=bars, extra=extra)
 
 
 def _sides_of(rows: pd.DataFrame) -> list[str]:
-    """Returns the hemispheres that some brain of a table has, left first."""
+    """Return the hemispheres that some brain of a table has, left first."""
     return [side for side in SIDES if (rows["hemisphere"] == side).any()]
 
 
@@ -251,11 +247,11 @@ def spectra_chart(
     spectra: pd.DataFrame,
     *,
     week: float,
+    colours: Mapping[str, Any],
     bands: Sequence[int] = FOLD_BANDS,
-    colours: Mapping[str, Any] | None = None,
-    **shown: Unpack[Shown],
+    measured: str = REAL_BRAIN,
 ) -> Figure:
-    """Returns the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
+    """Draw the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
 
     Bars of bands that are cut off or not resolved by the surface are hatched, such stars open, and so are all where a
     band that they are shares of is cut off. A band without any power is said to be beyond the modes.
@@ -265,16 +261,16 @@ def spectra_chart(
     spectra : columns subject, run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
     week
         Week in GW; InputError if the table has no such band then.
-    colours : {run: colour}
-        Other colours than those of the study, in this order.
+    colours : {run: colour}, in this order
+    measured
+        What the measured brains are called.
     """
-    rows = _of_bands(runs_by_name(spectra), bands)
+    rows = _of_bands(spectra, bands)
     rows = rows[(rows["week"] - week).abs() < 1e-6]
     if rows.empty:
         raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
     sides = _sides_of(rows)
-    figure, panels, own = run_panels(len(sides), rows["run"], shown, per_row=2, panel_in=2.3, sharey=True)
-    colours = own if colours is None else colours
+    figure, panels = panel_figure(len(sides), per_row=2, panel_in=2.3, sharey=True)
     width = 0.8 / max(len(colours), 1)
     for axes, hemisphere in zip(panels, sides, strict=True):
         side = rows[rows["hemisphere"] == hemisphere]
@@ -297,16 +293,15 @@ def spectra_chart(
         axes.set_xlabel("SpAnGy band, and the folds that go with it")
         axes.set_xlim(-0.5, len(bands) - 0.5)
         axes.set_title(f"{hemisphere} hemisphere")
-        light_grid(axes)
     panels[0].set_ylabel("relative power")
     from_zero(panels[0])
-    _spectra_legend(figure, rows, colours, shown, bars=True)
+    _spectra_legend(figure, rows, colours, measured, bars=True)
     return figure
 
 
 @styled
-def spectra_weeks_chart(spectra: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
-    """Returns the relative power of the bands of the folds over weeks: a row per hemisphere, a column per band.
+def spectra_weeks_chart(spectra: pd.DataFrame, *, runs: Sequence[str] = (), measured: str = REAL_BRAIN) -> Figure:
+    """Draw the relative power of the bands of the folds over weeks: a row per hemisphere, a column per band.
 
     Runs are lines, measured brains black stars; bands that are cut off, are shares of such, or are not resolved have
     open markers.
@@ -314,30 +309,19 @@ def spectra_weeks_chart(spectra: pd.DataFrame, **shown: Unpack[Shown]) -> Figure
     Parameters
     ----------
     spectra : as for `spectra_chart`
+    runs, measured : as for `metrics_chart`
     """
-    known = spectra[spectra["relative_power"].notna()]["band"]
-    bands = [band for band in FOLD_BANDS if (known == band).any()] or FOLD_BANDS
+    with_power = set(spectra.loc[spectra["relative_power"].notna(), "band"])
+    bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
     rows = _of_bands(runs_by_name(spectra), bands)
-    sides = _sides_of(rows)
+    sides, colours = _sides_of(rows), run_colours(rows["run"], runs)
     layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
-    figure, panels, colours = run_panels(len(sides) * len(bands), rows["run"], shown, **layout)
-    places = ((hemisphere, band) for hemisphere in sides for band in bands)
+    figure, panels = panel_figure(len(sides) * len(bands), **layout)
+    places = [(hemisphere, band) for hemisphere in sides for band in bands]
     for axes, (hemisphere, band) in zip(panels, places, strict=True):
         here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
-        for run in [*colours, MEASURED]:
-            series = here[here["run"] == run].sort_values("week")
-            colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
-            if run != MEASURED:
-                axes.plot(series["week"], series["relative_power"], color=colour)
-            for trusted, part in series.groupby("trusted"):
-                look: dict[str, Any] = {
-                    "color": colour,
-                    "markerfacecolor": colour if trusted else "white",
-                    "markersize": size,
-                }
-                axes.plot(part["week"], part["relative_power"], marker, **look)
+        _band_over_weeks(axes, here, colours)
         week_axis(axes, rows["week"])
-        light_grid(axes)
         if not here["relative_power"].notna().any():
             _beyond_the_modes(axes, 0.5, axes.transAxes)
             axes.set_yticks([])
@@ -349,5 +333,17 @@ def spectra_weeks_chart(spectra: pd.DataFrame, **shown: Unpack[Shown]) -> Figure
             axes.set_ylabel(f"{hemisphere} hemisphere\nrelative power")
     for axes in panels[: len(bands)]:
         from_zero(axes)
-    _spectra_legend(figure, rows, colours, shown, bars=False)
+    _spectra_legend(figure, rows, colours, measured, bars=False)
     return figure
+
+
+def _band_over_weeks(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> None:
+    for run in [*colours, MEASURED]:
+        series = rows[rows["run"] == run].sort_values("week")
+        colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
+        if run != MEASURED:
+            axes.plot(series["week"], series["relative_power"], color=colour)
+        for trusted, part in series.groupby("trusted"):
+            face = colour if trusted else "white"
+            look: dict[str, Any] = {"color": colour, "markerfacecolor": face, "markersize": size}
+            axes.plot(part["week"], part["relative_power"], marker, **look)

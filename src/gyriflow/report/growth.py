@@ -9,13 +9,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .labels import column_label
 from .style import (
     REAL_BRAIN,
     RUN_COLOURS,
-    all_synthetic,
     from_zero,
-    light_grid,
     panel_figure,
     styled,
     week_axis,
@@ -34,7 +31,7 @@ def growth_chart(
     folding_rate_per_s: float | Mapping[float, float] | None = None,
     measured: str = REAL_BRAIN,
 ) -> Figure:
-    """Returns cortical area, volume over weeks, and the tangential growth rate of each interval as bars: three panels.
+    """Draw cortical area, volume over weeks, and the tangential growth rate of each interval as bars: three panels.
 
     Several series of brains share the panels of areas and of volumes; each has a panel of bars, on one scale.
 
@@ -48,48 +45,45 @@ def growth_chart(
     """
     names = list(dict.fromkeys(rates["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
-    shown: dict[str, Any] = {"panel_in": 2.4, "foot_in": 0.0, "synthetic": all_synthetic(measured)}
-    figure, grid = panel_figure(2 + len(names), **shown)
-    panels = iter(grid)
-    for column, label in (("area_cm2", "pial area (cm²)"), ("volume_ml", "volume (mL)")):
-        _sizes_panel(next(panels), areas, column, label, colours, measured)
-    drawn: list[Axes] = []
-    for name, colour in colours.items():
-        axes = next(panels)
-        heading = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 28)
-        _rates_panel(axes, rates[rates["series"] == name], colour, heading, folding_rate_per_s)
-        drawn.append(axes)
-    limits = np.array([axes.get_ylim() for axes in drawn])
-    for axes in drawn:
-        axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
+    figure, (of_areas, of_volumes, *of_rates) = panel_figure(2 + len(names), panel_in=2.4, foot_in=0.0)
+    for axes, column, label in (
+        (of_areas, "area_cm2", "pial area (cm²)"),
+        (of_volumes, "volume_ml", "volume (mL)"),
+    ):
+        _sizes_panel(axes, areas, column, colours)
+        axes.set_ylabel(label)
+        if len(names) == 1:
+            axes.set_title(wrap(measured, 32))
+    for axes, (name, colour) in zip(of_rates, colours.items(), strict=True):
+        _rates_panel(axes, rates[rates["series"] == name], colour, folding_rate_per_s)
+        title = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 28)
+        # the legend stands below the title
+        axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
+    low, high = zip(*(axes.get_ylim() for axes in of_rates), strict=True)
+    for axes in of_rates:
+        axes.set_ylim(min(low), max(high))
     return figure
 
 
-def _sizes_panel(
-    axes: Axes, areas: pd.DataFrame, column: str, label: str, colours: Mapping[str, str], measured: str
-) -> None:
-    """Draws areas or volumes over weeks, a colour per series."""
+def _sizes_panel(axes: Axes, areas: pd.DataFrame, column: str, colours: Mapping[str, str]) -> None:
+    """Draw areas or volumes over weeks, a colour per series."""
     for number, (name, colour) in enumerate(reversed(list(colours.items()))):
-        known = areas[areas["series"] == name].sort_values("week")
+        rows = areas[areas["series"] == name].sort_values("week")
         # series often agree: the later ones then are seen within the earlier ones
         look: dict[str, Any] = {"markersize": 3 + 2.5 * number, "markerfacecolor": "white" if number else colour}
-        axes.plot(known["week"], known[column], "o-", color=colour, zorder=2 - 0.1 * number, label=name, **look)
-    axes.set_ylabel(label)
+        axes.plot(rows["week"], rows[column], "o-", color=colour, zorder=2 - 0.1 * number, label=name, **look)
     from_zero(axes)
     week_axis(axes, areas["week"])
-    light_grid(axes)
-    if len(colours) == 1:
-        axes.set_title(wrap(measured, 32))
-    else:
+    if len(colours) > 1:
         # in the place of a title, where no curve can be
         axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.01), borderaxespad=0, reverse=True)
 
 
 def _rates_panel(
-    axes: Axes, rates: pd.DataFrame, colour: str, title: str, folding_rate_per_s: float | Mapping[float, float] | None
+    axes: Axes, rates: pd.DataFrame, colour: str, folding_rate_per_s: float | Mapping[float, float] | None
 ) -> None:
-    """Draws the growth rate of each interval of one series as a bar, and the folding's rate as a line."""
-    labels = _interval_labels(rates)
+    """Draw the growth rate of each interval of one series as a bar, and the folding's rate as a line."""
+    labels = [f"{first:g}–{last:g}" for first, last in zip(rates["from_week"], rates["to_week"], strict=True)]
     bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
     # in front of the folding's line, where they meet
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
@@ -100,29 +94,19 @@ def _rates_panel(
     axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
         _folding_line(axes, rates, folding_rate_per_s)
-        # above the axes, where no bar can be, and below the title
+        # above the axes, where no bar can be
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
-    axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
     axes.margins(y=0.25 if crowded else 0.12)
-    _interval_axis(axes, labels)
-
-
-def _interval_labels(rates: pd.DataFrame) -> list[str]:
-    return [column_label((a, b)).removesuffix(" GW") for a, b in zip(rates["from_week"], rates["to_week"], strict=True)]
-
-
-def _interval_axis(axes: Axes, labels: list[str]) -> None:
     axes.set_xlabel("gestational interval (GW)")
-    if len(labels) > 6:
-        axes.tick_params(axis="x", rotation=45)
+    axes.tick_params(axis="x", rotation=45 if len(labels) > 6 else 0)
     # room for three bars at least, else a single one fills the panel
     spare = max(0.0, 3 - len(labels)) / 2
     axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
 
 
 def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]) -> None:
-    """Draws the folding's growth rate over bars of equal width, one per interval of the rates."""
+    """Draw the folding's growth rate over bars of equal width, one per interval of the rates."""
     look: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
     if not isinstance(rate_per_s, Mapping):
         axes.axhline(rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **look)

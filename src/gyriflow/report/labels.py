@@ -27,14 +27,14 @@ METRICS = {
 """Metrics of the study's tables and their titles; others are called as they are."""
 MEASURES = {"shape_index": "shape index", "mean_curvature": "mean curvature"}
 """What a simulation is compared with a real brain by, as in the names of columns, and their titles."""
-FORETOLD = {
+SIMPLER_WAYS = {
     "scaled": "start, scaled: no folding",
     "atlas": "the atlas' brain, scaled",
     "atlas_deformed": "the atlas' brain, deformed onto the start",
     "displaced": "start, moved as the atlas",
     "target": "what the run grows towards",
 }
-"""Simpler ways to foretell a brain, by the names of the study's table."""
+"""Simpler ways to predict a brain, by the names of the study's table."""
 PRESSURES = {
     "contact_pressure_pa": "contact pressure (Pa)",
     "contact_pressure_pa_per_gw": "contact pressure built up in a week (Pa/GW)",

@@ -13,7 +13,7 @@ from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
 from .scene import PIXELS_PER_INCH, TISSUE, Material, View, half_extents, picture_axes, render, sees
-from .style import FULL_WIDTH_IN, SIMPLE_SHAPE, SINGLE_COLUMN_IN, synthetic_note, wrap
+from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
 _DOTS_PER_INCH = 300
@@ -73,19 +73,19 @@ class _Layout:
 
 
 def round_length(limit_mm: float) -> float:
-    """Returns the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
+    """Return the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
     decade = 10.0 ** np.floor(np.log10(limit_mm))
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= limit_mm * (1 + 1e-9)))
 
 
 def _blocks(columns: int) -> list[slice]:
-    """Returns the columns cut into blocks of as equal numbers as possible, to stand below each other."""
+    """Cut the columns into blocks of as equal numbers as possible, to stand below each other."""
     size = -(-columns // -(-columns // MOST_COLUMNS))
     return [slice(start, start + size) for start in range(0, columns, size)]
 
 
 def _half_widths_mm(rows: Sequence[Row]) -> Floats:
-    """Returns half of what each column shows in mm: its widest brain and a margin."""
+    """Return half of what each column shows in mm: its widest brain and a margin."""
     columns = zip(*(row.panels for row in rows), strict=True)
     halves = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in columns]
     return _MARGIN * np.maximum(halves, _NARROWEST * max(halves))
@@ -95,12 +95,10 @@ def panel_grid(
     columns: Sequence[str],
     rows: Sequence[Row],
     *,
-    synthetic: bool = False,
-    measured: str = SIMPLE_SHAPE,
     colour_bars: Sequence[tuple[ScalarMappable, str]] = (),
     legend: Sequence[Patch] = (),
 ) -> Figure:
-    """Returns the rows of surfaces under column headings, all at one scale in mm, with a scale bar below.
+    """Draw rows of surfaces under column headings, all at one scale in mm, with a scale bar below.
 
     More than eight columns go on in a further block below. Each view is named by its row's label, and the letters of
     its ends stand in the first panel that shows it. Several rows, or the panels of a single one, have the letters a,
@@ -127,17 +125,15 @@ def panel_grid(
 
     # a letter of a column's heading is about 0.055 in wide
     columns = [wrap(column, int(panel / 0.055)) for column, panel in zip(columns, panels, strict=True)]
-    head_in, caption_line_in = 0.1 + 0.16 * synthetic, 0.13
+    head_in, caption_line_in = _dots(0.1), 0.13
     block_head_in = _dots(0.2 + 0.12 * max(column.count("\n") for column in columns))
     heights = [[_dots(_row_height_in(row, block, layout)) for row in rows] for block in blocks]
     captions = [[_dots(caption_line_in * _caption_lines(row, block)) for row in rows] for block in blocks]
-    total = _dots(head_in) + layout.foot + len(blocks) * block_head_in
+    total = head_in + layout.foot + len(blocks) * block_head_in
     total += sum(map(sum, heights)) + sum(map(sum, captions))
 
     figure = Figure(figsize=(width, total))
-    if synthetic:
-        figure.suptitle(synthetic_note(measured), y=1 - 0.05 / total, va="top")
-    top = total - _dots(head_in)
+    top = total - head_in
     letters = iter(ascii_lowercase)
     for number, block in enumerate(blocks):
         left = left_in
@@ -168,7 +164,7 @@ def _caption_lines(row: Row, block: slice) -> int:
 
 
 def _dots(inches: float) -> float:
-    """Returns a length in inches rounded to whole dots."""
+    """Round a length in inches to whole dots."""
     return round(inches * _DOTS_PER_INCH) / _DOTS_PER_INCH
 
 

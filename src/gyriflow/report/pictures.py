@@ -1,6 +1,7 @@
-"""Pictures of surfaces: simulated beside measured brains, maps, regions, zones, and the mesh cut open."""
+"""Pictures of surfaces: simulated beside measured brains, maps, regions and zones."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,9 @@ from .style import (
 
 SurfaceMap = tuple[TriangleMesh, Floats]
 """A surface in RAS+ mm and a value per vertex."""
-Halves = Sequence[tuple[TriangleMesh, Mapping[str, Floats]]]
+SurfaceMaps = tuple[TriangleMesh, Mapping[str, Floats]]
+"""A surface in RAS+ mm and its maps per vertex by name."""
+Halves = Sequence[SurfaceMaps]
 """The hemispheres of a brain, each with its maps per vertex by name."""
 
 SIDE_VIEWS = ("left", "top")
@@ -87,54 +90,20 @@ TINTS = (0.0, 0.4, 0.7)
 
 
 def _ordered(*groups: Mapping) -> list:
-    """Returns the keys of all groups, weeks and intervals in order, names as they come."""
+    """Return the keys of all groups, weeks and intervals in order, names as they come."""
     keys = list(dict.fromkeys(key for group in groups for key in group))
     return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
 
 
-def _plain_panels(meshes: Mapping[Any, TriangleMesh | None], keys: Sequence, colour: str, view: View) -> list:
-    """Returns a panel of one colour for each key, None for those that lack a surface."""
-    found = [meshes.get(key) for key in keys]
-    return [None if mesh is None else Panel(mesh, uniform_colours(mesh, colour), view) for mesh in found]
+def _plain_panels(meshes: Mapping[Any, TriangleMesh], keys: Sequence, colour: str, view: View) -> list[Panel | None]:
+    """Return a panel of one colour for each key, None for those that lack a surface."""
+    return [Panel(meshes[key], uniform_colours(meshes[key], colour), view) if key in meshes else None for key in keys]
 
 
-@styled
-def runs_by_week(
-    runs: Mapping[str, Mapping[float, TriangleMesh]],
-    real: Mapping[float, TriangleMesh],
-    *,
-    deviations: Mapping[float, tuple[TriangleMesh, Mapping[str, Floats]]] | None = None,
-    views: Sequence[str] = SIDE_VIEWS,
-    measured: str = REAL_BRAIN,
-    **shown: Any,
-) -> Figure:
-    """Returns the brains of several runs (blue) above measured ones (beige), a column per week, their rows by view.
-
-    Parameters
-    ----------
-    runs : {run: {week: surface in RAS+ mm}}
-    real : {week: surface in RAS+ mm}
-        A week that one of them lacks leaves its place empty.
-    deviations : {week: (surface, maps)}
-        Of which `labels.DISTANCE` is shown below.
-    """
-    groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
-    groups |= {measured: (real, REAL_SURFACE_COLOUR)} if real else {}
-    keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), named_views(views)
-    panels = {
-        name: {view: _plain_panels(meshes, keys, colour, view) for view in seen}
-        for name, (meshes, colour) in groups.items()
-    }
-    away = {week: (mesh, maps[DISTANCE]) for week, (mesh, maps) in (deviations or {}).items()}
-    if away:
-        scale = scale_of(DISTANCE, np.concatenate([values for _, values in away.values()]))
-        panels["distance"] = {view: [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys] for view in seen}
-        shown["colour_bars"] = [(scale, MAPS[DISTANCE])]
-    return panel_grid(*_beside(keys, panels), measured=measured, **shown)
-
-
-def _beside(keys: Sequence, panels: Mapping[str, Mapping[View, Sequence[Panel | None]]]) -> tuple[list[str], list[Row]]:
-    """Returns the headings and rows of a grid: a row per group, its views beside each other where they fit.
+def _side_by_side(
+    keys: Sequence, panels: Mapping[str, Mapping[View, Sequence[Panel | None]]]
+) -> tuple[list[str], list[Row]]:
+    """Return the headings and rows of a grid: a row per group, its views beside each other where they fit.
 
     Where they do not, the rows of all groups stand below each other, view by view.
     """
@@ -146,25 +115,55 @@ def _beside(keys: Sequence, panels: Mapping[str, Mapping[View, Sequence[Panel | 
 
 
 @styled
-def brains_picture(brains: Mapping[str, TriangleMesh], *, views: Sequence[str] = SIDE_VIEWS, **shown: Any) -> Figure:
-    """Returns measured brains side by side, a row per view.
+def runs_by_week(
+    runs: Mapping[str, Mapping[float, TriangleMesh]],
+    real: Mapping[float, TriangleMesh],
+    *,
+    deviations: Mapping[float, SurfaceMaps] | None = None,
+    views: Sequence[str] = SIDE_VIEWS,
+    measured: str = REAL_BRAIN,
+) -> Figure:
+    """Draw the brains of several runs (blue) above measured ones (beige), a column per week, their rows by view.
 
     Parameters
     ----------
-    brains : {heading: surface in RAS+ mm}
+    runs : {run: {week: surface in RAS+ mm}}
+    real : {week: surface in RAS+ mm}
+        A week that one of them lacks leaves its place empty.
+    deviations : {week: (surface, maps)}
+        Of which `labels.DISTANCE` is shown below.
+    measured
+        What the measured brains are called.
     """
+    groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
+    if real:
+        groups[measured] = (real, REAL_SURFACE_COLOUR)
+    keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), named_views(views)
+    panels = {
+        name: {view: _plain_panels(meshes, keys, colour, view) for view in seen}
+        for name, (meshes, colour) in groups.items()
+    }
+    bars = []
+    if deviations:
+        away = {week: (mesh, maps[DISTANCE]) for week, (mesh, maps) in deviations.items()}
+        scale = scale_of(DISTANCE, np.concatenate([values for _, values in away.values()]))
+        panels["distance"] = {view: [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys] for view in seen}
+        bars = [(scale, MAPS[DISTANCE])]
+    return panel_grid(*_side_by_side(keys, panels), colour_bars=bars)
+
+
+@styled
+def brains_picture(brains: Mapping[str, TriangleMesh], *, views: Sequence[str] = SIDE_VIEWS) -> Figure:
+    """Draw measured brains, {heading: surface in RAS+ mm}, side by side, a row per view."""
     panels = {view: _plain_panels(brains, list(brains), REAL_SURFACE_COLOUR, view) for view in named_views(views)}
-    return panel_grid(*_beside(list(brains), {"": panels}), **shown)
+    return panel_grid(*_side_by_side(list(brains), {"": panels}))
 
 
 @styled
 def displacement_maps(
-    displacements: Mapping[str, Mapping[tuple[float, float], SurfaceMap]],
-    *,
-    views: Sequence[str] = SIDE_VIEWS,
-    synthetic: bool = False,
+    displacements: Mapping[str, Mapping[tuple[float, float], SurfaceMap]], *, views: Sequence[str] = SIDE_VIEWS
 ) -> Figure:
-    """Returns the norm of the displacement of runs on the pial surface, a column per interval, on one colour scale.
+    """Draw the norm of the displacement of runs on the pial surface, a column per interval, on one colour scale.
 
     The scale ends where one vertex in two hundred is above, so that a single maximum does not set it. The maximum is
     ringed, dotted where it lies on the side turned away; below each interval stand its size, its place in RAS+ mm, and
@@ -175,60 +174,58 @@ def displacement_maps(
     displacements : {run: {(from_week, to_week): (surface, norms in mm)}}
     """
     keys, seen = _ordered(*displacements.values()), named_views(views)
-    norms = [norms for known in displacements.values() for _, norms in known.values()]
-    scale = magnitude_scale(np.concatenate(norms), MAGNITUDES)
-
-    def panel(known: SurfaceMap | None, view: View) -> Panel | None:
-        if known is None:
-            return None
-        mesh, norms = known
-        place = mesh.vertices[int(np.nanargmax(norms))]
-        where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
-        said = f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm" if view == seen[0] else ""
-        return Panel(mesh, paint(norms, scale), view, said, MAP, place)
-
-    panels = {
-        run: {view: [panel(known.get(key), view) for key in keys] for view in seen}
-        for run, known in displacements.items()
-    }
-    bars = [(scale, "norm of the displacement (mm)")]
-    return panel_grid(*_beside(keys, panels), synthetic=synthetic, colour_bars=bars)
+    scale = magnitude_scale(
+        np.concatenate([n for maps in displacements.values() for _, n in maps.values()]), MAGNITUDES
+    )
+    panels: dict[str, dict[View, list[Panel | None]]] = {}
+    for run, maps in displacements.items():
+        panels[run] = {view: [] for view in seen}
+        for key in keys:
+            if key not in maps:
+                for view in seen:
+                    panels[run][view].append(None)
+                continue
+            mesh, norms = maps[key]
+            place = mesh.vertices[int(np.nanargmax(norms))]
+            where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
+            words = f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
+            for view in seen:
+                caption = words if view == seen[0] else ""
+                panels[run][view].append(Panel(mesh, paint(norms, scale), view, caption, MAP, place))
+    return panel_grid(*_side_by_side(keys, panels), colour_bars=[(scale, "norm of the displacement (mm)")])
 
 
 def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
-    """Returns a scale from zero to a round value that at most a few of the values pass, so that no outlier sets it."""
-    known = values[np.isfinite(values)]
-    high = float(np.quantile(known, _MOST)) if len(known) else 1.0
+    """Return a scale from zero to a round value that at most a few of the values pass, so that no outlier sets it."""
+    finite = values[np.isfinite(values)]
+    high = float(np.quantile(finite, _MOST)) if len(finite) else 1.0
     end = round_up(high) if high > 0 else 1.0
-    return colour_scale(colours, 0.0, end, cut=bool((known > end).any()))
+    return colour_scale(colours, 0.0, end, cut=bool((finite > end).any()))
 
 
 def signed_scale(values: Floats) -> ScalarMappable:
-    """Returns a scale that is pale at zero and as wide on both sides, for values of which some are below zero."""
-    known = np.abs(values[np.isfinite(values)])
-    end = round_up(float(np.quantile(known, _MOST))) if known.any() else 1.0
-    return colour_scale(SIGNED, -end, end, cut=bool((known > end).any()))
-
-
-def goes_below_zero(values: Floats) -> bool:
-    """Returns whether values go below zero by more than rounding."""
-    return bool(np.nanmin(values) < -ROUNDING * np.nanmax(np.abs(values)))
+    """Return a scale that is pale at zero and as wide on both sides, for values of which some are below zero."""
+    sizes = np.abs(values[np.isfinite(values)])
+    end = round_up(float(np.quantile(sizes, _MOST))) if sizes.any() else 1.0
+    return colour_scale(SIGNED, -end, end, cut=bool((sizes > end).any()))
 
 
 def round_up(value: float) -> float:
-    """Returns a positive value rounded up to two digits, so that a colour bar ends at a number one can say."""
+    """Return a positive value rounded up to two digits, so that a colour bar ends at a number one can say."""
     step = 10.0 ** (np.floor(np.log10(value)) - 1)
     return float(np.ceil(value / step - 1e-9) * step)
 
 
 def scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Returns the colour scale of one of `labels.MAPS`: its own limits, or from zero to where few vertices are above.
+    """Return the colour scale of one of `labels.MAPS`: its own limits, or from zero to where few vertices are above.
 
     InputError for another quantity.
     """
     if quantity not in MAPS:
         raise InputError("unknown quantity", found=quantity, expected=list(MAPS))
-    if quantity in DEVIATIONS or (quantity == AREA_GROWTH and goes_below_zero(values)):
+    # by more than rounding
+    shrinks = quantity == AREA_GROWTH and np.nanmin(values) < -ROUNDING * np.nanmax(np.abs(values))
+    if quantity in DEVIATIONS or shrinks:
         return signed_scale(values)
     if quantity in PRESSURES:
         return magnitude_scale(values[values > 0], PRESSURE_COLOURS)
@@ -238,8 +235,8 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     return magnitude_scale(values, MAGNITUDES if measure is None else measure.colours)
 
 
-def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> tuple[TriangleMesh, dict[str, Floats]]:
-    """Returns the hemispheres of a brain as one surface, with the maps that all of them have.
+def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMaps:
+    """Return the hemispheres of a brain as one surface, with the maps that all of them have.
 
     Parameters
     ----------
@@ -255,24 +252,22 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> tuple[Tria
     return merged(*(mesh for mesh, _ in halves)) if len(halves) > 1 else halves[0][0], values
 
 
-def shape_maps(brains: Mapping[str, Mapping[float, Halves]], *, quantity: str, **shown: Any) -> Figure:
-    """Returns `scalar_maps` of a measure of the hemispheres; thickness is not known of every brain.
+def shape_maps(
+    brains: Mapping[str, Mapping[float, Halves]], *, quantity: str, views: Sequence[str] = SIDE_VIEWS
+) -> Figure:
+    """Draw `scalar_maps` of a measure of the hemispheres; thickness is not known of every brain.
 
     Parameters
     ----------
     brains : {group: {week: hemispheres}}
         Groups without any are left out.
     """
-    whole = {
-        group: {week: whole_maps(halves, [quantity]) for week, halves in known.items()}
-        for group, known in brains.items()
-        if known
-    }
-    maps = {
-        group: {week: (mesh, values[quantity]) for week, (mesh, values) in known.items()}
-        for group, known in whole.items()
-    }
-    return scalar_maps(maps, quantity=quantity, **shown)
+    maps: dict[str, dict[float, SurfaceMap]] = {}
+    for group, weeks in brains.items():
+        for week, halves in weeks.items():
+            mesh, values = whole_maps(halves, [quantity])
+            maps.setdefault(group, {})[week] = mesh, values[quantity]
+    return scalar_maps(maps, quantity=quantity, views=views)
 
 
 @styled
@@ -282,9 +277,8 @@ def scalar_maps(
     quantity: str,
     directions: Mapping[Any, Floats] | None = None,
     views: Sequence[str] = SIDE_VIEWS,
-    **shown: Any,
 ) -> Figure:
-    """Returns a quantity on surfaces: a row per group and view, a column per week or run, one colour scale.
+    """Draw a quantity on surfaces: a row per group and view, a column per week or run, one colour scale.
 
     Parameters
     ----------
@@ -297,37 +291,36 @@ def scalar_maps(
 
     InputError for another quantity or an unknown view.
     """
-    scale = scale_of(quantity, np.concatenate([values for group in maps.values() for _, values in group.values()]))
-    keys, directions = _ordered(*maps.values()), directions or {}
-    lengths = [np.linalg.norm(vectors, axis=1) for vectors in directions.values()] or [np.ones(1)]
-    long = float(np.quantile(np.concatenate(lengths), LONG))
-    shares = {key: np.asarray(vectors / long, dtype=float) for key, vectors in directions.items()}
-    seen = named_views(views)
+    every = np.concatenate([values for group in maps.values() for _, values in group.values()])
+    scale, keys, seen = scale_of(quantity, every), _ordered(*maps.values()), named_views(views)
+    shares: dict[Any, Floats] = {}
+    if directions:
+        lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
+        shares = {key: vectors / np.quantile(lengths, LONG) for key, vectors in directions.items()}
     panels = {
         group: {
-            view: [_map_panel(known.get(key), scale, view, quantity, shares.get(key)) for key in keys] for view in seen
+            view: [_map_panel(shown.get(key), scale, view, quantity, shares.get(key)) for key in keys] for view in seen
         }
-        for group, known in maps.items()
+        for group, shown in maps.items()
     }
     legend = [Patch(color=NEUTRAL_COLOUR, label="no contact")] if quantity in PRESSURES else []
-    if not all(np.isfinite(values).all() for group in maps.values() for _, values in group.values()):
+    if not np.isfinite(every).all():
         legend.append(Patch(color=UNKNOWN_COLOUR, label="not measured"))
-    bars = [(scale, MAPS[quantity])]
-    return panel_grid(*_beside(keys, panels), colour_bars=bars, legend=legend, **shown)
+    return panel_grid(*_side_by_side(keys, panels), colour_bars=[(scale, MAPS[quantity])], legend=legend)
 
 
 def _map_panel(
-    known: SurfaceMap | None, scale: ScalarMappable, view: View, quantity: str, directions: Floats | None = None
+    shown: SurfaceMap | None, scale: ScalarMappable, view: View, quantity: str, directions: Floats | None = None
 ) -> Panel | None:
-    if known is None:
+    if shown is None:
         return None
-    mesh, values = known
+    mesh, values = shown
     lines = None if directions is None else direction_lines(mesh, directions, view)
     return Panel(mesh, paint(values, scale, zero_is_nothing=quantity in PRESSURES), view, material=MAP, lines=lines)
 
 
 def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
-    """Returns the (k, 2, 3) ends of lines along (n, 3) vectors, one in each cube of `LINES_MM` of what faces a view.
+    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one in each cube of `LINES_MM` of what faces a view.
 
     A vector of length 1 or more gives a line as long as a cube.
     """
@@ -385,17 +378,17 @@ def influence_picture(
 
 
 def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:
-    """Returns a colour for each region in the order given: those of runs, then their tints.
+    """Return a colour for each region in the order given: those of runs, then their tints.
 
     No scale from dark to pale, which would make neighbours alike, and dark ones like shade. From the 22nd region on the
     colours come again.
     """
-    colours = {}
-    for number, name in enumerate(dict.fromkeys(names)):
-        tint = TINTS[number // len(RUN_COLOURS) % len(TINTS)]
-        red, green, blue = (part + tint * (1.0 - part) for part in to_rgb(RUN_COLOURS[number % len(RUN_COLOURS)]))
-        colours[name] = red, green, blue
-    return colours
+    shades = [
+        (part[0] + tint * (1 - part[0]), part[1] + tint * (1 - part[1]), part[2] + tint * (1 - part[2]))
+        for tint in TINTS
+        for part in map(to_rgb, RUN_COLOURS)
+    ]
+    return dict(zip(dict.fromkeys(names), cycle(shades), strict=False))
 
 
 @styled
@@ -403,78 +396,57 @@ def regions_picture(
     brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints, Mapping[int, str]]]]],
     *,
     views: Sequence[str] = ROUND_VIEWS,
-    **shown: Any,
 ) -> Figure:
-    """Returns brains coloured by region, a column per brain and a row per view, with the regions' names.
+    """Draw brains coloured by region, a column per brain and a row per view, with the regions' names.
 
     Parameters
     ----------
     brains : {heading of the column: hemispheres, each with the numbers of its vertices' regions and their names}
         A number without a name is no region.
-
-    InputError where there is no brain.
     """
-    if not brains:
-        raise InputError("no brain with regions")
-    names = [name for halves in brains.values() for _, (_, table) in halves for name in table.values()]
-    colours = region_colours(names)
-    painted = {}
+    colours = region_colours(name for halves in brains.values() for _, (_, table) in halves for name in table.values())
+    legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
+    painted, nameless = {}, False
     for heading, halves in brains.items():
-        palettes = [
-            (numbers, {number: colours[name] for number, name in table.items()}) for _, (numbers, table) in halves
-        ]
-        shades = [[palette.get(n, to_rgb(NEUTRAL_COLOUR)) for n in map(int, numbers)] for numbers, palette in palettes]
+        shades = []
+        for mesh, (numbers, table) in halves:
+            of_side = np.tile(np.array(to_rgb(NEUTRAL_COLOUR)), (len(mesh.vertices), 1))
+            for number, name in table.items():
+                of_side[numbers == number] = colours[name]
+            shades.append(of_side)
+            nameless |= not np.isin(numbers, list(table)).all()
         painted[heading] = merged(*(mesh for mesh, _ in halves)), np.concatenate(shades)
+    if nameless:
+        legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     rows = [
         Row(f"{view.name} view", [Panel(mesh, shades, view) for mesh, shades in painted.values()])
         for view in named_views(views)
     ]
-    legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
-    if any(not np.isin(numbers, list(table)).all() for halves in brains.values() for _, (numbers, table) in halves):
-        legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
-    return panel_grid(list(painted), rows, legend=legend, **shown)
+    return panel_grid(list(painted), rows, legend=legend)
 
 
 @styled
 def zones_picture(
-    mesh: TriangleMesh,
-    zones: NDArray[np.integer],
-    *,
-    fissure_x_mm: float,
-    views: Sequence[str] = MEDIAL_VIEWS,
-    synthetic: bool = False,
+    mesh: TriangleMesh, zones: NDArray[np.integer], *, fissure_x_mm: float, views: Sequence[str] = MEDIAL_VIEWS
 ) -> Figure:
-    """Returns the zones of the brain's boundary from several sides, with their areas.
+    """Draw the zones of the brain's boundary from several sides, with their areas.
 
     Parameters
     ----------
-    zones : (m,) code of each face
+    zones : (m,) code of each face, of `ZONE_COLOURS`
     fissure_x_mm
         Where the medial views part the hemispheres.
-
-    Raises
-    ------
-    InputError
-        If the number of codes is not the number of faces, or a code has no name.
     """
-    if len(zones) != len(mesh.faces):
-        raise InputError("zones do not fit the surface", found=f"{len(zones)} codes", expected=f"{len(mesh.faces)}")
-    unknown = sorted(set(np.unique(zones).tolist()) - set(ZONE_COLOURS))
-    if unknown:
-        raise InputError("unknown zone", found=unknown, expected=list(ZONE_COLOURS))
     palette = np.zeros((max(ZONE_COLOURS) + 1, 3))
+    areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(palette)) * CM2_PER_MM2
+    legend = []
     for code, colour in ZONE_COLOURS.items():
         palette[code] = to_rgb(colour)
-    areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(palette)) * CM2_PER_MM2
-    legend = [
-        Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²")
-        for code, colour in ZONE_COLOURS.items()
-        if areas[code]
-    ]
+        if areas[code]:
+            legend.append(Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²"))
     # a brain of one hemisphere has no medial view of the other
     shown = [view for view in named_views(views) if hemisphere_faces(mesh, view.hemisphere, fissure_x_mm).any()]
     panels = [
         Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, material=MAP) for view in shown
     ]
-    headings = [f"{view.name} view" for view in shown]
-    return panel_grid(headings, [Row("", panels)], synthetic=synthetic, legend=legend)
+    return panel_grid([f"{view.name} view" for view in shown], [Row("", panels)], legend=legend)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Any, Unpack
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,65 +16,39 @@ from matplotlib.ticker import MaxNLocator
 from ..errors import InputError
 from ..parameters.terms import MEASURED, SIDES
 from .charts import spectra_chart
-from .labels import FORETOLD, MEASURES, parameter_label, plain, value_labels, with_unit
+from .labels import MEASURES, SIMPLER_WAYS, parameter_label, plain, value_labels, with_unit
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
+    REAL_BRAIN,
     REAL_COLOUR,
     RUN_COLOURS,
-    Shown,
     add_letters,
-    chosen_colours,
     from_zero,
-    light_grid,
     new_figure,
     panel_figure,
     run_colours,
     run_legend,
-    run_panels,
     star,
     styled,
     week_axis,
     wrap,
 )
 
-CEILING = "registration alone"
-GAIN = "gain in r over the scaled start"
-KINDS = ("explained", "predicted")
-"""Weeks whose growth was known, and those whose growth was not; panels show one of them."""
 ONE_WEEK = np.array([-0.25, 0.25])
 """Ends in weeks of a line that stands for a single week."""
 ROW_IN = 0.22
 """Height of a sulcus's row."""
-MARKERS = {"whole": "o", "left": "<", "right": ">"}
-LINE_COLOUR, OPTIMUM_COLOUR = RUN_COLOURS[:2]
+SIDE_LOOKS = {"whole": ("o", RUN_COLOURS[0]), "left": ("<", RUN_COLOURS[0]), "right": (">", RUN_COLOURS[1])}
+SIDE_NAMES = {"whole": "whole brain", "left": "left hemisphere", "right": "right hemisphere"}
 _SIZES = ("area", "volume", "gyrification_index")
 
 
-def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any) -> None:
-    """Draws a gain with its interval; full marks explain a week, open ones predict it."""
-    gain = rows[f"gain_{measure}"]
-    away = np.stack([gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain])
-    axes.errorbar(x, gain, yerr=away.clip(min=0), color=colour, linewidth=1.0, elinewidth=0.7)
-    for kind, face in zip(KINDS, (colour, "white"), strict=True):
-        if (chosen := rows["kind"] == kind).any():
-            axes.plot(x[chosen], gain[chosen], "o", color=colour, markerfacecolor=face)
-
-
-def _gain_axes(axes: Axes, title: str) -> None:
-    axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
-    axes.set_title(title)
-    light_grid(axes)
-
-
-def _ceiling_key(ceiling: pd.DataFrame | None) -> list[Artist]:
-    known = ceiling is not None and len(ceiling)
-    return [Line2D([], [], color=MUTED_COLOUR, linestyle=":", label=CEILING)] if known else []
-
-
 @styled
-def validation_chart(validation: pd.DataFrame, ceiling: pd.DataFrame | None = None, **shown: Unpack[Shown]) -> Figure:
-    """Returns by week how much better a run's curvature correlates with the real brain's than the scaled start's does.
+def validation_chart(
+    validation: pd.DataFrame, ceiling: pd.DataFrame | None = None, *, runs: Sequence[str] = ()
+) -> Figure:
+    """Draw by week how much better a run's curvature correlates with the real brain's than the scaled start's does.
 
     Bars are 95 % intervals of the bootstrap; filled marks explain the week, open ones predict it. The adjacent real
     week, which skill is measured against, and the start carried by registration alone are drawn beside.
@@ -86,8 +60,11 @@ def validation_chart(validation: pd.DataFrame, ceiling: pd.DataFrame | None = No
         `labels.MEASURES`.
     ceiling
         The same of the start carried by registration.
+    runs
+        All runs of the study, which settle the colours.
     """
-    figure, panels, colours = run_panels(len(MEASURES), validation["run"], shown, per_row=2, panel_in=2.5)
+    colours = run_colours(validation["run"], runs)
+    figure, panels = panel_figure(len(MEASURES), per_row=2, panel_in=2.5)
     for axes, (measure, name) in zip(panels, MEASURES.items(), strict=True):
         for number, ((run, _), rows) in enumerate(validation.groupby(["run", "start_week"], sort=False)):
             line = rows.sort_values("week")
@@ -102,29 +79,45 @@ def validation_chart(validation: pd.DataFrame, ceiling: pd.DataFrame | None = No
             if len(rows) == 1:  # a line through one point cannot be seen
                 begin, end = rows["week"].iloc[0] + ONE_WEEK
                 axes.hlines(gain, begin, end, colors=MUTED_COLOUR, linestyles=":")
-        _gain_axes(axes, name)
+        axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
+        axes.set_title(name)
         week_axis(axes, validation["week"])
-    panels[0].set_ylabel(GAIN)
-    real = star("real brain of the week before", markersize=6)
-    run_legend(figure, colours, extra=[real, *_ceiling_key(ceiling)])
+    panels[0].set_ylabel("gain in r over the scaled start")
+    extra: list[Artist] = [star("real brain of the week before", markersize=6)]
+    if ceiling is not None and len(ceiling):
+        extra.append(Line2D([], [], color=MUTED_COLOUR, linestyle=":", label="registration alone"))
+    run_legend(figure, colours, extra=extra)
     return figure
 
 
-@styled
-def prediction_chart(prediction: pd.DataFrame, **shown: Unpack[Shown]) -> Figure:
-    """Returns correlation with and distance from the real brain by weeks after the start: a row of panels per start.
+def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any) -> None:
+    """Draw a gain with its interval; full marks explain a week, open ones predict it."""
+    gain = rows[f"gain_{measure}"]
+    away = np.stack([gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain])
+    axes.errorbar(x, gain, yerr=away.clip(min=0), color=colour, linewidth=1.0, elinewidth=0.7)
+    for kind, face in (("explained", colour), ("predicted", "white")):
+        if (chosen := rows["kind"] == kind).any():
+            axes.plot(x[chosen], gain[chosen], "o", color=colour, markerfacecolor=face)
 
-    Runs are full lines, simpler ways to foretell the brain dashed ones.
+
+@styled
+def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+    """Draw correlation with and distance from the real brain by weeks after the start: a row of panels per start.
+
+    Runs are full lines, simpler ways to predict the brain dashed ones.
 
     Parameters
     ----------
     prediction
         Columns run, start, horizon, model (`run` or a simpler way), r_shape_index and distance_mm.
+    runs
+        All runs of the study, which settle the colours.
     """
     columns = {"r_shape_index": "shape index, r with the real brain", "distance_mm": "distance from it (mm)"}
     places = list(product(dict.fromkeys(prediction["start"]), columns))
     layout: dict[str, Any] = {"per_row": 2, "panel_in": 2.4, "foot_in": 0.9, "sharex": True, "sharey": "col"}
-    figure, panels, colours = run_panels(len(places), prediction["run"], shown, **layout)
+    figure, panels = panel_figure(len(places), **layout)
+    colours = run_colours(prediction["run"], runs)
     # what is simpler is the same for all runs
     lines = prediction.assign(line=prediction["run"].where(prediction["model"] == "run", prediction["model"]))
     shades = run_colours([*colours, *lines["line"]])
@@ -137,16 +130,18 @@ def prediction_chart(prediction: pd.DataFrame, **shown: Unpack[Shown]) -> Figure
         axes.set_xlabel("weeks after the start")
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
         axes.margins(x=0.1)
-        light_grid(axes)
     from_zero(panels[1])
-    extra = [Line2D([], [], color=c, linestyle="--", label=FORETOLD.get(way, plain(way))) for way, c in ways.items()]
+    extra = [
+        Line2D([], [], color=colour, linestyle="--", label=SIMPLER_WAYS.get(way, plain(way)))
+        for way, colour in ways.items()
+    ]
     run_legend(figure, colours, extra=extra)
     return figure
 
 
 @styled
 def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Returns a row for each sulcus that the real brains do not have at the start, with the weeks in which it begins.
+    """Draw a row for each sulcus that the real brains do not have at the start, with the weeks in which it begins.
 
     A cross at the right edge says that it never begins. Sulci are those of a start brain; where there are several,
     their names have its name behind.
@@ -160,18 +155,18 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     """
     several = len(onset["subject"].unique()) > 1
     table = onset.assign(row=onset["region"] + (" · " + onset["subject"] if several else ""))
-    table = table[~table["there_at_start"].astype(bool) | (table["run"] != MEASURED)]
+    table = table[~table["there_at_start"].astype(bool)]
     late = table[table["run"] == MEASURED].drop_duplicates("row").sort_values("onset_week", ascending=False)
     places = {name: place for place, name in enumerate(late["row"])}
-    drawn = table[table["row"].isin(places) & ~table["there_at_start"].astype(bool)]
+    drawn = table[table["row"].isin(places)]
     weeks = drawn["onset_week"].dropna()
     if not len(weeks):
-        figure = new_figure(FULL_WIDTH_IN, 0.4, synthetic=False)
+        figure = new_figure(FULL_WIDTH_IN, 0.4)
         figure.text(0.0, 0.5, "No sulcus begins after the start.", va="center")
         return figure
-    figure = new_figure(FULL_WIDTH_IN, 1.2 + ROW_IN * max(len(places), 2), synthetic=False)
+    figure = new_figure(FULL_WIDTH_IN, 1.2 + ROW_IN * max(len(places), 2))
     axes = figure.subplots()
-    colours = chosen_colours(onset["run"], runs)
+    colours = run_colours(onset["run"], runs)
     beyond = np.ceil(weeks.max() + 0.5)
     for number, (run, colour) in enumerate({MEASURED: REAL_COLOUR, **colours}.items()):
         rows = drawn[drawn["run"] == run].drop_duplicates("row")
@@ -187,7 +182,7 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     week_axis(axes, [weeks.min(), beyond])
     whole = np.arange(np.ceil(weeks.min()), beyond)
     axes.set_xticks([*whole, beyond], [*(f"{week:g}" for week in whole), "never"])
-    light_grid(axes, "both")
+    axes.grid(visible=True, axis="both")
     run_legend(figure, colours, measured="real brains")
     return figure
 
@@ -199,9 +194,9 @@ def influence_spectra(
     *,
     values: Mapping[str, Mapping[str, Any]],
     week: float,
-    **shown: Unpack[Shown],
+    measured: str = REAL_BRAIN,
 ) -> Figure:
-    """Returns the relative power in B4 to B6 of the members of a study at one week, beside the measured brain's.
+    """Draw the relative power in B4 to B6 of the members of a study at one week, beside the measured brain's.
 
     Colours go from pale to dark in the order of the values.
 
@@ -212,26 +207,21 @@ def influence_spectra(
     real : tables as for `spectra_chart`
     values : {run: {parameter: value}}
         What is varied, in the order of the study.
+    measured
+        What the measured brains are called.
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
     simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
-    named = pd.concat([*simulated, *real], ignore_index=True)
     shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
     colours = dict(zip(labels.values(), shades, strict=False))
-    return spectra_chart(named, week=week, colours=colours, **shown)
+    return spectra_chart(pd.concat([*simulated, *real]), week=week, colours=colours, measured=measured)
 
 
 @styled
 def nearest_chart(
-    comparison: pd.DataFrame,
-    nearest: pd.DataFrame,
-    *,
-    varied: str,
-    subject: str,
-    real: Sequence[str],
-    synthetic: bool = False,
+    comparison: pd.DataFrame, nearest: pd.DataFrame, *, varied: str, subject: str, real: Sequence[str]
 ) -> Figure:
-    """Returns by each measure how far the members of a study are from the measured brain, over the varied parameter.
+    """Draw by each measure how far the members of a study are from the measured brain, over the varied parameter.
 
     Each measure has its panel, with the whole brain or both hemispheres; the nearest member is filled and named.
 
@@ -252,22 +242,20 @@ def nearest_chart(
     InputError
         If no distance is known.
     """
-    own = comparison[(comparison["subject"] == subject) & comparison["real"].isin(real)]
-    rows = own[own["distance"].notna()]
+    rows = comparison[(comparison["subject"] == subject) & comparison["real"].isin(real)].dropna(subset="distance")
+    if rows.empty:
+        raise InputError("no distance to a measured brain is known", found=f"{len(comparison)} rows")
     rows = rows.assign(at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok"))
-    measures = list(dict.fromkeys(rows["measure"]))
-    if not measures:
-        raise InputError("no distance to a measured brain is known", found=f"{len(own)} rows")
     published = nearest.dropna(subset=["paper"]).drop_duplicates("measure").set_index("measure")["paper"]
-    figure, panels = panel_figure(len(measures), panel_in=2.1, synthetic=synthetic)
-    colours = {"whole": RUN_COLOURS[0], "left": RUN_COLOURS[0], "right": RUN_COLOURS[1]}
+    measures = list(dict.fromkeys(rows["measure"]))
+    figure, panels = panel_figure(len(measures), panel_in=2.1)
     drawn: set[str] = set()
     for number, (axes, measure) in enumerate(zip(panels, measures, strict=True)):
         own = rows[rows["measure"] == measure]
         sides = ["whole"] if (own["hemisphere"] == "whole").any() else list(SIDES)
         drawn |= set(sides)
         for side in sides:
-            _nearest_line(axes, own[own["hemisphere"] == side].sort_values("at"), MARKERS[side], colours[side])
+            _nearest_line(axes, own[own["hemisphere"] == side].sort_values("at"), *SIDE_LOOKS[side])
         axes.margins(y=0.25)
         if measure in published:
             axes.axvline(published[measure], color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
@@ -275,13 +263,11 @@ def nearest_chart(
         unit = "share of the real" if measure in _SIZES else own["unit"].iloc[0]
         axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
         axes.set_xlabel(parameter_label(varied))
-        light_grid(axes)
         if number % 3 == 0:
             axes.set_ylabel("distance from the real brain")
-    named = {"whole": "whole brain", "left": "left hemisphere", "right": "right hemisphere"}
     handles: list[Artist] = [
-        Line2D([], [], color=colours[side], marker=MARKERS[side], markersize=4.5, label=label)
-        for side, label in named.items()
+        Line2D([], [], color=colour, marker=marker, markersize=4.5, label=SIDE_NAMES[side])
+        for side, (marker, colour) in SIDE_LOOKS.items()
         if side in drawn
     ]
     ring: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
@@ -311,42 +297,32 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
 
 
 @styled
-def calibration_chart(
-    runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str], synthetic: bool = False
-) -> Figure:
-    """Returns a panel for each parameter, with the scores of the runs and the optimum of the surrogate.
+def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str]) -> Figure:
+    """Draw a panel for each parameter, with the scores of the runs and the optimum of the surrogate.
 
     Parameters
     ----------
     runs : columns of the parameters, round, score (NaN: diverged)
-    optimum
-        Of `compare.surrogate`.
+    optimum : columns parameter, value
     score
         What the score is the sum of.
     """
-    figure = new_figure(FULL_WIDTH_IN, 2.7, synthetic=synthetic)
+    figure = new_figure(FULL_WIDTH_IN, 2.7)
     panels = figure.subplots(1, len(optimum), squeeze=False)[0]
+    finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]
+    # later rounds are darker
+    shades = dict(zip(sorted(set(runs["round"])), np.linspace(0.75, 0, runs["round"].nunique()), strict=True))
     for axes, name, value in zip(panels, optimum["parameter"], optimum["value"], strict=True):
-        _parameter_panel(axes, name, runs, value)
+        axes.axvline(value, color=RUN_COLOURS[1], linestyle="--", label="optimum")
+        for number, shade in shades.items():
+            rows = finished[finished["round"] == number]
+            look: dict[str, Any] = {"color": str(shade), "markeredgecolor": "black", "markeredgewidth": 0.4}
+            axes.plot(rows[name], rows["score"], "o", label=f"round {number}", **look)
+        if len(diverged):
+            top = np.full(len(diverged), float(finished["score"].max()))
+            axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
+        axes.set_xlabel(parameter_label(name))
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
     add_letters(panels)
     figure.legend(handles=panels[0].get_legend_handles_labels()[0], loc="outside lower center", ncols=5)
     return figure
-
-
-def _parameter_panel(axes: Axes, name: str, runs: pd.DataFrame, optimum: float) -> None:
-    axes.axvline(optimum, color=OPTIMUM_COLOUR, linestyle="--", label="optimum")
-    finished = runs[runs["score"].notna()]
-    rounds = sorted(runs["round"].unique())
-    for place, number in enumerate(rounds):
-        rows = finished[finished["round"] == number]
-        # later rounds are darker
-        shade = str(0.75 - 0.75 * place / max(len(rounds) - 1, 1))
-        look: dict[str, Any] = {"color": shade, "markeredgecolor": "black", "markeredgewidth": 0.4}
-        axes.plot(rows[name], rows["score"], "o", label=f"round {number}", **look)
-    diverged = runs[runs["score"].isna()]
-    if len(diverged):
-        top = np.full(len(diverged), float(finished["score"].max()))
-        axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
-    axes.set_xlabel(parameter_label(name))
-    light_grid(axes)

@@ -1,7 +1,6 @@
 """Plane sections: outlines of surfaces over an image and over each other."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -88,7 +87,7 @@ def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
 
 
 @styled
-def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh, *, synthetic: bool = False) -> Figure:
+def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh) -> Figure:
     """Draw a volume in grey with the outline of a surface, in a coronal, an axial and a sagittal plane.
 
     The coronal and the axial plane pass the middle of the surface; the sagittal one passes the right hemisphere, at a
@@ -108,9 +107,7 @@ def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh, *,
     at = {"coronal": middle[1], "axial": middle[2], "sagittal": (middle[0] + high[0]) / 2}
     spans = np.array([(high - low)[list(PLANES[plane][1:])] + 2 * MARGIN_MM for plane in PLANES])
     # beside and above the panels is room for words
-    figure, grid = _plane_panels(
-        list(spans[:, 0]), [spans[:, 1].max()], beside_in=1.7, beyond_in=0.9, synthetic=synthetic
-    )
+    figure, grid = _plane_panels(list(spans[:, 0]), [spans[:, 1].max()], beside_in=1.7, beyond_in=0.9)
     for axes, plane in zip(grid[0], PLANES, strict=True):
         across, right, up = PLANES[plane]
         points, extent = plane_grid(plane, at[plane], low, high)
@@ -118,6 +115,7 @@ def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh, *,
         draw_outline(axes, surface, plane, at[plane])
         axes.set(xlabel=AXIS_NAMES[right], ylabel=AXIS_NAMES[up], xlim=extent[:2], ylim=extent[2:], aspect="equal")
         axes.set_title(f"{plane}, {'xyz'[across]} = {at[plane]:.1f} mm")
+        axes.grid(visible=False)
     add_letters(grid[0])
     return figure
 
@@ -129,7 +127,6 @@ def outlines_chart(
     *,
     planes: Sequence[str] = tuple(PLANES),
     measured: str = REAL_BRAIN,
-    synthetic: bool = False,
 ) -> Figure:
     """Draw the outlines of runs over those of the measured brain, a row per plane, a column per week.
 
@@ -140,6 +137,8 @@ def outlines_chart(
     ----------
     runs : {run: {week: surface in RAS+ mm, aligned with the measured one}}
     real : {week: measured surface in RAS+ mm}
+    measured
+        What the measured brains are called.
     """
     weeks, colours = sorted(real)[-MOST_WEEKS:], run_colours(runs)
     drawn = [brains[week] for brains in (real, *runs.values()) for week in weeks if week in brains]
@@ -147,8 +146,7 @@ def outlines_chart(
     high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1
     wide = max((high - low)[PLANES[plane][1]] for plane in planes)
     tall = [(high - low)[PLANES[plane][2]] for plane in planes]
-    shown: dict[str, Any] = {"measured": measured, "synthetic": synthetic}
-    figure, panels = _plane_panels([wide] * len(weeks), tall, beside_in=0.7, beyond_in=0.9, most_in=2.3, **shown)
+    figure, panels = _plane_panels([wide] * len(weeks), tall, beside_in=0.7, beyond_in=0.9, most_in=2.3)
     for row, plane in zip(panels, planes, strict=True):
         across, right, up = PLANES[plane]
         centre = (low[right] + high[right]) / 2
@@ -185,7 +183,6 @@ def _plane_panels(
     beside_in: float,
     beyond_in: float,
     most_in: float = FULL_WIDTH_IN,
-    **shown: Any,
 ) -> tuple[Figure, NDArray]:
     """Return a figure with a grid of panels at one scale, which is as wide as a page or less, and its panels.
 
@@ -197,10 +194,9 @@ def _plane_panels(
         What the page has besides the panels, in width and in height, in inches.
     most_in
         The most that a panel may be wide, in inches.
-    shown : as for `new_figure`
     """
     inches_per_mm = min((FULL_WIDTH_IN - beside_in) / sum(wide), most_in / max(wide))
     width = max(SINGLE_COLUMN_IN, beside_in + inches_per_mm * sum(wide))
-    figure = new_figure(width, inches_per_mm * sum(tall) + beyond_in, **shown)
+    figure = new_figure(width, inches_per_mm * sum(tall) + beyond_in)
     ratios = {"width_ratios": wide, "height_ratios": tall}
     return figure, figure.subplots(len(tall), len(wide), squeeze=False, gridspec_kw=ratios)

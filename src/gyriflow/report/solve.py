@@ -1,9 +1,10 @@
-"""What a folding solve did: its steps, its displacement, and the quality and resolution of its mesh."""
+"""What a folding solve did: its steps, its displacement, and how its mesh resolved the cortex."""
 
 import math
-from collections.abc import Mapping
-from typing import Any, Unpack
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -14,13 +15,12 @@ from .style import (
     MUTED_COLOUR,
     RUN_COLOURS,
     SINGLE_COLUMN_IN,
-    Shown,
     add_letters,
     from_zero,
-    light_grid,
     new_figure,
+    panel_figure,
+    run_colours,
     run_legend,
-    run_panels,
     runs_by_name,
     styled,
     week_axis,
@@ -31,26 +31,22 @@ FALLBACKS = {
     "cg, tangent shifted": "tangent made definite",
 }
 """What is said of steps by the linear solver that they needed, from the usual one on."""
-_PAPER = "FetalFoldSim"
-_MEASURED = "Wang et al. 2021"
-_MARKERS = {_PAPER: "s", _MEASURED: "^"}
+_MARKERS = {"FetalFoldSim": "s", "Wang et al. 2021": "^"}
 PUBLISHED = pd.DataFrame(
-    [
-        (source, from_week, from_week + 1.0, nodes, largest, mean)
-        for source, nodes, maxima, means in (
-            (_PAPER, "all", (2.51, 2.22, 2.37, 2.57), (0.42, 0.40, 0.38, 0.40)),
-            (_MEASURED, "published", (1.24, 2.29, 3.65, 5.79), (0.45, 0.88, 1.91, 3.03)),
-        )
-        for from_week, largest, mean in zip((21.0, 22.0, 23.0, 24.0), maxima, means, strict=True)
-    ],
-    columns=["source", "from_week", "to_week", "nodes", "max_mm", "mean_mm"],
+    {
+        "run": np.repeat(list(_MARKERS), 4),
+        "from_week": [21.0, 22, 23, 24] * 2,
+        "to_week": [22.0, 23, 24, 25] * 2,
+        "max_mm": [2.51, 2.22, 2.37, 2.57, 1.24, 2.29, 3.65, 5.79],
+        "mean_mm": [0.42, 0.40, 0.38, 0.40, 0.45, 0.88, 1.91, 3.03],
+    }
 )
 """Weekly displacement norms in mm: the FetalFoldSim paper's simulation (all nodes) and its quotation of real brains."""
 
 
 @styled
-def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> Figure:
-    """Returns what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
+def steps_chart(steps: pd.DataFrame, *, order: int) -> Figure:
+    """Draw what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
 
     Parameters
     ----------
@@ -60,7 +56,7 @@ def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> 
     order
         Of the elements: it says how many through the cortex are enough.
     """
-    figure = new_figure(SINGLE_COLUMN_IN, 8.4, synthetic=synthetic)
+    figure = new_figure(SINGLE_COLUMN_IN, 8.4)
     panels = dict(zip(STEPS, figure.subplots(len(STEPS), 1, sharex=True), strict=True))
     week = steps["week"]
     dots: dict[str, Any] = {"markersize": 2.0, "linewidth": 0.8, "marker": "o"}
@@ -68,13 +64,12 @@ def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> 
     for column, axes in panels.items():
         axes.plot(week, steps[column], color=RUN_COLOURS[0], **dots)
         axes.set_ylabel(STEPS[column])
-        light_grid(axes)
+        if column != "min_J":
+            from_zero(axes)
     sizes = panels["max_u_mm"]
     sizes.lines[0].set_label("max")
     sizes.plot(week, steps["mean_u_mm"], color=RUN_COLOURS[1], label="mean", **dots)
     sizes.legend(**above)
-    for column in ("newton", "krylov", "max_u_mm", "elements_through_cortex", "radius_ratio_01", "seconds"):
-        from_zero(panels[column])
     for column in ("newton", "krylov"):
         panels[column].yaxis.get_major_locator().set_params(integer=True, nbins=5)
     for column, limit in (("min_J", 0.0), ("elements_through_cortex", ELEMENTS_NEEDED[order])):
@@ -93,34 +88,35 @@ def steps_chart(steps: pd.DataFrame, *, order: int, synthetic: bool = False) -> 
 
 
 @styled
-def displacement_chart(displacement: pd.DataFrame, **told: Unpack[Shown]) -> Figure:
-    """Returns the maximal and the mean displacement norm of all nodes, as in the paper, per week.
+def displacement_chart(displacement: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+    """Draw the maximal and the mean displacement norm of all nodes, as in the paper, per week.
 
-    Norms between output weeks that lie further apart are divided by the weeks between them.
-
-    Runs are lines, published values grey.
+    Norms between output weeks that lie further apart are divided by the weeks between them. Runs are lines, published
+    values grey.
 
     Parameters
     ----------
     displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
+    runs
+        All runs of the study, which settle the colours.
     """
     named = runs_by_name(displacement)
-    shown = named[named["nodes"] == "all"]
-    figure, panels, colours = run_panels(2, shown["run"], told, per_row=2)
-    ends = pd.concat([shown, PUBLISHED])
+    rows = pd.concat([PUBLISHED, named[named["nodes"] == "all"]])
+    rows["middle"], span = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
+    colours = run_colours(named["run"], runs)
+    figure, panels = panel_figure(2, per_row=2)
     for axes, column, label in zip(panels, ("max_mm", "mean_mm"), ("maximal", "mean"), strict=True):
-        lines = {source: (PUBLISHED[PUBLISHED["source"] == source], MUTED_COLOUR) for source in _MARKERS}
-        lines |= {run: (shown[shown["run"] == run].sort_values("from_week"), colour) for run, colour in colours.items()}
-        for name, (rows, colour) in lines.items():
-            look: dict[str, Any] = {"marker": _MARKERS.get(name, "o"), "linestyle": "--" if name in _MARKERS else "-"}
-            per_week = rows[column] / (rows["to_week"] - rows["from_week"])
-            axes.plot((rows["from_week"] + rows["to_week"]) / 2, per_week, color=colour, label=name, **look)
+        per_week = rows.assign(per_week=rows[column] / span).sort_values("middle")
+        for run, line in per_week.groupby("run", sort=False):
+            look: dict[str, Any] = {"marker": "o", "color": colours.get(str(run), MUTED_COLOUR)}
+            if run in _MARKERS:
+                look |= {"marker": _MARKERS[str(run)], "linestyle": "--"}
+            axes.plot(line["middle"], line["per_week"], label=run, **look)
         axes.set_title(f"{label} displacement, all nodes")
         axes.set_ylabel("displacement (mm per week)")
         from_zero(axes)
-        week_axis(axes, [*ends["from_week"], *ends["to_week"]])
+        week_axis(axes, [*rows["from_week"], *rows["to_week"]])
         axes.set_xlabel("gestational age (GW), middle of the interval")
-        light_grid(axes)
     extra = [
         Line2D([], [], color=MUTED_COLOUR, marker=marker, linestyle="--", label=source)
         for source, marker in _MARKERS.items()
@@ -130,7 +126,7 @@ def displacement_chart(displacement: pd.DataFrame, **told: Unpack[Shown]) -> Fig
 
 
 def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
-    """Returns how well the steps of a run resolved the cortex, as the table of runs has it.
+    """Return how well the steps of a run resolved the cortex, as the table of runs has it.
 
     Parameters
     ----------
@@ -154,7 +150,7 @@ def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
 
 
 def resolution_verdict(run: Mapping[str, Any] | pd.Series) -> str:
-    """Returns what is to be said of a run whose mesh is too coarse, at the start or later; empty where it is not.
+    """Return what is to be said of a run whose mesh is too coarse, at the start or later; empty where it is not.
 
     Parameters
     ----------

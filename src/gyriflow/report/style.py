@@ -2,11 +2,9 @@
 
 import math
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
-from functools import wraps
+from collections.abc import Iterable, Mapping, Sequence
 from string import ascii_lowercase
-from typing import Any, TypedDict
+from typing import Any
 
 import matplotlib as mpl
 import pandas as pd
@@ -37,12 +35,10 @@ MAGNITUDES = "YlGnBu"
 NEUTRAL_COLOUR = "#D9D9D9"
 """Tissue without a value: outside, not measured, or exactly zero where only what is above counts."""
 
-REAL_BRAIN, SIMPLE_SHAPE = "real brain", "simple shape"
+REAL_BRAIN = "real brain"
 """What brains that were not simulated are called where their population is not known."""
-SYNTHETIC_NAMES = frozenset((SIMPLE_SHAPE, "sphere", "ellipsoid"))
-"""What shapes in place of brains are called."""
 
-_SETTINGS: dict[Any, Any] = {
+SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.0,
@@ -66,69 +62,27 @@ _SETTINGS: dict[Any, Any] = {
     "legend.frameon": False,
     "lines.linewidth": 1.3,
     "lines.markersize": 4.0,
+    # pale lines behind the data
+    "axes.grid": True,
+    "axes.grid.axis": "y",
     "grid.color": "#E2E2E2",
     "grid.linewidth": 0.5,
 }
 
 
-class Shown(TypedDict, total=False):
-    """What charts are told besides their data.
-
-    Attributes
-    ----------
-    runs : all runs of the study, which settle the colours
-    measured : what the measured brains are called, "real brain" unless it is said
-    synthetic : whether the folded brains are shapes in their place
-    """
-
-    runs: Sequence[str]
-    measured: str
-    synthetic: bool
+styled = mpl.rc_context(SETTINGS)
+"""Makes a function draw its figure in the project's style; the settings outside stay as they are."""
 
 
-def style() -> AbstractContextManager[None]:
-    """Returns a context in which matplotlib draws in the project's style; the settings outside stay as they are."""
-    return mpl.rc_context(_SETTINGS)
-
-
-def styled[**P](chart: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Returns `chart` made to draw its figure in the project's style."""
-
-    @wraps(chart)
-    def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with style():
-            return chart(*args, **kwargs)
-
-    return drawn
-
-
-def new_figure(width_in: float, height_in: float, *, synthetic: bool, measured: str = SIMPLE_SHAPE) -> Figure:
-    """Returns an empty figure. What it shows is said by its caption; that brains are synthetic, by the figure too.
-
-    Parameters
-    ----------
-    synthetic
-        Whether the folded brain is a shape in its place.
-    measured
-        What the brains that it is shown beside are called.
-    """
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    if synthetic:
-        figure.suptitle(synthetic_note(measured))
-    return figure
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure, whose parts are laid out so that they do not overlap."""
+    return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
 def panel_figure(
-    count: int,
-    *,
-    per_row: int = 3,
-    panel_in: float = 1.9,
-    foot_in: float = 0.7,
-    synthetic: bool = False,
-    measured: str = SIMPLE_SHAPE,
-    **grid: Any,
+    count: int, *, per_row: int = 3, panel_in: float = 1.9, foot_in: float = 0.7, **grid: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Returns a figure with so many panels, row after row, and the panels, with their letters.
+    """Return a figure with so many panels, row after row, and the panels, with their letters.
 
     Parameters
     ----------
@@ -136,14 +90,12 @@ def panel_figure(
         Panels of a full row, which is as wide as a page.
     panel_in, foot_in
         Height of a row, and what is left for the legend, in inches.
-    synthetic, measured : as for `new_figure`
     grid
         What else `Figure.subplots` takes.
     """
     columns = min(per_row, count)
     lines = -(-count // columns)
-    width = FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row)
-    figure = new_figure(width, foot_in + panel_in * lines, synthetic=synthetic, measured=measured)
+    figure = new_figure(FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row), foot_in + panel_in * lines)
     panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
     for spare in panels[count:]:
         spare.remove()
@@ -151,17 +103,8 @@ def panel_figure(
     return figure, panels[:count]
 
 
-def run_panels(
-    count: int, present: Iterable[str], shown: Shown, **layout: Any
-) -> tuple[Figure, list[Axes], dict[str, Any]]:
-    """Returns `panel_figure` for runs that are present, and the colours of these."""
-    told: dict[str, Any] = {"synthetic": shown.get("synthetic", False), "measured": shown.get("measured", SIMPLE_SHAPE)}
-    figure, panels = panel_figure(count, **told, **layout)
-    return figure, panels, chosen_colours(present, shown.get("runs", ()))
-
-
 def add_letters(panels: Iterable[Axes]) -> None:
-    """Writes a, b, c … at the upper left of panels, by which a caption calls them; nothing for a single panel."""
+    """Write a, b, c … at the upper left of panels, by which a caption calls them; nothing for a single panel."""
     panels = list(panels)
     if len(panels) > 1:
         for axes, letter in zip(panels, ascii_lowercase, strict=False):
@@ -179,35 +122,13 @@ def add_letters(panels: Iterable[Axes]) -> None:
             )
 
 
-def synthetic_note(measured: str = SIMPLE_SHAPE) -> str:
-    """Returns the words under which a synthetic brain is shown, alone or beside brains that are called `measured`."""
-    return "a simple shape, not a real brain" if all_synthetic(measured) else "simulated from a simple shape"
-
-
-def all_synthetic(measured: str) -> bool:
-    """Returns whether brains called `measured`, several names joined by "or", were all made by the workflow."""
-    return set(measured.split(" or ")) <= SYNTHETIC_NAMES
-
-
 def wrap(text: str, letters: int) -> str:
-    """Returns text with each of its lines broken between words so that it has about so many letters at most."""
+    """Return text with each of its lines broken between words so that it has about so many letters at most."""
     return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.split("\n"))
 
 
-def simulated_runs(runs: Iterable[str]) -> list[str]:
-    """Returns the names of the simulated runs, each once, in the order given."""
-    return [run for run in dict.fromkeys(runs) if run != MEASURED]
-
-
-def chosen_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
-    """Returns the colours of the simulated runs that are present, in the order of all `runs` of the study."""
-    simulated = simulated_runs(present)
-    colours = run_colours([*runs, *simulated])
-    return {run: colour for run, colour in colours.items() if run in simulated}
-
-
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
-    """Returns a table with columns run and subject in which simulated brains go by the names of `run_names`."""
+    """Return a table with columns run and subject in which simulated brains go by the names of `run_names`."""
     pairs = list(dict.fromkeys(zip(table["run"], table["subject"], strict=True)))
     pairs = [pair for pair in pairs if pair[0] != MEASURED]
     names = dict(zip(pairs, run_names(pairs), strict=True))
@@ -215,20 +136,22 @@ def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(run=shown)
 
 
-def run_colours(runs: Iterable[str]) -> dict[str, Any]:
-    """Returns a colour for each run in the order given: distinct ones, or a sequential scale for a long list.
+def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
+    """Return a colour for each simulated run that is present: distinct ones, or a sequential scale for a long list.
 
-    All figures of a study name all of its runs, in the same order: so a run keeps its colour from figure to figure.
+    Figures of a study give all of its `runs`, in the same order: so a run keeps its colour from figure to figure.
     """
-    names = list(dict.fromkeys(runs))
-    if len(names) <= len(RUN_COLOURS):
-        return dict(zip(names, RUN_COLOURS, strict=False))
-    scale = mpl.colormaps["viridis"]
-    return {name: scale(0.92 * i / (len(names) - 1)) for i, name in enumerate(names)}
+    shown = set(present := list(present))
+    names = [name for name in dict.fromkeys([*runs, *present]) if name != MEASURED]
+    colours: dict[str, Any] = dict(zip(names, RUN_COLOURS, strict=False))
+    if len(names) > len(RUN_COLOURS):
+        scale = mpl.colormaps["viridis"]
+        colours = {name: scale(0.92 * i / (len(names) - 1)) for i, name in enumerate(names)}
+    return {run: colour for run, colour in colours.items() if run in shown}
 
 
 def week_axis(axes: Axes, weeks: Iterable[float] | None = None) -> None:
-    """Labels the horizontal axis as gestational weeks with whole weeks as ticks."""
+    """Label the horizontal axis as gestational weeks with whole weeks as ticks."""
     axes.set_xlabel("gestational age (GW)")
     axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1))
     if weeks is not None:
@@ -239,20 +162,15 @@ def week_axis(axes: Axes, weeks: Iterable[float] | None = None) -> None:
 
 
 def from_zero(axes: Axes) -> None:
-    """Makes the vertical axis begin at zero and end a little above the data of all panels that share it."""
+    """Make the vertical axis begin at zero and end a little above the data of all panels that share it."""
     tops = [panel.dataLim.ymax for panel in axes.get_shared_y_axes().get_siblings(axes)]
     # panels without data have an infinite top
     top = max((top for top in tops if math.isfinite(top)), default=0.0)
     axes.set_ylim(0, 1.07 * top if top > 0 else 1.0)
 
 
-def light_grid(axes: Axes, axis: str = "y") -> None:
-    """Draws pale grid lines behind the data."""
-    axes.grid(visible=True, axis=axis)  # type: ignore[arg-type]
-
-
 def star(label: str, colour: str = REAL_COLOUR, **look: Any) -> Line2D:
-    """Returns the entry of a legend for measured brains."""
+    """Return the entry of a legend for measured brains."""
     usual: dict[str, Any] = {"marker": "*", "markersize": 7, "linestyle": "none"}
     return Line2D([], [], color=colour, label=label, **{**usual, **look})
 
@@ -265,7 +183,7 @@ def run_legend(
     bars: bool = False,
     extra: Sequence[Artist] = (),
 ) -> None:
-    """Draws below the panels a legend of the runs, of the measured brains where they have a name, and of what else.
+    """Draw below the panels a legend of the runs, of the measured brains where they have a name, and of what else.
 
     Runs are keyed as they are drawn, as lines or as `bars`. The legend has as many columns as its longest label allows,
     and the figure grows by its lines.

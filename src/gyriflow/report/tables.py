@@ -11,16 +11,15 @@ from markupsafe import Markup
 
 from ..parameters.terms import MEASURED
 from .charts import WITH_NORMS
-from .labels import FORETOLD, METRICS, parameter_label, plain, week_label, with_unit
-from .style import REAL_BRAIN, SIMPLE_SHAPE, runs_by_name, simulated_runs, synthetic_note
+from .labels import METRICS, SIMPLER_WAYS, parameter_label, plain, week_label, with_unit
+from .style import REAL_BRAIN, run_colours, runs_by_name
 
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?|–")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TABLE = Environment(autoescape=True).from_string(
-    "<table>{% if caption %}<caption>{{ caption }}</caption>{% endif %}"
-    "<thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr></thead>\n<tbody>"
+    "<table><thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr></thead>\n<tbody>"
     '{% for row in rows %}<tr>{% for kind, text in row %}<td class="{{ kind }}">{{ text }}</td>{% endfor %}</tr>\n'
     "{% endfor %}</tbody></table>"
 )
@@ -53,7 +52,7 @@ QUANTILE = r"_q\d\d$"
 
 
 def _named(rows: pd.DataFrame) -> pd.Series:
-    """Returns the metric of each row as in figures, with its unit."""
+    """Return the metric of each row as in figures, with its unit."""
     pairs = zip(rows["metric"], rows["unit"], strict=True)
     return pd.Series(
         [with_unit(METRICS.get(metric, plain(metric)), unit) for metric, unit in pairs], index=rows.index, dtype=object
@@ -61,7 +60,10 @@ def _named(rows: pd.DataFrame) -> pd.Series:
 
 
 def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.DataFrame:
-    """Returns the metrics of whole brains per week: each run, the measured brain, and each run's difference in %.
+    """Return the metrics of whole brains: each run, the measured brain, and each run's difference in %.
+
+    They are those of the last week that runs and measured brains share, else of the last of all. What says how a
+    surface was measured, not what it is like, is left out, and so are quantiles.
 
     Parameters
     ----------
@@ -70,40 +72,32 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     measured
         Heading of the measured brains' column.
 
-    What says how a surface was measured, not what it is like, is left out, and so are quantiles.
-
     Returns
     -------
-    DataFrame indexed by metric (with its unit) and week; cells without a value are NaN, without a difference "–"
+    DataFrame indexed by metric (with its unit); cells without a value are NaN, without a difference "–"
     """
     left_out = metrics["metric"].isin(OF_THE_SURFACE) | metrics["metric"].str.contains(QUANTILE)
     rows = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & ~left_out])
-    names = _named(rows)
-    below_zero = set(names[rows["metric"] == AROUND_ZERO])
-    order = list(dict.fromkeys(names))
-    wide = rows.assign(metric=names).pivot_table(
-        index=["metric", "week"], columns="run", values="value", aggfunc="mean", sort=True
-    )
-    wide = wide.reindex(order, level="metric")
-    runs = simulated_runs(rows["run"])
-    signed = wide.index.get_level_values("metric").isin(below_zero)
-    real = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
-    columns = {measured: real}
-    for run in runs:
-        columns[run] = wide[run]
-        columns[f"{run}, difference (%)"] = (
-            (100 * (wide[run] / real - 1)).map(_signed).where(~signed & real.notna(), "–")
-        )
-    return pd.DataFrame(columns)
+    real = rows["run"] == MEASURED
+    week = max(set(rows.loc[real, "week"]) & set(rows.loc[~real, "week"]) or set(rows["week"]))
+    rows = rows[rows["week"] == week].assign(name=_named)
+    wide = rows.pivot_table("value", "name", "run", aggfunc="mean").reindex(dict.fromkeys(rows["name"]))
+    around_zero = wide.index.isin(rows.loc[rows["metric"] == AROUND_ZERO, "name"])
+    of_real = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
+    columns = {measured: of_real}
+    for run in run_colours(rows["run"]):
+        differences = 100 * (wide[run] / of_real - 1)
+        columns |= {run: wide[run], f"{run}, difference (%)": differences.map(_signed).where(~around_zero, "–")}
+    return pd.DataFrame(columns).rename_axis(f"metric at {week_label(week)}")
 
 
 def _signed(percent: float) -> str:
-    """Returns a difference in per cent with its sign, none where it is rounded to zero."""
+    """Return a difference in per cent with its sign, none where it is rounded to zero."""
     return "–" if np.isnan(percent) else f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0")
 
 
 def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame:
-    """Returns metrics by region: a row per brain, run, week and region, left, right and asymmetry of each metric.
+    """Return metrics by region: a row per brain, run, week and region, left, right and asymmetry of each metric.
 
     Parameters
     ----------
@@ -127,7 +121,7 @@ def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame
 
 
 def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
-    """Returns the centiles of whole brains: a row per brain and week, a column per metric, with the number of brains.
+    """Return the centiles of whole brains: a row per brain and week, a column per metric, with the number of brains.
 
     Parameters
     ----------
@@ -155,7 +149,7 @@ def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
-    """Returns the parameters of the runs with their units: a row per parameter, a column per run.
+    """Return the parameters of the runs with their units: a row per parameter, a column per run.
 
     There are those that differ between the runs, then `OF_EVERY_RUN`.
 
@@ -172,66 +166,56 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     return shown.loc[chosen].rename(index=parameter_label).rename_axis("parameter")
 
 
-def metrics_page(metrics: pd.DataFrame, *, measured: str, **shown: bool) -> str:
-    """Returns `metrics_table` as HTML, at the last week that runs and measured brains share, else the last of all."""
-    table = metrics_table(metrics, measured=measured)
-    shared = table[table[measured].notna() & table.drop(columns=measured).notna().any(axis=1)]
-    week = (shared if len(shared) else table).index.get_level_values("week").max()
-    caption = f"Metrics of whole brains at {week_label(week)}"
-    at_week = table[table.index.get_level_values("week") == week].droplevel("week")
-    return html_table(at_week, caption=caption, measured=measured, **shown)
-
-
-def regions_page(regions: pd.DataFrame, asymmetry: pd.DataFrame, **shown: Any) -> str:
-    """Returns `region_table` as HTML."""
-    return html_table(region_table(regions, asymmetry), caption="Metrics by region", **shown)
-
-
-def centiles_page(centiles: pd.DataFrame, **shown: Any) -> str:
-    """Returns `centiles_table` as HTML."""
-    return html_table(centiles_table(centiles), caption="Centiles (z) among the measured brains", **shown)
-
-
-def prediction_page(prediction: pd.DataFrame) -> str:
-    """Returns what foretold brains and simpler ways are worth as HTML: a row per start, week and way.
+def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
+    """Return what predicted brains and simpler ways are worth: a row per start, week and way.
 
     Parameters
     ----------
     prediction : the study's prediction.csv
     """
-    ways = prediction["model"].map(lambda way: FORETOLD.get(way, plain(way)))
+    ways = prediction["model"].map(lambda way: SIMPLER_WAYS.get(way, plain(way)))
     table = prediction.assign(way=ways.where(prediction["model"] != "run", prediction["run"]))
     # what is simpler is the same for all runs
     table = table.drop_duplicates(["start", "week", "way"]).set_index(["start", "week", "way"])
     shown = ["r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error"]
-    table = table[[*shown, "crossing_faces", "roughness_ratio", "skill"]].rename(columns=plain)
-    return html_table(table, caption="Foretold brains beside the real ones", digits=3)
+    return table[[*shown, "crossing_faces", "roughness_ratio", "skill"]].rename(columns=plain)
 
 
-def html_table(
-    table: pd.DataFrame, *, caption: str = "", digits: int = 4, synthetic: bool = False, measured: str = SIMPLE_SHAPE
-) -> Markup:
-    """Returns the table as HTML, ready to be put in a page, with a caption if one is given.
+def mesh_quality_table(quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]) -> pd.DataFrame:
+    """Return the quality of meshes: a row per measure with its limit, a column per brain.
 
-    Text is escaped, numbers have `digits` significant digits and stand at the right, missing values are dashes. The
-    index is shown where it has a name.
+    Parameters
+    ----------
+    quality : {brain: content of its quality.json}
+    gates : the limits in the configuration, by their keys in the section mesh
+    """
+    columns = {
+        brain: {**values, "surface_distance_mm": values["surface_distance_mm"]["hausdorff99"]}
+        for brain, values in quality.items()
+    }
+    table = pd.DataFrame(columns, dtype=object).reindex(list(OF_THE_MESH)).rename(index=OF_THE_MESH)
+    table["limit"] = [gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}"))) for name in OF_THE_MESH]
+    return table.rename_axis("measure")
+
+
+def html_table(table: pd.DataFrame) -> Markup:
+    """Return the table as HTML, ready to be put in a page.
+
+    Text is escaped, numbers have four significant digits and stand at the right, missing values are dashes. The index
+    is shown where it has a name.
     """
     named = any(name is not None for name in table.index.names)
     flat = table.reset_index() if named else table
+    texts = flat.map(lambda value: _shown(value, 4))
     rows = [
-        [
-            (_kind(name, value, text), text)
-            for name, value in zip(flat, row, strict=True)
-            for text in [_shown(value, digits)]
-        ]
-        for row in flat.itertuples(index=False, name=None)
+        [(_kind(name, value, text), text) for name, value, text in zip(flat, row, words, strict=True)]
+        for row, words in zip(flat.to_numpy(dtype=object), texts.to_numpy(), strict=True)
     ]
-    note = f" ({synthetic_note(measured)})" if synthetic else ""
-    return Markup(_TABLE.render(caption=caption and caption + note, heads=list(flat), rows=rows))
+    return Markup(_TABLE.render(heads=list(flat), rows=rows))
 
 
 def _kind(name: object, value: object, text: str) -> str:
-    """Returns the class of a cell, by which the style sheet lays it out."""
+    """Return the class of a cell, by which the style sheet lays it out."""
     if (isinstance(value, int | float | np.number) and not isinstance(value, bool)) or NUMBER.fullmatch(text):
         return "number"
     if name == "verdict" and text in VERDICTS:
@@ -271,20 +255,3 @@ def _shown(value: object, digits: int = 6) -> str:
             return ", ".join(_shown(item, digits) for item in value)
         case _:
             return str(value)
-
-
-def mesh_quality_page(quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]) -> str:
-    """Draw up the quality of meshes as HTML: a row per measure with its limit, a column per brain.
-
-    Parameters
-    ----------
-    quality : {brain: content of its quality.json}
-    gates : the limits in the configuration, by their keys in the section mesh
-    """
-    columns = {
-        brain: {**found, "surface_distance_mm": found["surface_distance_mm"]["hausdorff99"]}
-        for brain, found in quality.items()
-    }
-    table = pd.DataFrame(columns, dtype=object).reindex(list(OF_THE_MESH)).rename(index=OF_THE_MESH)
-    table["limit"] = [gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}"))) for name in OF_THE_MESH]
-    return html_table(table.rename_axis("measure"), digits=3)

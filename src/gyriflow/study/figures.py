@@ -185,7 +185,7 @@ def _of_brains(study: Study) -> Iterator[Figure]:
     limits = study.config.mesh.model_dump()
     gates = {key: value for key, value in limits.items() if key.startswith(("min_", "max_"))}
     path = f"{STUDY}/mesh_quality.html"
-    yield Figure("mesh_quality", path, "tables.mesh_quality_page", {"quality": quality}, {"gates": gates})
+    yield Figure("mesh_quality", path, "tables.mesh_quality_table", {"quality": quality}, {"gates": gates})
 
 
 def _of_growth(study: Study) -> Iterator[Figure]:
@@ -270,7 +270,7 @@ def _of_metrics(study: Study) -> Iterator[Figure]:
     options: Given = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
     yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)
     measured = {"measured": options["measured"]}
-    yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_page", metrics, measured)
+    yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_table", metrics, measured)
     yield Figure("spectra_figure", f"{OF_STUDY}/spectra.png", "charts.spectra_weeks_chart", spectra, options)
     if len(reference := list(study.norm_reference)) >= FEWEST_FOR_NORMS:
         inputs = {**metrics, "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
@@ -278,7 +278,7 @@ def _of_metrics(study: Study) -> Iterator[Figure]:
         options = {"runs": options["runs"], "measured": name, "reference": reference}
         yield Figure("norms_figure", f"{OF_STUDY}/norms.png", "charts.norms_chart", inputs, options)
         inputs = {"centiles": f"{STUDY}/centiles.csv"}
-        yield Figure("centiles_table", f"{STUDY}/centiles.html", "tables.centiles_page", inputs)
+        yield Figure("centiles_table", f"{STUDY}/centiles.html", "tables.centiles_table", inputs)
     yield from _of_regions(study)
 
 
@@ -298,7 +298,7 @@ def _of_regions(study: Study) -> Iterator[Figure]:
     tables = {"regions": f"{STUDY}/regions.csv", "asymmetry": f"{STUDY}/asymmetry.csv"}
     options = {"measured": measured_name(brains)}
     yield Figure("regions_chart", f"{OF_STUDY}/regions_metrics.png", "charts.regions_chart", tables, options)
-    yield Figure("regions_table", f"{STUDY}/regions.html", "tables.regions_page", tables)
+    yield Figure("regions_table", f"{STUDY}/regions.html", "tables.region_table", tables)
 
 
 def _of_validation(study: Study) -> Iterator[Figure]:
@@ -313,7 +313,7 @@ def _of_validation(study: Study) -> Iterator[Figure]:
         path = f"{OF_STUDY}/prediction.png"
         yield Figure("prediction_figure", path, "scores.prediction_chart", inputs, options, target=target)
         path = f"{STUDY}/prediction.html"
-        yield Figure("prediction_table", path, "tables.prediction_page", inputs, target=target)
+        yield Figure("prediction_table", path, "tables.prediction_table", inputs, target=target)
     for one in study.expected:
         yield from _of_expected(one)
     if study.validated_carried:

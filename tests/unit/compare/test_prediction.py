@@ -16,7 +16,7 @@ from gyriflow.compare.prediction import (
 )
 from gyriflow.compare.shapes import ready
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
-from gyriflow.report.labels import FORETOLD
+from gyriflow.report.labels import SIMPLER_WAYS
 
 from .bumpy import RADIUS, bumpy, shaped
 
@@ -89,7 +89,7 @@ def test_a_surface_is_scaled_to_a_volume():
 
 
 def test_skill_is_against_the_best_simple_way_of_the_week():
-    names = ["run", *FORETOLD]
+    names = ["run", *SIMPLER_WAYS]
     away = {22: [0.3, 0.6, 0.8, 0.9, 1.2, 0.1], 23: [0.9, 0.9, 0.8, 0.45, 1.2, 0.2]}
     rows = pd.DataFrame(
         [(week, name, value) for week, values in away.items() for name, value in zip(names, values, strict=True)],

@@ -60,22 +60,15 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
     ]
 
 
-def test_a_shape_is_called_so_and_never_real():
-    metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
-    shape = {"measured": "sphere", "synthetic": True}
-    spectra = pd.concat(spectrum_rows("thin", 22.0, {4: 0.1}))
-    for figure in (metrics_chart(metrics, **shape), spectra_weeks_chart(spectra, **shape)):
-        shown = words(figure)
-        assert any("a simple shape" in text for text in shown)
-        assert "real brain" not in shown
-    assert not any("shape" in text for text in words(metrics_chart(metrics)))
+BLUE = {"thin": "#0072B2"}
 
 
-def test_a_shape_beside_real_brains_is_called_so_and_they_are_not():
+def test_measured_brains_are_called_by_what_they_are():
     metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
-    shown = words(metrics_chart(metrics, measured="real brain", synthetic=True))
-    assert {"simulated from a simple shape", "real brain"} <= shown
-    assert not any("not a real brain" in text for text in shown)
+    assert "real brain" in words(metrics_chart(metrics))
+    shown = words(metrics_chart(metrics, measured="ellipsoid"))
+    assert "ellipsoid" in shown
+    assert "real brain" not in shown
 
 
 def test_settings_outside_stay_and_fonts_inside_are_the_same_when_saved(tmp_path):
@@ -92,36 +85,28 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
             metric_rows("thin", "whole", "area", {22.0: 110.0, 21.0: 100.0}, "cm2"),
             metric_rows("real", "whole", "area", {21.0: 99.0, 22.0: 120.0}, "cm2"),
             metric_rows("thin", "left", "area", {21.0: 50.0}, "cm2"),
-        ]
-    )
-    figure = metrics_chart(metrics)
-    (axes,) = figure.axes
-    assert axes.get_title() == "pial area (cm²)"
-    assert [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"] == [[[21, 100], [22, 110]]]
-    (stars,) = [line for line in axes.lines if line.get_marker() == "*"]
-    assert stars.get_linestyle() == "None"
-    assert stars.get_xydata().tolist() == [[21, 99], [22, 120]]
-    assert {"thin", "real brain"} <= words(figure)
-
-
-def test_a_metric_of_hemispheres_only_is_drawn_for_both():
-    metrics = pd.concat(
-        [
             metric_rows("thin", "left", "mean_curvedness", {21.0: 0.1, 22.0: 0.2}, "1/mm"),
             metric_rows("thin", "right", "mean_curvedness", {21.0: 0.3, 22.0: 0.4}, "1/mm"),
         ]
     )
     figure = metrics_chart(metrics)
-    assert {line.get_linestyle(): line.get_ydata().tolist() for line in figure.axes[0].lines} == {
+    area, curvedness = figure.axes
+    assert area.get_title() == "pial area (cm²)"
+    drawn = {line.get_marker(): line.get_xydata().tolist() for line in area.lines}
+    assert drawn == {"o": [[21, 100], [22, 110]], "*": [[21, 99], [22, 120]]}
+    # what is known of hemispheres only
+    assert {line.get_linestyle(): line.get_ydata().tolist() for line in curvedness.lines} == {
         "--": [0.1, 0.2],
         ":": [0.3, 0.4],
     }
-    assert {"left hemisphere", "right hemisphere"} <= words(figure)
+    assert {"thin", "real brain", "left hemisphere", "right hemisphere"} <= words(figure)
 
 
-def test_metrics_chart_refuses_a_table_without_its_metrics():
+def test_a_table_without_metrics_or_spectra_is_refused():
     with pytest.raises(InputError, match=r"no metric to draw.*spam"):
         metrics_chart(metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""))
+    with pytest.raises(InputError, match=r"no spectrum at 30 GW; found \[28.0\]"):
+        spectra_chart(pd.concat(spectrum_rows("thin", 28.0, {4: 0.2})), week=30.0, colours=BLUE)
 
 
 def test_many_runs_have_distinct_colours_and_a_legend_within_the_figure():
@@ -136,55 +121,52 @@ def test_many_runs_have_distinct_colours_and_a_legend_within_the_figure():
     assert box.x1 <= figure.bbox.width
 
 
+def test_a_run_keeps_its_colour_in_charts_of_other_runs():
+    def colours(*runs):
+        rows = pd.concat([metric_rows(run, "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2") for run in runs])
+        return [line.get_color() for line in metrics_chart(rows, runs=["thin", "thick"]).axes[0].lines]
+
+    thin, thick = colours("thin", "thick")
+    assert colours("thick") == [thick] != [thin]
+
+
 def test_spectra_bars_are_the_relative_powers_of_each_side():
     rows = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15})]
     spectra = pd.concat([*rows, *spectrum_rows("thin", 27.0, {4: 0.9})])
-    left, right = spectra_chart(spectra, week=28.0).axes
+    left, right = spectra_chart(spectra, week=28.0, colours=BLUE).axes
     assert [bar.get_height() for bar in left.patches] == pytest.approx([0.2, 0.3, 0.1])
     assert [bar.get_height() for bar in right.patches] == pytest.approx([0.1, 0.15, 0.05])
     assert [line.get_xydata()[0].tolist() for line in left.lines] == [[0, 0.25], [1, 0.15]]
     assert not any(bar.get_hatch() for bar in left.patches)
 
 
-def test_bands_that_are_cut_off_are_hatched_and_written_as_b6_too():
-    rows = [*spectrum_rows("thin", 28.0, {5: 0.2}), *spectrum_rows("thin", 28.0, {6: 0.1}, complete=False)]
-    spectra = pd.concat(rows)
-    spectra["band"] = "B" + spectra["band"].astype(str)
-    figure = spectra_chart(spectra, week=28.0)
-    assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, True]
-    assert any("cut off" in text for text in words(figure))
-
-
 def hatches_and_open_stars(figure: Figure) -> tuple[bool, bool]:
     """Returns whether the legend of a figure has a hatched patch, and whether it has an open star."""
     handles = figure.legends[0].legend_handles
-    patches = [handle for handle in handles if isinstance(handle, Patch)]
-    marks = [handle for handle in handles if isinstance(handle, Line2D) and handle.get_marker() == "*"]
-    hatched = any(patch.get_hatch() for patch in patches)
-    return hatched, any(mark.get_markerfacecolor() == "white" for mark in marks)
+    hatched = any(handle.get_hatch() for handle in handles if isinstance(handle, Patch))
+    stars = [mark for mark in handles if isinstance(mark, Line2D) and mark.get_marker() == "*"]
+    return hatched, any(mark.get_markerfacecolor() == "white" for mark in stars)
 
 
 @pytest.mark.parametrize(("run", "shown"), [("thin", (True, False)), ("real", (False, True))])
-def test_the_legend_names_only_the_marks_that_are_drawn(run, shown):
+def test_bands_that_are_cut_off_are_marked_and_keyed(run, shown):
     good = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("real", 28.0, {4: 0.2})]
     spectra = pd.concat([*good, *spectrum_rows(run, 28.0, {5: 0.1}, complete=False)])
-    assert hatches_and_open_stars(spectra_chart(spectra, week=28.0)) == shown
-    assert hatches_and_open_stars(spectra_chart(pd.concat(good), week=28.0)) == (False, False)
+    # written as B5 too
+    figure = spectra_chart(spectra.assign(band="B" + spectra["band"].astype(str)), week=28.0, colours=BLUE)
+    assert hatches_and_open_stars(figure) == shown
+    assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, True][: 1 + shown[0]]
+    assert hatches_and_open_stars(spectra_chart(pd.concat(good), week=28.0, colours=BLUE)) == (False, False)
     assert hatches_and_open_stars(spectra_weeks_chart(spectra)) == (False, run == "real")
 
 
 def test_bands_without_modes_are_said_to_be_beyond_them():
     rows = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("thin", 28.0, {6: np.nan}, complete=False)]
-    figure = spectra_chart(pd.concat(rows), week=28.0, bands=(4, 6))
-    said = [text for text in figure.axes[0].texts if "modes computed" in text.get_text()]
-    assert [text.get_position()[0] for text in said] == [1]
+    figure = spectra_chart(pd.concat(rows), week=28.0, bands=(4, 6), colours=BLUE)
+    texts = [text for text in figure.axes[0].texts if "modes computed" in text.get_text()]
+    assert [text.get_position()[0] for text in texts] == [1]
     # nothing is drawn of it, so the legend has no mark for it
     assert hatches_and_open_stars(figure) == (False, False)
-
-
-def test_spectra_chart_refuses_a_week_without_spectra():
-    with pytest.raises(InputError, match=r"no spectrum at 30 GW; found \[28.0\]"):
-        spectra_chart(pd.concat(spectrum_rows("thin", 28.0, {4: 0.2})), week=30.0)
 
 
 def test_spectra_over_weeks_have_a_row_per_side_and_a_column_per_band():
@@ -200,26 +182,6 @@ def test_spectra_over_weeks_have_a_row_per_side_and_a_column_per_band():
     assert all(figure.axes[place].get_ylim()[0] == 0 and figure.axes[place].get_ylim()[1] > 0.22 for place in (0, 2))
 
 
-def test_a_run_keeps_its_colour_in_charts_of_other_runs():
-    def colours(*runs):
-        rows = pd.concat([metric_rows(run, "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2") for run in runs])
-        return [line.get_color() for line in metrics_chart(rows, runs=["thin", "thick"]).axes[0].lines]
-
-    thin, thick = colours("thin", "thick")
-    assert colours("thick") == [thick] != [thin]
-    spectra = pd.concat(spectrum_rows("thick", 28.0, {4: 0.2}))
-    bars = spectra_chart(spectra, week=28.0, runs=["thin", "thick"]).axes[0].patches
-    assert all(same_color(bar.get_facecolor(), thick) for bar in bars)
-
-
-def test_bars_are_keyed_as_bars_and_lines_as_lines():
-    spectra = pd.concat([*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("thin", 27.0, {4: 0.2})])
-    (bars,) = spectra_chart(spectra, week=28.0).legends[0].legend_handles
-    (lines,) = spectra_weeks_chart(spectra).legends[0].legend_handles
-    assert isinstance(bars, Patch)
-    assert isinstance(lines, Line2D)
-
-
 def test_regions_chart_sums_areas_and_averages_depths():
     area, depth, asymmetry = regions_chart(REGIONS, ASYMMETRY).axes[:3]
     assert "area" in area.get_title()
@@ -227,12 +189,11 @@ def test_regions_chart_sums_areas_and_averages_depths():
     colours = region_colours(REGIONS["region"])
 
     def points(axes, region, marker):
+        lines = [line for line in axes.lines if line.get_marker() == marker]
         return [
-            (float(x), float(y))
-            for line in axes.lines
-            if line.get_marker() == marker and same_color(line.get_color(), colours[region])
-            for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)
-        ]
+            point for line in lines if same_color(line.get_color(), colours[region])
+            for point in map(tuple, line.get_xydata().tolist())
+        ]  # fmt: skip
 
     assert points(area, "front", "*") == [(21, 21), (22, 25)]
     assert points(depth, "back", "*") == [(21, 20.5), (22, 24.5)]
@@ -244,11 +205,8 @@ def test_regions_chart_sums_areas_and_averages_depths():
 def test_table_of_regions_has_left_right_and_asymmetry():
     table = region_table(REGIONS, ASYMMETRY)
     row = table.loc[("a", "real", 21.0, "front")]
-    assert (row["pial area (cm²), left"], row["pial area (cm²), right"], row["pial area, asymmetry"]) == (
-        11.0,
-        10.0,
-        0.1,
-    )
+    columns = ["pial area (cm²), left", "pial area (cm²), right", "pial area, asymmetry"]
+    assert row[columns].tolist() == [11.0, 10.0, 0.1]
     assert len(table) == 6
 
 
@@ -306,8 +264,3 @@ def test_table_of_centiles_says_of_how_many_brains(metrics_with_norms):
     assert float(z) > 3
     # a brain of the reference is compared with the others
     assert table.loc[("s3", "real", 24.0), "brains"] == 9
-
-
-def test_norms_without_metrics_are_refused(metrics_with_norms):
-    with pytest.raises(InputError, match="no metric"):
-        norms_chart(metrics_with_norms.iloc[:0], pd.DataFrame(), pd.DataFrame(), reference=REFERENCE)

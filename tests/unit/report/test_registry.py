@@ -169,5 +169,5 @@ def test_outlines_are_laid_onto_the_real_brain(monkeypatch, tmp_path):
 def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_path):
     write_json(tmp_path / "quality.json", {"tets": 7})
     inputs = {"quality": {"a": str(tmp_path / "quality.json")}, "ceiling": None}
-    given = drawn(monkeypatch, tmp_path, "mesh_quality", "tables.mesh_quality_page", inputs, gates={})
+    given = drawn(monkeypatch, tmp_path, "mesh_quality", "tables.mesh_quality_table", inputs, gates={})
     assert given == {"quality": {"a": {"tets": 7}}, "ceiling": None, "gates": {}}
