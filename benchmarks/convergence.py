@@ -49,7 +49,8 @@ from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
-from gyriflow.metrics.measure import Settings, folding_rows, measure_hemisphere, size_rows, spectrum_rows
+from gyriflow.metrics.measure import folding_rows, measure_hemisphere, size_rows, spectrum_rows
+from gyriflow.parameters.terms import CURVATURE_RADIUS_MM
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
@@ -184,7 +185,7 @@ def carried(frames: Path, week: float, modes: str = "B5") -> Carried:
     measured = measured_surface()
     match = match_points(measured.vertices, vertex_normals(measured), TriangleMesh(before, faces))
     surface = TriangleMesh(measured.vertices + values_at(match, after - before), measured.faces)
-    side = measure_hemisphere("left", surface, None, Settings(spangy_modes=modes))
+    side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, modes)
     rows = size_rows(surface, side.crossing) + folding_rows([side]) + spectrum_rows(side, "shape_index")
     values = {name: value for name, value, _ in rows}
     values |= {f"own_{name}": value for name, value, _ in size_rows(TriangleMesh(after, faces), 0)[:2]}

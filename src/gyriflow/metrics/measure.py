@@ -10,7 +10,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -56,17 +55,6 @@ OF_WHITE = (
 
 LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
 """The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How hemispheres are measured; the names and values of the configuration's `metrics`.
-
-    See `curvature.curvature` and `spangy.modes_of`.
-    """
-
-    curvature_radius_mm: float = CURVATURE_RADIUS_MM
-    spangy_modes: SpangyModes = SPANGY_MODES
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,13 +117,15 @@ def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
     )
 
 
-def measure_hemisphere(name: str, mesh: TriangleMesh, thickness: Floats | None, settings: Settings) -> Hemisphere:
-    """Return what is measured on a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
-    folds = measure_folds(mesh, settings.curvature_radius_mm)
+def measure_hemisphere(
+    name: str, mesh: TriangleMesh, thickness: Floats | None, curvature_radius_mm: float, spangy_modes: SpangyModes
+) -> Hemisphere:
+    """Measure a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
+    folds = measure_folds(mesh, curvature_radius_mm)
     bend = folds.bend
     stiffness, mass = laplacian(mesh)
     first = first_eigenvalue(stiffness, mass)
-    modes, reach = modes_of(settings.spangy_modes, stiffness, mass, first)
+    modes, reach = modes_of(spangy_modes, stiffness, mass, first)
     weyl = weyl_number(area(mesh), first)
     # near a cut the proxy is continued from beyond
     values = continue_smoothly(bend.shape_index, bend.reliable, stiffness)
@@ -168,11 +158,8 @@ def folding_rows(sides: Sequence[Folds]) -> list[Row]:
     bend = join([side.bend for side in sides])
     weights = areas * bend.reliable
     if not weights.any():
-        raise MeshError(
-            "no curvature away from the cut",
-            found="every vertex has the edge of the surface within its radius",
-            remedy="Lower metrics.curvature_radius_mm",
-        )
+        found = "every vertex has the edge of the surface within its radius"
+        raise MeshError("no curvature away from the cut", found=found, remedy="Lower metrics.curvature_radius_mm.")
 
     def mean(values: NDArray) -> float:
         return float(np.average(values, weights=weights))
@@ -244,20 +231,12 @@ def _rows_of(sides: Sequence[Hemisphere]) -> list[Row]:
 class BrainMetrics:
     """The metrics of one brain.
 
-    Attributes
-    ----------
-    table : DataFrame
-        hemisphere (whole, left or right), metric, value, unit: one row per number.
-    maps : dict
-        Per hemisphere ("left", "right", or the only one) arrays per vertex by name: shape_index, curvedness (1/mm),
-        mean_curvature (1/mm), gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm
-        (where it is known; NaN where not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1).
-    spectra : DataFrame
-        Per hemisphere and band: hemisphere, band, wavelength_min_mm, wavelength_max_mm, modes, power, relative_power,
-        relative_power_weyl, complete, denominator_complete, resolved.
-    coefficients : DataFrame
-        Per hemisphere and mode: hemisphere, mode, eigenvalue_per_mm2, band (−1 beyond B6), coefficient (cᵢ, in mm, or
-        without a unit for mean curvature).
+    `table` has a row per number: hemisphere (whole, left or right), metric, value, unit. `maps` has per hemisphere
+    ("left", "right", or the only one) arrays per vertex by name: shape_index, curvedness (1/mm), mean_curvature (1/mm),
+    gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm (where it is known; NaN where
+    not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1). `spectra` has a row per hemisphere
+    and band with the columns of `Spectrum.bands`. `coefficients` has a row per hemisphere and mode: hemisphere, mode,
+    eigenvalue_per_mm2, band (−1 beyond B6), coefficient (cᵢ, in mm).
     """
 
     table: pd.DataFrame
@@ -274,9 +253,14 @@ def measure_brain(
     thickness_mm: Floats | None = None,
     label_volumes_ml: Mapping[str, float] | None = None,
     threads: int = 1,
-    **settings: Any,
+    curvature_radius_mm: float = CURVATURE_RADIUS_MM,
+    spangy_modes: SpangyModes = SPANGY_MODES,
 ) -> BrainMetrics:
-    """Return the metrics of a brain.
+    """Measure a brain.
+
+    A cut counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
+    curvature within `curvature_radius_mm` of it out of the means. What is said of the whole but its volume and area
+    is of both hemispheres: Σ area over Σ area of the hulls, and means over both.
 
     Parameters
     ----------
@@ -284,75 +268,67 @@ def measure_brain(
         The closed pial surface, outward, in mm.
     left, right
         The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure; None for a
-        hemisphere that the brain does not have. A cut
-        counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
-        curvature within `curvature_radius_mm` of it out of the means. What is said of the whole but its volume and area
-        is of both hemispheres: Σ area over Σ area of the hulls, and means over both.
+        hemisphere that the brain does not have.
     thickness_mm : (n,) float
         Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
     label_volumes_ml
         Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
     threads
         With two or more, the hemispheres are measured at the same time, each in a process of its own.
-    settings
-        Those of `Settings`.
+    curvature_radius_mm, spangy_modes
+        See `curvature.curvature` and `spangy.modes_of`.
 
-    Raises
-    ------
-    MeshError
-        Where a surface looks inwards, or a hemisphere is not in one piece.
+    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
-    for mesh in (whole, *meshes.values()):
-        volume_mm3 = signed_volume(cap(mesh))
-        if volume_mm3 <= 0:
-            raise MeshError(
-                "the faces of the surface look inwards",
-                found=f"volume {volume_mm3 * ML_PER_MM3:.3g} mL",
-                expected="a positive volume",
-                remedy="Turn the faces round",
-            )
-    chosen = Settings(**settings)
+    _require_outward(whole, *meshes.values())
     jobs = [
-        (name, mesh, None if thickness_mm is None else at_part(thickness_mm, whole, mesh), chosen)
+        (
+            name,
+            mesh,
+            None if thickness_mm is None else at_part(thickness_mm, whole, mesh),
+            curvature_radius_mm,
+            spangy_modes,
+        )
         for name, mesh in meshes.items()
     ]
-    if threads == 1:
-        sides = [measure_hemisphere(*job) for job in jobs]
-    else:
-        # each in a process, since PETSc cannot be used by threads; forked, since a new interpreter would run the
-        # calling script again; what MPI leaves behind goes with the folder
-        with (
-            TemporaryDirectory(prefix="gyriflow-") as folder,
-            ProcessPoolExecutor(
-                min(threads, len(jobs)), get_context("fork"), os.environ.update, ({"TMPDIR": folder},)
-            ) as pool,
-        ):
-            sides = list(pool.map(measure_hemisphere, *zip(*jobs, strict=True)))
+    sides = _in_processes(jobs, threads) if threads > 1 else [measure_hemisphere(*job) for job in jobs]
+    volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
     rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + _rows_of(sides)]
-    known = label_volumes_ml or {}
-    rows += [("whole", metric, known[name], "mL") for metric, name in LABEL_VOLUMES.items() if name in known]
+    rows += [("whole", metric, volume, "mL") for metric, volume in volumes.items() if volume is not None]
     for side in sides:
         own = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side)
         rows += [(side.name, *row) for row in own]
-    spectra = pd.concat([side.spectrum.bands for side in sides], keys=list(meshes), names=["hemisphere", None])
-    coefficients = {
-        side.name: pd.DataFrame(
-            {
-                "mode": np.arange(len(side.spectrum.eigenvalues)),
-                "eigenvalue_per_mm2": side.spectrum.eigenvalues,
-                "band": side.spectrum.band,
-                "coefficient": side.spectrum.coefficients,
-            }
-        )
-        for side in sides
-    }
     return BrainMetrics(
         table=pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"]),
         maps={side.name: side.maps() for side in sides},
-        spectra=spectra.reset_index("hemisphere").reset_index(drop=True),
-        coefficients=pd.concat(coefficients, names=["hemisphere"]).reset_index("hemisphere").reset_index(drop=True),
+        spectra=_stacked({side.name: side.spectrum.bands for side in sides}),
+        coefficients=_stacked({side.name: side.spectrum.modes() for side in sides}),
     )
+
+
+def _require_outward(*meshes: TriangleMesh) -> None:
+    for mesh in meshes:
+        if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
+            found = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
+            raise MeshError("the faces of the surface look inwards", found=found, remedy="Turn the faces round.")
+
+
+def _in_processes(jobs: Sequence[tuple], processes: int) -> list[Hemisphere]:
+    """Measure hemispheres at the same time.
+
+    Each in a process, since PETSc cannot be used by threads; forked, since a new interpreter would run the calling
+    script again; what MPI leaves behind goes with the folder.
+    """
+    with TemporaryDirectory(prefix="gyriflow-") as folder:
+        before = os.environ.update, ({"TMPDIR": folder},)
+        with ProcessPoolExecutor(min(processes, len(jobs)), get_context("fork"), *before) as pool:
+            return list(pool.map(measure_hemisphere, *zip(*jobs, strict=True)))
+
+
+def _stacked(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    stacked = pd.concat(tables, names=["hemisphere", None])
+    return stacked.reset_index("hemisphere").reset_index(drop=True)
 
 
 def measure_white(

@@ -34,18 +34,9 @@ OTHER_SIDES = "other hemispheres"
 class PublishedNorm:
     """A published curve: mean and standard deviation as polynomials of the week, highest power first.
 
-    Attributes
-    ----------
-    weeks
-        First and last week that the curve is for.
-    scheme, labels
-        The label scheme in which it was measured, and the labels that were counted.
-    tissue
-        The list of a `LabelScheme` that is nearest to it in other schemes; "" where there is none.
-    side
-        The hemisphere that the structure is in; None where it is in both.
-    subjects
-        How many brains it was made of; None where its source does not say.
+    It is for the first to the last of `weeks`, measured in a label `scheme` by counting `labels`, of so many
+    `subjects`, None where its source does not say. `tissue` is the list of a `LabelScheme` that is nearest to it in
+    other schemes, "" where there is none; `side` the hemisphere of the structure, None where it is in both.
     """
 
     mean: tuple[float, ...]
@@ -70,9 +61,7 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
         norm = PublishedNorm(**own, weeks=(first, last), **shared)
         lowest = float(np.polyval(norm.sd, np.linspace(first, last, 201)).min())
         if lowest <= 0:
-            raise InputError(
-                f"the norm of {name} has no standard deviation", found=f"{lowest:.3g} at its least", expected="above 0"
-            )
+            raise InputError(f"the norm of {name} has no standard deviation", found=f"{lowest:.3g}", expected="above 0")
         norms[name] = norm
     return norms
 

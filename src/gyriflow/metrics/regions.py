@@ -42,29 +42,21 @@ def region_metrics(
     maps
         Per hemisphere arrays per vertex by name, as `measure.BrainMetrics.maps`; those of `MAP_UNITS` are used. NaN
         is left out of means, and so is what lies near a cut where `reliable` is 0.
-    labels
-        Per hemisphere the (n,) label of each vertex, 0 for none.
-    names
-        Name of the region by label.
+    labels, names
+        Per hemisphere the (n,) label of each vertex, 0 for none, and the name of the region by label.
 
-    Returns
-    -------
-    DataFrame
-        hemisphere, region, metric, value, unit. Metrics are area (cm2), area_share (of the hemisphere) and the maps'
-        names without their unit, with mean_ in front; a region that is all NaN or near a cut has NaN.
-
-    InputError for labels that have no name, or are not as many as vertices.
+    Returns hemisphere, region, metric, value, unit. Metrics are area (cm2), area_share (of the hemisphere) and the
+    maps' names without their unit, with mean_ in front; a region that is all NaN or near a cut has NaN. InputError for
+    labels that have no name, or are not as many as vertices.
     """
     rows = []
     for side, mesh in sides.items():
         label = np.asarray(labels[side])
         unknown = sorted({int(number) for number in np.unique(label)} - {UNLABELLED, *names})
         if unknown or len(label) != len(mesh.vertices):
-            raise InputError(
-                f"regions of the {side} hemisphere do not fit",
-                found=f"{len(label)} labels, without a name: {', '.join(map(str, unknown)) or 'none'}",
-                expected=f"{len(mesh.vertices)} labels, each named",
-            )
+            found = f"{len(label)} labels, without a name: {', '.join(map(str, unknown)) or 'none'}"
+            expected = f"{len(mesh.vertices)} labels, each named"
+            raise InputError(f"regions of the {side} hemisphere do not fit", found=found, expected=expected)
         areas, total = vertex_areas(mesh), area(mesh)
         reliable = np.asarray(maps[side].get("reliable", np.ones(len(label))), dtype=bool)
         for number, name in names.items():

@@ -33,26 +33,17 @@ EDGES_PER_WAVELENGTH = 6
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """A folding proxy on the modes of a surface with n vertices.
+    """A folding proxy on the k modes of a surface with n vertices.
 
-    Attributes
-    ----------
-    eigenvalues : (k,) float
-        λ in mm⁻².
-    coefficients : (k,) float
-        cᵢ = fᵀ M φᵢ, in the proxy's unit times mm.
-    band : (k,) int
-        The band of each mode; −1 beyond the last band.
-    bands : DataFrame
-        Per band: band, wavelength_min_mm, wavelength_max_mm, modes, power (unit of the proxy squared times mm²; NaN
-        without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0), relative_power_weyl
-        (the same of as many modes as Weyl's number alone; NaN where there are fewer), complete (the modes
-        reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are), resolved
-        (the shortest wavelength spans at least 6 edges).
-    dominant_band : (n,) int
-        Signed dominant band per vertex, −6 to 6, among the complete bands; 0 where none is.
-    captured : float
-        Share of fᵀMf that the modes hold; 1 would be all (Parseval).
+    `eigenvalues` λ (k,) are in mm⁻², `coefficients` cᵢ = fᵀ M φᵢ (k,) in the proxy's unit times mm, `band` (k,) the
+    band of each mode, −1 beyond the last one. `dominant_band` (n,) is the signed dominant band, −6 to 6, among the
+    complete bands, 0 where none is; `captured` the share of fᵀMf that the modes hold, 1 if all (Parseval).
+
+    `bands` has a row per band: band, wavelength_min_mm, wavelength_max_mm, modes, power (unit of the proxy squared
+    times mm²; NaN without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0),
+    relative_power_weyl (the same of as many modes as Weyl's number alone; NaN where there are fewer), complete (the
+    modes reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are),
+    resolved (the shortest wavelength spans at least 6 edges).
     """
 
     eigenvalues: Floats
@@ -61,6 +52,11 @@ class Spectrum:
     bands: pd.DataFrame
     dominant_band: Ints
     captured: float
+
+    def modes(self) -> pd.DataFrame:
+        """Return mode, eigenvalue_per_mm2, band and coefficient, a row per mode."""
+        columns = {"eigenvalue_per_mm2": self.eigenvalues, "band": self.band, "coefficient": self.coefficients}
+        return pd.DataFrame({"mode": np.arange(len(self.eigenvalues)), **columns})
 
 
 def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> float:
