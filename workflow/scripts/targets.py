@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from gyriflow.geometry.deformations import between_moved
-from gyriflow.growth.expected import carry_sharply, foretell, sizes_of
+from gyriflow.growth.expected import carry_sharply, predict_shapes, sizes_of
 from gyriflow.io.registrations import Targets, read_correspondence, write_targets
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
@@ -28,6 +28,6 @@ with step(snakemake.log[0]):
         weeks, positions, others = [params.start_week, *params.weeks], carry_sharply(mesh, pairs, surfaces), {}
     else:
         known = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
-        weeks, positions, others = foretell(mesh, *known)
+        weeks, positions, others = predict_shapes(mesh, *known)
     targets = Targets(np.array(weeks), positions, sizes_of(mesh, positions), others)
     write_targets(snakemake.output[0], targets)

@@ -23,7 +23,7 @@ from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..parameters.varying import Maps
 from ..step import record_exit_code
 from .checks import refuse_impossible, stiffness_warning, zone_report, zone_warnings
-from .output import ZONES, say, tell, warn, write_events
+from .output import ZONES, log_event, say, warn, write_events
 from .points import IntegrationPoints
 from .predicted_memory import predicted_memory_mib
 from .run import run
@@ -120,7 +120,7 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
             main(comm, arguments)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr, flush=True)
-        tell("end", error=str(error))
+        log_event("end", error=str(error))
         code = error.exit_code
     except Exception:
         traceback.print_exc()

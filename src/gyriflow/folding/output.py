@@ -33,10 +33,10 @@ def say(text: str, event: str = "", **facts: float | str | None) -> None:
     """Prints a line at once, so that a log follows the run, and tells what has happened, if it is an event."""
     print(text, flush=True)
     if event:
-        tell(event, **facts)
+        log_event(event, **facts)
 
 
-def tell(event: str, **facts: float | str | None) -> None:
+def log_event(event: str, **facts: float | str | None) -> None:
     """Hands an event with its facts on to the file of `write_events`, where there is one."""
     log.info(event, extra={"facts": facts})
 

@@ -159,7 +159,7 @@ def expected_positions(
     return list(found), np.stack(list(found.values()))
 
 
-def foretell(
+def predict_shapes(
     mesh: TetrahedralMesh,
     start_week: float,
     pairs: Sequence[Correspondence],

@@ -15,7 +15,7 @@ from gyriflow.geometry.diffusion import diffuse, vertex_sizes
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
-from gyriflow.growth.expected import carry_sharply, expected_positions, fit_onto_surface, foretell, sizes_of
+from gyriflow.growth.expected import carry_sharply, expected_positions, fit_onto_surface, predict_shapes, sizes_of
 from gyriflow.metrics.curvature import curvature
 
 BALL = ellipsoid_mesh(10, (20.0, 20.0, 20.0))
@@ -91,7 +91,7 @@ def test_a_start_outside_an_atlas_of_matched_surfaces_follows_them_from_where_it
     later = [sphere(20.0).vertices @ turn.T * factor for factor in ([1.2, 1.1, 1.0], [1.5, 1.2, 1.1])]
     surfaces = [first, *(TriangleMesh(places, first.faces) for places in later)]
     pairs = [shift_map(1.0, (9.0, 0.0, 0.0)), *(MatchedSurfaces(one, two.vertices) for one, two in pairwise(surfaces))]
-    weeks, positions, others = foretell(BALL, 22.0, pairs, surfaces, WEEKS)
+    weeks, positions, others = predict_shapes(BALL, 22.0, pairs, surfaces, WEEKS)
     assert weeks == WEEKS
     boundary, used = boundary_surface(BALL)
     ends = BALL.vertices[used] @ turn.T * [1.5, 1.2, 1.1]
@@ -246,7 +246,7 @@ def test_simpler_ways_start_where_the_brain_is_and_sizes_are_those_of_the_bounda
     pairs = [shift_map(1.0), shift_map(1.1)]
     surface = sphere(20.0)
     surfaces = [surface, TriangleMesh(1.1 * surface.vertices, surface.faces)]
-    weeks, positions, others = foretell(BALL, 22.0, pairs, surfaces, [22.0, 23.0])
+    weeks, positions, others = predict_shapes(BALL, 22.0, pairs, surfaces, [22.0, 23.0])
     assert weeks == [22.0, 23.0]
     used = boundary_surface(BALL)[1]
     assert set(others) == {"atlas", "atlas_deformed", "displaced"}
