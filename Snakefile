@@ -8,9 +8,7 @@ from snakemake.utils import min_version
 min_version("9.0")
 # beside this file in a checkout; an installed package holds this file
 CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
-SOURCE = (
-    f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
-)
+SOURCE = f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 sys.path.insert(0, SOURCE)
 from gyriflow.io.sources import code_hash
 

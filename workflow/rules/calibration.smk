@@ -47,12 +47,9 @@ def calibrated_surfaces(wildcards):
 rule calibration_score:
     input:
         simulated=calibrated_surfaces,
-        real=lambda w: [
-            real.pial for brains in CALIBRATED.real.values() for real in brains
-        ],
+        real=lambda w: [real.pial for brains in CALIBRATED.real.values() for real in brains],
         summaries=lambda w: [
-            FOLDING["summary"].format(run=w.run, brain=base.start.id)
-            for base in CALIBRATED.base
+            FOLDING["summary"].format(run=w.run, brain=base.start.id) for base in CALIBRATED.base
         ],
         design=lambda w: CALIBRATED.design(w.run),
     output:

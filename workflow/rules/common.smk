@@ -53,9 +53,7 @@ CONFIG = study.config
 FIGURES = figures_of(study)
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
 REFUSED = {
-    brain: cause
-    for brain, cause in refused_brains().items()
-    if brain in [known.id for known in CONFIG.brains]
+    brain: cause for brain, cause in refused_brains().items() if brain in [known.id for known in CONFIG.brains]
 }
 if REFUSED and workflow.is_main_process:
     # each has told its cause
@@ -81,9 +79,7 @@ def from_brain(attribute):
 
 def from_simulation(attribute):
     """Return an input function: an attribute of the run from a brain that the wildcards name."""
-    return lambda wildcards: attrgetter(attribute)(
-        study.simulations[wildcards.run, wildcards.brain]
-    )
+    return lambda wildcards: attrgetter(attribute)(study.simulations[wildcards.run, wildcards.brain])
 
 
 def brains_with(condition):

@@ -4,9 +4,7 @@ DRAW = Path(workflow.basedir, "workflow", "scripts", "draw.py")
 
 def inputs_of(figure):
     """Return the inputs of a figure; which members of studies have come to their week is known once they are solved."""
-    ended = (
-        run for run, brain, week in figure.may_end if not reaches(run, brain, week)
-    )
+    ended = (run for run, brain, week in figure.may_end if not reaches(run, brain, week))
     return figure.inputs_without(ended)
 
 
@@ -26,9 +24,7 @@ for name, figures in by_rule(FIGURES).items():
             some.outputs,
         wildcard_constraints:
             **{
-                key: one_of(
-                    dict.fromkeys(figure.names[key] for figure in figures.values())
-                )
+                key: one_of(dict.fromkeys(figure.names[key] for figure in figures.values()))
                 for key in some.names
                 if f"{{{key}}}" in some.pattern
             },

@@ -3,9 +3,7 @@ from gyriflow.io.files import read_json
 from gyriflow.cli.cost import job_limits
 
 # runs of a calibration have their parameters from its rounds, and their maps from its base
-with_parameters = {
-    one.run: one for one in study.simulations.values() if one.base == one.run
-}
+with_parameters = {one.run: one for one in study.simulations.values() if one.base == one.run}
 
 
 rule parameters:

@@ -1,9 +1,5 @@
 # The brains that runs start from as tetrahedral meshes.
-MESH_GATES = {
-    key: value
-    for key, value in CONFIG.mesh.model_dump().items()
-    if key.startswith(("min_", "max_"))
-}
+MESH_GATES = {key: value for key, value in CONFIG.mesh.model_dump().items() if key.startswith(("min_", "max_"))}
 
 
 rule tetrahedralise:

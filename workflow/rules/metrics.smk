@@ -22,14 +22,10 @@ for suffix, sides in PARTS_OF_BRAINS.items():
             **MEASURES,
             **maps_of(*sides),
         wildcard_constraints:
-            where=one_of(
-                where for where, row in study.places.items() if row.sides == sides
-            ),
+            where=one_of(where for where, row in study.places.items() if row.sides == sides),
         params:
             labels=from_place("labels"),
-            settings=CONFIG.metrics.model_dump(
-                include={"curvature_radius_mm", "spangy_modes"}
-            ),
+            settings=CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes"}),
         script:
             "../scripts/measure.py"
 
@@ -74,9 +70,7 @@ rule displacement:
 
 rule similarity:
     input:
-        simulated=lambda w: list(
-            study.simulations[w.run, w.brain].at(float(w.week)).parts.values()
-        ),
+        simulated=lambda w: list(study.simulations[w.run, w.brain].at(float(w.week)).parts.values()),
         real=lambda w: list(study.brains[w.measured].measured.parts.values()),
     output:
         SIMILARITY,

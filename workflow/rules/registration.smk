@@ -25,9 +25,7 @@ rule register:
     output:
         REGISTERED,
     params:
-        brains=lambda w: [
-            study.brains[name].registered for name in (w.earlier, w.later)
-        ],
+        brains=lambda w: [study.brains[name].registered for name in (w.earlier, w.later)],
     script:
         "../scripts/register.py"
 
@@ -59,9 +57,7 @@ rule match_surfaces:
 
 def from_chain(attribute):
     """Return an input function: an attribute of the brains behind the growth of the start that the wildcards name."""
-    return lambda wildcards: getattr(
-        study.chains[wildcards.brain, wildcards.origin], attribute
-    )
+    return lambda wildcards: getattr(study.chains[wildcards.brain, wildcards.origin], attribute)
 
 
 # the shapes that the mesh of a start brain is to have in later weeks, for runs that grow towards them

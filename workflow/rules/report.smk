@@ -18,9 +18,7 @@ rule study_resources:
         # by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
         benchmarks=lambda w: {
             job.name: job.benchmark.regex().pattern
-            for job in takewhile(
-                lambda job: job.name != "study_resources", workflow.rules
-            )
+            for job in takewhile(lambda job: job.name != "study_resources", workflow.rules)
             if job.benchmark
         },
         power=CONFIG.report.power,
@@ -79,11 +77,7 @@ rule html_report:
     output:
         "results/report/report.html",
     params:
-        figures=[
-            (figure.name, figure.path, dict(figure.names))
-            for figure in FIGURES
-            if figure.target
-        ],
+        figures=[(figure.name, figure.path, dict(figure.names)) for figure in FIGURES if figure.target],
         picture_bytes=PICTURE_BYTES,
         brains=reporting.described_brains(study),
         surfaced=list(study.brains),
@@ -103,10 +97,7 @@ rule provenance:
         runs=study.files(f"{RUN}/provenance.json"),
     params:
         config=reporting.used_settings(study),
-        brains=[
-            brain.given.model_dump(mode="json", exclude_defaults=True)
-            for brain in study.brains.values()
-        ],
+        brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
         folded=study.pairs,
     script:
         "../scripts/provenance.py"

@@ -2,11 +2,7 @@
 # copy of a user's own is ever deleted or replaced.
 from gyriflow.config.atlas import retrieval_note
 
-ATLAS_FILES = {
-    str(file.path).removeprefix("/"): file
-    for atlas in CONFIG.atlases
-    for file in atlas.missing
-}
+ATLAS_FILES = {str(file.path).removeprefix("/"): file for atlas in CONFIG.atlases for file in atlas.missing}
 
 if workflow.is_main_process:
     for atlas in CONFIG.atlases:

@@ -23,10 +23,7 @@ rule compare_member:
     output:
         COMPARED_MEMBER,
     params:
-        real=lambda w: {
-            real.id: real.population
-            for real in study.comparisons[w.study].real[w.brain]
-        },
+        real=lambda w: {real.id: real.population for real in study.comparisons[w.study].real[w.brain]},
         population=from_brain("population"),
     script:
         "../scripts/compare_member.py"

@@ -2,9 +2,7 @@
 # the tables of a study, and the files that each is joined from
 JOINED = {**study.tables, **study.validation_tables}
 # the tables that hold metrics, of whole hemispheres and of regions
-METRIC_TABLES = [
-    f"{STUDY}/{table}.csv" for table in ("metrics", "regions") if JOINED[table]
-]
+METRIC_TABLES = [f"{STUDY}/{table}.csv" for table in ("metrics", "regions") if JOINED[table]]
 
 
 rule study_table:

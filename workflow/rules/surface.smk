@@ -9,9 +9,7 @@ def surface_memory(wildcards):
     """Return the memory in MiB that a brain's surface may need, of labels foreseen from their header."""
     brain = study.brains[wildcards.brain]
     labelled = brain.given.has_labels
-    return (
-        surface_memory_mib(brain.given.label_volume, brain.week) if labelled else 4000
-    )
+    return surface_memory_mib(brain.given.label_volume, brain.week) if labelled else 4000
 
 
 def surface_settings(*names):
@@ -26,9 +24,7 @@ def pial_settings(wildcards):
         return {}
     names = ["edge_length_mm", "smoothing_iterations"]
     if given.has_labels:
-        names += ["smoothing_voxels"] + (
-            ["fissure_mm"] if given.hemisphere is None else []
-        )
+        names += ["smoothing_voxels"] + (["fissure_mm"] if given.hemisphere is None else [])
     else:
         names += ["max_hole_mm"] + (["gap_mm"] if given.source == "hemispheres" else [])
     return surface_settings(*names)
@@ -53,9 +49,7 @@ for name, source, sides in (
         output:
             **pial_of(*sides),
         wildcard_constraints:
-            brain=brains_with(
-                lambda brain: brain.given.source == source and brain.sides == sides
-            ),
+            brain=brains_with(lambda brain: brain.given.source == source and brain.sides == sides),
         resources:
             mem_mb=surface_memory,
         params:
@@ -98,9 +92,7 @@ for name, source in (
             given=from_brain("thickness_from"),
             affine_from=from_brain("given.affine_from"),
             scheme=from_brain("scheme"),
-            settings=(
-                surface_settings("smoothing_voxels") if source == "labels" else {}
-            ),
+            settings=(surface_settings("smoothing_voxels") if source == "labels" else {}),
         script:
             "../scripts/thickness.py"
 

@@ -17,9 +17,7 @@ rule validation:
         unpack(from_simulation("validation_files")),
         params=PARAMETERS,
         # what the errors of runs that follow no curve are errors against
-        curves=lambda w: (
-            CURVES["curves"] if study.simulations[w.run, w.brain].series else []
-        ),
+        curves=lambda w: (CURVES["curves"] if study.simulations[w.run, w.brain].series else []),
     output:
         VALIDATION,
     params:
@@ -151,10 +149,6 @@ rule folding_agreement:
 
 rule validate:
     input:
-        [
-            f"{STUDY}/{name}.csv"
-            for name, files in study.validation_tables.items()
-            if files
-        ],
+        [f"{STUDY}/{name}.csv" for name, files in study.validation_tables.items() if files],
         rules.deviation_scores.output if study.expected else [],
         asked_for(FIGURES, "validate"),
