@@ -1,4 +1,4 @@
-"""Verification of the folding solver: cases whose answers are known, with figures and tables of what comes out.
+"""Verification of the folding solver: cases whose answers are known, with the numbers that docs/verification.md shows.
 
     ./run python benchmarks/verification.py --figures docs/images
 
@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
+ORDERS = {1: "linear", 2: "quadratic"}
 MANUFACTURED_CELLS = {1: (6, 12, 24), 2: (3, 6, 12)}
 """Cells along a side by the order of the elements: as many unknowns of both."""
 ELEMENTS = {1: (2, 4, 8), 2: (1, 2, 4)}
 """Cells to a cortical thickness by the order of the elements, of which error and price are compared."""
 POISSON_RATIOS = (0.45, 0.48, 0.49, 0.499)
-REFERENCE_THICKNESS_MM = 1.5
 CONTRASTS = (5.0, 20.0, 50.0)
 SLAB_CELLS = (2, 4, 8, 16)
 """Cells to a cortical thickness."""
@@ -30,55 +30,41 @@ RATE_GROWTH = 1e-3
 """Growth of the step from which rates are taken."""
 MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS = 20.0, 0.004, 12
 MEMORIES = (0.0, 0.05, np.inf)
-MEMORY_CELLS = (2, 4, 8, 16)
-STEP_CELLS, STEP_COUNTS = 4, (6, 12, 24)
+TWO_WEEKS = 2e-7 * 2 * 604_800
+"""Growth of the reference model."""
+STEPS_IN_TWO_WEEKS = {"2 days": 7, "1 day": 14, "half a day": 28, "a quarter": 56}
 RANKS = (1, 2, 3)
 ALONE = ("theory", "elements")
 """Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
-def consistency(order: int = 1) -> dict:
-    from verification_cases.consistency import LENGTHS, patch_residual, remainders
+def consistency() -> dict:
+    from verification_cases.consistency import patch_residual, remainders
 
-    found = remainders(order=order)
     return {
-        "patch_residual": patch_residual(order=order),
-        "lengths": LENGTHS,
-        "energy_remainders": found.energy,
-        "residual_remainders": found.residual,
-        "energy_slopes": found.slopes()[:, 0],
-        "residual_slopes": found.slopes()[:, 1],
+        name: {"patch_residual": patch_residual(order=order), "slopes": remainders(order=order).slopes()}
+        for order, name in ORDERS.items()
     }
 
 
-def manufactured(order: int = 1) -> dict:
+def manufactured() -> dict:
     from verification_cases.manufactured import CASES, rates, solved
 
-    found = {}
-    for case in CASES:
-        errors = [solved(case, cells, order=order) for cells in MANUFACTURED_CELLS[order]]
-        orders = rates(errors)
-        found[case] = {
-            "cells": MANUFACTURED_CELLS[order],
-            "displacement_errors": [one.displacement for one in errors],
-            "gradient_errors": [one.gradient for one in errors],
-            "displacement_orders": orders[:, 0],
-            "gradient_orders": orders[:, 1],
-        }
+    found: dict = {name: {} for name in ORDERS.values()}
+    for order, name in ORDERS.items():
+        for case in CASES:
+            errors = [solved(case, cells, order=order) for cells in MANUFACTURED_CELLS[order]]
+            found[name][case] = {
+                "displacement_errors": [one.displacement for one in errors],
+                "gradient_errors": [one.gradient for one in errors],
+                "orders": rates(errors),
+            }
     return found
 
 
-def quadratic_consistency() -> dict:
-    return consistency(order=2)
-
-
-def quadratic_manufactured() -> dict:
-    return manufactured(order=2)
-
-
 def elements() -> list[dict]:
-    """Returns error and price of the fastest wave by element, mesh and Poisson's ratio, at the reference contrast."""
+    """Measure error and price of the fastest wave by element, mesh and Poisson's ratio, at the reference contrast."""
     from verification_cases.slab import Waved, fastest_wave
 
     found = []
@@ -104,7 +90,7 @@ def symmetry() -> dict:
 
 
 def ranks() -> dict:
-    """Returns where all vertices went in some steps, in m, with tight tolerances and with those of a run."""
+    """Return where all vertices went in some steps, in m, with tight tolerances and with those of a run."""
     from verification_cases.mirrored import folded, hemisphere, reflected_and_merged, rounded
 
     linear, quadratic = hemisphere(8), rounded(hemisphere(4))
@@ -121,10 +107,10 @@ def ranks() -> dict:
 
 
 def theory() -> dict:
-    """Returns the linearised theory in limits that are known in closed form."""
+    """Work out the linearised theory in limits that are known in closed form, and what longer steps do to it."""
     from scipy.optimize import minimize_scalar
     from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
-    from verification_cases.modes import Slab, critical_growth, growth_rates
+    from verification_cases.modes import Slab, amplifications, critical_growth, growth_rates
 
     cortex = Slab(1.0, depth=8.0, thickness=np.inf)
     rates = growth_rates(cortex, 2 * np.pi / np.array([0.5, 1.0, 2.0]))
@@ -146,6 +132,13 @@ def theory() -> dict:
     half_space = Slab(1.0, 0.4999, depth=6.0, memory=np.inf, thickness=np.inf, finest=0.04)
     critical = critical_growth(half_space, 2 * np.pi / np.array([1.0]), 0.002, 1.0)
     found["half_space_stretch"] = {"known": BIOT_STRETCH, "found": 1 / (1 + critical[0])}
+
+    def log_height(steps: int) -> float:
+        waves = np.array([2 * np.pi / 7.07])
+        return float(np.log(amplifications(Slab(CONTRASTS[0]), waves, TWO_WEEKS / steps, steps)[-1, 0]))
+
+    exact = 2 * log_height(448) - log_height(224)
+    found["steps"] = {name: log_height(steps) / exact - 1 for name, steps in STEPS_IN_TWO_WEEKS.items()}
     return found
 
 
@@ -169,7 +162,7 @@ def memory() -> dict:
     found = {}
     for tau in MEMORIES:
         case = Waved(MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS, tau)
-        cells = MEMORY_CELLS if np.isinf(tau) else MEMORY_CELLS[2:3]
+        cells = SLAB_CELLS if np.isinf(tau) else SLAB_CELLS[2:3]
         found[f"{tau:g}"] = {
             "lengths": case.lengths_mm,
             "expected": case.expected(),
@@ -178,38 +171,11 @@ def memory() -> dict:
     return found
 
 
-def time_steps() -> dict:
-    from verification_cases.slab import Waved, amplified
-
-    found: dict = {"growth_of_step": [], "expected": [], "measured": []}
-    for count in STEP_COUNTS:
-        case = Waved(MEMORY_CONTRAST, MEMORY_GROWTH * MEMORY_STEPS / count, count, np.inf)
-        found["growth_of_step"].append(case.growth)
-        found["expected"].append(case.expected()[-1])
-        found["measured"].append(amplified(case, STEP_CELLS)[-1])
-    return found
-
-
-PARTS = {
-    part.__name__: part
-    for part in (
-        *(consistency, quadratic_consistency, manufactured, quadratic_manufactured, elements, symmetry, ranks, theory),
-        *(rates, memory, time_steps),
-    )
-}
-
-
-def plain(value):
-    """Returns a value with arrays as lists, for JSON."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+PARTS = {part.__name__: part for part in (consistency, manufactured, elements, symmetry, ranks, theory, rates, memory)}
 
 
 def run(part: str, ranks: int) -> dict:
-    """Returns what a part measures in an MPI run of its own."""
+    """Measure a part in an MPI run of its own."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         program = [sys.executable, __file__, "--inside-mpi", part, "--into", str(file)]
@@ -222,14 +188,15 @@ def run(part: str, ranks: int) -> dict:
 
 def inside_mpi(part: str, into: Path) -> None:
     from mpi4py import MPI
+    from verification_cases.summary import plain
 
     found = PARTS[part]()
     if MPI.COMM_WORLD.rank == 0:
-        into.write_text(json.dumps(plain(found)))
+        into.write_text(json.dumps(plain(found, digits=16)))
 
 
 def differences_between_ranks() -> dict:
-    """Returns the largest distance of a vertex between two numbers of ranks, over the largest displacement."""
+    """Return the largest distance of a vertex between two numbers of ranks, over the largest displacement."""
     runs = [run("ranks", count) for count in RANKS]
     found = {}
     for name in runs[0]:
@@ -239,41 +206,32 @@ def differences_between_ranks() -> dict:
     return found
 
 
-def parse() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--figures", type=Path, help="folder for the pictures (PNG)")
-    parser.add_argument("--only", nargs="+", choices=sorted(PARTS), help="parts to run instead of all, without figures")
-    parser.add_argument("--inside-mpi", choices=sorted(PARTS), help=argparse.SUPPRESS)
-    parser.add_argument("--into", type=Path, help=argparse.SUPPRESS)
-    return parser.parse_args()
-
-
-def main(arguments: argparse.Namespace) -> None:
+def main(only: list[str], figures: Path | None) -> None:
     from verification_cases.figures import draw
-    from verification_cases.summary import rounded, summary
+    from verification_cases.summary import memory_of, plain, rates_of
 
-    from gyriflow.config.stages import MeshSettings
-
-    if arguments.figures:
-        arguments.figures.mkdir(parents=True, exist_ok=True)  # rather than fail after all the work
     found: dict = {}
-    for part in arguments.only or PARTS:
+    for part in only:
         found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part in ALONE else 2)
         print(f"{part}: done", flush=True)
-    if arguments.only:
-        print(json.dumps(rounded(found)), flush=True)
-        return
-    if arguments.figures:
-        meshes = {"slab_cells": SLAB_CELLS, "memory_cells": MEMORY_CELLS}
-        draw(found | meshes | {"contrast": MEMORY_CONTRAST, "growth": MEMORY_GROWTH}, arguments.figures)
-    default = MeshSettings()
-    edge = default.order * default.surface_edge_mm
-    print(json.dumps(summary(found, default.order, round(REFERENCE_THICKNESS_MM / edge))), flush=True)
+    if figures and "rates" in found:
+        figures.mkdir(parents=True, exist_ok=True)
+        draw(found["rates"], SLAB_CELLS, figures)
+    if "rates" in found:
+        found["rates"] = {contrast: rates_of(float(contrast), one) for contrast, one in found["rates"].items()}
+    if "memory" in found:
+        found["memory"] = {tau: memory_of(one) for tau, one in found["memory"].items()}
+    print(json.dumps(plain(found)), flush=True)
 
 
 if __name__ == "__main__":
-    arguments = parse()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--figures", type=Path, help="folder for the picture (PNG)")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts to run instead of all")
+    parser.add_argument("--inside-mpi", choices=PARTS, help=argparse.SUPPRESS)
+    parser.add_argument("--into", type=Path, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
     if arguments.inside_mpi:
         inside_mpi(arguments.inside_mpi, arguments.into)
     else:
-        main(arguments)
+        main(arguments.only, arguments.figures)

@@ -75,12 +75,9 @@ def study(checkout_copy, tmp_path_factory):
     return workflow.surfaces(config, f"results/brains/{GOOD}/surface/thickness.json")
 
 
-def test_the_run_ends_in_2_without_a_traceback(study):
-    study.require_exit_code(2)
-
-
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_bad_input_is_refused_with_a_message_and_nothing_is_left(study, name):
+    study.require_exit_code(2)
     expected = BAD[name][1] if name in BAD else f"{study.directory / 'torn.nii.gz'}: cannot be read as an image"
     study.require_refused(name, expected)
 
@@ -121,18 +118,6 @@ def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its
     measured = read_json(folder / "thickness.json")
     assert measured["mean_mm"] == pytest.approx(thickness[0].data.mean(), abs=0.2)
     assert "a suggestion for thickness_mm" in study.log(GOOD, "cortical_thickness")
-
-
-def test_images_are_shown_where_they_are_given(workflow):
-    for name in ("t2w.nii.gz", "labels.nii.gz"):
-        (workflow.directory / name).touch()
-    brains = [
-        {"id": "a", "week": 22, "image": "t2w.nii.gz", "labels": "labels.nii.gz", "scheme": "feta-7"},
-        {"id": "b", "week": 23, "labels": "labels.nii.gz", "scheme": "binary"},
-    ]
-    study = {"brains": brains, "start": "a", "folding": {"end_week": 23}}
-    jobs = workflow.jobs("--configfile", workflow.write("study.yaml", study))
-    assert (jobs["overlay_figure"], jobs["pial_from_labels"], jobs["cortical_thickness"]) == (1, 2, 1)
 
 
 def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):

@@ -1,7 +1,11 @@
 """A study from start to tables, with a run that diverges among its runs."""
 
+import numpy as np
 import pandas as pd
 import pytest
+
+from gyriflow.geometry.triangles import area, signed_volume
+from gyriflow.io.surfaces import read_surface
 
 from .conftest import COARSE
 
@@ -72,3 +76,36 @@ def test_what_the_paper_reports_stands_beside_the_same_of_the_shipped_atlas(work
     assert "<p>Study thickness at 28 GW against" in page
     assert "spina bifida aperta, operated" in page
     assert all(name in page for name in ("dHCP", "2 of 2 runs"))
+
+
+@pytest.mark.slow
+def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(workflow):
+    """The brain of the later week is a tenth larger along each axis: its area takes growth, the volume stays behind."""
+    search = {
+        "base": "reference",
+        "parameters": {"growth_rate_per_s": [0.5e-7, 4.0e-7]},
+        "score": {"size": 1.0, "surface_distance": 0.1},
+        "compare_week": 22,
+        "first_runs": 3,
+        "rounds": 1,
+        "runs_per_round": 1,
+    }
+    study = {key: value for key, value in STUDY.items() if key != "studies"} | {"runs": {"reference": {}}}
+    name = workflow.write("study.yaml", study | {"calibrate": search})
+    outcome = workflow.run("calibrate", "--cores", "2", "--configfile", name, timeout_s=900)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    results = workflow.directory / "results"
+    runs = pd.read_csv(results / "study/calibration/runs.csv")
+    assert runs["outcome"].tolist() == ["finished"] * 4
+    assert runs["round"].tolist() == [0, 0, 0, 1]
+    real = read_surface(results / "brains/b/surface/pial.surf.gii")
+    for row in runs.to_dict("records"):
+        folded = read_surface(results / f"runs/{row['run']}/a/surfaces/week-22.00/pial.surf.gii")
+        expected = np.hypot(area(folded) / area(real) - 1, signed_volume(folded) / signed_volume(real) - 1)
+        assert row["size"] == pytest.approx(expected, rel=1e-6)
+        assert row["score"] == pytest.approx(row["size"] + 0.1 * row["surface_distance"])
+    # the more growth, the larger: the least score is not at the lowest rate, and the optimum is near the best run
+    (best,) = pd.read_csv(results / "study/calibration/optimum.csv").to_dict("records")
+    assert (best["parameter"], best["lowest"], best["highest"]) == ("growth_rate_per_s", 0.5e-7, 4.0e-7)
+    assert best["score"] <= runs["score"].min() + 2 * best["score_sd"] + 1e-3
+    assert (results / "study/calibration/calibration.png").exists()
