@@ -17,10 +17,11 @@ EXIT_FILE = "GYRIFLOW_EXIT_FILE"
 """Environment variable with the file in which `gyriflow.cli.launch` finds the first failed step's exit code."""
 INTERRUPTED = 130
 KILLED = 137
+OUT_OF_MEMORY = "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
 
 
 def record_exit_code(code: int) -> None:
-    """Hands an exit code to the launcher, if there is one; of several failures the first counts."""
+    """Hand an exit code to the launcher, if there is one; of several failures the first counts."""
     path = os.environ.get(EXIT_FILE)
     if path:
         # a step that failed earlier has made the file; where it cannot be made, Snakemake's own code has to do
@@ -29,58 +30,50 @@ def record_exit_code(code: int) -> None:
 
 
 def recorded_exit_code(path: Path) -> int | None:
-    """Returns the exit code of the first failed step, or None where none was recorded."""
-    try:
+    """Return the exit code of the first failed step, or None where none was recorded."""
+    with suppress(OSError, ValueError):
         return int(path.read_text())
-    except (OSError, ValueError):
-        return None
+    return None
 
 
 @contextmanager
 def step(log: str, *inputs: str) -> Iterator[None]:
-    """Runs a step with its messages in the file `log`.
+    """Run a step with its messages in the file `log`.
 
     A GyriflowError ends the program with its exit code and one message on the terminal and in the log; another error
     ends it with a traceback there. Where an error names no file, the message begins with the step's `inputs`.
     """
-    logging.basicConfig(
-        level=logging.INFO,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-        filename=log,
-        filemode="w",
-        force=True,
-    )
+    form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
+    logging.basicConfig(level=logging.INFO, format=form, filename=log, filemode="w", force=True)
     logging.captureWarnings(True)
     try:
         yield
     except (GyriflowError, MemoryError) as error:
-        message, code, named = f"memory ran out ({error}). Free memory, or run fewer jobs at once", KILLED, False
         if isinstance(error, GyriflowError):
             message, code, named = str(error), error.exit_code, error.names_file
+        else:
+            message, code, named = f"memory ran out ({error}). Free memory, or run fewer jobs at once", KILLED, False
         if inputs and not named:
             message = f"{', '.join(inputs)}: {message}"
         logging.error("%s", message)
         print(f"gyriflow: {message}", file=sys.stderr)
-        record_exit_code(code)
-        sys.exit(code)
     except KeyboardInterrupt:
-        record_exit_code(INTERRUPTED)
-        sys.exit(INTERRUPTED)
+        code = INTERRUPTED
     except Exception:
         logging.exception("unexpected error")
         traceback.print_exc()
-        record_exit_code(1)
-        sys.exit(1)
+        code = 1
+    else:
+        return
+    record_exit_code(code)
+    sys.exit(code)
 
 
 def _end_shell_step(code: int, log: str) -> int:
     if code == KILLED:
-        message = (
-            "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
-        )
-        print(message, file=sys.stderr)
+        print(OUT_OF_MEMORY, file=sys.stderr)
         with Path(log).open("a") as file:
-            file.write(message + "\n")
+            file.write(OUT_OF_MEMORY + "\n")
     record_exit_code(code)
     return code
 

@@ -12,7 +12,7 @@ RELEASE = "0.1.0"
 
 @cache
 def version() -> str:
-    """Returns the version, such as `0.1.0`, or `0.1.0+3.gabc1234` three commits after its tag."""
+    """Return the version, such as `0.1.0`, or `0.1.0+3.gabc1234` three commits after its tag."""
     if INSTALLED.is_dir():
         return metadata.version("gyriflow")
     described = _git("describe", "--tags", "--match", "v*", "--always", "--dirty")
@@ -26,7 +26,7 @@ def version() -> str:
 
 @cache
 def commit() -> str | None:
-    """Returns the commit of the checkout, with `-dirty` where files differ from it, or None outside of git."""
+    """Return the commit of the checkout, with `-dirty` where files differ from it, or None outside of git."""
     return _git("describe", "--match", "", "--always", "--abbrev=40", "--dirty") if not INSTALLED.is_dir() else None
 
 

@@ -1,6 +1,5 @@
 """Write the first configuration of a study: from a folder's brains, for one prediction, or for a BIDS data set."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from ..io.yaml_files import read_keys
 from ..parameters.growth import BEFORE_GW
 from ..parameters.settings import validated
 from ..shipped import SHIPPED
-from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, fitting_scheme, recognise
+from .recognition import SUBJECT_AND_SESSION, UNSET, fitting_scheme, recognise
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
@@ -69,10 +68,10 @@ def write_configuration(folder: Path, path: Path, force: bool, quick: bool = Fal
     # brains of unknown weeks come last
     rest = REST.format(start=brains[0].entry["id"], end=end, measured=MEASURED if len(weeks) > 1 else "")
     write_text(path, HEAD + "".join(lines) + rest + (QUICK if quick else ""))
-    kinds = ", ".join(f"{count} from {kind}" for kind, count in Counter(map(_kind, brains)).items())
-    yield f"{len(brains)} brain{'s' if len(brains) > 1 else ''}: {kinds}"
     for brain in brains:
-        yield from (f"to be filled in for {brain.entry['id']}: {note}" for note in brain.notes)
+        kind = f"labels, {brain.entry['scheme']}" if "labels" in brain.entry else "surfaces"
+        yield f"{brain.entry['id']}: {kind}, week {brain.entry['week']}"
+        yield from (f"  to be filled in: {note}" for note in brain.notes)
 
 
 def write_prediction(
@@ -182,11 +181,3 @@ def _absolute(value: object, folder: Path) -> object:
     if isinstance(value, str) and (folder / value).is_file():
         return str((folder / value).resolve())
     return value
-
-
-def _kind(brain: Recognised) -> str:
-    if "hemispheres" in brain.entry:
-        return "pairs of hemisphere surfaces"
-    if "hemisphere" in brain.entry:
-        return "surfaces of one hemisphere"
-    return f"label volumes ({brain.entry['scheme'] if brain.entry['scheme'] != UNSET else 'scheme unclear'})"

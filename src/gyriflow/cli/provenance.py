@@ -25,7 +25,7 @@ STUDY = Path("results", "study", "study.json")
 
 
 def software() -> dict[str, Any]:
-    """Returns the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
+    """Return the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
     packages: dict[str, str | None] = dict.fromkeys(PACKAGES)
     for name in PACKAGES:
         with suppress(metadata.PackageNotFoundError):
@@ -41,46 +41,49 @@ def software() -> dict[str, Any]:
 
 
 def require_own_results(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
-    """Raises InputError where the results in a working directory are those of another study.
+    """Raise InputError where the results in a working directory are those of another study.
 
     Another study is one of other configuration files without a brain in common; a configuration that was changed,
     copied or moved goes on. With `record` the study is written down as the one whose results these are.
     """
     path = directory / STUDY
-    brains: list[list[Any]] = [[b.id, b.week, b.source, *(Path(file).name for file in b.files)] for b in config.brains]
-    own: dict[str, Any] = {"configuration": [str(file.resolve()) for file in files], "brains": brains}
-    known = read_json(path) if path.is_file() else own
-    there = [brain[0] for brain in known["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
-    if there and known["configuration"] != own["configuration"] and not any(b in known["brains"] for b in brains):
+    brains = [
+        [brain.id, brain.week, brain.source, *(Path(file).name for file in brain.files)] for brain in config.brains
+    ]
+    study: dict[str, Any] = {"configuration": [str(file.resolve()) for file in files], "brains": brains}
+    recorded = read_json(path) if path.is_file() else study
+    there = [brain[0] for brain in recorded["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
+    shared = recorded["configuration"] == study["configuration"] or any(b in recorded["brains"] for b in brains)
+    if there and not shared:
         raise InputError(
             "the results here are those of another study",
             path=path.parents[1].resolve(),
-            found=f"{', '.join(there)} of {', '.join(known['configuration'])}",
-            expected=f"{', '.join(brain[0] for brain in brains)} of {', '.join(own['configuration'])}",
+            found=f"{', '.join(there)} of {', '.join(recorded['configuration'])}",
+            expected=f"{', '.join(brain[0] for brain in brains)} of {', '.join(study['configuration'])}",
             remedy="Give this study a folder of its own with --directory; or delete these results, or "
             f"study/{path.name} in them to have both in one folder.",
         )
-    if record and (known != own or not path.is_file()):
-        write_json(path, own)
+    if record and (recorded != study or not path.is_file()):
+        write_json(path, study)
 
 
 def texts_in(value: Any) -> list[str]:
-    """Returns all texts in nested mappings and lists, such as a brain's entry, names of files among them."""
+    """Return all texts in nested mappings and lists, such as a brain's entry, names of files among them."""
     items = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else []
     return [value] if isinstance(value, str) else [text for item in items for text in texts_in(item)]
 
 
 def input_contents(directory: Path, config: Config, record: bool) -> dict[str, str]:
-    """Returns the SHA-256 of each input file of a study by its path; that of its atlas where the file is not there yet.
+    """Return the SHA-256 of each input file of a study by its path; that of its atlas where the file is not there yet.
 
     With `record` they are kept in the results, with sizes and times, so that unchanged files are not read again.
     """
     path = directory / "results" / "study" / "inputs.json"
-    known: dict[str, Any] = {}
+    recorded: dict[str, Any] = {}
     with suppress(InputError):
-        known = read_json(path)
-    found = contents(dict.fromkeys(texts_in(config.model_dump())), known)
-    if record and found != known:
-        write_json(path, found)
+        recorded = read_json(path)
+    files = contents(dict.fromkeys(texts_in(config.model_dump())), recorded)
+    if record and files != recorded:
+        write_json(path, files)
     expected = {name: sha256 for name, (_, sha256) in config.known_files.items()}
-    return expected | {name: state[0] for name, state in found.items()}
+    return expected | {name: state[0] for name, state in files.items()}

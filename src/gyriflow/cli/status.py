@@ -14,6 +14,7 @@ from ..io.files import read_json
 from ..io.jobs import events_in, read_log
 from ..io.yaml_files import read_yaml
 from ..shipped import CONFIG
+from ..study import resolve
 from ..units import week_tag
 from .launch import hold_lock
 from .provenance import STUDY
@@ -113,7 +114,7 @@ def _configured(directory: Path) -> list[tuple[str, str]]:
         if (record := directory / STUDY).is_file():
             path = Path(read_json(record)["configuration"][-1])
         if path.is_file():
-            return load(read_yaml(path), path.resolve().parent).folded
+            return resolve(load(read_yaml(path), path.resolve().parent)).pairs
     return []
 
 

@@ -73,7 +73,7 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
         (tmp_path / name / "parcellation.nii.gz").write_bytes(LABELS.read_bytes())
     path = tmp_path / "gyriflow.yaml"
     said = list(write_configuration(tmp_path, path, force=False))
-    assert said == ["2 brains: 2 from label volumes (spina-bifida-atlas)"]
+    assert said == [f"{name}: labels, spina-bifida-atlas, week {name[2:]}.0" for name in ("GA21", "GA22")]
     config = load(yaml.safe_load(path.read_text()), tmp_path)
     assert [(brain.id, brain.week) for brain in config.brains] == [("GA21", 21.0), ("GA22", 22.0)]
     assert config.start == "GA21"
@@ -89,7 +89,7 @@ def test_what_files_do_not_tell_is_left_to_be_filled_in(tmp_path):
     (tmp_path / "mine_seg.nii.gz").write_bytes(LABELS.read_bytes())
     path = tmp_path / "gyriflow.yaml"
     said = list(write_configuration(tmp_path, path, force=False))
-    assert said[1] == "to be filled in for mine: week: not told by its name"
+    assert said[1] == "  to be filled in: week: not told by its name"
     written = yaml.safe_load(path.read_text())
     assert written["brains"][0]["week"] == UNSET
     with pytest.raises(InputError, match=r"brains\[0\].week"):
@@ -128,7 +128,7 @@ def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
     path = tmp_path / "gyriflow.yaml"
     list(write_configuration(tmp_path, path, force=False))
     config = load(yaml.safe_load(path.read_text()), tmp_path)
-    assert config.scans == {"sub-01": ["sub-01_ses-1", "sub-01_ses-2"]}
+    assert [brain.subject for brain in config.brains] == ["sub-01", "sub-01"]
 
 
 def test_an_ambiguous_age_is_asked_for_by_file_and_column(tmp_path):
