@@ -59,7 +59,6 @@ rule html_report:
         rules.metrics.input,
         rules.influence_figures.input,
         asked_for(FIGURES, "report", "quality"),
-        surfaces=expand(PIAL["report"], brain=study.brains),
         runs=rules.study_runs.output.csv,
         quality=rules.quality_table.output[0],
         warnings=rules.study_warnings.output[0],
@@ -80,7 +79,6 @@ rule html_report:
         figures=[(figure.name, figure.path, dict(figure.names)) for figure in FIGURES if figure.target],
         picture_bytes=PICTURE_BYTES,
         brains=reporting.described_brains(study),
-        surfaced=list(study.brains),
         config=reporting.used_settings(study),
     script:
         "../scripts/html_report.py"

@@ -3,7 +3,7 @@
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_text
 from gyriflow.io.yaml_files import read_yaml, yaml_text
-from gyriflow.report.page import Results, assemble, hide_paths, report_page, shown_figures
+from gyriflow.report.page import hide_paths, page_content, report_page, shown_figures
 from gyriflow.step import step
 
 PARTS = ("style", "three", "notice", "controls", "viewer")
@@ -14,15 +14,15 @@ with step(snakemake.log[0]):
     pictures = [path for _, path, _ in figures if path.endswith(".png")]
     contents = dict(zip(pictures, picture_addresses(pictures, params.picture_bytes), strict=True))
     contents |= {path: read_body(path) for _, path, _ in figures if path not in contents}
-    results = Results(
+    view = read_json(files.view)
+    content = page_content(
         brains=params.brains,
-        surfaces={brain: read_json(path) for brain, path in zip(params.surfaced, files.surfaces, strict=True)},
-        runs=read_table(files.runs),
         provenance=read_json(files.provenance),
         methods=read_text(files.methods),
         configuration=yaml_text(hide_paths(params.config)),
-        **{name: read_table(files[name]) for name in ("validation", "quality", "warnings") if files.get(name)},
+        shown=shown_figures(words, figures, contents),
+        validation=read_table(files.validation) if files.validation else None,
+        **{name: read_table(files[name]) for name in ("quality", "runs", "warnings")},
     )
-    view, shown = read_json(files.view), shown_figures(words, figures, contents)
     parts = {name: read_text(path) for name, path in files.items() if name in PARTS}
-    write_text(snakemake.output[0], report_page(read_text(files.page), parts, view, **assemble(results, shown, view)))
+    write_text(snakemake.output[0], report_page(read_text(files.page), parts, view, **content))

@@ -10,19 +10,18 @@ from matplotlib.figure import Figure
 
 from gyriflow.io.figures import picture_addresses, read_body, write_figure, write_html
 from gyriflow.report.page import (
-    Results,
-    Shown,
-    assemble,
     brains_table,
     caption_html,
     grouped,
     hide_paths,
     methods_text,
+    page_content,
     picture,
     report_page,
     run_verdict,
     scores_table,
     sections,
+    shown_figures,
     what_was_done,
 )
 from gyriflow.report.solve import resolution_over_steps
@@ -40,7 +39,6 @@ BRAINS = [
     },
     {"id": "old", "week": 23.0, "population": "healthy", "source": "labels", "synthetic": False, "licence": None},
 ]
-SURFACES = {"young": {"volume_mL": 46.2, "area_cm2": {"whole": 90.0}, "warnings": ["a bridge was cut"]}}
 RUNS = pd.DataFrame(
     {
         "run": ["thin"], "subject": ["young"], "start_week": [21.0], "preset": ["measured"], "end_week": [23.0],
@@ -58,46 +56,52 @@ VALIDATION = pd.DataFrame(
 )  # fmt: skip
 
 
-def page(shown: list[Shown], view: dict | None = None) -> str:
-    results = Results(
-        brains=BRAINS,
-        surfaces=SURFACES,
-        runs=RUNS,
-        provenance={
-            "commit": "abc-dirty",
-            "recorded": "2026-01-01T12:30:00+00:00",
-            "gyriflow": "0.1",
-            "python": "3.13",
-            "packages": {"numpy": "2.0", "absent": None},
-            "files": [{"brain": "young", "what": "labels", "sha256": "12ab"}],
-        },
-        methods="**Brains.** Two.",
-        configuration="start: young\n",
-        validation=VALIDATION,
-    )
+QUALITY = pd.DataFrame(
+    {
+        "subject": ["young", "old"], "verdict": ["look", "refused"], "cause": [np.nan, "cropped"],
+        "warnings": ["a bridge was cut", np.nan], "volume_ml": [46.2, np.nan], "area_cm2": [90.0, np.nan],
+    }
+)  # fmt: skip
+PROVENANCE = {
+    "commit": "abc-dirty",
+    "recorded": "2026-01-01T12:30:00+00:00",
+    "gyriflow": "0.1",
+    "python": "3.13",
+    "packages": {"numpy": "2.0", "absent": None},
+    "files": [{"brain": "young", "what": "labels", "sha256": "12ab"}],
+}
+
+
+def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains", content: str = "") -> list[dict]:
+    """Returns figures of rules, of which those that begin with "steps" are technical, in sections called as they."""
+    words = {
+        rule: {"section": rule, "title": title, "caption": caption, "technical": rule.startswith("steps")}
+        for rule in rules
+    }
+    figures = [(rule, f"{rule}{number}.png", {"brain": "a"}) for number, rule in enumerate(rules)]
+    return shown_figures(words, figures, {path: content for _, path, _ in figures})
+
+
+def page(figures: list[dict], view: dict | None = None) -> str:
+    content = page_content(
+        brains=BRAINS, quality=QUALITY, runs=RUNS, validation=VALIDATION, warnings=pd.DataFrame(),
+        provenance=PROVENANCE, methods="**Brains.** Two.", configuration="start: young\n", shown=figures,
+    )  # fmt: skip
     parts = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
     parts["notice"] = "three.LICENSE.txt"
     texts = {name: (PAGE / file).read_text() for name, file in parts.items()}
-    view = view or {"groups": [], "maps": []}
-    return report_page((PAGE / "page.html").read_text(), texts, view, **assemble(results, shown, view))
+    return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **content)
 
 
 def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
-    shown = [
-        Shown("Growth", "rates", "<table></table>", "of *all* brains"),
-        Shown("Folding", "weeks", picture("data:image/webp;base64,AA", 7.2, "weeks"), "first <page>", first=True),
-    ]
-    text = page(shown, {"groups": [{"name": "</script><b>"}], "maps": []})
-    assert (
-        re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)) == []
-    )
+    figures = [*shown("growth_figure", content="<table></table>"), *shown("weekly_figure", caption="first <page>")]
+    text = page(figures, {"groups": [{"name": "</script><b>"}], "maps": []})
+    outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', outside) == []
     assert "</script><b>" not in text
     assert "<em>all</em>" in text
-    assert "first &lt;page&gt;" in text
-    order = [
-        text.index(word)
-        for word in ("first &lt;page", "<h3>Runs", "<h3>Brains", "<h2>Surfaces in 3D", "<h2>Growth", "<h2>Provenance")
-    ]
+    parts = ("first &lt;page", "<h3>Runs", "<h3>Brains", "<h2>Surfaces in 3D", "<h2>growth_figure", "<h2>Provenance")
+    order = [text.index(word) for word in parts]
     assert order == sorted(order)
     assert "12ab" in text
     assert "Made 2026-01-01 12:30 UTC by gyriflow 0.1, commit abc, changed." in text
@@ -109,9 +113,10 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
 def test_what_a_user_has_written_is_shown_as_text(monkeypatch):
     script = "<script>alert(1)</script><img src=x onerror=alert(1)>"
     monkeypatch.setitem(BRAINS[0], "population", script)
-    monkeypatch.setitem(SURFACES["young"], "warnings", [script])
-    shown = [Shown("Growth", script, html_table(pd.DataFrame({script: [script]})), script)]
-    text = page(shown, {"groups": [{"name": script}], "maps": [script]})
+    monkeypatch.setitem(QUALITY, "warnings", [script, ""])
+    table = html_table(pd.DataFrame({script: [script]}))
+    figures = shown("growth_figure", title=script, caption=script, content=table)
+    text = page(figures, {"groups": [{"name": script}], "maps": [script]})
     # the data of the 3D view are JSON, in which no element ends
     shown_text = re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL)
     assert shown_text.count("alert(1)") >= 5
@@ -123,15 +128,22 @@ def test_without_surfaces_there_is_no_3d_view():
     assert 'id="view3d"' not in page([])
 
 
-def test_sections_stand_in_order_and_numbers_run_through():
-    found = sections([Shown(name, name, "") for name in ("Inputs", "Growth", "Inputs")])
-    assert {name: [item["number"] for item in items] for name, items in found} == {"Inputs": [1, 2], "Growth": [3]}
+def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_through():
+    figures = [{**item, "section": name} for item, name in zip(shown("steps", "maps", "rates"), "AAB", strict=True)]
+    found = [(name, [(item["number"], item["technical"]) for item in items]) for name, items in sections(figures)]
+    assert found == [("A", [(1, False), (2, True)]), ("B", [(3, False)])]
+    assert "<details><summary>2. a</summary>" in page(figures)
 
 
-def test_technical_figures_are_folded_away_at_the_end_of_their_section():
-    text = page([Shown("Folding", "Solver", "", technical=True), Shown("Folding", "Weeks", "")])
-    assert "<h3>1. Weeks</h3>" in text
-    assert "<details><summary>2. Solver</summary>" in text
+def test_titles_name_brains_where_there_are_several():
+    words = {"maps": {"section": "Metrics", "title": "Maps of the {measure}", "caption": "*{brain}*"}}
+    figures = [("maps", f"{b}.png", {"brain": b, "measure": "sulcal_depth_mm"}) for b in "ab"] + [("view", "v", {})]
+    both = shown_figures(words, figures, {"a.png": ("data:,", 7.2), "b.png": "<p>"})
+    assert [item["title"] for item in both] == ["Maps of the sulcal depth · a", "Maps of the sulcal depth · b"]
+    assert 'alt="Maps of the sulcal depth · a" width="1080"' in both[0]["content"]
+    assert "<em>a</em>" in both[0]["caption"]
+    (alone,) = shown_figures(words, figures[:1], {"a.png": ""})
+    assert alone["title"] == "Maps of the sulcal depth"
 
 
 def test_a_warning_of_several_brains_is_told_once():
@@ -154,27 +166,12 @@ def test_paths_and_commands_are_hidden(given, shown):
     assert hide_paths(given) == shown
 
 
-def test_a_table_escapes_its_text_and_marks_verdicts():
-    html = html_table(pd.DataFrame({"verdict": ["look"], "said": ["a < b"], "value": [np.nan]}))
-    assert '<td class="verdict look">look</td>' in html
-    assert "a &lt; b" in html
-    assert '<td class="number">–</td>' in html
-
-
-def test_a_brain_without_a_surface_is_refused_and_warnings_are_told():
-    table = brains_table(BRAINS, SURFACES).set_index("brain")
+def test_a_brain_has_its_verdict_with_cause_or_warnings():
+    table = brains_table(BRAINS, QUALITY).set_index("brain")
     assert table["verdict"].to_dict() == {"young": "look", "old": "refused"}
-    assert table.loc["young", "warnings"] == "a bridge was cut"
+    assert table["warnings"].to_list() == ["a bridge was cut", "cropped"]
     assert table["licence"].to_list() == ["CC0 1.0", "your own data"]
-
-
-def test_the_table_of_quality_control_judges_where_there_is_one():
-    quality = pd.DataFrame(
-        {"subject": ["young", "old"], "verdict": ["fine", "refused"], "cause": ["", "cropped"], "warnings": ""}
-    )
-    table = brains_table(BRAINS, SURFACES, quality).set_index("brain")
-    assert table["verdict"].to_dict() == {"young": "fine", "old": "refused"}
-    assert table.loc["old", "warnings"] == "cropped"
+    assert table.loc["young", ["volume (mL)", "pial area (cm²)"]].to_list() == [46.2, 90.0]
 
 
 def test_a_run_is_judged_and_scored_at_its_last_compared_week():
