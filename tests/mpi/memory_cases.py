@@ -13,7 +13,6 @@ from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.stress import packed, unpacked
-from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import M_PER_MM, SECONDS_PER_GW
 
@@ -109,19 +108,3 @@ def test_a_free_body_grows_without_drifting(mesh):
         assert size > 1e-6
         assert np.abs(u.mean(axis=0)).max() <= 1e-12 * size
         assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(x).max() * size * len(x)
-
-
-def test_two_free_bodies_move_as_each_does_alone():
-    one = distorted_box()
-    far = TetrahedralMesh(one.vertices + [40.0, 0.0, 0.0], one.tets)
-    both = TetrahedralMesh(
-        np.concatenate([one.vertices, far.vertices]), np.concatenate([one.tets, far.tets + len(one.vertices)])
-    )
-    settings = {"thickness_mm": 2.0, "support": "free", "no_growth": {"kind": "none"}}
-    moves = []
-    for mesh in (one, both):
-        folding, state = folding_of(mesh, replace(zones_of(mesh), free=True), **settings)
-        moves.append(folding.step(state, 43200.0).last)
-    count = len(one.vertices)
-    for part in (moves[1][:count], moves[1][count:]):
-        assert np.abs(part - moves[0]).max() <= 1e-8 * np.abs(moves[0]).max()

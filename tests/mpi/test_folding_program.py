@@ -16,7 +16,6 @@ from gyriflow.errors import StorageError
 from gyriflow.folding.__main__ import require_space
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
-from gyriflow.io.jobs import events_in
 from gyriflow.io.maps import write_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.parameters.folding import parameters_from
@@ -86,15 +85,6 @@ def test_memory_and_a_shortened_step_are_said_before_the_solve(default_run):
     before, _, _ = default_run[1].partition("step    1")
     assert "3072 elements, 2187 unknowns, 2 ranks, about 516 MiB" in before
     assert "step_s 43200 does not divide the time from GW 21 to 21.25: the last step there is shortened" in before
-
-
-def test_the_progress_is_told_as_json(default_run):
-    size, *steps, end = events_in(default_run[0].with_suffix(".jsonl").read_text())
-    assert (size["event"], size["elements"], size["ranks"], size["memory_mib"]) == ("size", 3072, 2, 516)
-    steps = [event for event in steps if event["event"] == "step"]
-    assert [step["step"] for step in steps] == [1, 2, 3, 4, 5, 6, 7, 8]
-    assert (steps[-1]["week"], steps[-1]["end_week"], steps[-1]["left_s"]) == (pytest.approx(21.5), 21.5, 0.0)
-    assert (end["event"], end["week"], end["error"]) == ("end", 21.5, None)
 
 
 @pytest.mark.fault(29)
@@ -185,17 +175,6 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, defaul
     assert "Free disk space" in done.stderr
     assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
     assert not [path for path in out.rglob("*") if path.is_file() and path.parent != out]
-
-
-@pytest.mark.fault(36)
-def test_a_folder_that_cannot_be_made_ends_in_code_five(mesh, tmp_path):
-    (tmp_path / "file").touch()
-    arguments = command(mesh, tmp_path / "out")
-    done = subprocess.run(
-        [*arguments[:-1], str(tmp_path / "file" / "out")], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 5, done.stdout + done.stderr
-    assert "file/out: cannot be written" in done.stderr
 
 
 @pytest.mark.fault(36)

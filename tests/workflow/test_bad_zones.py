@@ -75,4 +75,5 @@ def test_a_cortex_thinner_than_an_element_is_warned_of_with_the_ratio(meshed):
     before, _, _ = log.partition("step    1")
     ratio = read_json(meshed.directory / "results/runs/thin/a/folding/zones.json")["elements_through_cortex"]
     assert 0.05 < ratio < 0.5
-    assert f"fewer than two elements through the cortex ({ratio:.2f}): folds may be mesh noise" in before
+    assert f"elements through the cortex: {ratio:.1f}" in before
+    assert "from the start on fewer than 2 elements lie through the cortex: folds may be mesh noise" in log

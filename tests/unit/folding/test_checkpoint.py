@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapes import box_mesh
 
-from gyriflow.errors import InputError
 from gyriflow.folding import checkpoint
 from gyriflow.folding.checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from gyriflow.io.sources import modules_behind
@@ -123,28 +122,3 @@ def test_the_key_of_a_run_does_not_depend_on_how_labels_are_read():
     behind = {path.name for path in modules_behind(Path(checkpoint.__file__).with_name("__main__.py"))}
     assert {"run.py", "varying.py", "tetrahedra.py", "materials.py"} <= behind
     assert not {"labels.py", "extraction.py", "brains.py"} & behind
-
-
-def test_defaults_are_the_papers_reference_values():
-    p = parameters_from(VALUES)
-    constants = (p.thickness_mm, p.shear_modulus_cortex_pa, p.shear_modulus_core_pa, p.growth_rate_per_s)
-    assert list(constants) == [1.5, 1500, 300, 2e-7]
-    assert (p.poisson_ratio, p.step_s) == (0.45, 43200)
-    assert (p.stress_memory_gw, p.support, p.core_growth_rate_per_s) == (0, "ellipsoid", 0)
-
-
-@pytest.mark.fault(27)
-def test_unknown_parameters_are_all_named():
-    with pytest.raises(InputError, match=r"thicknes: unknown key; did you mean thickness_mm.*twice: unknown key"):
-        parameters_from(VALUES | {"thicknes": 1, "twice": 2})
-    with pytest.raises(InputError, match=r"contact\.gap"):
-        parameters_from(VALUES | {"contact": {"gap": 1}})
-
-
-@pytest.mark.fault(28)
-def test_parameters_out_of_bounds_are_all_named():
-    with pytest.raises(InputError, match=r"thickness_mm.*poisson_ratio"):
-        parameters_from(VALUES | {"thickness_mm": 0.0, "poisson_ratio": 0.5})
-    # what several keys say together is asked where each of them is valid
-    with pytest.raises(InputError, match="allow_negative_growth"):
-        parameters_from(VALUES | {"growth_rate_per_s": -1e-7})

@@ -15,8 +15,6 @@ from gyriflow.parameters.terms import (
     BASE,
     BRIDGE,
     CLAMPED,
-    CORE,
-    CORTEX,
     LEFT,
     LEFT_CONTACT,
     MEDIAL_WALL,
@@ -241,11 +239,3 @@ def test_elements_are_left_right_or_between_the_planes(tagged):
     volumes = signed_volumes(mesh)
     left, right = (volumes[tags["hemisphere"] == side].sum() for side in (LEFT, RIGHT))
     assert left == pytest.approx(right)
-
-
-def test_cortex_is_the_outer_layer_of_its_thickness(tagged):
-    mesh, _, tags = tagged
-    volumes = signed_volumes(mesh)
-    inner = np.prod([axis - 4.0 for axis in SEMI_AXES]) / np.prod(SEMI_AXES)
-    assert volumes[tags["layer"] == CORE].sum() / volumes.sum() == pytest.approx(inner, abs=0.05)
-    assert set(tags["layer"]) == {CORTEX, CORE}

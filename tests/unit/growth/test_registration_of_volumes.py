@@ -145,14 +145,6 @@ def test_a_cerebrum_at_the_edge_of_the_volume_is_refused():
         channels(volume(affine, later=False)[21:], affine, cerebrum=(WHITE, CORTEX))
 
 
-def test_missing_tissues_are_told():
-    affine = centred()
-    with pytest.raises(InputError, match="no voxel belongs to the cerebrum"):
-        channels(volume(affine, later=False), affine, cerebrum=(OTHER,))
-    with pytest.raises(InputError, match="no voxel belongs to the cortex"):
-        channels(volume(affine, later=False), affine, cerebrum=(WHITE, CORTEX), cortex=(OTHER,))
-
-
 def test_images_are_compared_where_both_brains_have_one(pair):
     affine = centred()
     labels = volume(affine, later=False)
