@@ -61,16 +61,11 @@ def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Corres
     return Deformation(second @ pair.matrix @ np.linalg.inv(first), turned, first @ pair.affine)
 
 
-def displacement_at(deformation: Deformation, points: Floats) -> Floats:
-    """Return the (n, 3) displacement u in mm at points in mm."""
-    index = transform_points(points, np.linalg.inv(deformation.affine)).T
-    parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
-    return np.stack(parts, axis=1).astype(np.float64)
-
-
 def carry(deformation: Deformation, points: Floats) -> Floats:
     """Return where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
-    return transform_points(points + displacement_at(deformation, points), deformation.matrix)
+    index = transform_points(points, np.linalg.inv(deformation.affine)).T
+    parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
+    return transform_points(points + np.stack(parts, axis=1).astype(np.float64), deformation.matrix)
 
 
 def determinants(deformation: Deformation) -> Floats:

@@ -38,18 +38,12 @@ def diffuse(
     if sigma_mm == 0:
         return values.copy()
     mass = vertex_sizes(vertices, cells)
-    used = mass > 0
-    step = sigma_mm**2 / 2 / steps
-    matrix = sparse.csr_matrix(sparse.diags(np.where(used, mass, 1.0)) + step * stiffness_matrix(vertices, cells))
-    inverse = 1.0 / matrix.diagonal()
-    nearly = LinearOperator(matrix.shape, matvec=lambda x: inverse * x.ravel(), dtype=float)
-    columns = values.reshape(len(values), -1).T.astype(float)
+    mass = np.where(mass > 0, mass, 1.0)
+    matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / steps * stiffness_matrix(vertices, cells))
     smooth = []
-    for column in columns:
+    for column in values.reshape(len(values), -1).T.astype(float):
         for _ in range(steps):
-            column, failed = cg(matrix, np.where(used, mass, 1.0) * column, x0=column, M=nearly, rtol=1e-8)
-            if failed:
-                raise ValueError(f"diffusion by {sigma_mm:g} mm does not converge: the mesh has degenerate cells")
+            column = _solved(matrix, mass * column, column)
         smooth.append(column)
     return np.stack(smooth, axis=1).reshape(values.shape)
 
@@ -58,19 +52,24 @@ def continue_harmonically(
     vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats
 ) -> Floats:
     """Return (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
-    stiffness = stiffness_matrix(vertices, cells)
     unknown = np.setdiff1d(np.unique(cells), known)
-    found = np.zeros((len(vertices), values.shape[1]))
-    found[known] = values
-    rows = stiffness[unknown]
+    continued = np.zeros((len(vertices), values.shape[1]))
+    continued[known] = values
+    rows = stiffness_matrix(vertices, cells)[unknown]
     matrix, right = rows[:, unknown], -(rows[:, known] @ values)
+    for column in range(values.shape[1]):
+        continued[unknown, column] = _solved(matrix, right[:, column])
+    return continued
+
+
+def _solved(matrix: sparse.csr_matrix, right: Floats, start: Floats | None = None) -> Floats:
+    """Solve a positive definite system by conjugate gradients, preconditioned by its diagonal."""
     inverse = 1.0 / matrix.diagonal()
     nearly = LinearOperator(matrix.shape, matvec=lambda x: inverse * x.ravel(), dtype=float)
-    for column in range(values.shape[1]):
-        found[unknown, column], failed = cg(matrix, right[:, column], M=nearly, rtol=1e-8, maxiter=10000)
-        if failed:
-            raise ValueError("the harmonic continuation does not converge: the mesh has degenerate cells")
-    return found
+    solution, failed = cg(matrix, right, x0=start, M=nearly, rtol=1e-8, maxiter=10000)
+    if failed:
+        raise ValueError("diffusion along the mesh does not converge: it has degenerate cells")
+    return np.asarray(solution)
 
 
 def stiffness_matrix(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:

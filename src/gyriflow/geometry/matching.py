@@ -69,8 +69,7 @@ def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None)
     low, high = (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) if box is None else box
     low = low - 4 * voxel_mm
     shape = np.ceil((high - low) / voxel_mm + 4).astype(int) + 1
-    centres = low + voxel_mm * np.indices(shape).reshape(3, -1).T
-    inside = igl.fast_winding_number(mesh.vertices, mesh.faces, centres) > 0.5
+    inside = _inside(mesh, low + voxel_mm * np.indices(shape).reshape(3, -1).T)
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = low
     return inside.reshape(shape).astype(np.int32), affine
@@ -82,15 +81,18 @@ def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], 
     `affine` (4, 4) leads from voxels to mm; what lies beyond the volume is not in it.
     """
     labels = np.zeros(shape, dtype=np.int32)
+    voxels = np.indices(shape).reshape(3, -1).T
     index = transformed(mesh, np.linalg.inv(affine)).vertices
-    low, high = np.floor(index.min(axis=0)).astype(int), np.ceil(index.max(axis=0)).astype(int) + 1
-    ticks = [np.arange(max(a, 0), max(min(b, most), 0)) for a, b, most in zip(low, high, shape, strict=True)]
-    voxels = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    voxels = voxels[((voxels >= index.min(axis=0)) & (voxels <= index.max(axis=0))).all(axis=1)]
     centres = voxels @ affine[:3, :3].T + affine[:3, 3]
-    inside = igl.fast_winding_number(mesh.vertices, mesh.faces, centres) > 0.5
+    inside = _inside(mesh, centres)
     depth, faces, _ = nearest_on(centres[inside], mesh)
     labels[tuple(voxels[inside].T)] = np.where(depth <= thickness[mesh.faces[faces]].mean(axis=1), 2, 1)
     return labels
+
+
+def _inside(mesh: TriangleMesh, points: Floats) -> NDArray[np.bool_]:
+    return np.asarray(igl.fast_winding_number(mesh.vertices, mesh.faces, points) > 0.5)
 
 
 def faces_that_cross(mesh: TriangleMesh) -> Ints:

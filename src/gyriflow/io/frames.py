@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..units import week_tag
 from .files import AnyPath, new_hdf5, write_text
-from .tetmeshes import attribute, document, geometry, grid, topology
+from .tetmeshes import document, grid
 
 POSITIONS = "positions"
 CELL_FIELDS = "cell_fields"
@@ -73,24 +73,20 @@ def join_frames(path: AnyPath, tets: NDArray, frames: Sequence[AnyPath]) -> None
 
 
 def _time_series(data_name: str, file: h5py.File) -> str:
-    tets = file["tets"]
-    grids = []
+    tets, grids = file["tets"], []
     for name in (name for name in file if name.startswith("week_")):
-        frame = file[name]
-        parts = [
-            f'<Time Value="{float(name.removeprefix("week_"))}"/>',
-            topology(tets, f"{data_name}:/tets"),
-            geometry(frame[POSITIONS], f"{data_name}:/{name}/{POSITIONS}"),
-        ]
-        for field, values in frame.items():
-            if field not in (POSITIONS, CELL_FIELDS):
-                parts.append(attribute(field, "Node", values, f"{data_name}:/{name}/{field}"))
+        frame, where = file[name], f"{data_name}:/{name}"
+        fields = {
+            field: (values, f"{where}/{field}")
+            for field, values in frame.items()
+            if field not in (POSITIONS, CELL_FIELDS)
+        }
         cell_fields = frame.get(CELL_FIELDS, {})
         if any(len(values) != len(tets) for values in cell_fields.values()):
             raise ValueError(f"fields of {len(tets)} elements in {name} have other lengths: {_lengths(cell_fields)}")
-        for field, values in cell_fields.items():
-            parts.append(attribute(field, "Cell", values, f"{data_name}:/{name}/{CELL_FIELDS}/{field}"))
-        grids.append(grid(name, parts))
+        of_cells = {field: (values, f"{where}/{CELL_FIELDS}/{field}") for field, values in cell_fields.items()}
+        cells, points = (tets, f"{data_name}:/tets"), (frame[POSITIONS], f"{where}/{POSITIONS}")
+        grids.append(grid(name, cells, points, fields, of_cells, float(name.removeprefix("week_"))))
     return f'<Grid Name="folding" GridType="Collection" CollectionType="Temporal">{"".join(grids)}</Grid>'
 
 

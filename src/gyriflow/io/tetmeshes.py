@@ -9,7 +9,6 @@ each tag, since dolfinx before 0.10 reads a grid's first tag only.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,34 +22,35 @@ XDMF_ATTRIBUTE = {1: "Scalar", 3: "Vector", 9: "Tensor"}
 XDMF_TOPOLOGY = {3: "Triangle", 4: "Tetrahedron", 10: "Tet_10"}
 
 
-def data_item(values: NDArray, where: str) -> str:
-    """Return the XDMF element that points to `values` stored at `where` ("file.h5:/name")."""
+Stored = tuple[NDArray, str]
+"""Values, and where they are stored ("file.h5:/name")."""
+
+
+def grid(
+    name: str,
+    cells: Stored,
+    points: Stored,
+    vertex_fields: Mapping[str, Stored],
+    cell_fields: Mapping[str, Stored],
+    time: float | None = None,
+) -> str:
+    """Return the XDMF grid of a mesh of triangles or tetrahedra (of 4 or 10 nodes), with its fields by name."""
+    kind, count = XDMF_TOPOLOGY[cells[0].shape[1]], len(cells[0])
+    parts = [] if time is None else [f'<Time Value="{time}"/>']
+    parts.append(f'<Topology TopologyType="{kind}" NumberOfElements="{count}">{_data_item(*cells)}</Topology>')
+    parts.append(f'<Geometry GeometryType="XYZ">{_data_item(*points)}</Geometry>')
+    for centre, fields in (("Node", vertex_fields), ("Cell", cell_fields)):
+        for field, (values, where) in fields.items():
+            kind = XDMF_ATTRIBUTE[1 if values.ndim == 1 else values.shape[1]]
+            item = _data_item(values, where)
+            parts.append(f'<Attribute Name="{field}" AttributeType="{kind}" Center="{centre}">{item}</Attribute>')
+    return f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>'
+
+
+def _data_item(values: NDArray, where: str) -> str:
     shape = " ".join(map(str, values.shape))
     kind, size = XDMF_NUMBER[values.dtype.kind], values.dtype.itemsize
     return f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="{size}" Format="HDF">{where}</DataItem>'
-
-
-def attribute(name: str, centre: str, values: NDArray, where: str) -> str:
-    """Return the XDMF element of a field; `centre` is "Node" or "Cell"."""
-    kind = XDMF_ATTRIBUTE[1 if values.ndim == 1 else values.shape[1]]
-    item = data_item(values, where)
-    return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{centre}">{item}</Attribute>'
-
-
-def topology(cells: NDArray, where: str) -> str:
-    """Return the XDMF element of the tetrahedra (of 4 or 10 nodes) or triangles stored at `where`."""
-    item = data_item(cells, where)
-    return f'<Topology TopologyType="{XDMF_TOPOLOGY[cells.shape[1]]}" NumberOfElements="{len(cells)}">{item}</Topology>'
-
-
-def geometry(points: NDArray, where: str) -> str:
-    """Return the XDMF element of the points stored at `where`."""
-    return f'<Geometry GeometryType="XYZ">{data_item(points, where)}</Geometry>'
-
-
-def grid(name: str, parts: Iterable[str]) -> str:
-    """Return the XDMF grid of a mesh, from its elements."""
-    return f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>'
 
 
 def document(*domains: str) -> str:
@@ -66,21 +66,17 @@ def write_tetrahedral_mesh(
     cell_fields: Mapping[str, NDArray] | None = None,
 ) -> None:
     """Write `path` (.xdmf) and the .h5 beside it: a mesh in mm, with fields (n,) or (n, 3) by name."""
-    path = Path(path)
-    data = path.with_suffix(".h5")
-    fields = [("Node", name, np.asarray(values)) for name, values in (vertex_fields or {}).items()]
-    fields += [("Cell", name, np.asarray(values)) for name, values in (cell_fields or {}).items()]
+    data = Path(path).with_suffix(".h5")
+    stored: dict[str, dict[str, Stored]] = {}
     with new_hdf5(data) as file:
-        file["tets"] = mesh.tets
-        file["vertices"] = mesh.vertices
-        for centre, name, values in fields:
-            file[f"{centre}/{name}"] = values
-    parts = [
-        topology(mesh.tets, f"{data.name}:/tets"),
-        geometry(mesh.vertices, f"{data.name}:/vertices"),
-        *(attribute(name, centre, values, f"{data.name}:/{centre}/{name}") for centre, name, values in fields),
-    ]
-    write_text(path, document(grid("mesh", parts)))
+        file["tets"], file["vertices"] = mesh.tets, mesh.vertices
+        for centre, fields in (("Node", vertex_fields), ("Cell", cell_fields)):
+            stored[centre] = {}
+            for name, values in (fields or {}).items():
+                file[f"{centre}/{name}"] = values
+                stored[centre][name] = np.asarray(values), f"{data.name}:/{centre}/{name}"
+    cells, points = (mesh.tets, f"{data.name}:/tets"), (mesh.vertices, f"{data.name}:/vertices")
+    write_text(path, document(grid("mesh", cells, points, stored["Node"], stored["Cell"])))
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
@@ -119,37 +115,30 @@ class Regions:
 
 def write_regions(path: AnyPath, regions: Regions) -> None:
     """Write `path` (.xdmf) and the .h5 beside it."""
-    path = Path(path)
-    data = path.with_suffix(".h5")
+    data = Path(path).with_suffix(".h5")
     cells = {"tets": regions.mesh.tets, "facets": regions.facets}
-    tags = {"tets": regions.cell_tags, "facets": regions.facet_tags}
+    tags = {
+        kind: {name: np.asarray(tag, dtype=np.int32) for name, tag in tagged.items()}
+        for kind, tagged in (("tets", regions.cell_tags), ("facets", regions.facet_tags))
+    }
     with new_hdf5(data) as file:
         file["vertices"] = regions.mesh.vertices
         for kind, values in cells.items():
             file[kind] = values
             for name, tag in tags[kind].items():
-                file[f"{kind}_tags/{name}"] = np.asarray(tag, dtype=np.int32)
+                file[f"{kind}_tags/{name}"] = tag
         for name, field in regions.fields.items():
             file[f"fields/{name}"] = field
 
-    def part(name: str, kind: Literal["tets", "facets"], tags: Tags, fields: Mapping[str, NDArray]) -> str:
-        parts = [
-            topology(cells[kind], f"{data.name}:/{kind}"),
-            geometry(regions.mesh.vertices, f"{data.name}:/vertices"),
-            *(
-                attribute(tag, "Cell", np.asarray(tags[tag], dtype=np.int32), f"{data.name}:/{kind}_tags/{tag}")
-                for tag in tags
-            ),
-            *(attribute(field, "Node", fields[field], f"{data.name}:/fields/{field}") for field in fields),
-        ]
-        return grid(name, parts)
+    def part(name: str, kind: str, names: Iterable[str], fields: Mapping[str, NDArray]) -> str:
+        of_cells = {tag: (tags[kind][tag], f"{data.name}:/{kind}_tags/{tag}") for tag in names}
+        of_vertices = {field: (values, f"{data.name}:/fields/{field}") for field, values in fields.items()}
+        points = regions.mesh.vertices, f"{data.name}:/vertices"
+        return grid(name, (cells[kind], f"{data.name}:/{kind}"), points, of_vertices, of_cells)
 
-    shown = part("mesh", "tets", regions.cell_tags, regions.fields) + part("facets", "facets", regions.facet_tags, {})
-    single = [part(name, "tets", {name: tag}, {}) for name, tag in regions.cell_tags.items()]
-    single += [
-        part(f"facet_{name}" if name in regions.cell_tags else name, "facets", {name: tag}, {})
-        for name, tag in regions.facet_tags.items()
-    ]
+    shown = part("mesh", "tets", tags["tets"], regions.fields) + part("facets", "facets", tags["facets"], {})
+    single = [part(name, "tets", [name], {}) for name in tags["tets"]]
+    single += [part(f"facet_{name}" if name in tags["tets"] else name, "facets", [name], {}) for name in tags["facets"]]
     write_text(path, document(shown, "".join(single)))
 
 
