@@ -35,7 +35,7 @@ rule calibration_parameters:
 
 
 def calibrated_surfaces(wildcards):
-    """Returns the surfaces of a run of the calibration, those of the brains where it has come to the week."""
+    """Return the surfaces of a run of the calibration, those of the brains where it has come to the week."""
     week = CONFIG.calibrate.compare_week
     return [
         study.simulations[wildcards.run, base.start.id].at(week).parts["whole"]

@@ -95,7 +95,7 @@ LIMITED = {
 
 
 def solve_options(*more):
-    """Returns the options of the folding program: the maps of a run where it has some, and `more`."""
+    """Return the options of the folding program: the maps of a run where it has some, and `more`."""
     return lambda wildcards, input: [
         *(["--maps", input.maps] if input.maps else []),
         *more,
@@ -147,7 +147,7 @@ checkpoint simulate_member:
 
 
 def reaches(run, brain, week):
-    """Returns whether a run from a brain has come to a week; runs of a study are solved before that is known."""
+    """Return whether a run from a brain has come to a week; runs of a study are solved before that is known."""
     if run in CONFIG.runs:
         return True
     summary = checkpoints.simulate_member.get(run=run, brain=brain).output.summary

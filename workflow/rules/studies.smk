@@ -6,7 +6,7 @@ PUBLISHED = f"{workflow.basedir}/workflow/published/fetalfoldsim.yaml"
 
 
 def tables_of_member(wildcards):
-    """Returns the tables of a run at the week of comparison and of the real brains, none where it has not come there."""
+    """Return the tables of a run at the week of comparison and of the real brains, none where it has not come there."""
     run, brain, compared = (
         wildcards.run,
         wildcards.brain,

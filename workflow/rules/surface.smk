@@ -26,19 +26,11 @@ def pial_settings(wildcards):
     if given.has_labels:
         names += ["smoothing_voxels"] + (["fissure_mm"] if given.hemisphere is None else [])
     else:
-        names += ["max_hole_mm"] + (["gap_mm"] if given.source == "hemispheres" else [])
+        names += ["max_hole_mm"]
     return surface_settings(*names)
 
 
-# by the name of the rule, the source of the brains and the hemispheres that they have
-for name, source, sides in (
-    ("pial_from_labels", "labels", SIDES),
-    ("pial_from_hemispheres", "hemispheres", SIDES),
-    ("pial_from_surface", "pial", SIDES),
-    ("pial_from_shape", "shape", SIDES),
-    ("pial_from_left_hemisphere", "hemisphere", ("left",)),
-    ("pial_from_right_hemisphere", "hemisphere", ("right",)),
-):
+for name, (source, sides) in PIAL_RULES.items():
 
     rule:
         name:
@@ -61,7 +53,7 @@ for name, source, sides in (
             scheme=from_brain("scheme"),
             checksums=from_brain("checksums"),
             settings=pial_settings,
-            limits=LIMITS,
+            limits=LIMITS if source == "hemispheres" else {},
         script:
             "../scripts/pial.py"
 

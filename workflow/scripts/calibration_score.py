@@ -15,7 +15,7 @@ files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
 
 
 def shape(mesh, real):
-    """Returns a surface ready to be compared with the real brain's, with its curvature."""
+    """Return a surface ready to be compared with the real brain's, with its curvature."""
     even = ready(mesh, real)
     bend = curvature(even, radius_mm=params.curvature_radius_mm)
     return Shape(even, bend.mean, bend.shape_index)

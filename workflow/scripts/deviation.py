@@ -16,7 +16,7 @@ from gyriflow.step import step
 
 
 def at(mesh, surface, values):
-    """Returns the values at the vertices of a surface at those of a mesh beside it."""
+    """Return the values at the vertices of a surface at those of a mesh beside it."""
     return values_at(match_points(mesh.vertices, vertex_normals(mesh), surface), values)
 
 

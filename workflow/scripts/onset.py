@@ -17,7 +17,7 @@ files, params, tables = snakemake.input, snakemake.params, []
 
 
 def places(mesh, index):
-    """Returns the last brain's sulci on a surface in the pose of the brain of an index."""
+    """Return the last brain's sulci on a surface in the pose of the brain of an index."""
     points = carry_surface(transformed(mesh, poses[index].inverse), between[index:])
     return regions_on(mesh, transform_points(points, poses[-1].world), real[-1], last)
 

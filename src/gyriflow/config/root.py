@@ -55,7 +55,7 @@ class Config(Settings):
         return [value] if isinstance(value, str | dict) else value
 
     def brain(self, name: str) -> Brain:
-        """Returns the brain of an id; KeyError if there is none."""
+        """Return the brain of an id; KeyError if there is none."""
         for brain in self.brains:
             if brain.id == name:
                 return brain
@@ -67,12 +67,12 @@ class Config(Settings):
         return self._left_out
 
     def leave_out(self, rows: dict[str, dict[str, Any]]) -> "Config":
-        """Returns the configuration with rows of `participants` that can't be used."""
+        """Return the configuration with rows of `participants` that can't be used."""
         self._left_out = rows
         return self
 
     def scheme(self, brain: Brain) -> dict[str, Any]:
-        """Returns the scheme of a brain's labels, the fields of a `LabelScheme`."""
+        """Return the scheme of a brain's labels, the fields of a `LabelScheme`."""
         name = brain.scheme
         assert name is not None
         own = self.schemes.get(name)

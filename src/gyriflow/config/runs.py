@@ -124,7 +124,7 @@ class GrowthSettings(Settings):
 def growth_series(
     brains: Sequence[Brain], given: Sequence[str] | Mapping[str, Sequence[str]] | None
 ) -> dict[str, list[str]]:
-    """Returns the ids of the brains of each series of growth rates, without series of fewer than two weeks.
+    """Return the ids of the brains of each series of growth rates, without series of fewer than two weeks.
 
     `given` is the setting `brains`, whose ids must be known. Only a series that it names may mix populations. A
     hemisphere that is alone shares none with whole brains or with the other one.
@@ -147,7 +147,7 @@ def growth_series(
 
 
 def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
-    """Returns brains by kind of data, or all together if one kind has fewer than two ages."""
+    """Return brains by kind of data, or all together if one kind has fewer than two ages."""
     volumes = [brain for brain in brains if brain.has_labels]
     surfaces = [brain for brain in brains if not brain.has_labels]
     by_kind: dict[str, Sequence[Brain]] = {"surface": surfaces, "volume": volumes}
@@ -205,7 +205,7 @@ class Study(Compared):
     """The same for the runs of single values of the first varied key, such as `{1.5: {step_s: 43200}}`."""
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns all keys by which the run of some varied values differs from the base."""
+        """Return all keys by which the run of some varied values differs from the base."""
         own = next((self.fixed_at.get(first, {}) for first in values.values()), {})
         return {**self.fixed, **own, **values, "end_week": self.compare_week}
 
@@ -271,7 +271,7 @@ class Member:
 
 
 def changed(run: Run, changes: Mapping[str, Any]) -> Run:
-    """Returns a run with some settings changed, by keys with dots for inner ones.
+    """Return a run with some settings changed, by keys with dots for inner ones.
 
     ValidationError where they are not valid; KeyError where there is no such key.
     """
@@ -288,7 +288,7 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
 
 
 def variants(name: str, study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yields the name and the varied values of each run of a study of a name, the last key varying fastest."""
+    """Yield the name and the varied values of each run of a study of a name, the last key varying fastest."""
     for values in product(*study.vary.values()):
         texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
         yield "-".join([name, *texts]), dict(zip(study.vary, values, strict=True))
@@ -297,7 +297,7 @@ def variants(name: str, study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
 def members_of(
     studies: Mapping[str, Study], runs: Mapping[str, Run], passes: Callable[[str, float], bool]
 ) -> dict[str, list[Member]]:
-    """Returns the members of each study; equal ones share a run, which ends at the latest of their weeks.
+    """Return the members of each study; equal ones share a run, which ends at the latest of their weeks.
 
     `passes` says whether a run of `runs`, by its name, has a given week among its output weeks.
     """
@@ -324,5 +324,5 @@ def members_of(
 
 
 def _model(run: Run) -> str:
-    """Returns what makes two runs the same but for their ends and what does not change their shapes."""
+    """Return what makes two runs the same but for their ends and what does not change their shapes."""
     return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields"})

@@ -16,24 +16,24 @@ PARTS = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
 
 
 def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:
-    """Returns the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
+    """Return the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
     return {part: f"{folder}/{PARTS[part]}.surf.gii" for part in ("whole", *sides)}
 
 
 def pial_of(*sides: Side) -> dict[str, str]:
-    """Returns the files that are made for every brain with some hemispheres, whatever its source."""
+    """Return the files that are made for every brain with some hemispheres, whatever its source."""
     folder = f"{BRAIN}/surface"
     return {**surfaces_in(folder, sides), "stl": f"{folder}/pial.stl", "report": f"{folder}/surface.json"}
 
 
 def folded_of(*sides: Side) -> dict[str, str]:
-    """Returns the surfaces of a simulated brain at a week with some hemispheres, and its thickness."""
+    """Return the surfaces of a simulated brain at a week with some hemispheres, and its thickness."""
     folder = f"{RUN}/surfaces/{WEEK}"
     return {**surfaces_in(folder, sides), "thickness": f"{folder}/thickness.shape.gii"}
 
 
 def maps_of(*sides: Side) -> dict[str, str]:
-    """Returns the files with maps on some hemispheres, beside the metrics of a brain."""
+    """Return the files with maps on some hemispheres, beside the metrics of a brain."""
     return {side: f"results/{{where}}/{side}.shape.gii" for side in sides}
 
 
@@ -42,16 +42,26 @@ TEMPLATE_MAPS = "results/{where}/{side}.template.shape.gii"
 
 
 def white_of(*sides: Side) -> dict[str, str]:
-    """Returns what is made of the white surfaces of some hemispheres: themselves, maps on them, and their metrics."""
+    """Return what is made of the white surfaces of some hemispheres: themselves, maps on them, and their metrics."""
     surfaces = {f"{side}_surface": f"{BRAIN}/surface/{side}.white.surf.gii" for side in sides}
     maps = {f"{side}_maps": f"{BRAIN}/metrics/{side}.white.shape.gii" for side in sides}
     return {**surfaces, **maps, "metrics": f"{BRAIN}/metrics/white.csv"}
 
 
 def region_files(folder: str) -> dict[str, str]:
-    """Returns the files with the regions of both hemispheres in a folder."""
+    """Return the files with the regions of both hemispheres in a folder."""
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
+
+PIAL_RULES: dict[str, tuple[str, tuple[Side, ...]]] = {
+    "pial_from_labels": ("labels", SIDES),
+    "pial_from_hemispheres": ("hemispheres", SIDES),
+    "pial_from_surface": ("pial", SIDES),
+    "pial_from_shape": ("shape", SIDES),
+    "pial_from_left_hemisphere": ("hemisphere", ("left",)),
+    "pial_from_right_hemisphere": ("hemisphere", ("right",)),
+}
+"""The rules that make pial surfaces, by name: the source of the brains, and the hemispheres that they have."""
 
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 POSE = f"{BRAIN}/surface/pose.json"
@@ -114,12 +124,12 @@ _FOLDERS = (BRAIN, RUN, "results/{where}", f"{STUDY}/{{study}}", CALIBRATION, ST
 
 
 def one_of(names: Iterable[str]) -> str:
-    """Returns a pattern that matches exactly these names, or nothing if there are none."""
+    """Return a pattern that matches exactly these names, or nothing if there are none."""
     return "|".join(map(re.escape, names)) or r"(?!)"
 
 
 def job_files(rule: str, output: str) -> tuple[str, str]:
-    """Returns the log and the benchmark file of a rule's jobs, beside the results that its first `output` is among.
+    """Return the log and the benchmark file of a rule's jobs, beside the results that its first `output` is among.
 
     They are called by the rule, and by those wildcards that the folder does not name.
     """

@@ -182,24 +182,13 @@ class Chain:
 class Simulation:
     """A run from one brain.
 
-    Attributes
-    ----------
-    weeks
-        The output weeks; the start's own is the first.
-    shapes
-        Whose growth gives the shapes that the run grows towards; None where it has rates or sizes.
-    series, curves
-        The growth series with curves of sizes for the start, and their table where the run follows one.
-    base
-        The run whose maps it has: the calibration's base for its runs, else its own name.
-    compared
-        The measured brains of its later weeks, by week in file names; later scans of the start's own subject first.
-    real
-        The real brain of each week that tells what the run is worth.
-    kind
-        Whether its growth knows these brains, or it predicts them.
-    from_others_only
-        Whether it predicts by another population's growth, which has seen no later brain like the start.
+    The start's own week is the first of the output `weeks`. `shapes` says whose growth gives the shapes that it grows
+    towards; None where it has rates or sizes. `series` is the growth series with curves of sizes for the start, and
+    `curves` their table where the run follows one. It has the maps of the run `base`: the calibration's for its runs.
+
+    `compared` are the measured brains of its later weeks, by week in file names, later scans of the start's own subject
+    first; `real` the one of each week that tells what the run is worth. These are `explained` by growth that knows
+    them, or else `predicted`: `from_others_only` by another population's, which has seen no later brain like the start.
     """
 
     run: str

@@ -4,18 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..config.brains import Brain as GivenBrain
-from .paths import BRAIN, THICKNESS
+from .paths import PIAL_RULES, THICKNESS
 from .records import Brain
 from .study import Study
-
-# the step that makes the surface, by the source of a brain, as its log is called
-_PIAL_STEPS = {
-    "labels": "pial_from_labels",
-    "hemispheres": "pial_from_hemispheres",
-    "hemisphere": "pial_from_{side}_hemisphere",
-    "pial": "pial_from_surface",
-    "shape": "pial_from_shape",
-}
 
 
 def used_settings(study: Study) -> dict[str, Any]:
@@ -53,10 +44,7 @@ def input_files(study: Study) -> list[tuple[str, str, str]]:
 
 def method(study: Study) -> dict[str, Any]:
     """Return what the text of the methods says of the configuration: its brains, and settings by section."""
-    named = {
-        **{"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}},
-        "metrics": {"curvature_radius_mm"},
-    }
+    named = {"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}, "metrics": {"curvature_radius_mm"}}
     brains = [brain for brain in described_brains(study) if brain["id"] in study.brains]
     return {"brains": brains, **study.config.model_dump(mode="json", include=named)}
 
@@ -67,7 +55,7 @@ def quality_labels(brain: GivenBrain) -> dict[str, Any]:
         "subject": brain.id,
         **{key: getattr(brain, key) for key in ("week", "population", "source")},
         "sides": " ".join(brain.sides),
-        "page": f"{BRAIN}/figures/quality.png".format(brain=brain.id),
+        "page": f"results/brains/{brain.id}/figures/quality.png",
     }
 
 
@@ -92,7 +80,6 @@ def quality_files(brain: Brain) -> dict[str, Any]:
 
 def surface_logs(brain: Brain) -> list[str]:
     """Return the logs of the steps that have made a brain's surface and thickness."""
-    surface = _PIAL_STEPS[brain.given.source].format(side=brain.sides[0])
-    return [
-        f"results/brains/{brain.id}/logs/{name}.log" for name in (surface, "cortical_thickness", "thickness_from_white")
-    ]
+    made_by = [rule for rule, made in PIAL_RULES.items() if made == (brain.given.source, brain.sides)]
+    rules = (*made_by, "cortical_thickness", "thickness_from_white")
+    return [f"results/brains/{brain.id}/logs/{rule}.log" for rule in rules]

@@ -40,6 +40,11 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
         foldings, members = _foldings(config, brains, unreachable)
         chains = _chains(foldings, series, known)
     simulations = {(one.run, one.start.id): _simulation(config, one, series, chains, known) for one in foldings}
+    calibration = None
+    if (asked := config.calibrate) is not None:
+        base = tuple(one for one in simulations.values() if one.run == asked.base)
+        real = {one.start.id: _compared_with(asked, one.start, known) for one in base}
+        calibration = Calibration(base, asked.runs, real)
     return Study(
         config=config,
         brains=brains,
@@ -47,7 +52,7 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
         simulations=simulations,
         chains=chains,
         comparisons=_comparisons(config, members, simulations.values(), known),
-        calibration=_calibration(config, simulations.values(), known),
+        calibration=calibration,
         references=_references([one for one in simulations.values() if one.run in config.runs], known),
         norm_reference=_norm_reference(config, [one.start for one in foldings if one.run in config.runs], known),
         unreachable=unreachable,
@@ -321,14 +326,6 @@ def _comparisons(
         if foldings:
             comparisons[name] = Comparison(name, study.compare_week, foldings, real)
     return comparisons
-
-
-def _calibration(config: Config, simulations: Iterable[Simulation], brains: Sequence[Brain]) -> Calibration | None:
-    if (settings := config.calibrate) is None:
-        return None
-    base = tuple(one for one in simulations if one.run == settings.base)
-    real = {one.start.id: _compared_with(settings, one.start, brains) for one in base}
-    return Calibration(base, settings.runs, real)
 
 
 def _norm_reference(config: Config, starts: Sequence[Brain], brains: Sequence[Brain]) -> list[str]:

@@ -97,21 +97,20 @@ def why_unmatched(brains: Sequence[GivenBrain], believed: Collection[str] = ()) 
     # files are looked at where growth by vertices is planned, which few configurations ask for
     from ..io.surfaces import connectivity
 
-    first: tuple[str, list[tuple[int, int, str]]] | None = None
+    first = brains[0]
     for brain in brains:
-        if brain.source != brains[0].source:
-            return f"{brain.id} is given as {brain.source}, {brains[0].id} as {brains[0].source}"
-    for brain in brains:
-        if believed and all(path in believed for path in brain.files):
-            continue
-        try:
-            sides = [connectivity(Path(path)) for path in brain.files]
-        except InputError as error:
-            return str(error)
-        name, expected = first = first or (brain.id, sides)
-        for one, two in zip(expected, sides, strict=True):
+        if brain.source != first.source:
+            return f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
+    read = [brain for brain in brains if not believed or not all(path in believed for path in brain.files)]
+    try:
+        sides = [[connectivity(Path(path)) for path in brain.files] for brain in read]
+    except InputError as error:
+        return str(error)
+    for brain, others in zip(read, sides, strict=True):
+        for one, two in zip(sides[0], others, strict=True):
             if one[:2] != two[:2]:
-                return f"{brain.id} has {two[0]} vertices and {two[1]} triangles where {name} has {one[0]} and {one[1]}"
+                has = f"{brain.id} has {two[0]} vertices and {two[1]} triangles"
+                return f"{has} where {read[0].id} has {one[0]} and {one[1]}"
             if one != two:
-                return f"{brain.id} has other triangles than {name}"
+                return f"{brain.id} has other triangles than {read[0].id}"
     return None

@@ -16,26 +16,13 @@ from .series import Series
 
 @dataclass(frozen=True)
 class Study:
-    """All that a configuration asks for, without the brains that were refused.
+    """All that a configuration asks for, without the brains that were refused, which `config` still has.
 
-    Attributes
-    ----------
-    config
-        The configuration, with refused brains.
-    brains
-        By id, in the order of the configuration.
-    simulations
-        By run and start: of `runs`, of studies, and of the calibration.
-    chains
-        The brains behind the growth of a start, by its id and whose growth it is.
-    comparisons
-        What the configuration calls studies, by name.
-    references
-        By start and week the real brain that runs are compared with, and the latest real one before it.
-    norm_reference
-        The ids of the brains that others are compared with.
-    unreachable
-        Why start brains are not folded, by their ids.
+    `simulations` are by run and start: of `runs`, of studies, and of the calibration. `chains` are the brains behind
+    the growth of a start, by its id and whose growth it is. `comparisons` are what the configuration calls studies.
+    `references` are by start and week the real brain that runs are compared with, and the latest real one before it;
+    `norm_reference` are the ids of the brains that others are compared with. `unreachable` says why starts are not
+    folded.
     """
 
     config: Config

@@ -95,20 +95,12 @@ def test_the_paper_is_planned_with_the_paper_s_steps_and_ratios():
     assert (ratios[0], ratios[-1], {run.step_s for _, run in members["stiffness"]}) == (1, 20, {43200})
 
 
-def test_every_run_folds_its_starts(real):
-    found = study(real[:2], runs={"one": {}, "two": {"start": "all"}})
-    assert found.pairs == [("one", "b21"), ("two", "b21"), ("two", "b22")]
-    assert found.files("{run}/{brain}") == ["one/b21", "two/b21", "two/b22"]
-    assert found.simulations["two", "b22"].week_tags == ["22.00", "23.00", "24.00"]
-    assert ids(found.starts) == ["b21", "b22"]
-
-
 def test_maps_are_made_for_the_runs_that_have_any(files, labels):
     pair = [str(files / "left.gii"), str(files / "right.gii")]
     runs = {
         "plain": {},
         "thick": {"thickness_mm": {"map": pair, "surface": pair}},
-        "soft": {"shear_modulus_core_pa": {"map": str(files / "map.nii.gz"), "weeks": {21: 1, 24: 2}}},
+        "soft": {"shear_modulus_core_pa": {"map": str(files / "map.nii.gz")}},
         "shapes": {"growth": "shapes"},
     }
     search = {"base": "soft", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
@@ -118,10 +110,6 @@ def test_maps_are_made_for_the_runs_that_have_any(files, labels):
     assert found.simulations["thick", "b21"].map_files == [*pair, *pair]
     # runs of the calibration have the maps of its base
     assert found.simulations["calibration-00", "b21"].maps == maps["soft"]
-    # in the parameters a map goes by the name of its parameter
-    parameters = found.simulations["soft", "b21"].parameters
-    assert parameters["shear_modulus_core_pa"] == {"map": "shear_modulus_core_pa", "weeks": {21.0: 1.0, 24.0: 2.0}}
-    assert not {"ranks", "start"} & set(parameters)
 
 
 def test_measured_sizes_are_waited_for_by_the_runs_that_follow_them(real):
@@ -465,8 +453,6 @@ def test_white_surfaces_of_labels_are_measured_where_they_are_asked_for(labels, 
         ("results/{where}/metrics.csv", "results/{where}/logs/r.log"),
         ("results/study/{table}.csv", "results/study/logs/r.{table}.log"),
         ("results/study/{study}/members/{run}/{brain}.csv", "results/study/{study}/logs/r.{run}.{brain}.log"),
-        ("results/study/calibration/round-{round}.csv", "results/study/calibration/logs/r.{round}.log"),
-        ("results/report/report.html", "results/report/logs/r.log"),
         ("results/export", "results/study/logs/r.log"),
     ],
 )
