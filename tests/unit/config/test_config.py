@@ -7,7 +7,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from configurations import LABELLED, labelled, problems, refusal, study, touched
+from configurations import labelled, problems, refusal, study, touched
 
 from gyriflow.config import load
 from gyriflow.config.atlas import Atlas
@@ -95,10 +95,6 @@ def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
     ]
 
 
-def test_what_stands_for_measured_brains_is_no_name_of_a_run():
-    assert problems(study(runs={"real": {}})) == ["runs.real: the name is taken; choose another"]
-
-
 def test_a_run_folds_the_brains_that_it_names():
     runs = {"one": {"start": "b"}, "some": {"start": ["b", "a"]}, "every": {"start": "all"}, "default": None}
     found = resolve(load(study(runs=runs)))
@@ -146,69 +142,6 @@ def test_negative_growth_only_where_it_is_allowed_by_name():
     folding = {"end_week": 24, "growth_rate_per_s": -1e-8}
     assert "allow_negative_growth" in problems(study(folding=folding))[0]
     assert load(study(folding=folding | {"allow_negative_growth": True})).folding.growth_rate_per_s == -1e-8
-
-
-@pytest.mark.fault(31)
-def test_a_brain_needs_exactly_one_source_of_its_own_id():
-    brains = [
-        {"id": "a", "week": 21, **LABELLED, "pial": __file__},
-        {"id": "a", "week": 22},
-        {"id": "study", "week": 23, **LABELLED},
-        {"id": "A", "week": 23, **LABELLED},
-    ]
-    both, none = problems(study(brains=brains))
-    assert both.startswith("brains[0]: found labels and pial as its source")
-    assert none.startswith("brains[1]: found none as its source")
-    del brains[0]["pial"]
-    assert problems(study(brains=[brains[0], *brains[2:], brains[0]])) == [
-        "brains: 2 brains have the id a; ids are unique",
-        "brains: the id study is reserved; choose another",
-        "brains: the ids a and A are the same folder on some disks; rename one",
-    ]
-
-
-def test_an_unknown_start_and_a_week_of_no_fetus_are_refused():
-    brains = [{"id": "c", "week": 50, "pial": __file__}]
-    assert problems(study(brains=brains)) == [
-        "brains[0].week: Input should be less than or equal to 45; found 50",
-    ]
-    assert problems(study(start="x")) == ["start: found 'x', which is no brain; known are a, b"]
-
-
-def test_files_are_found_beside_the_configuration_and_missing_ones_named(tmp_path):
-    touched(tmp_path, "left.gii", "labels.nii.gz")
-    brains = [
-        {"id": "a", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"},
-        {"id": "b", "week": 22, "hemispheres": {"left": "left.gii", "right": "right.gii"}},
-        {"id": "c", "week": 22, "labels": "labels.nii.gz"},
-    ]
-    assert problems(study(brains=brains), tmp_path) == [
-        f"brains[1].hemispheres.right: no such file: {tmp_path / 'right.gii'}",
-        "brains[2].scheme: is missing; it says what the labels mean",
-    ]
-    config = load(study(brains=brains[:1]), tmp_path)
-    assert config.brains[0].files == [str(tmp_path / "labels.nii.gz")]
-
-
-def test_white_surfaces_are_files_beside_the_pial_ones(tmp_path):
-    touched(tmp_path, "l.gii", "r.gii", "lw.gii", "rw.gii", "all.stl", "white.stl")
-    sides = {"left": "l.gii", "right": "r.gii", "white": {"left": "lw.gii", "right": "rw.gii"}}
-    brains = [
-        {"id": "a", "week": 21, "hemispheres": sides},
-        {"id": "b", "week": 22, "pial": "all.stl", "white": "white.stl"},
-        {"id": "c", "week": 22, "pial": "all.stl"},
-    ]
-    config = load(study(brains=brains), tmp_path)
-    assert config.brains[0].files == [str(tmp_path / "l.gii"), str(tmp_path / "r.gii")]
-    assert config.brains[0].white_files == {"left": str(tmp_path / "lw.gii"), "right": str(tmp_path / "rw.gii")}
-    assert config.brains[1].white_files == {"whole": str(tmp_path / "white.stl")}
-    assert config.brains[2].white_files == {}
-    sides["white"]["right"] = "lost.gii"
-    brains[2] = {"id": "c", "week": 22, **LABELLED, "white": "white.stl"}
-    assert problems(study(brains=brains), tmp_path) == [
-        f"brains[0].hemispheres.white.right: no such file: {tmp_path / 'lost.gii'}",
-        "brains[2].white: has no meaning with labels; only with pial or a hemisphere's surface",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -324,13 +257,6 @@ def test_the_schema_knows_types_bounds_and_words(wrong):
 @pytest.mark.parametrize("value", [{"weeks": {21: "on"}}, {"weeks": {21: True}}, True, "thick", {"map": "x.shape.gii"}])
 def test_what_cannot_vary_a_parameter_is_refused(value):
     assert problems(study(folding={"end_week": 24, "thickness_mm": value}))[0].startswith("folding.thickness_mm")
-
-
-def test_truth_values_are_no_times():
-    for wrong in (True, "forever"):
-        (line,) = problems(study(folding={"end_week": 24, "stress_memory_gw": wrong}))
-        assert line.startswith("folding.stress_memory_gw: should be ")
-        assert line.endswith(f"; found {wrong!r}")
 
 
 @pytest.mark.fault(28)

@@ -1,7 +1,7 @@
 """A cohort's table becomes brains; rows that can't be used are problems, or left out with their cause."""
 
 import pytest
-from configurations import LABELLED, refusal, series_for, series_of, study
+from configurations import LABELLED, series_for, series_of
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
@@ -172,21 +172,6 @@ def test_more_files_than_are_used_are_refused(folder, files, side, said):
         config(folder)
 
 
-def test_a_hemisphere_is_a_surface_or_labels_with_a_scheme(folder):
-    def problems(**keys):
-        return refusal(study([{"id": "a", "week": 24} | keys], folding=FOLDING), folder / "bids")
-
-    labels = {"file": "a.nii.gz", "side": "left"}
-    assert "brains[0].scheme: is missing" in problems(hemisphere=labels)
-    assert "scheme: has no meaning with a hemisphere's surface" in problems(
-        hemisphere=labels | {"file": "lh.surf.gii"}, scheme="feta-7"
-    )
-    assert "hemisphere.side" in problems(hemisphere=labels | {"side": "middle"}, scheme="feta-7")
-    assert "coordinates: has no meaning with labels of a hemisphere" in problems(
-        hemisphere=labels, scheme="feta-7", coordinates="ras"
-    )
-
-
 def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(folder):
     brains = [
         {"id": f"{side}{week}", "week": week, "hemisphere": {"file": "lh.surf.gii", "side": side}}
@@ -201,10 +186,3 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
         "volume": ["p24", "p25"],
     }
     assert series_for(found, "left24") == "left hemisphere, surface"
-
-
-def test_regions_need_both_hemispheres(folder):
-    brains = [{"id": "a", "week": 24, "hemisphere": {"file": "lh.surf.gii", "side": "left"}}]
-    regions = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
-    with pytest.raises(InputError, match=r"metrics\.regions: found a, of one hemisphere; regions need both"):
-        load({"brains": brains, "start": "a", "folding": FOLDING, "metrics": {"regions": regions}}, folder / "bids")

@@ -29,33 +29,6 @@ def test_brains_get_the_regions_of_the_nearest_week(volume):
     assert [found.giver_of_regions(brain).id for brain in ("p21", "p22", "p25")] == ["p21", "p21", "p25"]
 
 
-@pytest.mark.parametrize(
-    ("given", "match"),
-    [
-        ({}, "found neither; expected volume, or left and right"),
-        ({"volume": "{volume}"}, "names"),
-        ({"left": {"labels": "{volume}", "surface": "{volume}"}}, "right: is missing"),
-        ({"volume": "nowhere.nii.gz", **NAMES}, "no such file"),
-    ],
-)
-def test_wrong_regions_are_refused(volume, given, match):
-    filled = {
-        key: value.replace("{volume}", volume) if isinstance(value, str)
-        else {k: v.replace("{volume}", volume) for k, v in value.items()} if key in ("left", "right")
-        else value
-        for key, value in given.items()
-    }  # fmt: skip
-    with pytest.raises(InputError, match=match):
-        load(study(regions={"p21": filled}))
-
-
-def test_unknown_brains_are_refused(volume):
-    with pytest.raises(InputError, match=r"metrics.regions: found .q., which is no brain; known are p21, p22, p25"):
-        load(study(regions={"q": {"volume": volume, **NAMES}}))
-    with pytest.raises(InputError, match=r"metrics.norm_reference: found .x."):
-        load(study(norm_reference=["x"]))
-
-
 def test_scans_of_a_subject_by_week():
     brains = [{"id": "b", "week": 24, "subject": "one", **LABELLED}, *BRAINS]
     brains += [{"id": "a", "week": 22.5, "subject": "one", **LABELLED}]
@@ -87,9 +60,3 @@ def test_the_norm_is_of_brains_with_the_hemispheres_of_the_start(volume):
     for start, norm in (("w21", ["w21", "w22"]), ("left", ["left"])):
         assert resolve(load(study(brains) | {"start": start})).norm_reference == norm
     assert resolve(load(study(brains, norm_reference=["w22", "left"]) | {"start": "w21"})).norm_reference == ["w22"]
-
-
-def test_named_sulci_stand_in_for_regions_only_where_none_are_given(volume):
-    assert load(study(named_sulci=True)).metrics.named_sulci
-    with pytest.raises(InputError, match=r"metrics.named_sulci: found true beside regions"):
-        load(study(named_sulci=True, regions={"p21": {"volume": volume, **NAMES}}))
