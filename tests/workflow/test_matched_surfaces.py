@@ -11,7 +11,7 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_json
-from gyriflow.io.registrations import read_carried_mesh
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_pose, write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.parameters.terms import SIDES
@@ -90,7 +90,7 @@ def test_the_mesh_goes_where_the_surface_goes(workflow, hemispheres, kind):
     assert outcome.returncode == 0, outcome.stderr[-3000:]
     results = workflow.directory / "results"
     mesh = read_tetrahedral_mesh(results / "brains/b21/mesh/brain.xdmf")
-    carried = read_carried_mesh(results / "brains/b21/mesh/carried.h5")
+    carried = read_weekly_shapes(results / "brains/b21/mesh/carried.h5")
     assert carried.weeks.tolist() == list(WEEKS)
     places = in_week_21(results, mesh.vertices)
     # where the surface goes, whatever the pose of the files

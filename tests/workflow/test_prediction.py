@@ -12,7 +12,7 @@ from gyriflow.geometry.alignment import angle_deg, rigid_fit
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
-from gyriflow.io.registrations import read_targets
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.similarity import aligned_distance
@@ -115,7 +115,7 @@ def test_a_surface_in_another_pose_is_carried_through_the_labels_of_an_atlas(wor
     )
     assert outcome.returncode == 0, outcome.stdout[-1000:] + outcome.stderr[-3000:]
     boundary, used = boundary_surface(read_tetrahedral_mesh(folder / "b21/mesh/brain.xdmf"))
-    targets = read_targets(folder / "b21/mesh/targets.atlas.h5")
+    targets = read_weekly_shapes(folder / "b21/mesh/targets.atlas.h5")
     real = read_surface(folder / "a23/surface/pial.surf.gii")
     ends = targets.surfaces["atlas"][2], targets.positions[2][used]
     atlas, target = (TriangleMesh(places, boundary.faces) for places in ends)

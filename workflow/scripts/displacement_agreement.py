@@ -6,12 +6,12 @@ from gyriflow.compare.validation import displacement_table
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.files import write_table
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
-from gyriflow.io.registrations import read_carried_mesh
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.step import step
 
 files, labels = snakemake.input, snakemake.params.labels
 with step(snakemake.log[0]):
-    carried, weeks = read_carried_mesh(files.carried), read_weeks(files.frames)
+    carried, weeks = read_weekly_shapes(files.carried), read_weeks(files.frames)
     both = [week for week in weeks if np.isclose(carried.weeks, week).any()]
     start = read_positions(files.frames, weeks[0])
     surface, pial = boundary_surface(TetrahedralMesh(start, read_tets(files.frames)))

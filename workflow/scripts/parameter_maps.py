@@ -2,7 +2,7 @@
 
 from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface
 from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
-from gyriflow.io.registrations import read_targets
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_pose
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.mesh import maps as on_mesh
@@ -14,7 +14,7 @@ files, maps, given = snakemake.input, {}, snakemake.params
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
     facets, pose = boundary_faces(mesh)[0], read_pose(files.surface)
-    targets = read_targets(files.targets) if files.targets else None
+    targets = read_weekly_shapes(files.targets) if files.targets else None
     for name, source in given.maps.items():
         path = ", ".join(source["map"])
         if source["surface"]:

@@ -2,7 +2,7 @@
 
 from gyriflow.growth.following import THICKNESS, followed_sizes
 from gyriflow.io.files import read_json, read_table
-from gyriflow.io.registrations import read_targets
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.parameters.folding import target_map
 from gyriflow.step import step
@@ -11,7 +11,7 @@ files, weeks, settings = snakemake.input, snakemake.params.weeks, dict(snakemake
 growth = dict(settings["growth"])
 with step(snakemake.log[0]):
     if files.targets:
-        targets = read_targets(files.targets)
+        targets = read_weekly_shapes(files.targets)
         at = targets.weeks.tolist()
         growth |= {name: dict(zip(at, sizes.tolist(), strict=True)) for name, sizes in targets.sizes.items()}
         settings["targets"] = {week: target_map(week) for week in at[1:]}

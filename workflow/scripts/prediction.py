@@ -9,7 +9,7 @@ from gyriflow.compare.shapes import Shape, ready
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume
 from gyriflow.io.files import write_table
-from gyriflow.io.registrations import read_targets
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.curvature import curvature
@@ -18,7 +18,7 @@ from gyriflow.units import week_tag
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 with step(snakemake.log[0]):
-    targets, rows = read_targets(files.targets), []
+    targets, rows = read_weekly_shapes(files.targets), []
     start, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
     brains_of_atlas = dict(zip(map(week_tag, params.atlas_weeks), files.atlas, strict=True))
     for number, tag in enumerate(params.weeks):

@@ -6,7 +6,7 @@ import numpy as np
 
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.expected import carry_sharply, predict_shapes, sizes_of
-from gyriflow.io.registrations import Targets, read_correspondence, write_targets
+from gyriflow.io.registrations import WeeklyShapes, read_correspondence, write_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.step import step
@@ -29,5 +29,5 @@ with step(snakemake.log[0]):
     else:
         known = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
         weeks, positions, others = predict_shapes(mesh, *known)
-    targets = Targets(np.array(weeks), positions, sizes_of(mesh, positions), others)
-    write_targets(snakemake.output[0], targets)
+    targets = WeeklyShapes(np.array(weeks), positions, sizes_of(mesh, positions), others)
+    write_weekly_shapes(snakemake.output[0], targets)

@@ -10,7 +10,7 @@ from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.curves import value
 from gyriflow.growth.following import curves_of_run
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.registrations import read_carried_mesh
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
@@ -23,7 +23,7 @@ with step(snakemake.log[0]):
     rows, curves = [], []
     if files.get("carried"):
         surface, pial = boundary_surface(read_tetrahedral_mesh(files.mesh))
-        pose, carried = read_pose(files.report), read_carried_mesh(files.carried)
+        pose, carried = read_pose(files.report), read_weekly_shapes(files.carried)
         at = [carried.positions[np.isclose(carried.weeks, week).argmax()][pial] for week in params.weeks]
         surfaces = [TriangleMesh(transform_points(places, pose.world), surface.faces) for places in at]
     else:

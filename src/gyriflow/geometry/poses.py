@@ -44,20 +44,12 @@ class Pose:
         return self.files.get(side, self.files.get("whole", self.world))
 
     def of_volume(self, path: str) -> Floats:
-        """Return the (4, 4) motion from the brain's volumes to its surface.
-
-        InputError, with the path of the volume, where the hemispheres were posed separately: it cannot follow two
-        motions.
-        """
+        """Return the (4, 4) motion from the brain's volumes to its surface; InputError where the sides have two."""
         if self.together:
             return self.world
-        raise InputError(
-            "a volume cannot belong to a brain whose hemispheres were posed separately",
-            path=path,
-            found="one motion for the left and another for the right hemisphere (pose in surface.json)",
-            expected="hemispheres that lie in the coordinates of one brain",
-            remedy="Give the values per vertex (GIFTI), on surfaces of the brain, or hemispheres posed as one brain.",
-        )
+        problem = "a volume cannot belong to a brain whose hemispheres were posed separately"
+        remedy = "Give the values per vertex (GIFTI), on surfaces of the brain, or hemispheres posed as one brain."
+        raise InputError(problem, path=path, remedy=remedy)
 
     def then(self, matrix: Floats) -> "Pose":
         """Return the pose with a (4, 4) motion after it."""
@@ -70,28 +62,18 @@ class Pose:
 
     def plain(self) -> dict[str, Any]:
         """Return the pose in plain values for JSON."""
-        return {
-            "by": self.by,
-            "together": self.together,
-            "world": self.world.tolist(),
-            "files": {name: one.tolist() for name, one in self.files.items()},
-            "evidence": dict(self.evidence),
-            "warnings": list(self.warnings),
-        }
+        files = {name: one.tolist() for name, one in self.files.items()}
+        plain = {"by": self.by, "together": self.together, "world": self.world.tolist(), "files": files}
+        return plain | {"evidence": dict(self.evidence), "warnings": list(self.warnings)}
 
 
 def pose_from(plain: Mapping[str, Any]) -> Pose:
     """Return the pose that plain values hold; InputError where they are a refusal, for its reason."""
     if "refused" in plain:
         raise InputError(plain["refused"])
-    return Pose(
-        np.array(plain["world"]),
-        {name: np.array(one) for name, one in plain["files"].items()},
-        plain["by"],
-        plain["together"],
-        plain["evidence"],
-        tuple(plain["warnings"]),
-    )
+    files = {name: np.array(one) for name, one in plain["files"].items()}
+    judged = plain["by"], plain["together"], plain["evidence"], tuple(plain["warnings"])
+    return Pose(np.array(plain["world"]), files, *judged)
 
 
 def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) -> Pose:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import h5py
@@ -52,30 +52,8 @@ def read_correspondence(path: AnyPath) -> Correspondence:
 
 
 @dataclass(frozen=True, eq=False)
-class CarriedMesh:
-    """The (w, n, 3) positions in mm of a mesh's vertices at (w,) ascending gestational weeks."""
-
-    weeks: Floats
-    positions: Floats
-
-
-def write_carried_mesh(path: AnyPath, carried: CarriedMesh) -> None:
-    """Write the data sets weeks and positions."""
-    with new_hdf5(path) as file:
-        file["weeks"] = np.asarray(carried.weeks, dtype=np.float64)
-        file.create_dataset("positions", data=carried.positions.astype(np.float32), compression="gzip", shuffle=True)
-
-
-def read_carried_mesh(path: AnyPath) -> CarriedMesh:
-    """Return what `write_carried_mesh` has written; InputError where the file is none of it."""
-    expected = "an HDF5 file with weeks and positions"
-    with reading_hdf5(path, "a carried mesh", expected, "Carry the mesh again.") as file:
-        return CarriedMesh(file["weeks"][:], file["positions"][:].astype(np.float64))
-
-
-@dataclass(frozen=True, eq=False)
-class Targets:
-    """The shapes that a mesh is to have at (w,) ascending gestational weeks, its own first.
+class WeeklyShapes:
+    """The shapes that a mesh has, or is to have, at (w,) ascending gestational weeks, its own first.
 
     `positions` (w, n, 3) of its vertices are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of its
     boundary; `surfaces` by name w arrays (m, 3) of where simpler predictions put the boundary's vertices, in mm.
@@ -83,25 +61,25 @@ class Targets:
 
     weeks: Floats
     positions: Floats
-    sizes: Mapping[str, Floats]
-    surfaces: Mapping[str, Sequence[Floats]]
+    sizes: Mapping[str, Floats] = field(default_factory=dict)
+    surfaces: Mapping[str, Sequence[Floats]] = field(default_factory=dict)
 
 
-def write_targets(path: AnyPath, targets: Targets) -> None:
+def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
     """Write the data sets weeks, positions, sizes/{area_cm2, volume_ml} and surfaces/{name}."""
     with new_hdf5(path) as file:
-        file["weeks"] = np.asarray(targets.weeks, dtype=np.float64)
-        places = {"positions": targets.positions} | {f"surfaces/{name}": at for name, at in targets.surfaces.items()}
+        file["weeks"] = np.asarray(shapes.weeks, dtype=np.float64)
+        places = {"positions": shapes.positions} | {f"surfaces/{name}": at for name, at in shapes.surfaces.items()}
         for name, values in places.items():
             file.create_dataset(name, data=np.asarray(values, dtype=np.float32), compression="gzip", shuffle=True)
-        for name, values in targets.sizes.items():
+        for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
 
 
-def read_targets(path: AnyPath) -> Targets:
-    """Return what `write_targets` has written; InputError where the file is none of it."""
-    expected = "an HDF5 file with weeks, positions and sizes"
-    with reading_hdf5(path, "shapes to grow towards", expected, "Make them again.") as file:
-        sizes = {name: values[:] for name, values in file["sizes"].items()}
+def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
+    """Read what `write_weekly_shapes` has written; InputError where the file is none of it."""
+    expected = "an HDF5 file with weeks and positions"
+    with reading_hdf5(path, "shapes of a mesh by week", expected, "Make them again.") as file:
+        sizes = {name: values[:] for name, values in file.get("sizes", {}).items()}
         surfaces = {name: list(at[:].astype(np.float64)) for name, at in file.get("surfaces", {}).items()}
-        return Targets(file["weeks"][:], file["positions"][:].astype(np.float64), sizes, surfaces)
+        return WeeklyShapes(file["weeks"][:], file["positions"][:].astype(np.float64), sizes, surfaces)

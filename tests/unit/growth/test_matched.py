@@ -9,11 +9,11 @@ from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
 from gyriflow.growth.carrying import carry_mesh, carry_regions, carry_surface
 from gyriflow.growth.matched_surfaces import follow_surfaces, match_surfaces, outward
 from gyriflow.io.registrations import (
-    CarriedMesh,
-    read_carried_mesh,
+    WeeklyShapes,
     read_correspondence,
-    write_carried_mesh,
+    read_weekly_shapes,
     write_matched_surfaces,
+    write_weekly_shapes,
 )
 
 ATLAS = sphere()
@@ -100,11 +100,11 @@ def test_matched_surfaces_are_read_as_written(tmp_path):
 
 def test_carried_meshes_are_read_as_written(tmp_path):
     solid = ellipsoid_mesh(4, (10.0, 10.0, 10.0))
-    carried = CarriedMesh(np.array([21.0, 22.5]), np.stack([solid.vertices, 1.1 * solid.vertices]))
-    write_carried_mesh(tmp_path / "carried.h5", carried)
-    read = read_carried_mesh(tmp_path / "carried.h5")
+    carried = WeeklyShapes(np.array([21.0, 22.5]), np.stack([solid.vertices, 1.1 * solid.vertices]))
+    write_weekly_shapes(tmp_path / "carried.h5", carried)
+    read = read_weekly_shapes(tmp_path / "carried.h5")
     assert read.weeks.tolist() == [21.0, 22.5]
     assert read.positions == pytest.approx(carried.positions, abs=1e-5)
     (tmp_path / "torn.h5").write_bytes(b"torn")
-    with pytest.raises(InputError, match=r"torn\.h5: cannot be read as a carried mesh"):
-        read_carried_mesh(tmp_path / "torn.h5")
+    with pytest.raises(InputError, match=r"torn\.h5: cannot be read as shapes of a mesh"):
+        read_weekly_shapes(tmp_path / "torn.h5")
