@@ -21,6 +21,10 @@ from .stress import packed, unpacked
 
 MOST_STRAIN = 0.3
 """Largest logarithmic growth in any direction in a step: more belongs to elements that the target folds over."""
+SMALL = 0.12
+"""Largest entry of FᵀF − 1 for which the logarithm is taken by its series."""
+SMOOTHED_TO = 1e-5
+"""Relative tolerance of smoothing; the next step makes up for what is left."""
 SOON_GW = 1e-6
 """Time before which a target is taken to be reached."""
 
@@ -106,13 +110,29 @@ def log_growth(positions: Floats, pieces: np.ndarray, displacement: Floats, smoo
     after = positions + displacement
     edges = [np.swapaxes(at[pieces[:, 1:]] - at[pieces[:, :1]], 1, 2) for at in (positions, after)]
     F = edges[1] @ np.linalg.inv(edges[0])
-    squares, axes = np.linalg.eigh(np.swapaxes(F, 1, 2) @ F)
-    logs = np.clip(0.5 * np.log(np.maximum(squares, 1e-12)), -MOST_STRAIN, MOST_STRAIN)
-    parts = packed((axes * logs[:, None, :]) @ np.swapaxes(axes, 1, 2)) * (cell_sizes(positions, pieces) / 4)[:, None]
+    parts = packed(log_stretch(F)) * (cell_sizes(positions, pieces) / 4)[:, None]
     sums = [np.bincount(pieces.ravel(), np.repeat(part, 4), minlength=len(positions)) for part in parts.T]
     sizes = vertex_sizes(positions, pieces)
     mean = np.stack(sums, axis=1) / np.where(sizes > 0, sizes, 1.0)[:, None]
-    return diffuse(positions, pieces, mean, smoothing_mm, steps=1)
+    return diffuse(positions, pieces, mean, smoothing_mm, steps=1, tolerance=SMOOTHED_TO)
+
+
+def log_stretch(F: Floats) -> Floats:
+    """Returns the (m, 3, 3) logarithms ln U of the right stretch of (m, 3, 3) gradients, none above `MOST_STRAIN`.
+
+    Where all of FᵀF − 1 is below `SMALL`, six terms of the series of ln(1 + x) give it to 3e-8.
+    """
+    squares = np.swapaxes(F, 1, 2) @ F
+    x = squares - np.eye(3)
+    series = np.eye(3) / 6
+    for order in range(5, 0, -1):
+        series = np.eye(3) / order - x @ series
+    logs = 0.5 * (x @ series)
+    large = np.abs(x).max(axis=(1, 2)) > SMALL
+    values, axes = np.linalg.eigh(squares[large])
+    stretches = np.clip(0.5 * np.log(np.maximum(values, 1e-12)), -MOST_STRAIN, MOST_STRAIN)
+    logs[large] = (axes * stretches[:, None, :]) @ np.swapaxes(axes, 1, 2)
+    return np.asarray(logs)
 
 
 def inverse_exponential(logs: Floats) -> Floats:
