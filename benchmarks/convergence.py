@@ -1,49 +1,43 @@
-"""How much folding depends on the mesh and on the time step: one smooth start, several resolutions, both orders.
+"""How much folding depends on the mesh: one smooth start, several resolutions, both orders of elements.
 
     ./run python benchmarks/convergence.py --folder FOLDER
 
-A smooth hemisphere of 21 GW whose cortex and core grow, free, in contact with itself, is folded on
-meshes with so many node distances at the surface to the cortical thickness, linear and quadratic elements alike, so
-that both orders have about the same unknowns. The shape is the left half of the shipped atlas' brain of 21 GW, from
-labels smoothed more than a study would, with shallow bumps of 8 to 24 mm, far higher than facets and mesh noise: every
-mesh starts from the same imperfection. Every run carries the same surface along, which is measured; runs are compared
-at the same material points, and with the finest quadratic one. A second mesh of the same resolution, made of the
-surface turned, shows what chance does.
+A smooth hemisphere of 21 GW whose cortex and core grow, free, in contact with itself, is folded on meshes with so many
+node distances at the surface to the cortical thickness, linear and quadratic elements alike, so that both orders have
+about the same unknowns. The shape is the left half of the shipped atlas' brain of 21 GW, from labels smoothed more than
+a study would, with shallow bumps of 8 to 24 mm, far higher than facets and mesh noise: every mesh starts from the same
+imperfection. Every run carries the same surface along, which is measured; runs are compared with the finest one at the
+same material points. A second mesh of the same resolution, made of the surface turned, shows what chance does.
 
-Runs are done one at a time on one rank, coarse ones first, while the processor time that they are expected to take is
-left of the budget. What is in FOLDER already is not done again. Each run prints a JSON line; the last line is one JSON
-object with all of them. FOLDER holds `runs.csv`, `weeks.csv` (metrics), `differences.csv` (pairs of runs) and
-`time_steps.csv`.
+Runs are done one at a time on one rank; what in FOLDER is done already is not done again. Each run prints a JSON line;
+the last line is one JSON object with `runs` and the differences from the finest (`against_finest`) at the end.
 
-    ./run python benchmarks/convergence.py --folder FOLDER --parts solver --run MESH PARAMS [MAPS]
+    ./run python benchmarks/convergence.py --folder FOLDER --run MESH PARAMS [MAPS]
 
-varies the tolerance of Newton's method and the time step of a study's run instead: `tolerances.csv` and `run_steps.csv`
-give the error of positions at its end.
+varies the tolerance of Newton's method and the time step of a study's run instead: `tolerances` and `run_steps` give
+the error of positions at its end against the least of each.
 """
 
 import argparse
 import json
-import pickle
 import subprocess
 import sys
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.compare.placement import correlation
 from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
-from gyriflow.geometry.matching import match_points, nearest_on, values_at
+from gyriflow.geometry.matching import match_points, nearest_on, surface_distance, values_at
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, finer_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
-from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_positions, read_tets
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
@@ -95,14 +89,11 @@ COMPARED = (
     *(f"spangy_B{band}_relative_power" for band in range(1, 6)),
 )
 DAY_S = 86400.0
-STEPS_DAYS = (2.0, 1.0, 0.5)
-FINEST_STEP_DAYS = 0.0625
-STEPS_UNTIL_GW, STEPS_NODES = 23.0, 1.41
 
 
 @cache
 def start_surface() -> TriangleMesh:
-    """Returns the smooth hemisphere, closed and outward, in RAS+ mm."""
+    """Return the smooth hemisphere, closed and outward, in RAS+ mm."""
     volume, scheme = read_label_volume(ROOT / LABELS), SCHEMES["spina-bifida-atlas"]
     places = np.stack(np.indices(volume.labels.shape), axis=-1) @ volume.affine[:3, :3].T + volume.affine[:3, 3]
     x = places[..., 0]
@@ -124,7 +115,7 @@ def start_surface() -> TriangleMesh:
 
 
 def bumps(points: Floats) -> Floats:
-    """Returns the (n,) height in mm of the bumps: waves in directions spread evenly (a Fibonacci sphere)."""
+    """Return the (n,) height in mm of the bumps: waves in directions spread evenly (a Fibonacci sphere)."""
     number = np.arange(BUMPS) + 0.5
     polar, azimuth = np.arccos(1 - 2 * number / BUMPS), np.pi * (1 + np.sqrt(5)) * number
     directions = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)], axis=1)
@@ -133,7 +124,7 @@ def bumps(points: Floats) -> Floats:
 
 
 def mesh_of(surface: TriangleMesh, order: int, spacing_mm: float, turned: bool = False) -> TetrahedralMesh:
-    """Returns a mesh of elements of an order with nodes `spacing_mm` apart at the surface."""
+    """Return a mesh of elements of an order with nodes `spacing_mm` apart at the surface."""
     motion = np.eye(4)
     motion[:3, :3] = ROTATION if turned else np.eye(3)
     mesh = tetrahedralise(
@@ -169,12 +160,12 @@ class Carried:
 
 @cache
 def measured_surface() -> TriangleMesh:
-    """Returns the start surface with the edges at which a study measures."""
+    """Return the start surface with the edges at which a study measures."""
     return remesh(start_surface(), MEASURED_EDGE_MM)
 
 
 def carried(frames: Path, week: float, modes: str = "B5") -> Carried:
-    """Returns the measured surface as a run has moved it by a week, with its metrics."""
+    """Return the measured surface as a run has moved it by a week, with its metrics."""
     start = TetrahedralMesh(read_positions(frames, START_WEEK), read_tets(frames))
     own, nodes = boundary_surface(start)
     now = read_positions(frames, week)[nodes]
@@ -186,7 +177,7 @@ def carried(frames: Path, week: float, modes: str = "B5") -> Carried:
     match = match_points(measured.vertices, vertex_normals(measured), TriangleMesh(before, faces))
     surface = TriangleMesh(measured.vertices + values_at(match, after - before), measured.faces)
     side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, modes)
-    rows = size_rows(surface, side.crossing) + folding_rows([side]) + spectrum_rows(side, "shape_index")
+    rows = size_rows(surface, side.crossing) + folding_rows([side]) + spectrum_rows(side)
     values = {name: value for name, value, _ in rows}
     values |= {f"own_{name}": value for name, value, _ in size_rows(TriangleMesh(after, faces), 0)[:2]}
     return Carried(surface, side.bend.mean, values)
@@ -207,16 +198,10 @@ class Case:
 
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, required=True, help="for meshes, runs and tables; runs there are kept")
-    parser.add_argument(
-        "--parts", nargs="+", choices=("resolution", "steps", "solver"), default=["resolution", "steps"]
-    )
-    parser.add_argument(
-        "--run", type=Path, nargs="+", help="mesh and params.yaml of a run, with maps.h5 if it has some"
-    )
+    parser.add_argument("--folder", type=Path, required=True, help="for meshes and runs, which are kept")
+    parser.add_argument("--run", type=Path, nargs="+", help="mesh and params.yaml of a run, with its maps.h5")
     parser.add_argument("--run-steps-days", type=float, nargs="*", default=[0.25, 0.5, 1.0, 1.75])
     parser.add_argument("--run-tolerances", type=float, nargs="*", default=[1e-6, 1e-5, 1e-4, 1e-3])
-    parser.add_argument("--budget-min", type=float, default=50.0, help="processor minutes of solving")
     parser.add_argument("--thickness-mm", type=float, default=2.0)
     parser.add_argument("--nodes", type=float, nargs="+", default=list(NODES_TO_CORTEX), help="to the thickness")
     parser.add_argument("--orders", type=int, nargs="+", choices=(1, 2), default=[1, 2])
@@ -225,18 +210,17 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def write_mesh(folder: Path, case: Case, thickness_mm: float) -> tuple[Path, int]:
-    """Returns the file of a case's mesh, made where it is not there, and the number of its nodes."""
+def mesh_file(folder: Path, case: Case, thickness_mm: float) -> Path:
+    """Return the file of a case's mesh, made where it is not there."""
     file = folder / f"{case.name}.xdmf"
     if not file.exists():
-        mesh = mesh_of(start_surface(), case.order, thickness_mm / case.nodes, case.turned)
         folder.mkdir(parents=True, exist_ok=True)
-        write_tetrahedral_mesh(file, mesh)
-    return file, len(read_tetrahedral_mesh(file).vertices)
+        write_tetrahedral_mesh(file, mesh_of(start_surface(), case.order, thickness_mm / case.nodes, case.turned))
+    return file
 
 
 def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict[str, Any]:
-    """Returns the summary of a run on one rank, done where it has not been; an interrupted one goes on."""
+    """Return the summary of a run on one rank, done where it has not been; an interrupted one goes on."""
     if not (out / "summary.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         write_yaml(out / "params.yaml", parameters)
@@ -245,70 +229,42 @@ def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict
         with (out / "log").open("w") as log:
             done = subprocess.run([*program, "--out", str(out)], stdout=log, stderr=log, check=False)
         if done.returncode != 0:
-            return {"failed": (out / "log").read_text().strip().splitlines()[-1]}
-    steps = read_table(out / "steps.csv")
-    through = steps["elements_through_cortex"]
-    return read_json(out / "summary.json") | {
-        "elements_through_at_start": float(through.iloc[0]),
-        "elements_through_at_end": float(through.iloc[-1]),
-        "pairs_at_end": float(steps["contact_pairs"].iloc[-1]) if "contact_pairs" in steps else 0.0,
-    }
+            raise SystemExit(f"{out} failed: see its log")
+    return read_json(out / "summary.json")
 
 
-def parameters_of(arguments: argparse.Namespace, **own: Any) -> dict[str, Any]:
-    end = own.get("end_week", arguments.end_week)
-    return PARAMETERS | {
+def resolution_runs(arguments: argparse.Namespace) -> dict[Case, dict[str, Any]]:
+    """Fold all cases, coarse ones first; what their runs took."""
+    pairs = [(nodes, order) for nodes in sorted(arguments.nodes) for order in sorted(arguments.orders)]
+    cases = [Case(order, nodes) for nodes, order in pairs]
+    if (REPEATED, 2) in pairs:
+        cases.append(Case(2, REPEATED, turned=True))
+    parameters = PARAMETERS | {
         "thickness_mm": arguments.thickness_mm,
         "step_s": arguments.step_days * DAY_S,
-        "contact": {"kind": "global", "gap_mm": 0.02},
-        "end_week": end,
-        "output_weeks": [float(week) for week in np.append(np.arange(START_WEEK, end - 1e-6), end)],
-        **own,
+        "contact": {"kind": "global"},
+        "end_week": arguments.end_week,
+        "output_weeks": [START_WEEK, arguments.end_week],
     }
-
-
-def resolution_runs(arguments: argparse.Namespace) -> list[tuple[Case, dict[str, Any]]]:
-    """Returns the cases with what their runs took, coarse ones first, as far as the budget goes."""
-    cases = [
-        Case(order, nodes) for nodes in sorted(arguments.nodes) for order in sorted(arguments.orders, reverse=True)
-    ]
-    if 2 in arguments.orders and REPEATED in arguments.nodes:
-        cases.insert(cases.index(Case(2, REPEATED)) + 1, Case(2, REPEATED, turned=True))
-    done, left_s, seconds_per_node = [], 60 * arguments.budget_min, dict.fromkeys(ORDERS, 0.0)
+    rows = {}
     for case in cases:
-        mesh, nodes = write_mesh(arguments.folder / "meshes", case, arguments.thickness_mm)
-        out = arguments.folder / "runs" / case.name
-        expected = seconds_per_node[case.order] * nodes
-        if expected > left_s and not (out / "summary.json").exists():
-            print(json.dumps({"run": case.name, "skipped_since_s": expected, "left_s": left_s}), flush=True)
-            continue
-        found = fold(mesh, out, parameters_of(arguments))
-        took = found.get("cpu_seconds", 0.0)
-        left_s, seconds_per_node[case.order] = left_s - took, took / nodes
-        row = {"run": case.name, "order": case.order, "nodes_to_cortex": case.nodes, "turned": case.turned, **found}
-        row |= {"nodes": nodes, "elements_to_cortex": case.nodes / case.order}
-        print(json.dumps({name: value for name, value in row.items() if name != "weeks"}), flush=True)
-        done.append((case, row))
-    return done
-
-
-def measured(arguments: argparse.Namespace, case: Case, week: float) -> Carried:
-    """Returns the measured surface of a run; kept in its folder, since measuring takes seconds."""
-    file = arguments.folder / "runs" / case.name / f"measured-{week:g}.pickle"
-    if not file.exists():
-        file.write_bytes(pickle.dumps(carried(file.parent / "frames.h5", week)))
-    return pickle.loads(file.read_bytes())
+        mesh = mesh_file(arguments.folder / "meshes", case, arguments.thickness_mm)
+        summary = fold(mesh, arguments.folder / "runs" / case.name, parameters)
+        size = {"nodes": len(read_tetrahedral_mesh(mesh).vertices), "elements_to_cortex": case.nodes / case.order}
+        rows[case] = {"run": case.name, **size, **{key: summary[key] for key in summary if key != "weeks"}}
+        print(json.dumps(rows[case]), flush=True)
+    return rows
 
 
 def difference(one: Carried, other: Carried, start: Carried) -> dict[str, float]:
-    """Returns how two runs differ at a week: places in mm at the same material points, surfaces, curvature, metrics."""
+    """Return how two runs differ at a week: places in mm at the same material points, surfaces, curvature, metrics."""
     areas = vertex_areas(other.surface)
     apart = without_rigid_motion(other.surface.vertices, one.surface.vertices, areas)
     moved = without_rigid_motion(start.surface.vertices, other.surface.vertices, areas)
     laid = transformed(one.surface, rigid_fit(one.surface.vertices, other.surface.vertices, areas))
     pairs = ((laid, other.surface), (other.surface, laid))
-    ways = np.concatenate([nearest_on(surface.vertices, there)[0] for surface, there in pairs])
-    both = np.concatenate([vertex_areas(laid), areas])
+    ways = [(nearest_on(surface.vertices, far)[0], vertex_areas(surface)) for surface, far in pairs]
+    distance, distance95 = surface_distance(ways)
 
     def rms(vectors: np.ndarray) -> float:
         return float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=areas)))
@@ -316,43 +272,21 @@ def difference(one: Carried, other: Carried, start: Carried) -> dict[str, float]
     return {
         "displacement_rms_mm": rms(apart),
         "displacement_share": rms(apart) / rms(moved),
-        "surface_distance_mm": float(np.average(ways, weights=both)),
-        "surface_distance_95_mm": float(np.quantile(ways, 0.95, weights=both, method="inverted_cdf")),
+        "surface_distance_mm": distance,
+        "surface_distance_95_mm": distance95,
         "r_mean_curvature": correlation(one.mean_curvature, other.mean_curvature, areas),
         **{name: one.values[name] - other.values[name] for name in COMPARED},
     }
 
 
-def compare(arguments: argparse.Namespace, cases: list[Case]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Returns the metrics of all runs by week, and the differences of all pairs of runs by week."""
-    weeks = [week for week in parameters_of(arguments)["output_weeks"] if week > START_WEEK]
-    rows, pairs = [], []
-    start = measured(arguments, cases[0], START_WEEK)
-    for week in weeks:
-        found = {case: measured(arguments, case, week) for case in cases}
-        rows += [{"run": case.name, "week": week, **one.values} for case, one in found.items()]
-        for a, b in combinations(cases, 2):
-            pairs.append({"run": a.name, "other": b.name, "week": week} | difference(found[a], found[b], start))
-    return pd.DataFrame(rows), pd.DataFrame(pairs)
-
-
-def time_steps(arguments: argparse.Namespace) -> pd.DataFrame:
-    """Returns the error of each length of the step against the shortest, on one coarse mesh."""
-    mesh, _ = write_mesh(arguments.folder / "meshes", Case(2, STEPS_NODES), arguments.thickness_mm)
-    own = {"contact": {"kind": "none"}, "end_week": STEPS_UNTIL_GW}
-    runs = {days: parameters_of(arguments, step_s=days * DAY_S, **own) for days in (FINEST_STEP_DAYS, *STEPS_DAYS)}
-    return errors("step_days", runs, arguments.folder / "steps", mesh)
-
-
-def errors(varied: str, runs: dict[float, dict[str, Any]], folder: Path, mesh: Path, *maps: Path) -> pd.DataFrame:
-    """Returns the error of positions at the end of each run against the first, and what it took."""
+def errors(
+    varied: str, runs: dict[float, dict[str, Any]], folder: Path, mesh: Path, *maps: Path
+) -> list[dict[str, Any]]:
+    """Return the error of positions at the end of each run against the first, and what it took."""
     rows, exact = [], None
     for value, parameters in runs.items():
         out = folder / f"{value:g}"
         found = fold(mesh, out, parameters, *maps)
-        if "failed" in found:
-            rows.append({varied: value, **found})
-            continue
         ends = parameters["start_week"], parameters["end_week"]
         before, after = (read_positions(out / "frames.h5", week) for week in ends)
         exact = after if exact is None else exact
@@ -362,11 +296,11 @@ def errors(varied: str, runs: dict[float, dict[str, Any]], folder: Path, mesh: P
         row |= {"p95_mm": float(np.quantile(apart, 0.95)), "largest_mm": float(apart.max())}
         rows.append(row | {"share": row["rms_mm"] / float(np.sqrt((moved**2).mean()))})
         print(json.dumps(rows[-1]), flush=True)
-    return pd.DataFrame(rows)
+    return rows
 
 
-def solver_errors(arguments: argparse.Namespace) -> dict[str, pd.DataFrame]:
-    """Returns the errors that tolerance and time step of a study's run leave, against its least of each."""
+def solver_errors(arguments: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
+    """Return the errors that tolerance and time step of a study's run leave, against its least of each."""
     mesh, file, *maps = arguments.run
     given = read_yaml(file)
     solver = given["solver"]
@@ -378,29 +312,24 @@ def solver_errors(arguments: argparse.Namespace) -> dict[str, pd.DataFrame]:
     }
 
 
+def against_finest(arguments: argparse.Namespace, cases: list[Case]) -> list[dict[str, Any]]:
+    """Return how all runs differ from the finest at the end."""
+    finest = max((case for case in cases if not case.turned), key=lambda case: (case.nodes, case.order))
+    frames = {case: arguments.folder / "runs" / case.name / "frames.h5" for case in cases}
+    start, exact = carried(frames[finest], START_WEEK), carried(frames[finest], arguments.end_week)
+    others = (case for case in cases if case is not finest)
+    return [
+        {"run": case.name, "finest": finest.name} | difference(carried(frames[case], arguments.end_week), exact, start)
+        for case in others
+    ]
+
+
 def main(arguments: argparse.Namespace) -> None:
-    result: dict[str, Any] = {}
-    if "steps" in arguments.parts:
-        steps = time_steps(arguments)
-        write_table(arguments.folder / "time_steps.csv", steps)
-        result["time_steps"] = steps.to_dict("records")
-    if "solver" in arguments.parts:
-        for name, table in solver_errors(arguments).items():
-            write_table(arguments.folder / f"{name}.csv", table)
-            result[name] = table.to_dict("records")
-    if "resolution" in arguments.parts:
-        runs = [(case, row) for case, row in resolution_runs(arguments)]
-        folded = [case for case, row in runs if "failed" not in row]
-        table = pd.DataFrame([row for _, row in runs]).drop(columns="weeks", errors="ignore")
-        weeks, pairs = compare(arguments, folded)
-        for name, content in (("runs", table), ("weeks", weeks), ("differences", pairs)):
-            write_table(arguments.folder / f"{name}.csv", content)
-        result["runs"] = table.to_dict("records")
-        end = weeks["week"].max()
-        finest = max((case for case in folded if not case.turned), key=lambda case: (case.nodes, case.order)).name
-        result["finest"] = finest
-        if len(folded) > 1:
-            result["against_finest"] = pairs[(pairs["other"] == finest) & (pairs["week"] == end)].to_dict("records")
+    if arguments.run:
+        result: dict[str, Any] = solver_errors(arguments)
+    else:
+        runs = resolution_runs(arguments)
+        result = {"runs": list(runs.values()), "against_finest": against_finest(arguments, list(runs))}
     print(json.dumps(result), flush=True)
 
 

@@ -1,12 +1,11 @@
-"""Sets this package's curvature beside the estimator of slam, with what it does to spectra: one JSON line.
+"""Set this package's curvature beside the estimator of slam, with what it does to spectra: one JSON line.
 
     ./run python benchmarks/curvature_estimators.py LEFT.surf.gii RIGHT.surf.gii [--last B6]
 
 slam takes curvature as Rusinkiewicz 2004 (doi 10.1109/TDPVT.2004.1335277): a tensor in each face from how the normals
 change along its edges, averaged at the vertices. It is written here from that publication. For each hemisphere the JSON
 has `r_mean_curvature` and `r_shape_index` between both estimators, `rms_ratio` of mean curvature (theirs to ours), and
-for the shape index of `ours` and `theirs` the relative powers of B4, B5 and B6 in whole bands (`whole`), of as many
-modes as Weyl's number by the FetalFoldSim paper's formula (`weyl`), and as many as that paper takes (`paper_modes`).
+the relative powers of B4, B5 and B6 of the shape index by `ours` and `theirs`.
 """
 
 import argparse
@@ -19,7 +18,6 @@ from gyriflow.compare.placement import correlation
 from gyriflow.geometry.triangles import (
     Floats,
     TriangleMesh,
-    area,
     corners,
     face_normals,
     mean_edge_length,
@@ -29,15 +27,13 @@ from gyriflow.geometry.triangles import (
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.laplace_beltrami import laplacian
-from gyriflow.metrics.spangy import first_eigenvalue, modes_of, spectrum, weyl_number
+from gyriflow.metrics.spangy import first_eigenvalue, modes_of, spectrum
 
-PAPER_MODES = {"left": 1833, "right": 1970}
-"""How many modes the paper takes per hemisphere: the largest Weyl number of its surfaces."""
 BANDS = ("B4", "B5", "B6")
 
 
 def tensor_curvature(mesh: TriangleMesh) -> tuple[Floats, Floats]:
-    """Returns the (n,) principal curvatures κ1 ≥ κ2 in 1/mm at the vertices, positive on a ball (Rusinkiewicz 2004)."""
+    """Return the (n,) principal curvatures κ1 ≥ κ2 in 1/mm at the vertices, positive on a ball (Rusinkiewicz 2004)."""
     points, normals, facing = corners(mesh), vertex_normals(mesh), face_normals(mesh)
     sides = points[:, [2, 0, 1]] - points[:, [1, 2, 0]]
     first = sides[:, 0] / np.linalg.norm(sides[:, 0], axis=1)[:, None]
@@ -78,7 +74,7 @@ def tensor_curvature(mesh: TriangleMesh) -> tuple[Floats, Floats]:
 
 
 def turned_into(axes: Floats, facing: Floats, normals: Floats) -> Floats:
-    """Returns tangent axes (m, 3) at vertices rotated, about the line where both planes meet, into those of faces."""
+    """Return tangent axes (m, 3) at vertices rotated, about the line where both planes meet, into those of faces."""
     cosine = np.einsum("fi,fi->f", normals, facing)[:, None]
     # of the part along the tilt of the normals, the rotation keeps the length
     tilt = facing - cosine * normals
@@ -87,7 +83,7 @@ def turned_into(axes: Floats, facing: Floats, normals: Floats) -> Floats:
 
 
 def corner_areas(points: Floats, sides: Floats) -> Floats:
-    """Returns the (m, 3) areas of faces that belong to their corners: Voronoi's, or halves where a face is obtuse."""
+    """Return the (m, 3) areas of faces that belong to their corners: Voronoi's, or halves where a face is obtuse."""
     squared = (sides**2).sum(axis=2)
     whole = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
     # the angle at a corner is opposite its side
@@ -101,41 +97,25 @@ def corner_areas(points: Floats, sides: Floats) -> Floats:
     return parts
 
 
-def shares(bands, column: str) -> dict[str, float | None]:
-    """Returns the relative powers of B4 to B6 of a table of bands, none where there is no mode."""
-    values = bands.set_index("band")[column]
-    return {name: None if np.isnan(values[int(name[1])]) else round(float(values[int(name[1])]), 4) for name in BANDS}
-
-
-def compared(name: str, mesh: TriangleMesh, last: str) -> dict[str, object]:
-    """Returns what both estimators say of a hemisphere."""
+def compared(mesh: TriangleMesh, last: str) -> dict[str, object]:
+    """Return what both estimators say of a hemisphere."""
     ours = curvature(mesh, radius_mm=3.0)
     high, low = tensor_curvature(mesh)
-    theirs = {"mean": (high + low) / 2, "shape_index": 2 / np.pi * np.arctan2(high + low, high - low)}
-    areas = vertex_areas(mesh)
-    stiffness, mass = laplacian(mesh)
-    first = first_eigenvalue(stiffness, mass)
-    weyl = weyl_number(area(mesh), first)
-    modes, reach = modes_of(last, stiffness, mass, first)
-    rms = [np.sqrt(np.average(mean**2, weights=areas)) for mean in (theirs["mean"], ours.mean)]
+    theirs, index = (high + low) / 2, 2 / np.pi * np.arctan2(high + low, high - low)
+    areas, (stiffness, mass) = vertex_areas(mesh), laplacian(mesh)
+    modes, reach = modes_of(last, stiffness, mass, first_eigenvalue(stiffness, mass))
+    rms = [np.sqrt(np.average(mean**2, weights=areas)) for mean in (theirs, ours.mean)]
     found: dict[str, object] = {
         "vertices": len(mesh.vertices),
         "edge_mm": round(mean_edge_length(mesh), 3),
-        "modes": len(modes.eigenvalues),
-        "weyl_number": weyl,
-        "r_mean_curvature": round(correlation(ours.mean, theirs["mean"], areas), 4),
-        "r_shape_index": round(correlation(ours.shape_index, theirs["shape_index"], areas), 4),
+        "r_mean_curvature": round(correlation(ours.mean, theirs, areas), 4),
+        "r_shape_index": round(correlation(ours.shape_index, index, areas), 4),
         "rms_ratio": round(float(rms[0] / rms[1]), 4),
     }
-    for who, proxy in (("ours", ours.shape_index), ("theirs", theirs["shape_index"])):
-        cuts = {"weyl": weyl, "paper_modes": PAPER_MODES[name]}
-        tables = {
-            cut: spectrum(proxy, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach, weyl=number).bands
-            for cut, number in cuts.items()
-        }
-        found[who] = {"whole": shares(tables["weyl"], "relative_power")} | {
-            cut: shares(table, "relative_power_weyl") for cut, table in tables.items()
-        }
+    for name, proxy in (("ours", ours.shape_index), ("theirs", index)):
+        bands = spectrum(proxy, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach).bands
+        shares = bands.set_index("band")["relative_power"].dropna()
+        found[name] = {band: round(float(shares[int(band[1])]), 4) for band in BANDS if int(band[1]) in shares}
     return found
 
 
@@ -146,7 +126,7 @@ def main() -> None:
     parser.add_argument("--last", choices=BANDS, default="B6", help="the last band whose modes are all taken")
     options = parser.parse_args()
     sides = {"left": options.left, "right": options.right}
-    found = {name: compared(name, read_surface(path), options.last) for name, path in sides.items()}
+    found = {name: compared(read_surface(path), options.last) for name, path in sides.items()}
     print(json.dumps(found))
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..geometry.alignment import fit_onto
-from ..geometry.matching import crossing_faces, nearest_on
+from ..geometry.matching import crossing_faces, nearest_on, surface_distance
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import (
     Floats,
@@ -22,9 +22,6 @@ from ..geometry.triangles import (
 )
 from .placement import INTERVAL, MEASURES, correlation, draw_patches, drawn_correlations, values_on
 from .shapes import EDGE_MM, Shape, cortex_dice
-
-FAR = 0.95
-"""Quantile of the distance that stands for its largest values."""
 
 
 def apart(predicted: TriangleMesh, real: TriangleMesh, real_even: TriangleMesh) -> list[tuple[TriangleMesh, Floats]]:
@@ -42,14 +39,13 @@ def distances(pair: list[tuple[TriangleMesh, Floats]]) -> dict[str, float]:
     distance_mm is the mean over both surfaces, weighted by area, and distance95_mm the larger of their 95 % quantiles;
     distance_left_mm and distance_right_mm are means over what lies left and right of x = 0, NaN where nothing does.
     """
-    means, far = [], []
-    for even, away in pair:
-        areas, left = vertex_areas(even), even.vertices[:, 0] < 0
-        parts = [areas, areas * left, areas * ~left]
-        means.append([np.average(away, weights=part) if part.any() else np.nan for part in parts])
-        far.append(float(np.quantile(away, FAR, weights=areas, method="inverted_cdf")))
-    names = ("distance_mm", "distance_left_mm", "distance_right_mm")
-    return dict(zip(names, map(float, np.mean(means, axis=0)), strict=True)) | {"distance95_mm": max(far)}
+    mean, far = surface_distance((away, vertex_areas(even)) for even, away in pair)
+    sides = []
+    for of_side in (np.less, np.greater_equal):
+        parts = [(away, vertex_areas(even) * of_side(even.vertices[:, 0], 0)) for even, away in pair]
+        sides.append(surface_distance(parts)[0] if all(areas.any() for _, areas in parts) else float("nan"))
+    left, right = sides
+    return {"distance_mm": mean, "distance_left_mm": left, "distance_right_mm": right, "distance95_mm": far}
 
 
 def drawn_distances(pair: list[tuple[TriangleMesh, Floats]], points: Floats, patch: Ints, drawn: Ints) -> Floats:
