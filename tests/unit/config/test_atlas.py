@@ -67,12 +67,6 @@ def test_shipped_atlases_are_valid_and_named_after_their_folder(name):
     assert atlas.url.startswith("https://")
 
 
-def test_the_atlases_are_those_that_are_promised():
-    accepted = {name: read_yaml(ATLASES / name / "atlas.yaml")["licence"].get("accept") for name in shipped_atlases()}
-    assert all(accepted[name] for name in ("chinese", "crl", "dhcp-volume"))
-    assert not any(accepted[name] for name in ("dhcp-surface", "spina-bifida"))
-
-
 def test_labels_of_spina_bifida_lie_in_the_checkout_as_published(tmp_path):
     config = load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path)
     weeks = {"unoperated": range(21, 26), "operated": range(25, 35)}
@@ -125,24 +119,6 @@ def test_a_growth_curve_across_populations_is_refused(tmp_path):
     assert series_of(found) == {}
 
 
-def test_a_population_of_a_brain_of_ones_own(tmp_path):
-    put(tmp_path, "a.stl", "b.stl")
-    brains = [
-        {"id": "a", "week": 21, "pial": "a.stl", "population": "sheep"},
-        {"id": "b", "week": 22, "pial": "b.stl"},
-        {"id": "c", "week": 22, "shape": {"semi_axes_mm": [23, 23, 23]}},
-    ]
-    raw = {"brains": brains, "start": "a", "folding": {"end_week": 22}}
-    known = resolve(load(raw, tmp_path)).brains
-    assert measured_name([known["a"]]) == "sheep"
-    assert measured_name(known.values()) == "sheep (21 GW) or real brain (22 GW) or sphere"
-    brains[2]["population"] = "sheep"
-    assert problems(raw, tmp_path) == [
-        "brains[2].population: has no meaning with shape; only with labels or labels of a hemisphere or hemispheres or "
-        "a hemisphere's surface or pial"
-    ]
-
-
 def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_path):
     own = [{"id": "own", "week": 21, **LABELLED}]
     atlas = [{"name": "spina-bifida", "series": "unoperated", "weeks": [22, 21]}, "dhcp-surface"]
@@ -166,12 +142,6 @@ def test_surfaces_of_hemispheres_and_labels(tmp_path):
     assert surface.hemispheres.right == f"{root}/dhcp-surface/atlas/fetal.week21.right.pial.surf.gii"
     assert (volume.source, volume.scheme) == ("labels", "dhcp-19")
     assert volume.labels == f"{root}/dhcp-volume/parcellations/tissue-t21.00_dhcp-19.nii.gz"
-
-
-def test_a_dump_has_the_brains_in_the_place_of_the_atlas(tmp_path):
-    config = load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path)
-    again = load(config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas"}))
-    assert (again.brains, again.atlas) == (config.brains, ())
 
 
 # files in a folder
@@ -198,12 +168,8 @@ def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
     # which is looked at by the stage that reads it
     found = {file: config.known_files[file]}
     assert found == {file: ("crl", known[22]["labels"]["sha256"])}
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match=rf"{file}: is not the file of crl; .*{known[22]['labels']['sha256']}"):
         require_checksums(found)
-    assert str(caught.value) == (
-        f"{file}: is not the file of crl; found another SHA-256; expected {known[22]['labels']['sha256']}. Delete it, "
-        "and it is fetched; or give a changed file as a brain of your own under brains"
-    )
 
 
 def test_two_files_of_one_name_and_a_file_in_the_place_of_the_folder_are_refused(tmp_path):
@@ -276,15 +242,6 @@ def test_mistakes_in_a_description_are_named_with_its_file(tmp_path, changes, fo
     assert found in named
 
 
-def test_a_scheme_that_is_not_known_is_named_and_one_of_the_configuration_is_used(tmp_path):
-    put(tmp_path, "w21.nii.gz", "w22.nii.gz")
-    own_atlas(tmp_path, series={"scheme": "sheep"})
-    raw = study("atlas.yaml", "mine-21", folding={"end_week": 22})
-    first, _ = problems(raw, tmp_path)
-    assert first.startswith("brains[0].scheme: found 'sheep'; expected one of ")
-    assert load(raw | {"schemes": {"sheep": {"cerebrum": [1]}}}, tmp_path).brains[0].scheme == "sheep"
-
-
 # licences and mistakes
 
 
@@ -300,12 +257,6 @@ def test_a_narrow_licence_has_to_be_accepted_and_is_told(tmp_path):
     assert "Gholipour" in note
     assert "non-commercial education and research only" in note
     assert "checksums" not in note
-
-
-def test_files_without_known_checksums_are_said(tmp_path):
-    config = load(study({"name": "dhcp-surface", "weeks": [21]}, "dhcp-surface-21"), tmp_path)
-    assert "2 files to fetch into" in retrieval_note(config.atlases[0])
-    assert "; no checksums are known" in retrieval_note(config.atlases[0])
 
 
 @pytest.mark.parametrize(

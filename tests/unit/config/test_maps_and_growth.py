@@ -104,31 +104,14 @@ def test_series_may_be_named(tmp_path):
             {"brains": {"one": ["v21", "s21"], "two": ["v21", "v22"]}},
             ["growth.brains.one: found brains of 1 week(s); growth needs two or more"],
         ),
+        ({"brains": []}, ["growth.brains: found brains of 0 week(s); growth needs two or more"]),
+        ({"brains": ["s21", "v22"]}, []),
         ({"estimated_from": "volumes"}, ["growth.estimated_from: found 'volumes'; the series are surface, volume"]),
         ({"brains": {"one": "v21"}}, ["growth.brains.one: Input should be a valid tuple; found 'v21'"]),
     ],
 )
 def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
     assert problems(both_kinds(tmp_path, (21, 22)) | {"growth": growth, "folding": FOLDING}, tmp_path) == found
-
-
-@pytest.mark.parametrize(
-    ("growth", "settings", "found"),
-    [
-        ({}, FOLDING, []),
-        ({"brains": ["a", "c"]}, FOLDING, []),
-        (None, FOLDING, []),
-        ({"brains": ["a", "d"]}, FOLDING, ["growth.brains: found 'd', which is no brain; known are a, b, c"]),
-        (
-            {"brains": ["b", "c"]},
-            {"end_week": 24},
-            ["growth.brains: found brains of 1 week(s); growth needs two or more"],
-        ),
-        ({"brains": []}, {"end_week": 24}, ["growth.brains: found brains of 0 week(s); growth needs two or more"]),
-    ],
-)
-def test_brains_that_give_no_growth_rate_are_refused(growth, settings, found):
-    assert problems({"brains": BRAINS, "start": "a", "growth": growth, "folding": settings}) == found
 
 
 CURVE = {21: 99, 30: 252}

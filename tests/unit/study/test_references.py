@@ -1,4 +1,4 @@
-"""Regions, norms and scans of one subject in a configuration."""
+"""Which brains are references: norms, regions and scans of one subject."""
 
 import pytest
 from configurations import LABELLED
