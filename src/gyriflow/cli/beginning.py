@@ -140,7 +140,7 @@ def write_bids(
     starts = [ids[0] for subject, ids in scans.items() if subject and len(ids) > 1]
     weeks = [brain.entry["week"] for brain in brains]
     given = read_keys(settings) if settings else {}
-    runs = {"reference": {}} | ({"measured": {"preset": "measured"}} if len(set(weeks)) > 1 else {})
+    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if len(set(weeks)) > 1 else {})
     text = {
         "brains": [_absolute(brain.entry, folder) for brain in brains],
         "start": starts or brains[0].entry["id"],

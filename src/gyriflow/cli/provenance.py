@@ -47,7 +47,7 @@ def require_own_results(directory: Path, files: Sequence[Path], config: Config, 
     copied or moved goes on. With `record` the study is written down as the one whose results these are.
     """
     path = directory / STUDY
-    brains = [
+    brains: list[list[Any]] = [
         [brain.id, brain.week, brain.source, *(Path(file).name for file in brain.files)] for brain in config.brains
     ]
     study: dict[str, Any] = {"configuration": [str(file.resolve()) for file in files], "brains": brains}

@@ -122,15 +122,15 @@ def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recog
             rest = str(file.parent / KINDS.sub("", SIDES.sub("", file.name)))
             sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
             sides["left" if side[1] else "right"] = file
-    for (rest, kind), sides in surfaces.items():
-        if kind == "white":
+    for (rest, layer), sides in surfaces.items():
+        if layer == "white":
             continue
-        pair: dict[str, Any] = {side: str(sides[side]) for side in ("left", "right") if side in sides}
-        side, file = next(iter(pair.items()))
+        pair: dict[str, Any] = {name: str(sides[name]) for name in ("left", "right") if name in sides}
+        first, file = next(iter(pair.items()))
         white = surfaces.get((rest, "white"), {})
         if len(pair) == 2 and len(white) == 2:
-            pair["white"] = {side: str(white[side]) for side in ("left", "right")}
-        source = {"hemispheres": pair} if len(sides) == 2 else {"hemisphere": {"file": file, "side": side}}
+            pair["white"] = {name: str(white[name]) for name in ("left", "right")}
+        source = {"hemispheres": pair} if len(sides) == 2 else {"hemisphere": {"file": file, "side": first}}
         yield _recognised(Path(file), scans, source)
 
 

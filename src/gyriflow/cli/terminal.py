@@ -151,7 +151,10 @@ class RunDisplay:
             words = f"{as_duration(left)} left  " if left else ""
             self.console.print(f"{self.task.percentage:3.0f} %  {words}{'; '.join(now)}")
         if self.total:
-            state = {"began": f"{self.began:%F %T}", "ended": f"{self.ended:%F %T}" if self.ended else None}
+            state: dict[str, Any] = {
+                "began": f"{self.began:%F %T}",
+                "ended": f"{self.ended:%F %T}" if self.ended else None,
+            }
             state |= {"done": self.done, "total": self.total, "left_s": left, "running": now, "failed": self.failed}
             state |= {"interrupted": self.interrupted, "details": str(self.details)}
             # a full disk is the steps' to report
