@@ -13,14 +13,11 @@ from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stre
 from mpi4py import MPI
 from shapes import box_mesh
 
-from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import ContactSettings, SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import PLAIN
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic, signed_volumes
-from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
 
 TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
@@ -88,24 +85,6 @@ def test_an_element_that_folds_over_between_its_points_is_seen():
     assert bounds[0] > 0 >= bounds[1]
 
 
-def folding_of(mesh, zones, comm=COMM, **changes):
-    parameters = parameters_from(RUN | {"contact": {"kind": "none"}} | changes)
-    return Folding(comm, mesh, zones, parameters), State.at_start(mesh.vertices * M_PER_MM, parameters.step_s)
-
-
-def test_a_kept_state_does_not_depend_on_the_number_of_ranks():
-    mesh = curved_box()
-    zones = zones_of(mesh, at_the_bottom)
-    ends = []
-    for comm in (COMM, MPI.COMM_SELF):
-        folding, state = folding_of(mesh, zones, comm, stress_memory_gw=1.0, thickness_mm=2.0)
-        for _ in range(3):
-            state = folding.step(state, 43200.0)
-        ends.append(state)
-    together, alone = ends
-    assert np.abs(together.positions - alone.positions).max() <= 1e-8 * np.abs(alone.last).max()
-    np.testing.assert_allclose(together.stretch, alone.stretch, atol=1e-9)
-    assert (COMM.bcast(together.positions) == together.positions).all()
 
 
 def pressed_blocks(comm, growth, distance):

@@ -233,8 +233,8 @@ class SelfContact:
         of_vertex = part[self._vertices][heaviest][seen.vertices]
         # the numbers below 0 stand for no vertex
         ends = [of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in near]
-        own = {(int(two.min()), int(two.max())) for two in ends}
-        links = np.array(sorted(set().union(*self.domain.comm.allgather(own)))).reshape(-1, 2)
+        own_pairs = {(int(two.min()), int(two.max())) for two in ends}
+        links = np.array(sorted(set().union(*self.domain.comm.allgather(own_pairs)))).reshape(-1, 2)
         count = int(part.max()) + 1
         graph = sparse.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
         return connected_components(graph, directed=False)[1][part].astype(np.int64)
@@ -242,8 +242,8 @@ class SelfContact:
     def energy(self) -> float:
         """Returns the barrier's energy in J."""
         state = self._state()
-        own = float(self._barrier(state.pairs, state.surface, state.positions)) * J_PER_PA_MM3
-        return self.domain.comm.allreduce(own)
+        of_rank = float(self._barrier(state.pairs, state.surface, state.positions)) * J_PER_PA_MM3
+        return self.domain.comm.allreduce(of_rank)
 
     def forces(self) -> Floats:
         """Returns the (n, 3) derivative of the energy in N at the surface's nodes."""
@@ -256,9 +256,9 @@ class SelfContact:
         gradient = self._barrier.gradient(state.pairs, state.surface, state.positions)
         return gradient.reshape(-1, 3) * N_PER_PA_MM2
 
-    def _summed(self, own: Floats) -> Floats:
-        total = np.empty_like(own, order="C")
-        self.domain.comm.Allreduce(np.ascontiguousarray(own), total)
+    def _summed(self, values: Floats) -> Floats:
+        total = np.empty_like(values, order="C")
+        self.domain.comm.Allreduce(np.ascontiguousarray(values), total)
         return total
 
     def add_residual(self, out: PETSc.Vec) -> None:
@@ -270,18 +270,19 @@ class SelfContact:
         state, comm = self._state(), self.domain.comm
         if not comm.allreduce(len(state.pairs)):
             return None
-        own: sparse.csr_matrix | None = None
+        of_rank: sparse.csr_matrix | None = None
         if len(state.pairs):
             kind = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
             hessian = self._barrier.hessian(state.pairs, state.surface, state.positions, kind) * N_PER_M_PER_PA_MM
-            own = sparse.csr_matrix(self._part_to_nodes @ hessian @ self._nodes_to_part)
-        return self._distributed(own)
+            of_rank = sparse.csr_matrix(self._part_to_nodes @ hessian @ self._nodes_to_part)
+        return self._distributed(of_rank)
 
-    def _distributed(self, own: sparse.csr_matrix | None) -> PETSc.Mat:
+    def _distributed(self, of_pairs: sparse.csr_matrix | None) -> PETSc.Mat:
         comm, components = self.domain.comm, np.arange(3)
         # each rank gets what all have of the rows that it owns
         of_rank = [
-            None if own is None else own[(3 * rows[:, None] + components).ravel()] for rows in self._rows_by_rank
+            None if of_pairs is None else of_pairs[(3 * rows[:, None] + components).ravel()]
+            for rows in self._rows_by_rank
         ]
         kept, of_rank[comm.rank] = of_rank[comm.rank], None
         received = [kept, *comm.alltoall(of_rank)]
@@ -334,8 +335,8 @@ class SelfContact:
         forces, areas = np.zeros_like(self._start), np.zeros(len(self._start))
         forces[state.part.vertices] = self._own_forces(state)
         # all faces at a vertex are in its owner's part alone
-        own = state.part.owned
-        areas[state.part.vertices[own]] = np.array(state.surface.vertex_areas)[own] * M_PER_MM**2
+        owned = state.part.owned
+        areas[state.part.vertices[owned]] = np.array(state.surface.vertex_areas)[owned] * M_PER_MM**2
         values = np.zeros(len(self.domain.positions))
         # nodes are the first vertices of the surface of contact
         pressure = np.linalg.norm(self._summed(forces), axis=1) / self._summed(areas)

@@ -40,8 +40,10 @@ def worst_quality(domain: Domain) -> float:
 def resolution_warning(rows: Sequence[dict], order: int) -> str:
     """Returns what to say where the cortex has just come to be resolved too coarsely; empty where it has not."""
     # not a number where no element has its centre in the cortex: none lies through it
-    found = [0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]]
-    now, before = found[-1], found[0] if len(found) > 1 else math.inf
+    through = [
+        0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]
+    ]
+    now, before = through[-1], through[0] if len(through) > 1 else math.inf
     if not now < ELEMENTS_NEEDED[order] <= before:
         return ""
     since = f"since it grows, from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"

@@ -141,11 +141,11 @@ class Domain:
 
     def least(self, values: Floats, numbers: NDArray, places: Floats) -> tuple[float, int, Floats]:
         """Returns the smallest of the local values over all ranks, with its number in the file and its place."""
-        found = (np.inf, -1, np.full(3, np.nan))
+        local_least = (np.inf, -1, np.full(3, np.nan))
         if len(values):
             i = int(values.argmin())
-            found = (float(values[i]), int(numbers[i]), places[i])
-        return min(self.comm.allgather(found), key=lambda entry: entry[:2])
+            local_least = (float(values[i]), int(numbers[i]), places[i])
+        return min(self.comm.allgather(local_least), key=lambda entry: entry[:2])
 
     def local_facets(self, facets: NDArray[np.int64], tags: NDArray[np.int64]) -> dolfinx.mesh.MeshTags:
         """Returns the tags of boundary facets on the local facets.
@@ -162,10 +162,10 @@ class Domain:
         names = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
         count = len(self.positions)
         weights = np.array([count * count, count, 1], dtype=np.int64)
-        known = np.sort(faces, axis=1) @ weights
-        order = np.argsort(known)
+        numbers = np.sort(faces, axis=1) @ weights
+        order = np.argsort(numbers)
         wanted = names @ weights
-        place = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
-        if (known[place] != wanted).any():
+        place = order[np.minimum(np.searchsorted(numbers, wanted, sorter=order), len(order) - 1)]
+        if (numbers[place] != wanted).any():
             raise ValueError("the facets are not the boundary of the mesh")
         return dolfinx.mesh.meshtags(self.mesh, 2, local, tags[place].astype(np.int32))

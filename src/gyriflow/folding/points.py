@@ -33,8 +33,8 @@ class IntegrationPoints:
             places = np.concatenate([a + (1 - 4 * a) * np.eye(4) for a, _ in CUBIC])
             return cls(order, places, np.repeat([weight for _, weight in CUBIC], 4))
         kind = basix.QuadratureType.xiao_gimbutas if degree == 5 else basix.QuadratureType.default
-        found, weights = basix.make_quadrature(basix.CellType.tetrahedron, degree, kind)
-        return cls(order, np.column_stack([1 - found.sum(axis=1), found]), weights / weights.sum())
+        places, weights = basix.make_quadrature(basix.CellType.tetrahedron, degree, kind)
+        return cls(order, np.column_stack([1 - places.sum(axis=1), places]), weights / weights.sum())
 
     @property
     def smooth(self) -> Floats:

@@ -143,10 +143,12 @@ def seconds_to(week: float, parameters: FoldingParameters) -> float:
     return (week - parameters.start_week) * SECONDS_PER_GW
 
 
-def foreign_checkpoints(out: Path, own: Path) -> list[str]:
+def foreign_checkpoints(out: Path, present: Path) -> list[str]:
     """Returns what to say of checkpoints of other meshes or parameters, which stay; only the newest two are kept."""
     others = sorted(
-        (path for path in out.glob("checkpoint-*") if path != own), key=lambda path: path.stat().st_mtime, reverse=True
+        (path for path in out.glob("checkpoint-*") if path != present),
+        key=lambda path: path.stat().st_mtime,
+        reverse=True,
     )
     for old in others[2:]:
         shutil.rmtree(old, ignore_errors=True)

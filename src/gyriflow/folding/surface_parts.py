@@ -38,16 +38,16 @@ class SurfacePart:
         """
         if self.owned.all():
             return pairs
-        own: list[bool] = list(self.owned)
+        owned: list[bool] = list(self.owned)
         lowest: list[int] = list(self.edges[:, 0])
         kept = ipctk.NormalCollisions()
         kept.use_area_weighting = pairs.use_area_weighting
-        kept.vv_collisions = [pair for pair in pairs.vv_collisions if own[min(pair.vertex0_id, pair.vertex1_id)]]
-        kept.ev_collisions = [pair for pair in pairs.ev_collisions if own[pair.vertex_id]]
+        kept.vv_collisions = [pair for pair in pairs.vv_collisions if owned[min(pair.vertex0_id, pair.vertex1_id)]]
+        kept.ev_collisions = [pair for pair in pairs.ev_collisions if owned[pair.vertex_id]]
         kept.ee_collisions = [
-            pair for pair in pairs.ee_collisions if own[min(lowest[pair.edge0_id], lowest[pair.edge1_id])]
+            pair for pair in pairs.ee_collisions if owned[min(lowest[pair.edge0_id], lowest[pair.edge1_id])]
         ]
-        kept.fv_collisions = [pair for pair in pairs.fv_collisions if own[pair.vertex_id]]
+        kept.fv_collisions = [pair for pair in pairs.fv_collisions if owned[pair.vertex_id]]
         return kept
 
 
@@ -96,8 +96,10 @@ def part_of_surface(
         near = np.ones(len(faces), dtype=bool)
     else:
         low, high = positions[faces].min(axis=1), positions[faces].max(axis=1)
-        own = owned[faces].any(axis=1)
-        near = (low <= high[own].max(axis=0) + reach).all(axis=1) & (high >= low[own].min(axis=0) - reach).all(axis=1)
+        owned_faces = owned[faces].any(axis=1)
+        near = (low <= high[owned_faces].max(axis=0) + reach).all(axis=1) & (
+            high >= low[owned_faces].min(axis=0) - reach
+        ).all(axis=1)
         # and what adjoins these, for the areas at their vertices
         touched = np.zeros(len(positions), dtype=bool)
         touched[faces[near]] = True

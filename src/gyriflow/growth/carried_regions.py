@@ -41,8 +41,8 @@ def number_regions(*tables: Mapping[int, str]) -> dict[str, int]:
 def renumber(labels: NDArray[np.integer], names: Mapping[int, str], numbers: Mapping[str, int]) -> Ints:
     """Returns labels as numbers of the regions that they name; 0 for those without a name."""
     values, back = np.unique(labels, return_inverse=True)
-    found = [numbers[names[int(value)]] if int(value) in names else NO_REGION for value in values]
-    return np.array(found, dtype=np.int64)[back].reshape(np.shape(labels))
+    regions = [numbers[names[int(value)]] if int(value) in names else NO_REGION for value in values]
+    return np.array(regions, dtype=np.int64)[back].reshape(np.shape(labels))
 
 
 def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.integer], affine: Floats) -> dict[str, Ints]:
@@ -62,7 +62,7 @@ def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.intege
         raise InputError("no voxel has a region", expected="labels that are named")
     centres = inside @ affine[:3, :3].T + affine[:3, 3]
     tree = cKDTree(centres)
-    found: dict[str, Ints] = {}
+    by_side: dict[str, Ints] = {}
     reached = []
     for side, vertices in points.items():
         away, nearest = tree.query(vertices, distance_upper_bound=REACH_MM)
@@ -74,14 +74,14 @@ def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.intege
                 expected="regions along the cortex, in the space of the brain's labels",
             )
         reached.append(near)
-        found[side] = np.full(len(vertices), NO_REGION, dtype=np.int64)
-        found[side][near] = regions[tuple(inside[nearest[near]].T)]
+        by_side[side] = np.full(len(vertices), NO_REGION, dtype=np.int64)
+        by_side[side][near] = regions[tuple(inside[nearest[near]].T)]
     share = float(np.concatenate(reached).mean())
     if share < USUAL_NEAR:
         # few regions leave most vertices without one, but lie along the surface themselves
         away, _ = cKDTree(np.concatenate(list(points.values()))).query(centres, distance_upper_bound=REACH_MM)
         _require_along(max(share, float(np.isfinite(away).mean())))
-    return found
+    return by_side
 
 
 def _require_along(share: float) -> None:
@@ -107,14 +107,14 @@ def find_places(brain: Channels, drawn: Channels, *, threads: int = 1) -> Deform
     A place needs no overlap of the cortex, which is thin in early weeks: that of the cerebrum is judged, and folding.
     """
     try:
-        found = register(brain, drawn, threads=threads).deformation
-        quality = replace(judge(brain, drawn, found), dice_cortex=float("nan"))
+        deformation = register(brain, drawn, threads=threads).deformation
+        quality = replace(judge(brain, drawn, deformation), dice_cortex=float("nan"))
         require_good(quality, pair="with the brain of the named sulci")
     except InputError as error:
         # sulci have numbers then: no reason to stop a study
         log.warning("sulci have no names: %s", error)
         return None
-    return found
+    return deformation
 
 
 def regions_by_deformation(points: Floats, between: Deformation, regions: NDArray[np.integer], affine: Floats) -> Ints:
@@ -124,9 +124,9 @@ def regions_by_deformation(points: Floats, between: Deformation, regions: NDArra
     """
     index = np.rint(transform_points(carry(between, points), np.linalg.inv(affine))).astype(int)
     inside = np.all((index >= 0) & (index < regions.shape), axis=1)
-    found = np.full(len(points), NO_REGION, dtype=np.int64)
-    found[inside] = regions[tuple(index[inside].T)]
-    return found
+    carried = np.full(len(points), NO_REGION, dtype=np.int64)
+    carried[inside] = regions[tuple(index[inside].T)]
+    return carried
 
 
 def regions_from_surface(target: TriangleMesh, surface: TriangleMesh, regions: NDArray[np.integer]) -> Ints:

@@ -80,11 +80,11 @@ def maps_on_template(
             _require_on_grid(pair, template.vertices, "the template")
     shape = TriangleMesh(carry_surface(template, between), template.faces)
     match = match_points(shape.vertices, vertex_normals(shape), surface)
-    found: dict[str, NDArray] = {
+    at_template: dict[str, NDArray] = {
         name: labels_at(match, values) if (values == np.round(values)).all() else values_at(match, values)
         for name, values in maps.items()
     }
-    return {**found, "template_distance_mm": match.distance_mm}
+    return {**at_template, "template_distance_mm": match.distance_mm}
 
 
 def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> None:

@@ -41,16 +41,18 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
     normals, areas = vertex_normals(surface), vertex_areas(surface)
     for length in PULL_MM:
         now = TriangleMesh(vertices, faces)
-        own = vertex_areas(now)
+        areas_now = vertex_areas(now)
         there = match_points(vertices, vertex_normals(now), surface)
-        weight = own * (there.agrees & (there.distance_mm < REACH_MM))
+        weight = areas_now * (there.agrees & (there.distance_mm < REACH_MM))
         pull = (values_at(there, surface.vertices) - vertices) * weight[:, None]
         back = match_points(surface.vertices, normals, now)
         shares = back.weights * (areas * (back.agrees & (back.distance_mm < REACH_MM)))[:, None]
         missing = surface.vertices - values_at(back, vertices)
         np.add.at(weight, back.corners, shares)
         np.add.at(pull, back.corners, shares[..., None] * missing[:, None])
-        smooth = diffuse(vertices, faces, np.column_stack([pull, weight]) / np.maximum(own, 1e-9)[:, None], length)
+        smooth = diffuse(
+            vertices, faces, np.column_stack([pull, weight]) / np.maximum(areas_now, 1e-9)[:, None], length
+        )
         vertices = vertices + smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
     return np.asarray(vertices)
 
@@ -149,14 +151,14 @@ def expected_positions(
     apart = mesh.vertices - now
     smooth = diffuse(mesh.vertices, pieces, apart, own_mm)
     size = cell_sizes(now, pieces).sum()
-    found = {start_week: mesh.vertices}
+    by_week = {start_week: mesh.vertices}
     for week in sorted({*weeks, *also}):
         if week > start_week + 1e-6:
             places = positions_at(week, atlas, weeks, sizes)
             scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
             fading = np.exp((start_week - week) / FADING_GW)
-            found[float(week)] = laid_onto(places, now) + scale * (smooth + fading * (apart - smooth))
-    return list(found), np.stack(list(found.values()))
+            by_week[float(week)] = laid_onto(places, now) + scale * (smooth + fading * (apart - smooth))
+    return list(by_week), np.stack(list(by_week.values()))
 
 
 def predict_shapes(
@@ -184,12 +186,12 @@ def predict_shapes(
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
     carried = carry_sharply(mesh, pairs, surfaces)[1:]
-    known, positions = expected_positions(mesh, start_week, carried, weeks, also=also)
-    others = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in known]}
+    shape_weeks, positions = expected_positions(mesh, start_week, carried, weeks, also=also)
+    others = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in shape_weeks]}
     for name, way in (("atlas_deformed", carried), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
         _, places = expected_positions(mesh, start_week, way, weeks, also=also, own_mm=0)
         others[name] = [at[used] for at in places]
-    return known, positions, others
+    return shape_weeks, positions, others
 
 
 def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats]) -> dict[str, Floats]:

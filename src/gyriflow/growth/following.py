@@ -26,11 +26,11 @@ def fits_of_series(areas: pd.DataFrame, *, may_shrink: bool = False) -> dict[str
     for name, brains in areas.groupby("series", sort=False):
         fits[str(name)] = {}
         for quantity in (*SIZES, *([THICKNESS] if THICKNESS in brains else [])):
-            known = brains.dropna(subset=quantity)
-            if quantity in SIZES or len(known["week"].unique()) > 1:
+            measured = brains.dropna(subset=quantity)
+            if quantity in SIZES or len(measured["week"].unique()) > 1:
                 shrinks = may_shrink or quantity == THICKNESS
                 fits[str(name)][quantity] = fitted(
-                    *known[["week", quantity]].to_numpy().T, name=quantity, may_shrink=shrinks
+                    *measured[["week", quantity]].to_numpy().T, name=quantity, may_shrink=shrinks
                 )
     return fits
 
@@ -60,9 +60,9 @@ def followed_sizes(
         if given == "measured":
             curve = _measured(curves, series, quantity)
         else:
-            known = {float(week): number for week, number in given.items()}
+            by_week = {float(week): number for week, number in given.items()}
             shrinks = shrink or quantity == THICKNESS
-            curve = tabulated(list(known), list(known.values()), name=quantity, may_shrink=shrinks)
+            curve = tabulated(list(by_week), list(by_week.values()), name=quantity, may_shrink=shrinks)
         sizes = value(curve, at)
         tables[quantity] = {round(float(week), 6): float(size) for week, size in zip(at, sizes, strict=True)}
     return tables

@@ -91,10 +91,10 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
             expected=f"at most {AWAY_MM:g} mm on average",
             remedy="Both must be in one pose and of one week.",
         )
-    beside, weights = mesh.vertices - values_at(match, start.vertices), vertex_areas(start)
+    offsets, weights = mesh.vertices - values_at(match, start.vertices), vertex_areas(start)
     turns = [rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces]
     return np.stack(
-        [values_at(match, surface) + beside @ turn.T for surface, turn in zip(surfaces, turns, strict=True)]
+        [values_at(match, surface) + offsets @ turn.T for surface, turn in zip(surfaces, turns, strict=True)]
     )
 
 

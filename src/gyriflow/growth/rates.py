@@ -59,8 +59,8 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
         seconds = (rates["to_week"] - rates["from_week"]) * SECONDS_PER_GW
         for tissue in TISSUES:
             if f"{tissue}_ml" in brains:
-                known = brains.groupby("week")[f"{tissue}_ml"].mean().to_numpy(dtype=float)
-                rates[f"{tissue}_ratio"] = known[1:] / known[:-1]
+                volumes_ml = brains.groupby("week")[f"{tissue}_ml"].mean().to_numpy(dtype=float)
+                rates[f"{tissue}_ratio"] = volumes_ml[1:] / volumes_ml[:-1]
                 rates[f"{tissue}_compound_rate_per_s"] = np.log(rates[f"{tissue}_ratio"]) / (3 * seconds)
         tables.append(rates)
     return pd.concat(tables, ignore_index=True)

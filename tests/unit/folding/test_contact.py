@@ -49,17 +49,3 @@ def test_the_barrier_becomes_stiffer_where_folds_come_close_and_softer_where_the
     # only the last step counts
     contact.adapt([after(0.01, START_PA), after(part, before * START_PA)])
     assert contact.stiffness_pa == then * START_PA
-
-
-def test_the_barrier_begins_as_set(domain):
-    contact = contact_of(domain, adaptive=True)
-    contact.stiffness_pa = 3 * START_PA
-    contact.adapt([])
-    assert contact.stiffness_pa == START_PA
-
-
-@pytest.mark.parametrize("part", [0.01, 0.5, 0.9, np.nan])
-def test_a_given_stiffness_is_kept(domain, part):
-    contact = contact_of(domain, adaptive=False)
-    contact.adapt([after(part, 4 * START_PA)])
-    assert contact.stiffness_pa == START_PA

@@ -7,7 +7,7 @@ from shapes import ellipsoid
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.matching import surface_mask
-from gyriflow.geometry.triangles import TriangleMesh, signed_volume
+from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.carried_regions import (
     number_regions,
     regions_from_surface,
@@ -78,13 +78,6 @@ def test_another_mesh_of_the_surface_has_the_same_regions_and_no_other():
         regions_from_surface(BRAIN, fine, labels[:-1])
     with pytest.raises(InputError, match="not that of the brain"):
         regions_from_surface(BRAIN, TriangleMesh(fine.vertices + [0, 60.0, 0], fine.faces), labels)
-
-
-def test_the_mask_of_a_surface_fills_it():
-    mask, affine = surface_mask(BRAIN, 1.0)
-    assert mask.sum() == pytest.approx(signed_volume(BRAIN), rel=0.01)
-    centre = transform_points(np.argwhere(mask > 0), affine).mean(axis=0)
-    np.testing.assert_allclose(centre, 0, atol=0.1)
 
 
 def test_regions_of_brains_without_labels_are_carried_by_the_masks_of_their_surfaces():
