@@ -57,5 +57,5 @@ rule paper:
     input:
         asked_for(FIGURES, "paper"),
         rules.growth_rates.output if study.growing else [],
-        rules.replication.output,
+        rules.replication.output if study.folded else [],
         rules.studies.input,

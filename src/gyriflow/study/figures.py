@@ -376,7 +376,7 @@ def _of_comparison(study: Study, comparison: Comparison) -> Iterator[Figure]:
 
 
 def _of_the_rest(study: Study) -> Iterator[Figure]:
-    if calibrate := study.config.calibrate:
+    if study.calibration and (calibrate := study.config.calibrate):
         tables = {name: f"{CALIBRATION}/{name}.csv" for name in ("runs", "optimum")}
         path, options = f"{CALIBRATION}/calibration.png", {"score": list(calibrate.score)}
         yield Figure("calibration_figure", path, "scores.calibration_chart", tables, options, target="calibrate")

@@ -44,7 +44,7 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     if (asked := config.calibrate) is not None:
         base = tuple(one for one in simulations.values() if one.run == asked.base)
         real = {one.start.id: _compared_with(asked, one.start, known) for one in base}
-        calibration = Calibration(base, asked.runs, real)
+        calibration = Calibration(base, asked.runs, real) if base else None
     return Study(
         config=config,
         brains=brains,

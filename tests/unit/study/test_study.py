@@ -157,8 +157,10 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], "named")
     assert {tuple(row["template_maps"]) for row in found.exported} == {()}
     # nothing is left where no start is
-    empty = study(real, ["b21"], studies={"thick": varied})
+    search = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
+    empty = study(real, ["b21"], studies={"thick": varied}, calibrate=search)
     assert empty.folded == empty.norm_reference == [] == list(empty.comparisons)
+    assert empty.calibration is None
 
 
 # which real brains a run is compared with
