@@ -50,7 +50,6 @@ def validated_study():
 
 study, CONTENTS = validated_study()
 CONFIG = study.config
-FIGURES = figures_of(study)
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
 REFUSED = {
     brain: cause for brain, cause in refused_brains().items() if brain in [known.id for known in CONFIG.brains]
@@ -61,6 +60,7 @@ if REFUSED and workflow.is_main_process:
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
 if REFUSED and not study.brains:
     sys.exit(0)
+FIGURES = figures_of(study)
 if workflow.is_main_process:
     for cause in study.unreachable.values():
         print(f"gyriflow: not folded: {cause}", file=sys.stderr)
