@@ -57,7 +57,6 @@ MAPS = {
 }
 """The quantities that are drawn as maps, with the labels of their colour bars."""
 WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth (% per week)", "shear modulus (Pa)"
-"""The fields of the folding, with their units."""
 STEPS = {
     "newton": "Newton\niterations",
     "krylov": "CG iterations",
@@ -100,37 +99,24 @@ _ENDINGS = {
 _UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
 
 
-def shown_unit(unit: object) -> str:
-    """Returns a unit of the tables as shown, for example "cm²"; empty where there is none."""
-    return _UNITS.get(unit, unit) if isinstance(unit, str) else ""
-
-
 def with_unit(name: str, unit: object) -> str:
-    """Returns a name with a unit of the tables behind it, for example "pial area (cm²)"."""
-    return f"{name} ({shown})" if (shown := shown_unit(unit)) else name
+    """Return a name with a unit of the tables behind it, for example "pial area (cm²)"."""
+    shown = _UNITS.get(unit, unit) if isinstance(unit, str) else ""
+    return f"{name} ({shown})" if shown else name
 
 
 def plain(name: str) -> str:
-    """Returns a name of columns or files as words."""
+    """Return a name of columns or files as words."""
     return name.replace("_", " ")
 
 
-def shown_number(value: float) -> str:
-    """Returns a number with at most three digits, a very large or small one with its power of ten, as in 2·10⁻⁷."""
-    digits, _, power = f"{value:.3g}".replace("-", "−").partition("e")
-    if not power:
-        return digits
-    factor = "" if digits == "1" else f"{digits}·"
-    return f"{factor}10$^{{{int(power.replace('−', '-'))}}}$"
-
-
 def week_label(week: float) -> str:
-    """Returns a gestational week as shown, for example "21 GW" or "21.5 GW"."""
+    """Return a gestational week as shown, for example "21 GW" or "21.5 GW"."""
     return f"{week:g} GW"
 
 
 def column_label(key: Hashable) -> str:
-    """Returns the heading of a column: a week, an interval of two weeks, or a name as it is."""
+    """Return the heading of a column: a week, an interval of two weeks, or a name as it is."""
     match key:
         case (first, last):
             return f"{first:g}–{last:g} GW"
@@ -141,27 +127,21 @@ def column_label(key: Hashable) -> str:
 
 
 def parameter_label(key: str) -> str:
-    """Returns what a key of the folding is called on an axis, with its unit, for example "cortical thickness (mm)"."""
-    name, unit = key, ""
-    for ending, shown in _ENDINGS.items():
-        if name.endswith(ending):
-            name, unit = name.removesuffix(ending), shown
-            break
+    """Return what a key of the folding is called on an axis, with its unit, for example "cortical thickness (mm)"."""
+    ending = next((ending for ending in _ENDINGS if key.endswith(ending)), "")
+    name, unit = key.removesuffix(ending), _ENDINGS.get(ending)
     return with_unit(PARAMETERS.get(name, plain(name.replace(".", " "))), unit)
 
 
 def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Returns a heading for each member of a study: its values with their units, for example "1.5 mm".
+    """Return a heading for each member of a study: its values with their units, for example "1.5 mm".
 
     Where several keys are varied, each is named.
     """
-    labels = []
-    for member in values:
-        parts = []
-        for key, value in member.items():
-            name, _, unit = parameter_label(key).partition(" (")
-            text = f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
-            text += f" {unit.removesuffix(')')}" if unit else ""
-            parts.append(text if len(member) == 1 and unit else f"{name} {text}")
-        labels.append("\n".join(parts))
-    return labels
+    return ["\n".join(_value_label(*item, alone=len(member) == 1) for item in member.items()) for member in values]
+
+
+def _value_label(key: str, value: Any, *, alone: bool) -> str:
+    name, _, unit = parameter_label(key).removesuffix(")").partition(" (")
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{text} {unit}" if alone and unit else f"{name} {text} {unit}".rstrip()

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from string import ascii_lowercase
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -95,7 +96,7 @@ def panel_grid(
     columns: Sequence[str],
     rows: Sequence[Row],
     *,
-    colour_bars: Sequence[tuple[ScalarMappable, str]] = (),
+    colour_bar: tuple[ScalarMappable, str] | None = None,
     legend: Sequence[Patch] = (),
 ) -> Figure:
     """Draw rows of surfaces under column headings, all at one scale in mm, with a scale bar below.
@@ -106,7 +107,7 @@ def panel_grid(
 
     Parameters
     ----------
-    colour_bars : colour scales and their labels
+    colour_bar : a colour scale and its label
     legend : entries of a legend
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
@@ -120,7 +121,8 @@ def panel_grid(
     most_in = max(sum(panels[block]) for block in blocks)
     width = _dots(max(SINGLE_COLUMN_IN, label_in + most_in))
     left_in = _dots(label_in + (width - label_in - most_in) / 2)
-    foot_in = max(0.66 if colour_bars or legend else 0.46, 0.15 * -(-len(legend) // _legend_columns(width)) + 0.16)
+    legend_columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
+    foot_in = max(0.66 if colour_bar or legend else 0.46, 0.15 * -(-len(legend) // legend_columns) + 0.16)
     layout = _Layout(width, left_in, panels, _dots(foot_in), inches_per_mm)
 
     # a letter of a column's heading is about 0.055 in wide
@@ -148,7 +150,16 @@ def panel_grid(
             _draw_row(figure, row, block, layout, marked, bottom=top - height, height=height)
             top -= height + caption
     _draw_scale_bar(figure, layout, {end for panel in shown for end in panel.view.ends})
-    _draw_keys(figure, layout, colour_bars, legend)
+    if colour_bar:
+        start = _SCALE_SHARE * width + 0.1
+        place = start / width, 0.5 / total, (width - start - 0.3) / width, 0.08 / total
+        bar = figure.colorbar(colour_bar[0], cax=figure.add_axes(place), orientation="horizontal")
+        bar.set_label(colour_bar[1], labelpad=1)
+        bar.ax.tick_params(pad=1, length=2)
+        bar.outline.set_linewidth(0.5)
+    if legend:
+        place_of_legend: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.0), "borderaxespad": 0.2}
+        figure.legend(handles=legend, ncols=legend_columns, **place_of_legend)
     return figure
 
 
@@ -186,18 +197,11 @@ def _draw_row(
         axes.set_axis_off()
         if index < len(letters):
             # beside the row's label, or above the letters of the ends, of this picture and the one before
-            beside = row.label and not index
-            axes.annotate(
-                letters[index],
-                (0.0, 1.0),
-                xytext=(-2, 2),
-                textcoords="offset points",
-                xycoords="axes fraction",
-                ha="right" if beside else "left",
-                va="top" if beside else "bottom",
-                fontsize=9,
-                fontweight="bold",
-            )
+            look: dict[str, Any] = {"ha": "left", "va": "bottom"}
+            if row.label and not index:
+                look = {"ha": "right", "va": "top"}
+            look |= {"xytext": (-2, 2), "textcoords": "offset points", "xycoords": "axes fraction"}
+            axes.annotate(letters[index], (0.0, 1.0), fontsize=9, fontweight="bold", **look)
         if panel is None:
             axes.text(0.5, 0.5, row.absent, transform=axes.transAxes, ha="center", va="center", fontsize=6.5)
             continue
@@ -246,24 +250,3 @@ def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
     axes.text(0.0, -0.6, f"{length:g} mm", transform=axes.transAxes, ha="left", va="top", fontsize=7)
     words = ", ".join(f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends)
     figure.text(_EDGE_IN / layout.width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
-
-
-def _legend_columns(width_in: float) -> int:
-    return 2 if width_in > 1.5 * SINGLE_COLUMN_IN else 1
-
-
-def _draw_keys(
-    figure: Figure, layout: _Layout, colour_bars: Sequence[tuple[ScalarMappable, str]], legend: Sequence[Patch]
-) -> None:
-    total, width = figure.get_figheight(), layout.width
-    start = _SCALE_SHARE * width
-    for index, (scale, label) in enumerate(colour_bars):
-        share = (width - start - 0.2) / len(colour_bars)
-        place = ((start + index * share + 0.1) / width, 0.5 / total, (share - 0.2) / width, 0.08 / total)
-        bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation="horizontal")
-        bar.set_label(label, labelpad=1)
-        bar.ax.tick_params(pad=1, length=2)
-        bar.outline.set_linewidth(0.5)
-    if legend:
-        columns = _legend_columns(width)
-        figure.legend(handles=legend, loc="lower right", ncols=columns, bbox_to_anchor=(1.0, 0.0), borderaxespad=0.2)

@@ -34,7 +34,6 @@ from .scene import (
     UNKNOWN_COLOUR,
     View,
     colour_scale,
-    hemisphere_faces,
     named_views,
     paint,
     restricted,
@@ -143,13 +142,13 @@ def runs_by_week(
         name: {view: _plain_panels(meshes, keys, colour, view) for view in seen}
         for name, (meshes, colour) in groups.items()
     }
-    bars = []
+    bar = None
     if deviations:
         away = {week: (mesh, maps[DISTANCE]) for week, (mesh, maps) in deviations.items()}
         scale = scale_of(DISTANCE, np.concatenate([values for _, values in away.values()]))
         panels["distance"] = {view: [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys] for view in seen}
-        bars = [(scale, MAPS[DISTANCE])]
-    return panel_grid(*_side_by_side(keys, panels), colour_bars=bars)
+        bar = scale, MAPS[DISTANCE]
+    return panel_grid(*_side_by_side(keys, panels), colour_bar=bar)
 
 
 @styled
@@ -192,7 +191,7 @@ def displacement_maps(
             for view in seen:
                 caption = words if view == seen[0] else ""
                 panels[run][view].append(Panel(mesh, paint(norms, scale), view, caption, MAP, place))
-    return panel_grid(*_side_by_side(keys, panels), colour_bars=[(scale, "norm of the displacement (mm)")])
+    return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, "norm of the displacement (mm)"))
 
 
 def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
@@ -306,7 +305,7 @@ def scalar_maps(
     legend = [Patch(color=NEUTRAL_COLOUR, label="no contact")] if quantity in PRESSURES else []
     if not np.isfinite(every).all():
         legend.append(Patch(color=UNKNOWN_COLOUR, label="not measured"))
-    return panel_grid(*_side_by_side(keys, panels), colour_bars=[(scale, MAPS[quantity])], legend=legend)
+    return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, MAPS[quantity]), legend=legend)
 
 
 def _map_panel(
@@ -374,7 +373,7 @@ def influence_picture(
     for view in seen:
         panels = [_map_panel(shown, scale, view, quantity) for shown in maps.values()]
         rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, absent=ABSENT))
-    return panel_grid(list(brains), rows, colour_bars=[(scale, MAPS[quantity])])
+    return panel_grid(list(brains), rows, colour_bar=(scale, MAPS[quantity]))
 
 
 def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:
@@ -444,9 +443,10 @@ def zones_picture(
         palette[code] = to_rgb(colour)
         if areas[code]:
             legend.append(Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²"))
-    # a brain of one hemisphere has no medial view of the other
-    shown = [view for view in named_views(views) if hemisphere_faces(mesh, view.hemisphere, fissure_x_mm).any()]
     panels = [
-        Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, material=MAP) for view in shown
+        Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, material=MAP)
+        for view in named_views(views)
     ]
-    return panel_grid([f"{view.name} view" for view in shown], [Row("", panels)], legend=legend)
+    # a brain of one hemisphere has no medial view of the other
+    panels = [panel for panel in panels if len(panel.mesh.faces)]
+    return panel_grid([f"{panel.view.name} view" for panel in panels], [Row("", panels)], legend=legend)

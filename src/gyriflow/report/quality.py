@@ -18,7 +18,7 @@ from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.schemes import LabelScheme
-from .scene import VIEWS, colour_scale, half_extents, hemisphere_faces, paint, render, restricted, uniform_colours
+from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, Extent, draw_image, draw_outline, plane_grid, voxel_index
 from .style import FULL_WIDTH_IN, REAL_SURFACE_COLOUR, new_figure, styled, wrap
 
@@ -183,9 +183,9 @@ def _draw_views(figure: SubFigure, brain: Brain, colours: Floats, names: Sequenc
     pixels_per_mm = PIXELS_PER_INCH * (FULL_WIDTH_IN - 0.7) / len(names) / (2 * wide)
     for axes, view in zip(panels, [VIEWS[name] for name in names], strict=True):
         axes.set_axis_off()
-        if not hemisphere_faces(brain.pial, view.hemisphere, brain.fissure_x_mm).any():
-            continue
         mesh, painted = restricted(brain.pial, colours, view.hemisphere, brain.fissure_x_mm)
+        if not len(mesh.faces):
+            continue
         picture = render(mesh, painted, view, half_width_mm=wide, half_height_mm=tall, pixels_per_mm=pixels_per_mm)
         axes.imshow(picture)
         axes.set_title(view.name, fontsize=6.5, pad=1)

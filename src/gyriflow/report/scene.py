@@ -88,42 +88,34 @@ _LAMPS = (((0.0, 1.0, 0.8), 0.45), ((-1.0, 0.2, 0.5), 0.22), ((1.0, 0.2, 0.5), 0
 
 
 def picture_axes(view: View) -> tuple[Floats, Floats]:
-    """Returns the unit vectors that point right and up in the picture."""
+    """Return the unit vectors that point right and up in the picture."""
     up = np.array(view.up, dtype=float)
     return np.cross(up, np.array(view.towards, dtype=float)), up
 
 
 def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
-    """Returns half the width and half the height in mm of the surface as seen."""
+    """Return half the width and half the height in mm of the surface as seen."""
     right, up = (np.ptp(mesh.vertices @ axis) / 2 for axis in picture_axes(view))
     return float(right), float(up)
-
-
-def hemisphere_faces(mesh: TriangleMesh, hemisphere: str, fissure_x_mm: float) -> NDArray[np.bool_]:
-    """Returns a (m,) mask of the faces on one side of the fissure's plane; of all faces for ""."""
-    middle = corners(mesh).mean(axis=1)[:, 0]
-    match hemisphere:
-        case "left":
-            return middle < fissure_x_mm
-        case "right":
-            return middle >= fissure_x_mm
-        case _:
-            return np.ones(len(mesh.faces), dtype=bool)
 
 
 def restricted(
     mesh: TriangleMesh, colours: Floats, hemisphere: str, fissure_x_mm: float
 ) -> tuple[TriangleMesh, Floats]:
-    """Returns one hemisphere of the surface and its part of the (n, 3) vertex or (m, 3) face colours."""
+    """Return the faces on one side of the fissure's plane, all for "", and their (n, 3) vertex or (m, 3) face colours.
+
+    A brain that lacks the hemisphere has no faces there.
+    """
     if not hemisphere:
         return mesh, colours
-    keep = hemisphere_faces(mesh, hemisphere, fissure_x_mm)
+    left = corners(mesh).mean(axis=1)[:, 0] < fissure_x_mm
+    keep = left if hemisphere == "left" else ~left
     part, vertices = submesh(mesh, keep)
     return part, colours[vertices] if len(colours) == len(mesh.vertices) else colours[keep]
 
 
 def named_views(names: Sequence[str]) -> list[View]:
-    """Returns the views of these names; InputError for an unknown one."""
+    """Return the views of these names; InputError for an unknown one."""
     unknown = [name for name in names if name not in VIEWS]
     if unknown:
         raise InputError("unknown view", found=unknown, expected=list(VIEWS))
@@ -131,12 +123,12 @@ def named_views(names: Sequence[str]) -> list[View]:
 
 
 def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
-    """Returns one colour for every vertex, (n, 3) in 0 to 1."""
+    """Return one colour for every vertex, (n, 3) in 0 to 1."""
     return np.tile(np.array(to_rgb(colour)), (len(mesh.vertices), 1))
 
 
 def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -> ScalarMappable:
-    """Returns a colour scale; `cut` marks its upper end as passed by some values."""
+    """Return a colour scale; `cut` marks its upper end as passed by some values."""
     start, end = PARTS.get(colormap, (0.0, 1.0))
     shades = mpl.colormaps[colormap](np.linspace(start, end, 256))
     colours = LinearSegmentedColormap.from_list(colormap, [tuple(shade) for shade in shades])
@@ -145,7 +137,7 @@ def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -
 
 
 def paint(values: Floats, scale: ScalarMappable, *, zero_is_nothing: bool = False) -> Floats:
-    """Returns the (n, 3) colours of values, grey where they are not finite, and, if asked for, where there is nothing.
+    """Return the (n, 3) colours of values, grey where they are not finite, and, if asked for, where there is nothing.
 
     Nothing is zero, and on a scale that begins at zero what is below, too.
     """
@@ -159,7 +151,7 @@ def paint(values: Floats, scale: ScalarMappable, *, zero_is_nothing: bool = Fals
 
 
 def sees(mesh: TriangleMesh, point: Floats, view: View) -> bool:
-    """Returns whether a point of the surface is in front, seen from a side."""
+    """Return whether a point of the surface is in front, seen from a side."""
     away = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     towards = np.array(view.towards)
@@ -181,7 +173,7 @@ def render(
     material: Material = TISSUE,
     lines: Floats | None = None,
 ) -> Image:
-    """Returns a picture of the surface in parallel projection, its bounding box in the middle.
+    """Return a picture of the surface in parallel projection, its bounding box in the middle.
 
     Parameters
     ----------

@@ -54,9 +54,8 @@ QUANTILE = r"_q\d\d$"
 def _named(rows: pd.DataFrame) -> pd.Series:
     """Return the metric of each row as in figures, with its unit."""
     pairs = zip(rows["metric"], rows["unit"], strict=True)
-    return pd.Series(
-        [with_unit(METRICS.get(metric, plain(metric)), unit) for metric, unit in pairs], index=rows.index, dtype=object
-    )
+    names = [with_unit(METRICS.get(metric, plain(metric)), unit) for metric, unit in pairs]
+    return pd.Series(names, index=rows.index, dtype=object)
 
 
 def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.DataFrame:

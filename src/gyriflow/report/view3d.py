@@ -2,7 +2,6 @@
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,101 +25,81 @@ LABELS = {name: label for name, label in MAPS.items() if name not in PRESSURES}
 """The maps of the view, with the labels of their colour bars."""
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
-# base64 writes three bytes as four letters
-_LETTERS_PER_BYTE = 4 / 3
+# base64 writes three bytes as four letters; a vertex has about two triangles, of three indices of two bytes
+_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(LABELS), 12
 
-
-@dataclass(frozen=True, eq=False)
-class TimedSurface:
-    """A surface in RAS+ mm at a week, and its (n,) maps by name; NaN where a value is not known."""
-
-    week: float
-    mesh: TriangleMesh
-    maps: Mapping[str, Floats]
+Timed = tuple[float, TriangleMesh, dict[str, Floats]]
+"""A week, a surface in RAS+ mm and its maps by name; NaN where a value is not known."""
 
 
 def surfaces_view(
-    runs: Mapping[str, Sequence[tuple[float, Halves]]], real: Sequence[tuple[float, Halves]], *, measured: str
-) -> dict[str, Any]:
-    """Returns `view_data` of simulated and measured brains, each a week with its hemispheres and their maps."""
-    simulated = {name: with_displacement([_timed(*frame) for frame in frames]) for name, frames in runs.items()}
-    return view_data(simulated, [_timed(*frame) for frame in real], measured=measured)
-
-
-def _timed(week: float, halves: Halves) -> TimedSurface:
-    mesh, maps = whole_maps(halves)
-    return TimedSurface(week, mesh, {name: values for name, values in maps.items() if name in LABELS})
-
-
-def with_displacement(surfaces: Sequence[TimedSurface]) -> list[TimedSurface]:
-    """Returns a run's surfaces with the map of the distance in mm that each vertex has moved since the first one.
-
-    InputError where the surfaces do not have the same vertices.
-    """
-    start = surfaces[0].mesh.vertices
-    moved = []
-    for surface in surfaces:
-        if surface.mesh.vertices.shape != start.shape:
-            found = f"{len(surface.mesh.vertices)} vertices at {surface.week:g} GW"
-            raise InputError("a run's surfaces differ in their vertices", found=found, expected=f"{len(start)}")
-        norms = np.linalg.norm(surface.mesh.vertices - start, axis=1)
-        moved.append(TimedSurface(surface.week, surface.mesh, {**surface.maps, DISPLACEMENT: norms}))
-    return moved
-
-
-def view_data(
-    simulated: Mapping[str, Sequence[TimedSurface]],
-    real: Sequence[TimedSurface],
+    runs: Mapping[str, Sequence[tuple[float, Halves]]],
+    real: Sequence[tuple[float, Halves]],
     *,
     measured: str,
     budget_bytes: float = BUDGET_BYTES,
 ) -> dict[str, Any]:
-    """Returns the surfaces, thinned out to fit the budget, with their maps and colour scales, ready for JSON.
+    """Return the surfaces, thinned out to fit the budget, with their maps and colour scales, ready for JSON.
 
-    A run's surfaces share their triangles, so that the view can move smoothly from week to week; measured brains have
-    their own each week. Positions are in steps of 1/65535 of the box around all surfaces, values of maps in 254 steps
-    of their scale.
+    A run's surfaces share their triangles, so that the view can move smoothly from week to week, and have the map of
+    the distance that each vertex has moved since the first one; measured brains have their own triangles each week.
+    Positions are in steps of 1/65535 of the box around all surfaces, values of maps in 254 steps of their scale.
 
     Parameters
     ----------
-    simulated : {run: surfaces by week, with the same vertices}
-    real : surfaces of the measured brains by week
+    runs : {run: (week, hemispheres) by week, with the same vertices}
+        InputError where their vertices differ in number.
+    real : (week, hemispheres) of the measured brains by week
     measured
         What the measured brains are called.
     """
-    everything = [surface for surfaces in simulated.values() for surface in surfaces] + list(real)
+    simulated = {name: _with_displacement([_timed(*frame) for frame in frames]) for name, frames in runs.items()}
+    others = [_timed(*frame) for frame in real]
+    everything = [frame for frames in simulated.values() for frame in frames] + others
     if not everything:
         return {"groups": [], "maps": []}
-    vertices = _vertices_within(budget_bytes, simulated, real)
-    low = np.min([surface.mesh.vertices.min(axis=0) for surface in everything], axis=0)
-    high = np.max([surface.mesh.vertices.max(axis=0) for surface in everything], axis=0)
-    names = [name for name in LABELS if any(name in surface.maps for surface in everything)]
-    scales = {name: _scale(name, everything) for name in names}
+    bytes_per_vertex = len(everything) * _BYTES_PER_FRAME + (len(runs) + len(real)) * _BYTES_PER_TRIANGULATION
+    vertices = int(np.clip(budget_bytes / _LETTERS_PER_BYTE / bytes_per_vertex, FEWEST_VERTICES, MOST_VERTICES))
+    low = np.min([mesh.vertices.min(axis=0) for _, mesh, _ in everything], axis=0)
+    high = np.max([mesh.vertices.max(axis=0) for _, mesh, _ in everything], axis=0)
     box = low, float((high - low).max())
-    groups = []
-    for run, surfaces in simulated.items():
-        kept, faces = thin_out(surfaces[-1].mesh, vertices)
-        frames = [_frame(surface, kept, box, scales) for surface in surfaces]
-        groups.append(
-            {"name": run, "kind": "simulated", "colour": SIMULATED_SURFACE_COLOUR, "faces": _faces(faces)}
-            | {"frames": frames}
-        )
-    frames = []
-    for surface in real:
-        kept, faces = thin_out(surface.mesh, vertices)
-        frames.append(_frame(surface, kept, box, scales) | {"faces": _faces(faces)})
-    if frames:
-        groups.append({"name": measured, "kind": "real", "colour": REAL_SURFACE_COLOUR, "frames": frames})
-    return {
-        "low": low.tolist(),
-        "size": box[1],
-        "groups": groups,
-        "maps": [_described(name, scales[name]) for name in names],
-    }
+    scales = {}
+    for name in LABELS:
+        if values := [maps[name] for _, _, maps in everything if name in maps]:
+            every = np.concatenate(values)
+            scales[name] = scale_of(name, every[np.isfinite(every)])
+    groups: list[dict[str, Any]] = []
+    for run, frames in simulated.items():
+        kept, faces = thin_out(frames[-1][1], vertices)
+        look = {"name": run, "kind": "simulated", "colour": SIMULATED_SURFACE_COLOUR, "faces": _text(faces, "<u2")}
+        groups.append(look | {"frames": [_frame(frame, kept, box, scales) for frame in frames]})
+    if others:
+        look = {"name": measured, "kind": "real", "colour": REAL_SURFACE_COLOUR}
+        groups.append(look | {"frames": []})
+    for frame in others:
+        kept, faces = thin_out(frame[1], vertices)
+        groups[-1]["frames"].append(_frame(frame, kept, box, scales) | {"faces": _text(faces, "<u2")})
+    maps = [_described(name, scale) for name, scale in scales.items()]
+    return {"low": low.tolist(), "size": box[1], "groups": groups, "maps": maps}
+
+
+def _timed(week: float, halves: Halves) -> Timed:
+    mesh, maps = whole_maps(halves)
+    return week, mesh, {name: values for name, values in maps.items() if name in LABELS}
+
+
+def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
+    start = frames[0][1].vertices
+    for week, mesh, maps in frames:
+        if mesh.vertices.shape != start.shape:
+            found = f"{len(mesh.vertices)} vertices at {week:g} GW"
+            raise InputError("a run's surfaces differ in their vertices", found=found, expected=f"{len(start)}")
+        maps[DISPLACEMENT] = np.linalg.norm(mesh.vertices - start, axis=1)
+    return list(frames)
 
 
 def thin_out(mesh: TriangleMesh, vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Returns which vertices are kept, about so many, and the (m, 3) triangles between them, as places among these.
+    """Return which vertices are kept, about so many, and the (m, 3) triangles between them, as places among these.
 
     Edges are collapsed onto vertices that there are (Schroeder, Zarge & Lorensen 1992), so that maps and the positions
     of other weeks are those of the kept vertices.
@@ -135,51 +114,25 @@ def thin_out(mesh: TriangleMesh, vertices: int) -> tuple[NDArray[np.int64], NDAr
     return kept, np.asarray(coarse.regular_faces, dtype=np.int64)
 
 
-def _vertices_within(
-    budget_bytes: float, simulated: Mapping[str, Sequence[TimedSurface]], real: Sequence[TimedSurface]
-) -> int:
-    """Returns how many vertices each surface may have."""
-    maps = len(LABELS)
-    # about two triangles a vertex, of three indices of two bytes
-    per_frame, per_triangulation = 6 + maps, 12
-    frames = sum(len(surfaces) for surfaces in simulated.values()) + len(real)
-    triangulations = len(simulated) + len(real)
-    bytes_per_vertex = _LETTERS_PER_BYTE * (frames * per_frame + triangulations * per_triangulation)
-    return int(np.clip(budget_bytes / bytes_per_vertex, FEWEST_VERTICES, MOST_VERTICES))
-
-
-def _scale(name: str, surfaces: Sequence[TimedSurface]) -> ScalarMappable:
-    values = np.concatenate([surface.maps[name] for surface in surfaces if name in surface.maps])
-    return scale_of(name, values[np.isfinite(values)])
-
-
 def _described(name: str, scale: ScalarMappable) -> dict[str, Any]:
     low, high = scale.get_clim()
     colours = scale.to_rgba(np.linspace(low, high, _VALUE_LEVELS + 1), bytes=True)[:, :3]
-    return {"name": name, "label": LABELS[name], "low": low, "high": high, "colours": _text(colours.astype(np.uint8))}
+    return {"name": name, "label": LABELS[name], "low": low, "high": high, "colours": _text(colours, "u1")}
 
 
 def _frame(
-    surface: TimedSurface,
-    kept: NDArray[np.int64],
-    box: tuple[Floats, float],
-    scales: Mapping[str, ScalarMappable],
+    frame: Timed, kept: NDArray[np.int64], box: tuple[Floats, float], scales: Mapping[str, ScalarMappable]
 ) -> dict[str, Any]:
-    low, size = box
-    places = np.round((surface.mesh.vertices[kept] - low) / size * _POSITION_LEVELS).astype("<u2")
+    (week, mesh, maps), (low, size) = frame, box
     values = {}
-    for name, scale in scales.items():
-        if name in surface.maps:
-            bottom, top = scale.get_clim()
-            own = np.asarray(surface.maps[name], dtype=float)[kept]
-            levels = np.clip(np.round((own - bottom) / (top - bottom) * _VALUE_LEVELS), 0, _VALUE_LEVELS)
-            values[name] = _text(np.where(np.isfinite(own), levels, _UNKNOWN).astype(np.uint8))
-    return {"week": surface.week, "positions": _text(places), "values": values}
+    for name, of_vertices in maps.items():
+        bottom, top = scales[name].get_clim()
+        shares = (np.asarray(of_vertices, dtype=float)[kept] - bottom) / (top - bottom)
+        levels = np.clip(np.round(shares * _VALUE_LEVELS), 0, _VALUE_LEVELS)
+        values[name] = _text(np.where(np.isfinite(shares), levels, _UNKNOWN), "u1")
+    places = np.round((mesh.vertices[kept] - low) / size * _POSITION_LEVELS)
+    return {"week": week, "positions": _text(places, "<u2"), "values": values}
 
 
-def _faces(faces: NDArray[np.int64]) -> str:
-    return _text(faces.astype("<u2"))
-
-
-def _text(values: NDArray) -> str:
-    return b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+def _text(values: NDArray, kind: str) -> str:
+    return b64encode(np.ascontiguousarray(values.astype(kind)).tobytes()).decode("ascii")

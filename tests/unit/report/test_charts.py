@@ -1,6 +1,5 @@
 """Charts hold what the tables say."""
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
@@ -69,14 +68,6 @@ def test_measured_brains_are_called_by_what_they_are():
     shown = words(metrics_chart(metrics, measured="ellipsoid"))
     assert "ellipsoid" in shown
     assert "real brain" not in shown
-
-
-def test_settings_outside_stay_and_fonts_inside_are_the_same_when_saved(tmp_path):
-    before = dict(mpl.rcParams)
-    figure = metrics_chart(metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2"))
-    assert dict(mpl.rcParams) == before
-    figure.savefig(tmp_path / "chart.png")
-    assert {label.get_fontsize() for axes in figure.axes for label in axes.get_xticklabels()} == {7.0}
 
 
 def test_metrics_of_runs_are_lines_and_measured_ones_stars():

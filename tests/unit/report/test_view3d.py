@@ -9,7 +9,7 @@ import pyvista as pv
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.report.labels import DISPLACEMENT
-from gyriflow.report.view3d import TimedSurface, thin_out, view_data, with_displacement
+from gyriflow.report.view3d import surfaces_view, thin_out
 
 
 def ball(radius: float = 20.0, count: int = 40) -> TriangleMesh:
@@ -26,14 +26,10 @@ def positions(data: dict, frame: dict) -> np.ndarray:
     return np.array(data["low"]) + shorts(frame["positions"]).reshape(-1, 3) / 65535 * data["size"]
 
 
-def growing(values: np.ndarray | None = None) -> list[TimedSurface]:
-    mesh = ball()
-    return [
-        TimedSurface(
-            week, TriangleMesh(scale * mesh.vertices, mesh.faces), {} if values is None else {"curvedness": values}
-        )
-        for week, scale in ((21.0, 1.0), (22.0, 1.2))
-    ]
+def growing(values: np.ndarray | None = None) -> list:
+    """Returns a ball of 21 GW that is a fifth larger at 22 GW, each as one half with a map."""
+    mesh, maps = ball(), {} if values is None else {"curvedness": values}
+    return [(21.0, [(mesh, maps)]), (22.0, [(TriangleMesh(1.2 * mesh.vertices, mesh.faces), maps)])]
 
 
 def test_thinning_keeps_vertices_and_the_shape():
@@ -47,7 +43,7 @@ def test_thinning_keeps_vertices_and_the_shape():
 
 
 def test_a_run_has_one_triangulation_and_its_positions_each_week():
-    data = view_data({"thin": growing()}, [], measured="real brain")
+    data = surfaces_view({"thin": growing()}, [], measured="real brain")
     (group,) = data["groups"]
     places = [positions(data, frame) for frame in group["frames"]]
     assert [frame["week"] for frame in group["frames"]] == [21.0, 22.0]
@@ -60,8 +56,8 @@ def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
     count = len(ball().vertices)
     values = np.linspace(0.0, 0.2, count)
     values[0] = np.nan
-    data = view_data({"thin": growing(values)}, [], measured="real brain")
-    (described,) = data["maps"]
+    data = surfaces_view({"thin": growing(values)}, [], measured="real brain")
+    described, _ = data["maps"]
     levels = np.frombuffer(b64decode(data["groups"][0]["frames"][0]["values"]["curvedness"]), dtype=np.uint8)
     assert levels[0] == 255
     assert levels[1:] / 254 * described["high"] == pytest.approx(values[1:].clip(max=described["high"]), abs=1e-3)
@@ -69,19 +65,25 @@ def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
 
 
 def test_displacement_is_measured_from_the_first_week():
-    start, later = with_displacement(growing())
-    assert start.maps[DISPLACEMENT].max() == 0
-    assert later.maps[DISPLACEMENT] == pytest.approx(4.0, abs=1e-5)
+    data = surfaces_view({"thin": growing()}, growing(), measured="real brain")
+    assert [described["name"] for described in data["maps"]] == [DISPLACEMENT]
+    simulated, real = data["groups"]
+    start, later = (b64decode(frame["values"][DISPLACEMENT]) for frame in simulated["frames"])
+    assert set(start) == {0}
+    assert np.frombuffer(later, dtype=np.uint8) / 254 * data["maps"][0]["high"] == pytest.approx(4.0, abs=0.02)
+    # what was measured has not moved
+    assert real["name"] == "real brain"
+    assert not any(frame["values"] for frame in real["frames"])
 
 
 def test_surfaces_of_a_run_with_other_vertices_are_refused():
     with pytest.raises(InputError, match="differ in their vertices"):
-        with_displacement([TimedSurface(21.0, ball(), {}), TimedSurface(22.0, ball(count=20), {})])
+        surfaces_view({"thin": [growing()[0], (22.0, [(ball(count=20), {})])]}, [], measured="real brain")
 
 
 def test_many_surfaces_are_thinned_more_to_fit_the_budget():
     runs = {f"run{number}": growing() for number in range(8)}
-    small = view_data(runs, growing(), measured="real brain", budget_bytes=200_000)
+    small = surfaces_view(runs, growing(), measured="real brain", budget_bytes=200_000)
     sent = sum(
         len(frame["positions"]) + len(frame.get("faces", "")) for group in small["groups"] for frame in group["frames"]
     ) + sum(len(group.get("faces", "")) for group in small["groups"])
