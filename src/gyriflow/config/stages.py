@@ -52,8 +52,6 @@ class MeshSettings(Settings):
     """Distance between neighbouring nodes deep inside. [mm]"""
     envelope_mm: float = Field(0.1, gt=0.001, le=2)
     """Largest distance of the mesh's surface from the pial surface (`pytetwild`). [mm]"""
-    time_limit_s: float = Field(1800.0, gt=0)
-    """Time after which the mesher is stopped. [s]"""
     min_radius_ratio: float = Field(0.02, ge=0, lt=1)
     """Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
     max_volume_change: float = Field(0.01, gt=0, lt=1)

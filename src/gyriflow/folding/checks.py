@@ -23,7 +23,7 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
     pial = TriangleMesh(mesh.vertices, zones.facets)
     areas = face_areas(pial)
     centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
-    clamped = np.isin(zones.facet_zone, (CLAMPED, BASE, *((MEDIAL_WALL,) if zones.wall_held else ())))
+    clamped = np.isin(zones.facet_zone, (CLAMPED, BASE))
     sides = {"left": centroid_x < zones.fissure_x_mm, "right": centroid_x >= zones.fissure_x_mm}
     return {
         "zones": {
@@ -93,7 +93,7 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     if zones.free:
         return
     # a wall that slides holds what else would turn away
-    clamped = zones.vertices_of(CLAMPED, BASE, *((MEDIAL_WALL,) if zones.wall_held or zones.anchors else ()))
+    clamped = zones.vertices_of(CLAMPED, BASE, *((MEDIAL_WALL,) if zones.anchors else ()))
     if not len(clamped):
         raise InputError(
             "no facet is clamped, so the brain would drift",

@@ -36,9 +36,8 @@ class Zones:
         1 where tissue grows, 0 where it does not.
     planes_mm
         The planes that the left, and that the right hemisphere may not pass.
-    free, wall_held
-        Whether nothing is fixed on purpose, so that rigid motions are to be removed; whether the medial wall is clamped
-        or stays in its plane.
+    free
+        Whether nothing is fixed on purpose, so that rigid motions are to be removed.
     anchors : (k,) int, (k, 3) bool
         Vertices, and which of their components are fixed beside the zones', so that a body whose only support is a
         sliding wall makes no rigid motion. They take no force: as few are fixed as there are such motions.
@@ -50,7 +49,6 @@ class Zones:
     fissure_x_mm: float
     planes_mm: tuple[float, float]
     free: bool = False
-    wall_held: bool = False
     anchors: tuple[NDArray[np.int64], NDArray[np.bool_]] | None = None
 
     def vertices_of(self, *zones: int) -> NDArray[np.int64]:
@@ -82,7 +80,6 @@ class Zones:
         fixed[self.vertices_of(terms.SIDE_Y), 1] = True
         wall = self.vertices_of(terms.MEDIAL_WALL)
         fixed[wall, 0] = True
-        fixed[wall] |= self.wall_held
         if self.anchors is not None:
             vertices, components = self.anchors
             fixed[vertices] |= components
@@ -154,7 +151,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
     that of the wall.
     """
     p = parameters
-    fissure_x_mm, support, side, wall_held = p.fissure_x_mm, p.support, p.side, p.medial_wall == "held"
+    fissure_x_mm, support, side = p.fissure_x_mm, p.support, p.side
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
     left_plane, right_plane = fissure_x_mm - p.contact.gap_mm / 4, fissure_x_mm + p.contact.gap_mm / 4
@@ -184,7 +181,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
     if side is not None:
         zone[medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
         wall = np.unique(facets[zone == terms.MEDIAL_WALL])
-        if support == "free" and not wall_held and len(wall):
+        if support == "free" and len(wall):
             anchors = _wall_anchors(mesh.vertices, wall)
 
     growth = np.ones(len(mesh.vertices))
@@ -193,7 +190,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         if side is None:
             growth[bridge_vertices(mesh, facets, left_plane, right_plane)] = 0.0
     free = support == "free" and side is None
-    return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, wall_held, anchors)
+    return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, anchors)
 
 
 def bridge_vertices(

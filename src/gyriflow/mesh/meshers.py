@@ -49,7 +49,7 @@ def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> Tet
         raise MeshError(
             f"the mesher {name} was stopped after {time_limit_s:g} s",
             found=f"its last words: {last or 'none'}",
-            remedy="Raise mesh.time_limit_s, or mesh with longer edges.",
+            remedy="Mesh with longer edges, or with another mesh.mesher.",
         )
     if code == MISSING:
         raise MeshError(

@@ -19,6 +19,7 @@ from .nodes import curve_edges, improve
 log = logging.getLogger(__name__)
 FINE_DEPTH_EDGES = 2.5
 """Elements of fTetWild are as fine as at the surface down to so many edges of it ..."""
+TIME_LIMIT_S = 3600.0
 EDGE_GROWTH = 0.5
 """... and grow by this part of each mm below."""
 OTHER_VOLUME = 0.05
@@ -57,7 +58,7 @@ def tetrahedralise(
     surface_edge_mm: float,
     core_edge_mm: float,
     envelope_mm: float,
-    time_limit_s: float,
+    time_limit_s: float = TIME_LIMIT_S,
     mesher: Mesher = "pytetwild",
     order: int = 1,
 ) -> TetrahedralMesh:

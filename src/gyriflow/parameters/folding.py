@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, fi
 from ..errors import InputError
 from .growth import Growth
 from .settings import Problem, Settings, line, validated
-from .terms import FieldName, MaterialName, MedialWall, Side
+from .terms import FieldName, MaterialName, Side
 from .varying import (
     Floats,
     Maps,
@@ -134,9 +134,6 @@ class FoldingSettings(Settings):
     support: Literal["ellipsoid", "base", "box", "free"] = "ellipsoid"
     """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the
     flat base, `box` too, and lets upright sides slide; `free` removes rigid motions only."""
-    medial_wall: MedialWall = "sliding"
-    """What holds the medial wall, which has no cortex, of a hemisphere alone: `sliding` keeps it in its plane,
-    as the other hemisphere would; `held` clamps it."""
     contact: Contact = Contact()
     """Contact."""
     no_growth: NoGrowth = NoGrowth()

@@ -31,8 +31,6 @@ Coordinates = Literal["auto", "ras", "lps"]
 AffineSource = Literal["auto", "sform", "qform"]
 """Which affine of a NIfTI file is used; `auto` refuses two that disagree."""
 
-MedialWall = Literal["held", "sliding"]
-"""What holds the medial wall of a hemisphere that is alone."""
 MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
 """Names of the constitutive laws; each is a class of `mechanics.materials`."""
 

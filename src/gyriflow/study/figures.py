@@ -15,7 +15,7 @@ WEEKLY = f"{OF_STUDY}/weekly.{{brain}}.png"
 AROUND = ["left", "right", "top", "bottom"]
 THREE_SIDES = ["left", "top", "bottom"]
 REAL_BRAIN = "real brain"
-ZONES = {"contact", "no_growth", "support", "medial_wall"}
+ZONES = {"contact", "no_growth", "support"}
 """Settings of a run that decide its zones: runs alike in them have one figure of these."""
 FEWEST_FOR_NORMS = 5
 
