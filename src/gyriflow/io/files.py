@@ -41,7 +41,7 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
 
 def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> None:
     """Raise InputError where some of a file's (n,) or (n, k) values, such as the coordinates of vertices, are none."""
-    bad = int(np.count_nonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
+    bad = int(np.count_nonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim)))))
     if bad:
         raise InputError(f"has NaN or infinite {what}", path=path, found=f"{bad} {of}", expected="none")
 

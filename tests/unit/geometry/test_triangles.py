@@ -76,12 +76,3 @@ def test_a_mirroring_motion_keeps_the_surface_outward(box):
     assert signed_volume(transformed(box, mirror)) == pytest.approx(24.0)
     shifted = transformed(box, [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]])
     np.testing.assert_allclose(shifted.vertices.mean(axis=0) - box.vertices.mean(axis=0), [5, 6, 7])
-
-
-def test_meshes_cannot_be_changed_and_refuse_wrong_indices(box):
-    with pytest.raises(ValueError, match="read-only"):
-        box.vertices[0] = 0
-    with pytest.raises(ValueError, match="does not exist"):
-        TriangleMesh(np.zeros((3, 3)), [[0, 1, 3]])
-    with pytest.raises(ValueError, match="shape"):
-        TriangleMesh(np.zeros((3, 2)), [[0, 1, 2]])

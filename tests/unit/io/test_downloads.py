@@ -70,13 +70,6 @@ def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     assert server.asked == []
 
 
-def test_a_broken_connection_is_tried_again(tmp_path, server):
-    server.broken_after[LONG] = [200_000] * (downloads.TRIES - 1)
-    fetched(tmp_path, server, LONG, sha256=sha256(LABELS))
-    assert files_in(tmp_path) == {LONG: LABELS}
-    assert server.asked == [LONG] * downloads.TRIES
-
-
 @pytest.mark.fault(40)
 def test_of_a_connection_that_stays_broken_nothing_is_kept(tmp_path, server):
     server.broken_after[LONG] = [150_000] * downloads.TRIES

@@ -150,10 +150,3 @@ def test_what_could_not_be_measured_is_nan(tmp_path):
     assert len(jobs) == 5
     np.testing.assert_array_equal(jobs["wall_s"], [0.3, np.nan, np.nan, 5.0, np.nan])
     assert jobs[["cpu_s", "memory_MiB"]].isna().all(axis=None)
-
-
-def test_repeated_jobs_add_up_and_no_jobs_are_an_empty_table(tmp_path):
-    assert read_benchmarks(tmp_path, PATTERNS).empty
-    write(tmp_path, "study/benchmarks/study_runs.tsv", line(2, 50, 1), line(3, 70, "NA"))
-    (job,) = read_benchmarks(tmp_path, PATTERNS).to_dict("records")
-    assert (job["wall_s"], job["cpu_s"], job["memory_MiB"]) == (5.0, 1.0, 70.0)

@@ -93,13 +93,6 @@ def test_a_volume_keeps_fractions_nan_and_its_oblique_affine(tmp_path):
     assert volume.affine == pytest.approx(oblique, abs=1e-5)
 
 
-def test_a_stored_scale_counts(tmp_path):
-    image = nib.Nifti1Image(np.full((3, 3, 3), 7, np.int16), np.eye(4))
-    image.header.set_slope_inter(0.25, 1.0)
-    nib.save(image, tmp_path / "a.nii")
-    assert read_volume_map(tmp_path / "a.nii").values == pytest.approx(np.full((3, 3, 3), 2.75))
-
-
 def test_maps_on_a_mesh_come_back_exactly(tmp_path):
     maps = {"thickness_mm": np.random.default_rng(0).normal(size=50), "growth_rate_per_s": np.full(50, 2e-7)}
     write_maps(tmp_path / "maps.h5", maps)

@@ -50,22 +50,6 @@ def test_quadratic_meshes_come_back_curved_and_positive_readable_by_others(tmp_p
     np.testing.assert_array_equal(read.vertices, mesh.vertices)
 
 
-def test_frames_of_quadratic_elements_are_read_as_such_by_vtk(tmp_path):
-    mesh = quadratic(box_mesh((2, 2, 2), (2.0, 2.0, 2.0)))
-    x = mesh.vertices
-    for week, size in ((21.0, 1.0), (22.0, 2.0)):
-        write_frame(
-            tmp_path / f"{week}.h5", week, {"positions": size * x, "x": x[:, 0]}, {"v": np.arange(len(mesh.tets))}
-        )
-    join_frames(tmp_path / "frames.h5", mesh.tets, [tmp_path / "21.0.h5", tmp_path / "22.0.h5"])
-    reader = pyvista.get_reader(tmp_path / "frames.xdmf")
-    reader.set_active_time_value(22.0)
-    seen = reader.read()
-    assert set(seen.celltypes) == {pyvista.CellType.QUADRATIC_TETRA}
-    np.testing.assert_array_equal(seen.cells.reshape(-1, 11)[:, 1:], mesh.tets)
-    assert seen.compute_cell_sizes()["Volume"].sum() == pytest.approx(64.0)
-
-
 @pytest.mark.parametrize(
     ("point", "tet", "message"),
     [

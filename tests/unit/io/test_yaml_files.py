@@ -21,12 +21,6 @@ def test_a_key_that_is_there_twice_is_refused_with_both_lines(tmp_path):
         read_yaml(path)
 
 
-def test_a_merged_mapping_may_repeat_keys(tmp_path):
-    path = tmp_path / "x.yaml"
-    path.write_text("base: &base {a: 1, b: 2}\nrun: {<<: *base, a: 3}\n")
-    assert read_yaml(path)["run"] == {"a": 3, "b": 2}
-
-
 def test_a_file_that_is_no_yaml_or_missing_is_refused(tmp_path):
     (tmp_path / "x.yaml").write_text("a: [1\nb: 2\n")
     with pytest.raises(InputError, match=r"not valid YAML, line 2"):

@@ -84,24 +84,11 @@ def test_modes_other_than_the_inertia_counts_are_an_error(monkeypatch: pytest.Mo
         lowest_modes(stiffness, mass, 20)
 
 
-def test_a_slice_may_be_empty(monkeypatch: pytest.MonkeyPatch) -> None:
-    # slices of one mode: between the few distinct eigenvalues of a sphere many hold none
-    monkeypatch.setattr(laplace_beltrami, "MODES_PER_SLICE", 1)
-    found = lowest_modes(*laplacian(sphere(1.0)), 9).eigenvalues
-    np.testing.assert_allclose(found, np.repeat([0, 2, 6], [1, 3, 5]), rtol=0.01, atol=1e-9)
-
-
 def test_all_modes_below_a_value() -> None:
     stiffness, mass = laplacian(ellipsoid(AXES))
     lowest = lowest_modes(stiffness, mass, 200).eigenvalues
     found = modes_below(stiffness, mass, 0.5 * (lowest[120] + lowest[121])).eigenvalues
     np.testing.assert_allclose(found[1:], lowest[1:121], rtol=1e-9)
-
-
-def test_what_slepc_cannot_solve_is_an_error() -> None:
-    stiffness, mass = laplacian(ellipsoid(AXES))
-    with pytest.raises(SolverError, match="could not be found"):
-        modes_below(stiffness, mass, -10.0)  # an interval that ends before it begins
 
 
 def test_vertex_without_a_face_is_refused() -> None:
