@@ -53,6 +53,11 @@ class Growth(Settings):
     def _model_alone(cls, raw: Any) -> Any:
         return {"model": raw} if isinstance(raw, str) else raw
 
+    def own_keys(self) -> dict[str, Any]:
+        """Returns the model and the keys that mean something with it, as they are written in a file."""
+        values = self.model_dump(mode="json")
+        return {key: value for key, value in values.items() if self.model in MODELS_OF_KEY.get(key, (self.model,))}
+
     def problems(self) -> Iterator[Problem]:
         for key, models in MODELS_OF_KEY.items():
             if self.model not in models and getattr(self, key) != type(self).model_fields[key].default:

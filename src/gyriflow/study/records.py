@@ -268,6 +268,7 @@ class Simulation:
         The number of ranks is left out, since no result depends on it.
         """
         settings = self.settings.model_dump(mode="json", exclude={"ranks", "start"})
+        settings["growth"] = self.settings.growth.own_keys()
         for name in VARYING:
             if isinstance(value := getattr(self.settings, name), Varying):
                 curve = {"weeks": value.weeks} if value.weeks else {}
