@@ -7,30 +7,25 @@ motion `to_ras` (4, 4) back to RAS+ mm and whether it is `inside_out`. `repose.p
 import argparse
 import json
 import logging
-import re
 import time
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyriflow.anatomy.pial import from_hemispheres
-from gyriflow.anatomy.plausible import expected_volume_ml
-from gyriflow.anatomy.pose import Pair, pairs_by_shape, poses
-from gyriflow.anatomy.repair import pieces, sound_pieces
-from gyriflow.errors import GyriflowError, InputError
-from gyriflow.geometry.poses import Pose
-from gyriflow.geometry.triangles import TriangleMesh, euler_number, is_closed, signed_volume
+from gyriflow.anatomy.pial import PialSurface, from_hemispheres
+from gyriflow.anatomy.plausible import Limits, expected_volume_ml
+from gyriflow.anatomy.repair import pieces
+from gyriflow.errors import GyriflowError
+from gyriflow.geometry.triangles import Floats, TriangleMesh, euler_number, is_closed, signed_volume
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_hemispheres, read_surface
 
-Floats = NDArray[np.float64]
 Files = tuple[Path, Path]
 
 SIDES = ("left", "right")
-MAX_HOLE_MM = 3.0
 WEEKS = np.arange(18.0, 45.5, 0.5)
+LIMITS = Limits(max_asymmetry=0.05)
 
 
 def main() -> None:
@@ -40,111 +35,69 @@ def main() -> None:
     folder = parser.parse_args().folder
     truth = read_json(folder / "truth.json")
     began = time.perf_counter()
-    found, refused = posed(pairs_of_files(folder))
+    surfaces, refused = {}, []
+    for brain in pairs_of_files(folder):
+        try:
+            surfaces[brain] = posed(brain)
+        except GyriflowError as error:
+            refused.append(f"{brain[0].name}: {error}")
     seconds = time.perf_counter() - began
-    result = {"n": 2 * len(found)} | errors(found, truth)
-    counts, failed = surfaces(found, truth)
-    result, refused = result | counts, refused + failed
+    result = {"n": 2 * len(surfaces)} | errors(surfaces, truth) | counts(surfaces, truth)
     print(json.dumps(result | {"seconds": round(seconds, 1), "refused": refused}))
 
 
 def pairs_of_files(folder: Path) -> list[Files]:
     """Returns the files of each brain in a folder, the left hemisphere's first."""
-    found = []
-    for left in sorted(folder.iterdir()):
-        right = left.with_name(re.sub(r"left", "right", left.name))
-        if left.name != right.name and right.exists():
-            found.append((left, right))
-    return found
+    pairs = [(left, left.with_name(left.name.replace("left", "right"))) for left in sorted(folder.glob("*left*"))]
+    return [(left, right) for left, right in pairs if right.exists()]
 
 
-def posed(files: list[Files]) -> tuple[dict[Files, Pose], list[str]]:
-    """Returns the poses of the brains, and what was refused."""
-    brains: dict[Files, tuple[TriangleMesh, TriangleMesh]] = {}
-    named: dict[Files, bool] = {}
-    refused = []
-    for brain in files:
-        try:
-            *read, named[brain] = read_hemispheres(*brain)
-            left, right = (sound_pieces(side, MAX_HOLE_MM, one=True).mesh for side in read)
-            brains[brain] = left, right
-        except GyriflowError as error:
-            refused.append(f"{brain[0].name}: {error}")
-    # as the workflow does: a brain that is doubtful alone is posed like the others of the study
-    found = dict(zip(brains, pairs_by_shape(list(brains.values())), strict=True))
-    refused += [f"{brain[0].name}: {pair}" for brain, pair in found.items() if isinstance(pair, InputError)]
-    pairs = {brain: pair for brain, pair in found.items() if isinstance(pair, Pair)}
-    if not pairs:
-        raise InputError("no pair of hemispheres could be posed", found="; ".join(refused) or "no pair of files")
-    posed_as = poses(list(pairs.values()), [named[brain] for brain in pairs])
-    return dict(zip(pairs, posed_as, strict=True)), refused
+def posed(brain: Files) -> PialSurface:
+    """Returns the pial surface of two files, coarse, as the workflow makes it."""
+    left, right, declared = read_hemispheres(*brain)
+    edge = max(1.2, abs(signed_volume(left)) ** (1 / 3) / 25)
+    settings = {"week": _week(left), "edge_length_mm": edge, "limits": LIMITS}
+    return from_hemispheres(left, right, coordinates="auto", declared=declared, **settings)
 
 
-def errors(found: dict[Files, Pose], truth: dict) -> dict[str, float]:
-    """Returns the worst errors once one rotation, the same for all, has been taken off.
+def errors(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, float]:
+    """Returns the worst errors in degrees and mm.
 
-    Pitch, about x, and tilt, about the other axes, are the parts of the angles. Offset and gap are the places of left
-    and right relative to each other: within the sagittal plane, and along x.
-    `worst_place_mm` is the place of a brain in the sagittal plane relative to the mean of all.
+    Pitch, about x, and tilt, about the other axes, are the parts of the angles. Those `of_study` are what is left once
+    one rotation, the same for all, has been taken off: absolute pitch is a convention. Offset and gap are the places of
+    left and right relative to each other: within the sagittal plane, and along x.
     """
-    motions, centres = [], []
-    for brain, pose in found.items():
-        for path, motion in zip(brain, (pose.files[side] for side in SIDES), strict=True):
+    turns, away = [], []
+    for brain, surface in surfaces.items():
+        for path, side in zip(brain, SIDES, strict=True):
             true = np.array(truth[path.name]["to_ras"])
-            motions.append(motion @ np.linalg.inv(true))
-            centres.append(true[:3, :3] @ read_surface(path).vertices.mean(axis=0) + true[:3, 3])
-    common = _common([motion[:3, :3] for motion in motions])
-    off = [Rotation.from_matrix(motion[:3, :3]) * common.inv() for motion in motions]
-    away = np.array([
-        common.inv().apply(motion[:3, :3] @ centre + motion[:3, 3]) - centre
-        for motion, centre in zip(motions, centres, strict=True)
-    ])  # fmt: skip
-    vectors = np.degrees([turn.as_rotvec() for turn in off])
-    apart, places = away[1::2] - away[::2], 0.5 * (away[::2] + away[1::2])
+            centre = true[:3, :3] @ read_surface(path).vertices.mean(axis=0) + true[:3, 3]
+            left = surface.pose.of_file(side) @ np.linalg.inv(true)
+            turns.append(Rotation.from_matrix(left[:3, :3]))
+            away.append(left[:3, :3] @ centre + left[:3, 3] - centre)
+    vectors = np.degrees([turn.as_rotvec() for turn in turns])
+    common = Rotation.concatenate(turns).mean()
+    of_study = np.degrees([(turn * common.inv()).as_rotvec() for turn in turns])
+    apart = np.diff(np.reshape(away, (-1, 2, 3)), axis=1)[:, 0]
     return {
-        "worst_angle_deg": _worst(np.degrees([turn.magnitude() for turn in off])),
         "worst_pitch_deg": _worst(np.abs(vectors[:, 0])),
         "worst_tilt_deg": _worst(np.linalg.norm(vectors[:, 1:], axis=1)),
-        "common_angle_deg": _worst(np.degrees([common.magnitude()])),
+        "worst_pitch_of_study_deg": _worst(np.abs(of_study[:, 0])),
+        "worst_tilt_of_study_deg": _worst(np.linalg.norm(of_study[:, 1:], axis=1)),
         "worst_offset_mm": _worst(np.linalg.norm(apart[:, 1:], axis=1)),
         "worst_gap_mm": _worst(np.abs(apart[:, 0])),
-        "worst_place_mm": _worst(np.linalg.norm((places - places.mean(axis=0))[:, 1:], axis=1)),
     }
 
 
-def surfaces(found: dict[Files, Pose], truth: dict) -> tuple[dict[str, int], list[str]]:
-    """Returns how many files were recognised as inside out or not, how many brains closed, and what failed."""
-    right, closed, failed = 0, 0, []
-    for brain, pose in found.items():
-        left, other = map(read_surface, brain)
-        size = (abs(signed_volume(left))) ** (1 / 3)
-        edge = max(1.2, size / 25)
-        try:
-            surface = from_hemispheres(left, other, pose, week=_week(left), coordinates="auto", edge_length_mm=edge)
-        except GyriflowError as error:
-            failed.append(f"{brain[0].name}: {error}")
-            continue
-        sound = [is_closed(piece) and euler_number(piece) == 2 for piece in pieces(surface.whole)]
-        closed += sound == [True, True]
+def counts(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, int]:
+    """Returns how many files were recognised as inside out or not, and how many brains are two closed pieces."""
+    right, closed = 0, 0
+    for brain, surface in surfaces.items():
+        closed += [is_closed(piece) and euler_number(piece) == 2 for piece in pieces(surface.whole)] == [True, True]
         for side, path in zip(SIDES, brain, strict=True):
             turned = surface.report[f"repair_{side}"]["pieces_turned_outward"] > 0
-            outward = signed_volume(getattr(surface, side)) > 0
-            right += outward and turned == truth[path.name]["inside_out"]
-    return {"inside_out_right": right, "merged_closed": closed}, failed
-
-
-def _common(rotations: list[Floats]) -> Rotation:
-    """Returns the rotation from which the furthest of others is nearest, by weights moved to the furthest ones."""
-    every, weights = Rotation.from_matrix(rotations), np.ones(len(rotations))
-    best, least = every.mean(), np.inf
-    for _ in range(300):
-        mean = every.mean(weights=weights)
-        angles = (every * mean.inv()).magnitude()
-        if angles.max() < least:
-            best, least = mean, angles.max()
-        weights = weights * (1e-9 + angles / max(angles.max(), 1e-9)) ** 0.5 + 1e-6
-        weights /= weights.sum()
-    return best
+            right += signed_volume(getattr(surface, side)) > 0 and turned == truth[path.name]["inside_out"]
+    return {"inside_out_right": right, "merged_closed": closed}
 
 
 def _week(left: TriangleMesh) -> float:

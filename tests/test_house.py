@@ -30,9 +30,11 @@ ARROWS = {
     # what a study consists of is told from its configuration
     "study": PLAIN | {"config", "io"},
     "mechanics": set(),
+    # surfaces are posed by those of the shipped atlas
+    "anatomy": PLAIN | {"io", "shipped"},
     # the solve is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io"},
-    **dict.fromkeys(("io", "anatomy", "mesh", "growth", "metrics"), PLAIN),
+    **dict.fromkeys(("io", "mesh", "growth", "metrics"), PLAIN),
     **dict.fromkeys(("compare", "report"), PLAIN),
     "shipped": set(),
     "version": {"shipped"},

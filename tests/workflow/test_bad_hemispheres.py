@@ -60,7 +60,7 @@ def test_bad_hemispheres_are_refused_with_a_message_and_nothing_is_left(study, n
     study.require_exit_code(2)
     *_, files, said = BAD[name]
     assert said in study.outcome.stderr
-    if name != "exchanged":  # all poses are found before any surface
+    if name != "exchanged":
         study.require_refused(name, f"{files.format(study.directory / name)}: {said}")
     assert not (study.results / name / "surface" / "pial.surf.gii").exists()
 

@@ -36,8 +36,7 @@ for name, (source, sides) in PIAL_RULES.items():
         name:
             name
         input:
-            files=SHAPE if source == "shape" else from_brain("given.files"),
-            pose=from_brain("pose"),
+            SHAPE if source == "shape" else from_brain("given.files"),
         output:
             **pial_of(*sides),
         wildcard_constraints:
@@ -87,21 +86,6 @@ for name, source in (
             settings=(surface_settings("smoothing_voxels") if source == "labels" else {}),
         script:
             "../scripts/thickness.py"
-
-
-POSED = [brain for brain in study.brains.values() if brain.pose]
-
-
-rule poses:
-    input:
-        [path for brain in POSED for path in brain.given.files],
-    output:
-        [brain.pose for brain in POSED],
-    params:
-        max_hole_mm=CONFIG.surface.max_hole_mm,
-        limits=LIMITS,
-    script:
-        "../scripts/poses.py"
 
 
 rule surface:

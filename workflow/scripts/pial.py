@@ -4,14 +4,13 @@ from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, fro
 from gyriflow.anatomy.plausible import Limits
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
-from gyriflow.io.surfaces import read_one_hemisphere, read_pose, read_surface, write_brain
+from gyriflow.io.surfaces import read_hemispheres, read_one_hemisphere, read_surface, write_brain
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
-files = [snakemake.input.files] if isinstance(snakemake.input.files, str) else list(snakemake.input.files)
+files = list(snakemake.input)
 settings = {"week": params.week, **params.settings}
 with step(snakemake.log[0], *files):
     require_checksums(params.checksums)
@@ -20,10 +19,9 @@ with step(snakemake.log[0], *files):
         scheme = LabelScheme(**params.scheme)
         surface = from_labels(volume.labels, volume.affine, scheme, params.side, **settings)
     elif params.source == "hemispheres":
-        pair = map(read_one_hemisphere, files, SIDES)
-        pose = read_pose(snakemake.input.pose) if snakemake.input.pose else None
+        left, right, declared = read_hemispheres(*files)
         settings |= {"coordinates": params.coordinates, "limits": Limits(**params.limits)}
-        surface = from_hemispheres(*pair, pose, **settings)
+        surface = from_hemispheres(left, right, declared=declared, **settings)
     elif params.source == "shape":
         surface = from_shape(read_surface(files[0]), **settings)
     else:

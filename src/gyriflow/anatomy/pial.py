@@ -59,6 +59,7 @@ from .fissure import (
     to_the_right,
     upright,
 )
+from .hindbrain import pose_of_labels
 from .labels import (
     LEAST_CORTEX_OUTSIDE,
     SMALLEST_HEMISPHERE,
@@ -83,12 +84,10 @@ from .plausible import (
 )
 from .pose import (
     doubts_of_hemispheres,
-    pair_by_shape,
     pose_of_hemisphere,
-    pose_of_labels,
+    pose_of_pair,
+    pose_of_surface,
     pose_of_volume_by_shape,
-    pose_surface_by_shape,
-    poses,
 )
 from .repair import KEPT, after_repairs, make_sound, pieces, require_sound, sound_pieces, with_volume
 
@@ -232,10 +231,10 @@ def from_labels(
 def from_hemispheres(
     left: TriangleMesh,
     right: TriangleMesh,
-    pose: Pose | None = None,
     *,
     week: float,
     coordinates: Coordinates = "ras",
+    declared: bool = False,
     gap_mm: float = 0.5,
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
@@ -246,8 +245,8 @@ def from_hemispheres(
 
     The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
-    other. With coordinates "auto" each may be in any rigid pose; `pose` is then what brings each to RAS+, if it is
-    known already, as from all brains of a study. A shape that contradicts coordinates that are named is told.
+    other. With coordinates "auto" each may be in any rigid pose, which its shape shows; `declared` is whether both
+    files name one coordinate system. Where coordinates are named, a shape that contradicts them is warned of.
     InputError where the pose cannot be determined, or the hemispheres are swapped, of different size or not of the
     week's size; MeshError where one can't be made a closed surface without handles and intersections.
     """
@@ -258,7 +257,7 @@ def from_hemispheres(
     volume = signed_volume(left) + signed_volume(right)
     warnings += told(require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week))
     if coordinates == "auto":
-        pose = pose or poses([pair_by_shape(left, right, limits)], [False])[0]
+        pose = pose_of_pair(left, right, declared=declared)
         left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
         warnings += told(pose.warnings)
     else:
@@ -319,7 +318,7 @@ def from_surface(
         pose = pose_of_hemisphere(even.mesh, side, coordinates)
     else:
         warnings += told(require_whole(even.mesh, "surface"))
-        pose = pose_surface_by_shape(even.mesh, coordinates)
+        pose = pose_of_surface(even.mesh, coordinates)
     warnings += told(pose.warnings)
     # "lps" where these were found, else what the user has named
     found = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"

@@ -64,7 +64,6 @@ PIAL_RULES: dict[str, tuple[str, tuple[Side, ...]]] = {
 """The rules that make pial surfaces, by name: the source of the brains, and the hemispheres that they have."""
 
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
-POSE = f"{BRAIN}/surface/pose.json"
 PIAL = pial_of(*SIDES)
 THICKNESS = {
     "thickness": f"{BRAIN}/surface/thickness.shape.gii",

@@ -108,12 +108,6 @@ class Brain:
         return {"image": self.given.image, "affine_from": self.given.affine_from, "scheme": scheme}
 
     @property
-    def pose(self) -> str | list[str]:
-        """The pose of its hemispheres where it has to be found, for the whole study at once."""
-        unknown = self.given.source == "hemispheres" and self.given.coordinates == "auto"
-        return paths.POSE.format(brain=self.id) if unknown else []
-
-    @property
     def pial(self) -> str:
         return paths.PIAL["whole"].format(brain=self.id)
 

@@ -5,10 +5,12 @@ import re
 import numpy as np
 import odd_brains
 import pytest
-from shapes import cerebrum_surface, ellipsoid, phantom, rigid
+from atlas_brains import atlas_brain, atlas_halves
+from shapes import LPS, cerebrum_surface, ellipsoid, phantom, rigid
 
+from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.plausible import narrowness
-from gyriflow.anatomy.pose import doubts_of_hemispheres, pose_of_labels, pose_of_volume_by_shape, pose_surface_by_shape
+from gyriflow.anatomy.pose import doubts_of_hemispheres, pose_of_surface, pose_of_volume_by_shape
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import transformed
@@ -81,9 +83,8 @@ def test_labels_without_hindbrain_and_sides_tell_no_pose(brain):
 
 
 @pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 0, 180), (90, 0, 0), (0, 180, 0)])
-def test_volumes_without_a_hindbrain_are_posed_by_their_shape(brain, degrees):
-    labels, affine = brain
-    mesh = transformed(cerebrum_surface(labels, affine), rigid(*degrees))
+def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
+    mesh = transformed(atlas_brain(), rigid(*degrees))
     pose = pose_of_volume_by_shape(mesh, sided=False)
     np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
     assert ["left and right are exchanged now" in warning for warning in pose.warnings] == [True] * any(degrees)
@@ -105,37 +106,40 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
 
 
 @pytest.mark.fault(10)
-@pytest.mark.parametrize("pathology", [None, "without_callosum", "holoprosencephaly", "wide_hemisphere"])
-def test_the_shape_tells_lps_from_ras(brain, pathology):
-    labels, affine = brain
-    mesh = cerebrum_surface(getattr(odd_brains, pathology)(labels, affine) if pathology else labels, affine)
-    assert pose_surface_by_shape(mesh, "auto").warnings == ()
-    lps = pose_surface_by_shape(transformed(mesh, rigid(*(0, 0, 180))), "auto")
-    np.testing.assert_allclose(lps.of_file()[:3, :3], np.diag([-1.0, -1.0, 1.0]))
+def test_the_shape_tells_lps_from_ras():
+    assert pose_of_surface(atlas_brain(), "auto").warnings == ()
+    lps = pose_of_surface(transformed(atlas_brain(), LPS), "auto")
+    np.testing.assert_array_equal(lps.of_file(), LPS)
     assert "are LPS" in lps.warnings[0]
 
 
-def test_the_shape_tells_any_pose(brain):
-    mesh = cerebrum_surface(*brain)
-    turn = rigid(*(100, 40, -70))
-    pose = pose_surface_by_shape(transformed(mesh, turn), "auto")
+def test_the_shape_tells_any_pose():
+    turn = rigid(100, 40, -70)
+    pose = pose_of_surface(transformed(atlas_brain(), turn), "auto")
     assert angle_deg(pose.world[:3, :3] @ turn[:3, :3]) < 5.0
     assert "as its shape says" in pose.warnings[0]
 
 
-def test_coordinates_that_are_named_are_kept_and_doubted(brain):
-    mesh = cerebrum_surface(*brain)
-    pose = pose_surface_by_shape(transformed(mesh, rigid(*(180, 0, 0))), "ras")
+def test_coordinates_that_are_named_are_kept_and_doubted():
+    pose = pose_of_surface(transformed(atlas_brain(), rigid(180, 0, 0)), "ras")
     assert np.array_equal(pose.world[:3, :3], np.eye(3))
     assert "turned by 1" in pose.warnings[0]
-    assert pose_surface_by_shape(mesh, "ras").warnings == ()
+    assert pose_of_surface(atlas_brain(), "ras").warnings == ()
+
+
+@pytest.mark.parametrize("pathology", ["without_callosum", "holoprosencephaly", "wide_hemisphere"])
+def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, pathology):
+    mesh = cerebrum_surface(getattr(odd_brains, pathology)(*brain), brain[1])
+    pose = pose_of_surface(mesh, "auto")
+    assert pose.by == "default"
+    assert "set coordinates" in pose.warnings[0]
 
 
 def test_a_shape_without_a_pose_is_refused():
     # neither front nor back, up nor down, and its axes are no file's
     mesh = transformed(ellipsoid((24, 33, 22)), rigid(*(50, 40, 30)))
     with pytest.raises(InputError, match="cannot be determined from its shape"):
-        pose_surface_by_shape(mesh, "auto")
+        pose_of_surface(mesh, "auto")
 
 
 def test_hemispheres_are_narrow_and_brains_are_not(brain):
@@ -145,12 +149,12 @@ def test_hemispheres_are_narrow_and_brains_are_not(brain):
 
 
 @pytest.mark.fault(9, 10)
-def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted(brain):
-    left, right = (cerebrum_surface(odd_brains.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right"))
+def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted():
+    left, right = atlas_halves()
     assert doubts_of_hemispheres(left, right, "ras") == []
     # files that are swapped, and in the other one of RAS and LPS: back to front
-    about = [transformed(side, rigid(*(0, 0, 180))) for side in (right, left)]
+    about = [transformed(side, LPS) for side in (right, left)]
     (doubt,) = doubts_of_hemispheres(*about, "lps")
-    assert "behind the middle: are left and right swapped, and the coordinates not LPS?" in doubt
-    (doubt,) = doubts_of_hemispheres(*(transformed(side, rigid(*(180, 0, 0))) for side in (left, right)), "ras")
+    assert "are left and right swapped, and the coordinates not LPS?" in doubt
+    (doubt,) = doubts_of_hemispheres(*(transformed(side, rigid(180, 0, 0)) for side in (left, right)), "ras")
     assert "turned by 1" in doubt

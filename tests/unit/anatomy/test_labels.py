@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.labels import (
     cerebrum_mask,
     missing_tissues,
     require_cortex_outside,
     require_sides,
 )
-from gyriflow.anatomy.pose import pose_of_labels
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES

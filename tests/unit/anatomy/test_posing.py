@@ -1,115 +1,89 @@
 """Hemispheres in any pose: found again by their shape or their files, or refused."""
 
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from atlas_brains import atlas_halves
 from scipy.spatial.transform import Rotation
-from shapes import LPS, ellipsoid, phantom_halves
+from shapes import LPS, ellipsoid
 
 from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.fissure import least_gap
 from gyriflow.anatomy.pial import from_hemispheres
-from gyriflow.anatomy.plausible import Limits
-from gyriflow.anatomy.pose import about_x, pair_by_shape, pairs_by_shape, pitch_deg, poses
+from gyriflow.anatomy.pose import hemisphere_by_shape, pitch_deg, pose_of_pair
 from gyriflow.anatomy.repair import pieces
+from gyriflow.anatomy.template import MIRROR, medial_wall, shape_of
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import motion
+from gyriflow.geometry.alignment import angle_deg, motion
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
 from gyriflow.io.surfaces import declared, read_surface, write_surface
 from gyriflow.parameters.terms import SIDES
 
-DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
+DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data")) / "hemispheres"
 
 
 @pytest.fixture(scope="module")
 def halves():
-    return phantom_halves()
+    return atlas_halves()
 
 
 def rigid(seed):
     random = np.random.default_rng(seed)
-    turn = Rotation.random(random_state=random).as_matrix()
-    return motion(turn, random.normal(0, 30, 3))
+    return motion(Rotation.random(random_state=random).as_matrix(), random.normal(0, 30, 3))
 
 
 def linear(mesh, matrix):
     return transformed(mesh, motion(matrix))
 
 
-def found(left, right):
-    return poses([pair_by_shape(left, right)], [False])[0]
-
-
-def errors(pose, moved, halves):
-    """Returns the angles (degrees) of what is left of the motions, and by how much (mm) both halves are apart more."""
-    rest = [side @ motion for side, motion in zip((pose.of_file(side) for side in SIDES), moved, strict=True)]
-    angles = [np.degrees(Rotation.from_matrix(motion[:3, :3]).magnitude()) for motion in rest]
-    left, right = (
-        transformed(half, motion).vertices.mean(axis=0) - half.vertices.mean(axis=0)
-        for half, motion in zip(halves, rest, strict=True)
-    )
-    return angles, right - left
+def require_upright(pose, moved, pitch=10.0, tilt=2.0):
+    """Requires that the pose takes the motions of both sides back, but for pitch and tilt in degrees."""
+    for side, there in zip(SIDES, moved, strict=True):
+        vector = Rotation.from_matrix((pose.of_file(side) @ there)[:3, :3]).as_rotvec(degrees=True)
+        assert abs(vector[0]) < pitch
+        assert np.hypot(*vector[1:]) < tilt
 
 
 def test_separately_moved_hemispheres_are_posed(halves):
     moved = [rigid(1), rigid(101)]
-    pose = found(*(transformed(half, motion) for half, motion in zip(halves, moved, strict=True)))
-    angles, apart = errors(pose, moved, halves)
-    assert max(angles) < 3.0
-    assert np.abs(apart[1:]).max() < 1.0
+    pose = pose_of_pair(*(transformed(half, there) for half, there in zip(halves, moved, strict=True)))
+    require_upright(pose, moved, pitch=5.0)
     assert not pose.together
     assert min(pose.evidence["confidence"].values()) > 1.5
+    assert min(pose.evidence["sided"].values()) > 1.1
+    # side by side as they were, but for the gap
+    left, right = (
+        transformed(half, pose.of_file(side) @ there).vertices.mean(axis=0) - half.vertices.mean(axis=0)
+        for half, side, there in zip(halves, SIDES, moved, strict=True)
+    )
+    assert np.abs(right - left)[1:].max() < 1.0
 
 
 def test_hemispheres_of_one_pose_keep_their_distance(halves):
     turn = rigid(3)
-    pose = found(*(transformed(half, turn) for half in halves))
-    angles, apart = errors(pose, [turn, turn], halves)
+    pose = pose_of_pair(*(transformed(half, turn) for half in halves))
     assert pose.together
-    assert max(angles) < 3.0
-    np.testing.assert_allclose(apart, 0.0, atol=0.1)
+    np.testing.assert_array_equal(pose.of_file("left"), pose.of_file("right"))
+    require_upright(pose, [turn, turn], pitch=5.0)
 
 
-@pytest.mark.parametrize("frame", ["ras", "lps"])
-def test_exact_axes_of_the_file_are_kept(halves, frame):
-    axes = LPS if frame == "lps" else np.eye(4)
-    pose = found(*(transformed(half, axes) for half in halves))
+@pytest.mark.parametrize(("frame", "axes"), [("ras", np.eye(4)), ("lps", LPS)])
+def test_axes_of_the_file_are_kept(halves, frame, axes):
+    pose = pose_of_pair(*(transformed(half, axes) for half in halves))
     assert (pose.by, pose.evidence["coordinates"]) == ("file", frame)
     np.testing.assert_array_equal(pose.of_file("left"), axes)
 
 
-def test_tilted_axes_are_kept_where_the_file_names_them(halves):
-    tilt = Rotation.from_euler("y", 5, degrees=True).as_matrix()
-    tilted = pair_by_shape(*(linear(half, tilt) for half in halves))
-    assert poses([tilted], [False])[0].by == "shape"
-    assert poses([tilted], [True])[0].by == "file"
-
-
-def test_other_brains_follow_the_one_whose_file_is_right(halves):
-    # a pitch of the convention that no shape tells
-    pitched = [linear(half, about_x(8.0)) for half in halves]
-    moved = [rigid(5), rigid(6)]
-    larger = [transformed(linear(half, 1.1 * np.eye(3)), motion) for half, motion in zip(halves, moved, strict=True)]
-    first, second = poses([pair_by_shape(*pitched), pair_by_shape(*larger)], [False, False])
-    assert first.by == "file"
-    for side, turn in zip((second.of_file(side) for side in SIDES), moved, strict=True):
-        assert pitch_deg((side @ turn)[:3, :3]) == pytest.approx(8.0, abs=1.0)
-
-
-def bent(mesh, rms_mm, seed):
-    """Returns the surface in smooth random waves as long as a hemisphere, without what of them is a rigid motion."""
-    random = np.random.default_rng(seed)
-    centre = mesh.vertices.mean(axis=0)
-    points, size = mesh.vertices - centre, signed_volume(mesh) ** (1 / 3)
-    phases = points @ random.normal(0.0, 2.0 / size, (60, 3)).T + random.uniform(0.0, 2 * np.pi, 60)
-    waves = np.cos(phases) @ random.normal(0.0, 1.0, (60, 3))
-    waves -= waves.mean(axis=0)
-    there = points + waves * rms_mm / np.sqrt((waves**2).sum(axis=1).mean())
-    back, _ = Rotation.align_vectors(points, there)
-    return TriangleMesh(back.apply(there) + centre, mesh.faces)
+def test_files_that_name_one_system_stay_together_however_they_lie(halves):
+    lower = transformed(halves[0], motion(shift=[0.0, 0.0, -9.0]))
+    assert not pose_of_pair(lower, halves[1]).together
+    pose = pose_of_pair(lower, halves[1], declared=True)
+    assert pose.together
+    np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))
 
 
 @pytest.mark.parametrize(
@@ -118,45 +92,40 @@ def bent(mesh, rms_mm, seed):
     ids=["stretched, of adult size", "sheared"],
 )
 def test_other_sizes_and_asymmetric_brains_are_posed(halves, change):
-    # the right hemisphere only: a brain that is not its own mirror image
     size = np.cbrt(np.linalg.det(change))
     changed = [linear(halves[0], size * np.eye(3)), linear(halves[1], np.array(change))]
     moved = [rigid(7), rigid(8)]
-    pose = found(*(transformed(half, motion) for half, motion in zip(changed, moved, strict=True)))
-    angles, apart = errors(pose, moved, changed)
-    assert max(angles) < 4.0
-    assert np.linalg.norm(apart[1:]) < 1.5 * size
-
-
-def test_hemispheres_of_an_asymmetric_brain_come_to_lie_alike(halves):
-    # the bent medial wall alone would turn the right one by 4°
-    asymmetric = [halves[0], bent(halves[1], 1.5, 3)]
-    moved = [rigid(3), rigid(53)]
-    pose = found(*(transformed(half, motion) for half, motion in zip(asymmetric, moved, strict=True)))
-    angles, apart = errors(pose, moved, asymmetric)
-    assert max(angles) < 2.0
-    assert np.linalg.norm(apart[1:]) < 1.0
-
-
-def test_deformed_hemispheres_of_one_pose_keep_their_distance(halves):
-    turn = rigid(13)
-    pose = found(*(transformed(half, turn) for half in (halves[0], bent(halves[1], 1.5, 4))))
-    assert pose.together
+    pose = pose_of_pair(*(transformed(half, there) for half, there in zip(changed, moved, strict=True)))
+    require_upright(pose, moved, tilt=4.0)
 
 
 def test_swapped_hemispheres_are_refused(halves):
     left, right = (transformed(half, rigid(seed)) for half, seed in zip(halves, (9, 10), strict=True))
     with pytest.raises(InputError, match="seem to be swapped"):
-        pair_by_shape(right, left)
+        pose_of_pair(right, left)
     with pytest.raises(InputError, match="of one side"):
-        pair_by_shape(left, left)
+        pose_of_pair(left, left)
 
 
-@pytest.mark.parametrize("half_lengths", [(20, 20, 20), (9, 24, 16)])
+@pytest.mark.parametrize("half_lengths", [(20, 20, 20), (9, 24, 16), (12, 24, 12)])
 def test_shapes_without_a_pose_are_refused(half_lengths):
     shape = ellipsoid(half_lengths)
     with pytest.raises(InputError, match="cannot be determined from its shape"):
-        pair_by_shape(shape, shape)
+        pose_of_pair(shape, shape)
+
+
+def test_a_wall_that_was_cut_is_found_to_half_a_degree():
+    ball = ellipsoid((0.6, 1.0, 0.75), 5)
+    half = TriangleMesh(np.maximum(ball.vertices, [0.0, -np.inf, -np.inf]), ball.faces)
+    turn = Rotation.from_rotvec([0.0, 6.0, 8.0], degrees=True).as_matrix()
+    normal, offset = medial_wall(shape_of(linear(half, turn)), np.array([-1.0, 0.0, 0.0]))
+    assert np.degrees(np.arccos(-(normal @ turn)[0])) < 0.5
+    shape = shape_of(half)
+    assert offset * shape.size_mm == pytest.approx(shape.centre[0], abs=0.01)
+
+
+def test_the_pitch_of_a_rotation_is_that_about_x():
+    assert pitch_deg(Rotation.from_euler("xyz", [20, 3, -2], degrees=True).as_matrix()) == pytest.approx(20, abs=0.5)
 
 
 def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
@@ -181,74 +150,35 @@ def test_files_say_their_axes_and_side(tmp_path, halves):
     assert declared(tmp_path / "left.stl") == (None, None)
 
 
-def test_a_pose_is_the_same_beside_other_brains(halves):
-    def brain(size, seed):
-        return pair_by_shape(*(transformed(linear(half, size * np.eye(3)), rigid(seed)) for half in halves))
-
-    one = brain(1.0, 20)
-    alone, beside = poses([one], [False])[0], poses([one, brain(1.1, 21)], [False, False])[0]
-    assert alone.plain() == beside.plain()
-
-
-@pytest.mark.skipif(not (DATA / "hemispheres").is_dir(), reason=f"no example hemispheres in {DATA}")
-def test_real_hemispheres_in_different_poses_are_posed_alike():
-    weeks = (21, 22)
-    files = [
-        [read_surface(DATA / "hemispheres" / f"fetal.week{week}.{side}.pial.surf.gii") for side in ("left", "right")]
-        for week in weeks
-    ]
-    exact, tilted = poses([pair_by_shape(*sides) for sides in files], [False, False])
-    # week 21 is in LPS; week 22, each hemisphere tilted on its own, has to come to lie like it
-    assert exact.evidence["coordinates"] == "lps"
-    assert tilted.by == "shape"
-    posed = [[transformed(side, m) for side, m in zip(sides, (p.of_file(side) for side in SIDES), strict=True)]
-             for sides, p in zip(files, (exact, tilted), strict=True)]  # fmt: skip
-    for side in (0, 1):
-        first, second = (brain[side].vertices for brain in posed)
-        np.testing.assert_allclose(np.ptp(second, axis=0) / np.ptp(first, axis=0), 1.06, atol=0.05)
+@pytest.mark.slow
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no example hemispheres in {DATA}")
+@pytest.mark.parametrize("week", range(21, 30))
+def test_real_hemispheres_are_upright(week):
+    truth = json.loads((DATA / "truth.json").read_text())
+    files = [f"fetal.week{week}.{side}.pial.surf.gii" for side in SIDES]
+    meshes = [read_surface(DATA / file) for file in files]
+    meshes = [flipped(mesh) if signed_volume(mesh) < 0 else mesh for mesh in meshes]
+    require_upright(pose_of_pair(*meshes), [np.linalg.inv(truth[file]["to_ras"]) for file in files])
 
 
 @pytest.fixture
 def doubtful(monkeypatch):
-    """Has another pose of every hemisphere fit the reference nearly as well."""
-    by_shape = posing.hemisphere_by_shape
-    monkeypatch.setattr(posing, "hemisphere_by_shape", lambda mesh: replace(by_shape(mesh), confidence=1.05))
+    """Has another pose of every hemisphere fit the template nearly as well."""
+    monkeypatch.setattr(posing, "hemisphere_by_shape", lambda mesh: replace(hemisphere_by_shape(mesh), confidence=1.05))
 
 
 @pytest.mark.usefixtures("doubtful")
-@pytest.mark.parametrize("frame", ["ras", "lps"])
-def test_a_doubtful_shape_near_the_axes_of_files_is_posed_as_these_say(halves, frame):
-    axes = (LPS if frame == "lps" else np.eye(4))[:3, :3]
-    turns = [axes @ Rotation.from_euler("xyz", tilt, degrees=True).as_matrix() for tilt in ((9, -14, 12), (-8, 10, 3))]
-    pair = pair_by_shape(*(linear(half, turn) for half, turn in zip(halves, turns, strict=True)))
-    mirrored = np.diag([-1.0, 1, 1]) @ turns[0] @ np.diag([-1.0, 1, 1])
-    for hemisphere, turn in ((pair.left, mirrored), (pair.right, turns[1])):
-        assert np.degrees(Rotation.from_matrix(hemisphere.rotation @ turn).magnitude()) < 5.0
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("doubtful")
-def test_a_doubtful_shape_in_any_pose_is_posed_like_the_studys_others_or_refused(halves):
-    motions = rigid(31), rigid(32)
-    moved = tuple(transformed(half, motion) for half, motion in zip(halves, motions, strict=True))
+def test_a_doubtful_shape_is_posed_near_the_axes_of_files_only(halves):
+    turns = [LPS[:3, :3] @ Rotation.from_euler("xyz", t, degrees=True).as_matrix() for t in ((9, -14, 12), (-8, 10, 3))]
+    pose = pose_of_pair(*(linear(half, turn) for half, turn in zip(halves, turns, strict=True)))
+    require_upright(pose, [motion(turn) for turn in turns])
     with pytest.raises(InputError, match="cannot be determined from its shape"):
-        pair_by_shape(*moved)
-    pairs = pairs_by_shape([moved, tuple(halves)])
-    posed, _ = poses(pairs, [False, False])
-    for side, turn in zip((posed.of_file(side) for side in SIDES), motions, strict=True):
-        assert np.degrees(Rotation.from_matrix((side @ turn)[:3, :3]).magnitude()) < 3.0
+        pose_of_pair(*(transformed(half, rigid(31)) for half in halves))
 
 
-def test_declared_hemispheres_stay_together_however_they_lie(halves):
-    lower = np.eye(4)
-    lower[2, 3] = -4.0
-    (pose,) = poses([pair_by_shape(transformed(halves[0], lower), halves[1])], [True])
-    assert pose.together
-    np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))
-
-
-def test_how_asymmetric_hemispheres_may_be_is_the_users_choice(halves):
-    pair = [halves[0], linear(halves[1], np.diag([1.2, 1.0, 1.0]))]
-    assert pair_by_shape(*pair).fit.residual > 0.02
-    with pytest.raises(InputError, match=r"no mirror images.*surface\.max_asymmetry"):
-        pair_by_shape(*pair, Limits(max_asymmetry=0.005))
+def test_the_mirror_image_of_a_hemisphere_fits_worse(halves):
+    right = halves[1]
+    one, other = hemisphere_by_shape(right), hemisphere_by_shape(transformed(right, MIRROR))
+    assert one.sided > 1.1
+    assert other.sided == pytest.approx(1 / one.sided, rel=0.1)
+    assert angle_deg(one.rotation) < 8.0
