@@ -26,6 +26,7 @@ EVERY_PERCENT = 5
 """Where there is no terminal, a line each so many percent takes the place of the bar."""
 SLURM = re.compile(r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL)
 SIGNAL = re.compile(r"died with <Signals\.(\w+)")
+ENDED_BY = {"SIGKILL": KILLED, **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), "it was stopped")}
 INTERRUPTED = ("Terminating processes on user request", "Cancelling snakemake on user request")
 OF_FAILED_JOBS = (
     *("Exiting because a job execution failed", "At least one job did not", "WorkflowError:\nAt least one job did not"),
@@ -126,7 +127,7 @@ class RunDisplay:
         if slurm:
             why = f"Slurm ended its job {slurm[1]}: {slurm[2]}"
         elif signal:
-            why = KILLED if signal[1] == "SIGKILL" else f"it crashed ({signal[1]}): please report this with its log"
+            why = ENDED_BY.get(signal[1], f"it crashed ({signal[1]}): please report this with its log")
         else:
             why = cause("".join(map(read_log, said["log"]))) or message or "it left no message"
         if why == KILLED:

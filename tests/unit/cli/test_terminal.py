@@ -132,6 +132,7 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
     [
         ("died with <Signals.SIGKILL: 9>.", "it was killed, most probably because memory ran out", 137),
         ("died with <Signals.SIGSEGV: 11>.", "it crashed (SIGSEGV)", None),
+        ("died with <Signals.SIGTERM: 15>.", "it was stopped", None),
         # as snakemake-executor-plugin-slurm 2.8 puts it
         ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", "Slurm ended its job 12: CANCELLED", None),
         ("SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x", "a.nii: is no image", None),
