@@ -65,7 +65,7 @@ rule html_report:
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         provenance=rules.report_provenance.output[0],
         methods=rules.methods.output[0],
-        view=asked_for(FIGURES, "view"),
+        view=asked_for(FIGURES, "view")[0],
         words=f"{workflow.basedir}/workflow/report/figures.yaml",
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
