@@ -253,16 +253,9 @@ class Calibration(Compared):
 
 @dataclass(frozen=True)
 class Member:
-    """A run of a study.
+    """A run of a study: its name, the varied values by their keys, and its complete settings.
 
-    Attributes
-    ----------
-    run
-        Its name: that of an equal run of `runs` or of an earlier study, where there is one.
-    values
-        The varied values by their keys.
-    settings
-        Its complete settings, from its start to the week of comparison.
+    The name is that of an equal run of `runs` or of an earlier study, where there is one.
     """
 
     run: str

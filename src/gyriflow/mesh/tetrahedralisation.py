@@ -17,9 +17,10 @@ from .meshers import run_mesher
 from .nodes import curve_edges, improve
 
 log = logging.getLogger(__name__)
+TIME_LIMIT_S = 3600.0
+"""After which a mesher is stopped."""
 FINE_DEPTH_EDGES = 2.5
 """Elements of fTetWild are as fine as at the surface down to so many edges of it ..."""
-TIME_LIMIT_S = 3600.0
 EDGE_GROWTH = 0.5
 """... and grow by this part of each mm below."""
 OTHER_VOLUME = 0.05

@@ -28,7 +28,7 @@ from .varying import (
 
 
 def _memory(value: Any) -> float:
-    """Returns a time in GW from a number or `infinite`."""
+    """Return a time in GW from a number or `infinite`."""
     if value == "infinite":
         return math.inf
     try:
@@ -166,7 +166,7 @@ GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_
 
 
 def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:
-    """Returns the output weeks of a run: the start, then every `every_gw` weeks, and the end."""
+    """Return the output weeks of a run: the start, then every `every_gw` weeks, and the end."""
     steps = int((end_week - start_week) / every_gw + 1e-9)
     weeks = [round(start_week + n * every_gw, 9) for n in range(steps + 1)]
     return weeks if end_week - weeks[-1] < 1e-6 else [*weeks, end_week]
@@ -197,7 +197,7 @@ class FoldingParameters(FoldingSettings):
         return varying | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
 
     def thickness_at(self, week: float, maps: Maps) -> float | Floats:
-        """Returns the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
+        """Return the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
         return thickness_at(self, self.start_week, week, maps)
 
     def problems(self) -> Iterator[Problem]:
@@ -208,34 +208,30 @@ class FoldingParameters(FoldingSettings):
 
 
 def thickness_at(p: FoldingSettings, start_week: float, week: float, maps: Maps) -> float | Floats:
-    """Returns the cortical thickness in mm of a run from a week at another week, at all vertices where it has a map."""
+    """Return the cortical thickness in mm of a run from a week at another week, at all vertices where it has a map."""
     return value_at(p.thickness_mm, week, maps) + p.thickness_growth_mm_per_gw * (week - start_week)
 
 
 def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[Problem]:
-    """Yields the inconsistencies between the settings of a run, over all its weeks and vertices.
+    """Yield the inconsistencies between the settings of a run, over all its weeks and vertices.
 
-    Parameters whose maps are not among `maps` are left out.
-
-    Parameters
-    ----------
-    start
-        Name of the start in messages, such as "the week of the start brain a".
+    Parameters whose maps are not among `maps` are left out. `start` is the name of the start in messages, such as "the
+    week of the start brain a".
     """
     end = p.end_week
     if end <= start_week:
         called = f"{start_week:g}, {start}" if start else f"start_week, {start_week:g}"
         yield Problem(f"found {end:g}; it should be above {called}", ("end_week",))
-    known = {
+    values = {
         key: value
         for key in VARYING
         if not (isinstance(value := getattr(p, key), Varying) and value.map not in (None, *maps))
     }
-    for week in weeks_within(known["thickness_mm"], start_week, end) if "thickness_mm" in known else ():
+    for week in weeks_within(values["thickness_mm"], start_week, end) if "thickness_mm" in values else ():
         if (reached := float(np.min(thickness_at(p, start_week, week, maps)))) <= 0:
             yield Problem(f"reaches {reached:g} mm at {week:g} GW; it should stay above 0", ("thickness_mm",))
             break
-    ranges = {key: value_range(value, maps, start_week, end) for key, value in known.items()}
+    ranges = {key: value_range(value, maps, start_week, end) for key, value in values.items()}
     for key in ("shear_modulus_cortex_pa", "shear_modulus_core_pa"):
         if key in ranges and (least := ranges[key][0]) <= 0:
             yield Problem(f"reaches {least:g} Pa; it should stay above 0", (key,))
@@ -248,12 +244,12 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
 
 
 def target_map(week: float) -> str:
-    """Returns what the names of the maps of positions that a mesh is to have at a week begin with."""
+    """Return what the names of the maps of positions that a mesh is to have at a week begin with."""
     return f"target_{week:05.2f}"
 
 
 def target_maps(weeks: Iterable[float], positions: Floats) -> dict[str, Floats]:
-    """Returns the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at w weeks."""
+    """Return the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at w weeks."""
     return {
         f"{target_map(week)}_{axis}": values
         for week, places in zip(weeks, positions, strict=True)
@@ -262,24 +258,16 @@ def target_maps(weeks: Iterable[float], positions: Floats) -> dict[str, Floats]:
 
 
 def parameters_from(values: Any) -> FoldingParameters:
-    """Returns the parameters from nested mappings as read from YAML; numbers written as 2e-7 are understood.
-
-    Raises
-    ------
-    InputError
-        Naming all problems at once.
-    """
+    """Return the parameters from nested mappings as read from YAML; InputError naming all problems at once."""
     return validated(FoldingParameters, values, "folding parameters")
 
 
 def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
-    """Raises InputError where a map is missing, does not fit the mesh, or holds impossible values."""
+    """Raise InputError where a map is missing, does not fit the mesh, or holds impossible values."""
     for name in sorted(p.maps):
         if name not in maps:
             raise InputError(f"the map {name} is missing", expected="a file with it, given with --maps")
-        found = maps[name].shape
-        if found != (vertices,):
-            raise InputError(f"the map {name} does not fit the mesh", found=found, expected=f"{vertices} values")
-    problems = [line(problem.key, problem.text) for problem in value_problems(p, p.start_week, maps)]
-    if problems:
+        if (shape := maps[name].shape) != (vertices,):
+            raise InputError(f"the map {name} does not fit the mesh", found=shape, expected=f"{vertices} values")
+    if problems := [line(problem.key, problem.text) for problem in value_problems(p, p.start_week, maps)]:
         raise InputError("folding parameters: " + "; ".join(problems))

@@ -5,18 +5,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class VertexMeasure:
-    """How a map per vertex is drawn and described.
+    """How a map per vertex is drawn and described: the colour bar's label, the beginning of a sentence, its colours.
 
-    Attributes
-    ----------
-    label
-        Label of the colour bar, with the unit.
-    caption
-        What the map shows, as the beginning of a sentence in the report.
-    colours
-        Name of a Matplotlib colour map.
-    limits
-        Ends of the colour scale; None: from 0 to where few vertices of all surfaces are above.
+    The limits are the ends of the colour scale; None: from 0 to where few vertices of all surfaces are above.
     """
 
     label: str

@@ -98,7 +98,7 @@ STIFFNESS_RATIO = "stiffness_ratio"
 
 
 def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
-    """Returns what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
+    """Return what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
     pairs = [(run, brain) for run, brain in folded]
     several = {run for run, _ in pairs if sum(run == other for other, _ in pairs) > 1}
     return [f"{run} · {brain}" if run in several else run for run, brain in pairs]

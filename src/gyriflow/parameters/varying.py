@@ -69,7 +69,7 @@ class Varying(Settings):
 
 
 def files_of(files: str | tuple[str, str] | None) -> list[str]:
-    """Returns the files of a map or of its surface as a list."""
+    """Return the files of a map or of its surface as a list."""
     return [files] if isinstance(files, str) else list(files or ())
 
 
@@ -89,18 +89,18 @@ BOUND_TEXTS = {
 
 
 def varying(default: float, **bounds: float) -> Any:
-    """Returns a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
+    """Return a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
     return Field(default, json_schema_extra={BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()})
 
 
 def bounds_of(field: FieldInfo) -> dict[str, float]:
-    """Returns the bounds (gt, ge, le) of a parameter that may vary, none for other keys."""
+    """Return the bounds (gt, ge, le) of a parameter that may vary, none for other keys."""
     extra: Any = field.json_schema_extra or {}
     return {name: extra[key] for name, (key, *_) in BOUND_TEXTS.items() if key in extra}
 
 
 def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
-    """Raises ValueError where a number, or one of a curve without a map, is out of its bounds."""
+    """Raise ValueError where a number, or one of a curve without a map, is out of its bounds."""
     if isinstance(value, Varying):
         numbers = [] if value.map is not None else list((value.weeks or {}).values())
     else:
@@ -112,17 +112,17 @@ def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
 
 
 def map_of(value: float | Varying) -> str | None:
-    """Returns the name of the map of a parameter in a run's parameters, None where it has none."""
+    """Return the name of the map of a parameter in a run's parameters, None where it has none."""
     return value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
 
 
 def weeks_of(value: float | Varying) -> dict[float, float]:
-    """Returns the curve of a parameter, {week: value} in ascending order; empty where it has none."""
+    """Return the curve of a parameter, {week: value} in ascending order; empty where it has none."""
     return (value.weeks or {}) if isinstance(value, Varying) else {}
 
 
 def curve_at(value: float | Varying, week: float) -> float:
-    """Returns the number, or the curve's value at a week: linear in between, constant beyond, 1 without a curve."""
+    """Return the number, or the curve's value at a week: linear in between, constant beyond, 1 without a curve."""
     if not isinstance(value, Varying):
         return value
     curve = weeks_of(value)
@@ -130,18 +130,18 @@ def curve_at(value: float | Varying, week: float) -> float:
 
 
 def value_at(value: float | Varying, week: float, maps: Maps) -> float | Floats:
-    """Returns a parameter's value at a week: a number, or (n,) values where there is a map."""
+    """Return a parameter's value at a week: a number, or (n,) values where there is a map."""
     name = map_of(value)
     return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
 
 
 def weeks_within(value: float | Varying, start: float, end: float) -> list[float]:
-    """Returns start, end, and the weeks of the curve between them: where its extremes lie."""
+    """Return start, end, and the weeks of the curve between them: where its extremes lie."""
     return [start, *(week for week in weeks_of(value) if start < week < end), end]
 
 
 def value_range(value: float | Varying, maps: Maps, start: float, end: float) -> tuple[float, float]:
-    """Returns the smallest and the largest value of a parameter from a week to a week, over all places."""
+    """Return the smallest and the largest value of a parameter from a week to a week, over all places."""
     name = map_of(value)
     places = np.ones(1) if name is None else maps[name]
     curve = [curve_at(value, week) for week in weeks_within(value, start, end)]
