@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import KDTree
 
-from gyriflow.compare.deviation import deviation_maps
+from gyriflow.compare.deviation import deviation_maps, thickness_difference_mm
 from gyriflow.geometry.alignment import fit_onto
 from gyriflow.geometry.matching import match_points, values_at
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
@@ -27,9 +27,10 @@ with step(snakemake.log[0]):
     fitted = TriangleMesh(fit_onto_surface(expected, real), expected.faces)
     maps = deviation_maps(expected, fitted)
     if files.thickness:
-        own, before, now, found = (read_vertex_maps(path)["thickness_mm"] for path in files.thickness)
-        # the start's own thickness, as the run has it grow
-        maps["thickness_difference_mm"] = at(fitted, real, found) - at(first, start, own) * now / before
+        at_start, run_at_start, run, found = (read_vertex_maps(path)["thickness_mm"] for path in files.thickness)
+        maps["thickness_difference_mm"] = thickness_difference_mm(
+            at(fitted, real, found), at(first, start, at_start), run_at_start, run
+        )
     write_vertex_maps(snakemake.output.maps, maps)
 
     parts = {"whole": surface, **dict(zip(params.sides, map(read_surface, files.sides), strict=True))}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gyriflow.compare.shapes import Shape, ready
-from gyriflow.compare.validation import Comparison, ordered, validation_row
+from gyriflow.compare.validation import ordered, validation_row
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
@@ -16,7 +16,6 @@ from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
-from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
@@ -30,8 +29,7 @@ with step(snakemake.log[0]):
         surfaces, growth = map(read_surface, files.simulated), read_yaml(files.params)["growth"]
         curves = curves_of_run(growth, read_table(files.curves) if files.curves else None, params.series)
     for number, (week, simulated) in enumerate(zip(params.weeks, surfaces, strict=True)):
-        aim = [float(value(curve, week)) for curve in curves]
-        aim = (aim[0] / CM2_PER_MM2, aim[1] / ML_PER_MM3) if aim else None
+        aims = {name: float(value(curve, week)) for name, curve in zip(("area_cm2", "volume_ml"), curves, strict=False)}
         real = read_surface(files.whole[number])
         even = ready(simulated, real)
         bend = curvature(even, radius_mm=params.curvature_radius_mm)
@@ -39,6 +37,6 @@ with step(snakemake.log[0]):
         for name in ("real", "start", "adjacent"):
             maps = read_vertex_maps(files[f"{name}_maps"][number])
             shapes[name] = Shape(read_surface(files[name][number]), **maps)
-        comparison = Comparison(params.run, params.kind, params.start_week, week)
-        rows.append(validation_row(comparison, simulated=simulated, real_brain=real, curve=aim, **shapes))
+        labels = {"run": params.run, "kind": params.kind, "start_week": params.start_week, "week": week}
+        rows.append(validation_row(labels, simulated=simulated, real_brain=real, aims=aims, **shapes))
     write_table(snakemake.output[0], ordered(rows))

@@ -25,3 +25,8 @@ def deviation_maps(expected: TriangleMesh, real: TriangleMesh) -> dict[str, Floa
         "distance_mm": ((real.vertices - expected.vertices) * vertex_normals(expected)).sum(axis=1),
         "log_area": np.log(diffuse(expected.vertices, expected.faces, ratio, SMOOTHING_MM)),
     }
+
+
+def thickness_difference_mm(real: Floats, start: Floats, run_at_start: Floats, run: Floats) -> Floats:
+    """Return by how much the (n,) real thickness exceeds that of the start brain, grown as the run has it grow."""
+    return real - start * run / run_at_start

@@ -3,9 +3,8 @@
 Beside them how the surface moves and how much it is folded, each against the real brain.
 """
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,36 +27,18 @@ from .placement import placement
 from .prediction import apart, distances
 from .shapes import Shape, against_real, cortex_dice
 
-type Kind = Literal["explained", "predicted"]
-"""Whether growth came from the weeks that are compared, or from another brain, atlas or only earlier weeks."""
-
 AGREEMENT = ("gyrification_index", "gyrification_index_envelope", "mean_sulcal_depth", "mean_curvedness")
 """What is compared of the table of metrics."""
 BAND = "spangy_share_B"
 """What the names of the spectrum's shares begin with: relative power of a band."""
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Which simulated brain is compared: weeks are those that the run began at, and that is compared."""
-
-    run: str
-    kind: Kind
-    start_week: float
-    week: float
-
-    @property
-    def horizon(self) -> float:
-        """Weeks from the start to the one compared."""
-        return self.week - self.start_week
-
-
 def validation_row(
-    comparison: Comparison,
+    labels: Mapping[str, Any],
     *,
     simulated: TriangleMesh,
     real_brain: TriangleMesh,
-    curve: tuple[float, float] | None,
+    aims: Mapping[str, float],
     run: Shape,
     real: Shape,
     start: Shape,
@@ -65,26 +46,28 @@ def validation_row(
 ) -> dict[str, Any]:
     """Return a row of validation.csv.
 
-    Columns: run, kind, start_week, week, horizon; distance_mm and distance95_mm of `prediction.distances` and
+    Columns: the labels, horizon (weeks since the start); distance_mm and distance95_mm of `prediction.distances` and
     `cortex_dice`, both of the surfaces as they are, laid onto each other rigidly; area_cm2, volume_ml and the same with
     real_ and curve_ in front; area_error and volume_error against the curve and area_difference and volume_difference
     from the real brain, as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
     `placement.placement` and `shapes.against_real`.
 
-    `simulated` and `real_brain` are closed surfaces in mm as they are; `curve` the area (mm²) and volume (mm³) that the
-    run was to follow in this week, if any; the shapes are ready and laid onto the real brain, as for `placement`.
+    The labels are run, kind ("explained" where growth came from the weeks that are compared, "predicted" where from
+    another brain, atlas or only earlier weeks), start_week and week. `simulated` and `real_brain` are closed surfaces
+    in mm as they are; `aims` the area_cm2 and volume_ml that the run was to have in this week, if any; the shapes are
+    ready and laid onto the real brain, as for `placement`.
     """
-    sizes = {"": _sizes(simulated), "real_": _sizes(real_brain)}
-    wanted = (np.nan, np.nan) if curve is None else (curve[0] * CM2_PER_MM2, curve[1] * ML_PER_MM3)
-    row: dict[str, Any] = asdict(comparison) | {"horizon": comparison.horizon}
+    horizon = labels["week"] - labels["start_week"]
     placed = transformed(simulated, fit_onto(simulated, real_brain))
+    row: dict[str, Any] = dict(labels) | {"horizon": horizon}
     row |= distances(apart(placed, real_brain, real.mesh)) | {"cortex_dice": cortex_dice(placed, real_brain)}
-    row |= {f"{who}{name}": value for who, size in sizes.items() for name, value in size.items()}
-    row |= {"curve_area_cm2": wanted[0], "curve_volume_ml": wanted[1]}
-    for name, unit, aim in (("area", "cm2", wanted[0]), ("volume", "ml", wanted[1])):
-        row[f"{name}_error"] = row[f"{name}_{unit}"] / aim - 1
-        row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"real_{name}_{unit}"] - 1
-    row |= placement(real, run, start, adjacent, horizon=comparison.horizon, seed=0)
+    row |= _sizes(simulated) | {f"real_{name}": size for name, size in _sizes(real_brain).items()}
+    for name in ("area_cm2", "volume_ml"):
+        row[f"curve_{name}"] = aims.get(name, np.nan)
+        quantity, _ = name.split("_")
+        row[f"{quantity}_error"] = row[name] / row[f"curve_{name}"] - 1
+        row[f"{quantity}_difference"] = row[name] / row[f"real_{name}"] - 1
+    row |= placement(real, run, start, adjacent, horizon=horizon, seed=0)
     return row | against_real(run, real)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapes import sphere
 
-from gyriflow.compare.deviation import deviation_maps
+from gyriflow.compare.deviation import deviation_maps, thickness_difference_mm
 from gyriflow.geometry.triangles import TriangleMesh
 
 BALL = sphere(20.0)
@@ -18,7 +18,9 @@ def test_a_larger_ball_lies_outside_and_has_more_area():
     maps = deviation_maps(BALL, scaled(1.1))
     np.testing.assert_allclose(maps["distance_mm"], 2.0, atol=0.01)
     np.testing.assert_allclose(maps["log_area"], 2 * np.log(1.1), atol=1e-6)
-    assert (deviation_maps(BALL, scaled(0.9))["distance_mm"] < 0).all()
+    smaller = deviation_maps(BALL, scaled(0.9))
+    assert (smaller["distance_mm"] < 0).all()
+    assert (smaller["log_area"] < 0).all()
 
 
 def test_what_deviates_in_one_place_does_so_there_alone():
@@ -29,3 +31,9 @@ def test_what_deviates_in_one_place_does_so_there_alone():
     pole, opposite = BALL.vertices[:, 2].argmax(), BALL.vertices[:, 2].argmin()
     assert maps["log_area"][pole] == pytest.approx(2 * np.log(1.1), abs=0.01)
     assert maps["log_area"][opposite] == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_thicker_cortex_than_expected_is_positive():
+    # 2 mm that grow by a quarter, where the real brain has 2.5 and 3 mm
+    real, start, at_start, run = np.array([2.5, 3.0]), np.full(2, 2.0), np.full(2, 1.6), np.full(2, 2.0)
+    np.testing.assert_allclose(thickness_difference_mm(real, start, at_start, run), [0.0, 0.5])

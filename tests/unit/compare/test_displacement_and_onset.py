@@ -1,4 +1,5 @@
 import numpy as np
+import pandas as pd
 import pytest
 import trimesh
 
@@ -96,21 +97,30 @@ def test_relief_is_bottom_below_crowns_not_depth_below_the_hull():
     assert sunken["relief_mm"].iloc[0] == 0
 
 
-def test_onset_is_when_two_millimetres_are_reached():
-    reliefs = {}
-    for week, depth in {21.0: 0.0, 22.0: 1.0, 23.0: 1.6, 24.0: 2.8, 25.0: 3.5}.items():
-        mesh, depths = groove(depth)
-        reliefs[week] = relief(mesh, depths, REGIONS, NAMES)
-    central = {week: table.set_index("region").loc["central", "relief_mm"] for week, table in reliefs.items()}
-    table = onset(reliefs).set_index("region")
-    expected = 23 + (2 - central[23.0]) / (central[24.0] - central[23.0])
-    assert 23 < expected < 24
-    assert table.loc["central", "onset_week"] == pytest.approx(expected)
-    assert not table.loc["central", "there_at_start"]
-    assert np.isnan(table.loc["calcarine", "onset_week"])
-    late = onset({week: reliefs[week] for week in (24.0, 25.0)}).set_index("region")
+def reliefs_of(depths):
+    """Returns tables of `relief` by week, with what is known of two regions beside the ball."""
+    return {
+        week: pd.DataFrame({"region": ["central", "calcarine"], "relief_mm": [d, 0.1]}) for week, d in depths.items()
+    }
+
+
+def test_onset_is_when_two_millimetres_are_reached_whatever_the_order_of_weeks():
+    depths = {25.5: 3.5, 21.0: 0.0, 24.0: 2.8, 22.0: 1.0}
+    for order in (list(depths), sorted(depths), sorted(depths, reverse=True)):
+        table = onset(reliefs_of({week: depths[week] for week in order})).set_index("region")
+        # from 1.0 mm at 22 to 2.8 mm at 24 GW
+        assert table.loc["central", "onset_week"] == pytest.approx(22 + 2 * 1.0 / 1.8)
+        assert tuple(table.loc["central", ["first_relief_mm", "last_relief_mm"]]) == (0.0, 3.5)
+        assert not table.loc["central", "there_at_start"]
+        assert np.isnan(table.loc["calcarine", "onset_week"])
+
+
+def test_what_is_there_at_the_start_has_no_onset_and_an_unknown_week_is_skipped():
+    late = onset(reliefs_of({24.0: 2.8, 25.0: 3.5})).set_index("region")
     assert late.loc["central", "there_at_start"]
     assert np.isnan(late.loc["central", "onset_week"])
+    unknown = onset(reliefs_of({22.0: np.nan, 24.0: 2.8})).set_index("region")
+    assert unknown.loc["central", "onset_week"] == 24.0
 
 
 def test_sulci_are_valleys_found_by_their_depth_and_carried_to_an_earlier_surface():
@@ -154,14 +164,3 @@ def test_sulci_are_named_by_the_regions_that_they_lie_in():
     same, numbers = named(mesh, sulci, regions, {}, "left")
     assert sorted(numbers.values()) == ["left 1", "left 2", "left 3"]
     assert {numbers[int(number)] for number in np.unique(same[sulci == 2])} == {"left 2"}
-
-
-def test_the_same_sulcus_has_its_name_at_its_week():
-    """A groove in a named region, which deepens: its row has the region's name and the week."""
-    mesh, depths = groove(4.0)
-    sulci = sulcal_regions(mesh, depths, np.where(depths > 1.0, -0.2, 0.05))
-    regions, names = named(mesh, sulci, np.where(POINTS[:, 0] > 0, 3, 5), {3: "central", 5: "calcarine"}, "right")
-    reliefs = {20.0 + depth: relief(*groove(depth), regions, names) for depth in (0.0, 1.0, 2.0, 3.0, 4.0)}
-    table = onset(reliefs).set_index("region")
-    assert list(table.index) == ["right central"]
-    assert 22 <= table.loc["right central", "onset_week"] < 24

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.compare.validation import Comparison, ordered, validation_row
+from gyriflow.compare.validation import ordered, validation_row
 from gyriflow.geometry.triangles import area, signed_volume, transformed
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -23,10 +23,10 @@ SHAPES = {"real": shaped(REAL), "start": shaped(bumpy(2)), "adjacent": shaped(bu
 def row(week: float, *, grown: float = 1.0, run: str = "measured") -> dict:
     """A row of the real brain `grown`, which was to have the real brain's own area and volume."""
     return validation_row(
-        Comparison(run, "predicted", 21.0, week),
+        {"run": run, "kind": "predicted", "start_week": 21.0, "week": week},
         simulated=transformed(REAL, np.diag([grown] * 3 + [1.0])),
         real_brain=REAL,
-        curve=(area(REAL), signed_volume(REAL)),
+        aims={"area_cm2": area(REAL) / 100, "volume_ml": signed_volume(REAL) / 1000},
         run=SHAPES["real"],
         **SHAPES,
     )
