@@ -32,7 +32,6 @@ with step(snakemake.log[0]):
             at(fitted, real, found), at(first, start, at_start), run_at_start, run
         )
     write_vertex_maps(snakemake.output.maps, maps)
-
     parts = {"whole": surface, **dict(zip(params.sides, map(read_surface, files.sides), strict=True))}
     places = {part: KDTree(surface.vertices).query(mesh.vertices)[1] for part, mesh in parts.items()}
     own = {part: {name: values[place] for name, values in maps.items()} for part, place in places.items()}

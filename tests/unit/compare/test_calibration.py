@@ -49,13 +49,6 @@ def test_rounds_look_where_the_least_is_and_apart_from_each_other():
     assert min(gaps) >= 0.02
 
 
-def test_an_optimum_at_a_bound_says_so():
-    runs = sobol_design(BOUNDS, 12, seed=0)
-    runs["score"] = in_unit_box(runs, BOUNDS)[:, 0]
-    best = optimum(fit(runs, BOUNDS, seed=0)).set_index("parameter")
-    assert best.loc["thickness_mm", "at_bound"]
-
-
 def test_a_diverged_run_keeps_others_away():
     runs = scored(sobol_design(BOUNDS, 12, seed=0))
     thick = runs["thickness_mm"] > 2.4

@@ -95,14 +95,6 @@ def test_what_stands_against_the_nearest_is_said():
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
 
 
-def test_members_say_how_they_ended():
-    rows = MEMBERS.set_index("run")
-    assert rows["outcome"].to_dict() == {"t1": "finished", "t2": "finished", "t3": "finished", "t4": "diverged"}
-    assert (rows.loc["t4", "reached_week"], rows.loc["t4", "cause"]) == (26.5, "det F")
-    assert rows.loc["t1", "resolution"] == "not resolved by the mesh"
-    assert rows.loc["t2", "resolution"] == "ok"
-
-
 def test_the_papers_value_stands_beside_ours_where_it_reports_one():
     published = {"nearest": [{"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 2.25}]}
     table = nearest(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])

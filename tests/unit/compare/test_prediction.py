@@ -11,11 +11,10 @@ from gyriflow.compare.prediction import (
     distances,
     endpoints,
     roughness_mm,
-    scaled_to,
     with_skill,
 )
 from gyriflow.compare.shapes import ready
-from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
+from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.report.labels import SIMPLER_WAYS
 
 from .bumpy import RADIUS, bumpy, shaped
@@ -82,10 +81,6 @@ def test_a_surface_is_worth_most_against_itself():
     assert abs(unlike["r_shape_index"]) < 0.4
     for name in ("r_shape_index", "distance_mm"):
         assert unlike[f"{name}_low"] < unlike[name] < unlike[f"{name}_high"]
-
-
-def test_a_surface_is_scaled_to_a_volume():
-    assert signed_volume(scaled_to(bumpy(1), 5000.0)) == pytest.approx(5000.0)
 
 
 def test_skill_is_against_the_best_simple_way_of_the_week():

@@ -30,12 +30,6 @@ def test_other_folds_of_the_same_height_differ_in_place_and_not_in_distribution(
     assert flat["curvature_distribution"] > 3 * far["curvature_distribution"]
 
 
-def test_only_what_is_asked_for_is_scored():
-    shape = shaped(bumpy(1))
-    assert list(shape_scores(shape, shape, ["curvature_distribution"])) == ["curvature_distribution"]
-    assert shape_scores(shape, shape, ["size"]) == {}
-
-
 def test_a_brain_scaled_by_a_tenth_differs_in_area_and_volume():
     mesh = bumpy(1)
     larger = TriangleMesh(1.1 * mesh.vertices, mesh.faces)
