@@ -35,24 +35,6 @@ POINTS, ROUNDS, ARRIVED_MM = 4000, 60, 0.005
 """Of closest points: how many of either surface, most rounds, and the move that ends them."""
 
 
-@dataclass(frozen=True, eq=False)
-class Searched:
-    """A surface with its search tree and its faces' normals."""
-
-    mesh: TriangleMesh
-    tree: igl.AABB
-    normals: Floats
-
-    def nearest(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return per point the nearest point of the surface with the normal there."""
-        _, face, on = self.tree.squared_distance(self.mesh.vertices, self.mesh.faces, points)
-        return on, self.normals[face]
-
-    def spread(self) -> Floats:
-        """Return about `POINTS` points spread over the surface, the same in every call."""
-        return self.mesh.vertices[:: max(1, len(self.mesh.vertices) // POINTS)]
-
-
 def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) -> Floats:
     """Return the (4, 4) motion p → rotation p + shift; without one of the two, the identity in its place."""
     matrix = np.eye(4)
@@ -126,11 +108,16 @@ def follow_planes(
     return rotation, shift
 
 
-def searched(mesh: TriangleMesh) -> Searched:
-    """Return a surface with its search tree."""
-    tree = igl.AABB()
+def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floats]]:
+    """Return a function that gives, for (n, 3) points, the nearest ones of a surface and the normals there."""
+    tree, normals = igl.AABB(), face_normals(mesh)
     tree.init(mesh.vertices, mesh.faces)
-    return Searched(mesh, tree, face_normals(mesh))
+
+    def nearest(points: Floats) -> tuple[Floats, Floats]:
+        _, face, on = tree.squared_distance(mesh.vertices, mesh.faces, points)
+        return on, normals[face]
+
+    return nearest
 
 
 def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
@@ -139,14 +126,14 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
     It begins with the surfaces as they are, centroids of the vertices together. Each round moves points of both
     surfaces towards the planes of their nearest faces on the other one.
     """
-    a, b = searched(mesh), searched(onto)
-    of_a, of_b = a.spread(), b.spread()
+    nearest_of_a, nearest_of_b = _nearest_planes(mesh), _nearest_planes(onto)
+    of_a, of_b = (one.vertices[:: max(1, len(one.vertices) // POINTS)] for one in (mesh, onto))
 
     def planes(rotation: Floats, shift: Floats) -> Planes:
         moved = of_a @ rotation.T + shift
-        on_b, normals_b = b.nearest(moved)
+        on_b, normals_b = nearest_of_b(moved)
         # points of b are taken back to where a is given
-        on_a, normals_a = a.nearest((of_b - shift) @ rotation)
+        on_a, normals_a = nearest_of_a((of_b - shift) @ rotation)
         points = np.concatenate([moved, on_a @ rotation.T + shift])
         normals = np.concatenate([normals_b, normals_a @ rotation.T])
         return points, normals, np.einsum("ij,ij->i", np.concatenate([on_b, of_b]) - points, normals), None
