@@ -7,16 +7,14 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from configurations import keys, labelled, problems, refusal, study, touched
+from configurations import keys, labelled, problems, refusal, study
 
 from gyriflow.config import load
 from gyriflow.config.atlas import Atlas
 from gyriflow.config.root import Config
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import output_weeks, parameters_from
-from gyriflow.report.style import REAL_BRAIN
 from gyriflow.study import resolve
-from gyriflow.study.figures import measured_name
 
 
 def test_defaults_are_the_reference_values():
@@ -149,28 +147,6 @@ def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
 def test_a_validated_configuration_written_out_is_valid_again():
     config = load(study(runs={"x": {"thickness_mm": 2}}))
     assert load(config.model_dump(mode="json", exclude_defaults=True)) == config
-
-
-@pytest.mark.parametrize(
-    ("shown", "name"),
-    [
-        (["real"], REAL_BRAIN),
-        ([], REAL_BRAIN),
-        (["ball"], "sphere"),
-        (["ball", "egg"], "simple shape"),
-        (["real", "egg"], "real brain or ellipsoid"),
-        (["real", "ball", "egg"], "real brain or simple shape"),
-    ],
-)
-def test_only_real_brains_are_called_so(tmp_path, shown, name):
-    touched(tmp_path, "a.stl")
-    brains = [{"id": "real", "week": 22, "pial": "a.stl"}]
-    brains += [
-        {"id": "ball", "week": 21, "shape": {"semi_axes_mm": [23, 23, 23]}},
-        {"id": "egg", "week": 21, "shape": {}},
-    ]
-    known = resolve(load(study(brains, start="ball"), tmp_path)).brains
-    assert measured_name(known[brain] for brain in shown) == name
 
 
 def test_parameters_of_a_run_are_what_the_folding_program_reads():

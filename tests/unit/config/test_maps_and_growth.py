@@ -1,7 +1,7 @@
 """Maps and growth in a configuration: what the steps of the workflow are handed."""
 
 import pytest
-from configurations import LABELLED, problems, series_for, series_of
+from configurations import LABELLED, problems, touched
 
 from gyriflow.config import load
 from gyriflow.study import resolve
@@ -51,46 +51,12 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     assert plain.parameters["thickness_mm"] == 1e-8
 
 
-@pytest.mark.parametrize(
-    ("growth", "brains"),
-    [({}, ["a", "b", "c"]), ({"brains": ["c", "a"]}, ["a", "c"]), ({"brains": None}, ["a", "b", "c"])],
-)
-def test_growth_is_estimated_from_all_brains_or_those_named(growth, brains):
-    assert series_of(resolve(load(study({}, growth=growth)))) == {"volume": brains}
-
-
 def both_kinds(tmp_path, weeks):
-    """Returns a study with a phantom and a closed surface of each of some weeks, the phantoms first."""
-    (tmp_path / "pial.surf.gii").touch()
+    """Returns a configuration with labels and a closed surface of each of some weeks, the labels first."""
+    touched(tmp_path, "pial.surf.gii")
     made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
     given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
     return {"brains": [*made, *given], "start": "s21", "folding": {"end_week": 24}}
-
-
-def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_estimated_from(tmp_path):
-    raw = both_kinds(tmp_path, (21, 22))
-    found = resolve(load(raw, tmp_path))
-    assert series_of(found) == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
-    assert (series_for(found, "s21"), series_for(found, "v21")) == ("surface", "volume")
-    named = resolve(load(raw | {"growth": {"estimated_from": "volume"}}, tmp_path))
-    assert series_for(named, "s21") == "volume"
-    chosen = resolve(load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path))
-    assert series_of(chosen) == {"volume": ["v21", "v22"]}
-
-
-def test_kinds_of_which_one_has_a_single_week_are_one_series(tmp_path):
-    raw = both_kinds(tmp_path, (21, 22))
-    for chosen, series in ((["s21", "v22"], ["v22", "s21"]), (["s21", "v21", "v22"], ["v21", "v22", "s21"])):
-        found = resolve(load(raw | {"growth": {"brains": chosen}}, tmp_path))
-        assert series_of(found) == {"all": series}
-
-
-def test_series_may_be_named(tmp_path):
-    raw = both_kinds(tmp_path, (21, 22, 23))
-    named = {"early": ["s21", "s22"], "late": ["v22", "s23"]}
-    found = resolve(load(raw | {"growth": {"brains": named, "estimated_from": "late"}}, tmp_path))
-    assert series_of(found) == {"early": ["s21", "s22"], "late": ["v22", "s23"]}
-    assert series_for(found, "s21") == "late"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """A cohort's table becomes brains; rows that can't be used are problems, or left out with their cause."""
 
 import pytest
-from configurations import LABELLED, series_for, series_of
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
@@ -170,19 +169,3 @@ def test_more_files_than_are_used_are_refused(folder, files, side, said):
     write(folder, ("id", "week", "files", "side"), ("sub-1", "24", files, side))
     with pytest.raises(InputError, match=f"sub-1: files: {said}"):
         config(folder)
-
-
-def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(folder):
-    brains = [
-        {"id": f"{side}{week}", "week": week, "hemisphere": {"file": "lh.surf.gii", "side": side}}
-        for side in ("left", "right")
-        for week in (24, 25)
-    ]
-    brains += [{"id": f"p{week}", "week": week, **LABELLED} for week in (24, 25)]
-    found = resolve(load({"brains": brains, "start": "left24", "folding": FOLDING}, folder / "bids"))
-    assert series_of(found) == {
-        "left hemisphere, surface": ["left24", "left25"],
-        "right hemisphere, surface": ["right24", "right25"],
-        "volume": ["p24", "p25"],
-    }
-    assert series_for(found, "left24") == "left hemisphere, surface"

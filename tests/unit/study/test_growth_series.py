@@ -1,0 +1,89 @@
+"""Which brains are the series that growth is measured on, and what they are called."""
+
+import pytest
+from configurations import LABELLED, labelled, series_for, series_of, study, touched
+
+from gyriflow.config import load
+from gyriflow.report.style import REAL_BRAIN
+from gyriflow.study import resolve
+from gyriflow.study.figures import measured_name
+
+
+def both_kinds(folder, weeks):
+    """Returns a configuration with labels and a closed surface of each of some weeks, the labels first."""
+    touched(folder, "pial.surf.gii")
+    made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
+    given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
+    return {"brains": [*made, *given], "start": "s21", "folding": {"end_week": 24}}
+
+
+@pytest.mark.parametrize(
+    ("growth", "brains"),
+    [({}, ["a", "b", "c"]), ({"brains": ["c", "a"]}, ["a", "c"]), ({"brains": None}, ["a", "b", "c"])],
+)
+def test_growth_is_estimated_from_all_brains_or_those_named(growth, brains):
+    assert series_of(resolve(load(study(labelled(21, 22, 22), growth=growth)))) == {"volume": brains}
+
+
+def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_estimated_from(tmp_path):
+    raw = both_kinds(tmp_path, (21, 22))
+    found = resolve(load(raw, tmp_path))
+    assert series_of(found) == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
+    assert (series_for(found, "s21"), series_for(found, "v21")) == ("surface", "volume")
+    named = resolve(load(raw | {"growth": {"estimated_from": "volume"}}, tmp_path))
+    assert series_for(named, "s21") == "volume"
+    chosen = resolve(load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path))
+    assert series_of(chosen) == {"volume": ["v21", "v22"]}
+
+
+def test_kinds_of_which_one_has_a_single_week_are_one_series(tmp_path):
+    raw = both_kinds(tmp_path, (21, 22))
+    for chosen, series in ((["s21", "v22"], ["v22", "s21"]), (["s21", "v21", "v22"], ["v21", "v22", "s21"])):
+        found = resolve(load(raw | {"growth": {"brains": chosen}}, tmp_path))
+        assert series_of(found) == {"all": series}
+
+
+def test_series_may_be_named(tmp_path):
+    raw = both_kinds(tmp_path, (21, 22, 23))
+    named = {"early": ["s21", "s22"], "late": ["v22", "s23"]}
+    found = resolve(load(raw | {"growth": {"brains": named, "estimated_from": "late"}}, tmp_path))
+    assert series_of(found) == {"early": ["s21", "s22"], "late": ["v22", "s23"]}
+    assert series_for(found, "s21") == "late"
+
+
+def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(tmp_path):
+    brains = [
+        {"id": f"{side}{week}", "week": week, "hemisphere": {"file": "lh.surf.gii", "side": side}}
+        for side in ("left", "right")
+        for week in (24, 25)
+    ]
+    brains += [{"id": f"p{week}", "week": week, **LABELLED} for week in (24, 25)]
+    found = resolve(load(study(brains, start="left24", folding={"end_week": 26}), touched(tmp_path, "lh.surf.gii")))
+    assert series_of(found) == {
+        "left hemisphere, surface": ["left24", "left25"],
+        "right hemisphere, surface": ["right24", "right25"],
+        "volume": ["p24", "p25"],
+    }
+    assert series_for(found, "left24") == "left hemisphere, surface"
+
+
+@pytest.mark.parametrize(
+    ("shown", "name"),
+    [
+        (["real"], REAL_BRAIN),
+        ([], REAL_BRAIN),
+        (["ball"], "sphere"),
+        (["ball", "egg"], "simple shape"),
+        (["real", "egg"], "real brain or ellipsoid"),
+        (["real", "ball", "egg"], "real brain or simple shape"),
+    ],
+)
+def test_only_real_brains_are_called_so(tmp_path, shown, name):
+    touched(tmp_path, "a.stl")
+    brains = [{"id": "real", "week": 22, "pial": "a.stl"}]
+    brains += [
+        {"id": "ball", "week": 21, "shape": {"semi_axes_mm": [23, 23, 23]}},
+        {"id": "egg", "week": 21, "shape": {}},
+    ]
+    known = resolve(load(study(brains, start="ball"), tmp_path)).brains
+    assert measured_name(known[brain] for brain in shown) == name
