@@ -97,12 +97,12 @@ def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
 
 @pytest.mark.fault(32)
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_goes_on(mesh, tmp_path):
-    solver = {"max_newton": 1, "newton_tolerance": 1e-6}
-    done = fold(mesh, tmp_path / "out", step_s=302400.0, growth_rate_per_s=3e-6, solver=solver)
+    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_newton": 1}}
+    done = fold(mesh, tmp_path / "out", end_week=21.4, output_weeks=[21.0, 21.4], **hard)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "trying" in done.stdout
     steps = pd.read_csv(tmp_path / "out" / "steps.csv")
-    assert steps["dt_s"].min() < 302400
+    assert steps["dt_s"].min() <= 43200
     assert (steps["min_J"] > 0).all()
 
 
