@@ -123,8 +123,8 @@ def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: 
     return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(axis=1) <= 1
 
 
-def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64], sides: bool) -> NDArray[np.int64]:
-    """Returns BASE for facets of a flat base, SIDE_X and SIDE_Y for those of upright sides if asked for, else FREE.
+def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return BASE for facets of a flat base, SIDE_X and SIDE_Y for those of upright sides, else FREE.
 
     A facet belongs to a cut where its vertices lie within a hundredth of the extent of the mesh's end and it faces it.
     """
@@ -133,7 +133,7 @@ def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64], sides: bool) -> 
     normals = face_normals(TriangleMesh(mesh.vertices, facets))
     corners = mesh.vertices[facets]
     zone = np.full(len(facets), terms.FREE)
-    for axis, name in ((0, terms.SIDE_X), (1, terms.SIDE_Y)) if sides else ():
+    for axis, name in ((0, terms.SIDE_X), (1, terms.SIDE_Y)):
         for end, sign in ((low, -1.0), (high, 1.0)):
             at_end = (np.abs(corners[:, :, axis] - end[axis]) <= near[axis]).all(axis=1)
             zone[on_whole_faces(at_end & (sign * normals[:, axis] > 0.7), mesh.order)] = name
@@ -174,8 +174,8 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         zone[faces_where((facet_x > left_plane) & (facet_x < right_plane))] = terms.BETWEEN_PLANES
         zone[faces_where((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))] = terms.LEFT_CONTACT
         zone[faces_where((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))] = terms.RIGHT_CONTACT
-    if support in ("base", "box"):
-        cuts = flat_cuts(mesh, facets, sides=support == "box")
+    if support == "box":
+        cuts = flat_cuts(mesh, facets)
         zone[cuts != terms.FREE] = cuts[cuts != terms.FREE]
     anchors = None
     if side is not None:

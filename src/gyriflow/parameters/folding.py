@@ -131,9 +131,9 @@ class FoldingSettings(Settings):
     stress_memory_gw: Memory = 0.0
     """Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.
     [GW]"""
-    support: Literal["ellipsoid", "base", "box", "free"] = "ellipsoid"
-    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `base` clamps the
-    flat base, `box` too, and lets upright sides slide; `free` removes rigid motions only."""
+    support: Literal["ellipsoid", "box", "free"] = "ellipsoid"
+    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `box` clamps a flat
+    base and lets upright sides slide; `free` removes rigid motions only."""
     contact: Contact = Contact()
     """Contact."""
     no_growth: NoGrowth = NoGrowth()

@@ -12,7 +12,6 @@ from gyriflow.folding.zones import brain_box, cell_tags, inside_ellipsoid, zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from gyriflow.parameters.folding import NoGrowth, parameters_from
 from gyriflow.parameters.terms import (
-    BASE,
     BRIDGE,
     CLAMPED,
     LEFT,
@@ -102,26 +101,6 @@ def test_walls_between_the_planes_are_warned_of(brain):
 
     assert warnings(2.5) == []
     assert "feels no contact" in warnings(20.0)[0]
-
-
-def dome(cells=8):
-    """Returns the upper half of an ellipsoid, on a flat base at z = 0."""
-    box = box_mesh((cells, cells, cells), (2.0, 2.0, 2.0))
-    x = box.vertices * [1.0, 1.0, 0.5] + [0.0, 0.0, 0.5]
-    shell = np.abs(x * [1.0, 1.0, 1.0]).max(axis=1, keepdims=True)
-    length = np.linalg.norm(x, axis=1, keepdims=True)
-    return TetrahedralMesh(20.0 * x * np.where(length > 0, shell / np.where(length > 0, length, 1), 1), box.tets)
-
-
-def test_a_flat_base_is_held_and_has_no_cortex():
-    mesh = dome()
-    zones = find_zones(mesh, fissure_x_mm=0.0, **(DEFAULTS | OPEN), support="base", grows_everywhere=True)
-    base = zones.facets[zones.facet_zone == BASE]
-    assert len(base)
-    assert (mesh.vertices[base][:, :, 2] == 0).all()
-    assert (zones.fixed.any(axis=1) == (mesh.vertices[:, 2] == 0)).all()
-    assert len(zones.cortex_facets) == len(zones.facets) - len(base)
-    refuse_impossible(mesh, zones)
 
 
 def test_the_sides_of_a_box_slide_in_their_planes():
