@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.terms import (
@@ -32,9 +31,9 @@ from .panels import MOST_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
     UNKNOWN_COLOUR,
+    VIEWS,
     View,
     colour_scale,
-    named_views,
     paint,
     restricted,
     uniform_colours,
@@ -137,7 +136,7 @@ def runs_by_week(
     groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
     if real:
         groups[measured] = (real, REAL_SURFACE_COLOUR)
-    keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), named_views(views)
+    keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), [VIEWS[name] for name in views]
     panels = {
         name: {view: _plain_panels(meshes, keys, colour, view) for view in seen}
         for name, (meshes, colour) in groups.items()
@@ -154,7 +153,9 @@ def runs_by_week(
 @styled
 def brains_picture(brains: Mapping[str, TriangleMesh], *, views: Sequence[str] = SIDE_VIEWS) -> Figure:
     """Draw measured brains, {heading: surface in RAS+ mm}, side by side, a row per view."""
-    panels = {view: _plain_panels(brains, list(brains), REAL_SURFACE_COLOUR, view) for view in named_views(views)}
+    panels = {
+        view: _plain_panels(brains, list(brains), REAL_SURFACE_COLOUR, view) for view in map(VIEWS.__getitem__, views)
+    }
     return panel_grid(*_side_by_side(list(brains), {"": panels}))
 
 
@@ -172,7 +173,7 @@ def displacement_maps(
     ----------
     displacements : {run: {(from_week, to_week): (surface, norms in mm)}}
     """
-    keys, seen = _ordered(*displacements.values()), named_views(views)
+    keys, seen = _ordered(*displacements.values()), [VIEWS[name] for name in views]
     scale = magnitude_scale(
         np.concatenate([n for maps in displacements.values() for _, n in maps.values()]), MAGNITUDES
     )
@@ -216,12 +217,7 @@ def round_up(value: float) -> float:
 
 
 def scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Return the colour scale of one of `labels.MAPS`: its own limits, or from zero to where few vertices are above.
-
-    InputError for another quantity.
-    """
-    if quantity not in MAPS:
-        raise InputError("unknown quantity", found=quantity, expected=list(MAPS))
+    """Return the colour scale of one of `labels.MAPS`: its own limits, or from zero to where few vertices are above."""
     # by more than rounding
     shrinks = quantity == AREA_GROWTH and np.nanmin(values) < -ROUNDING * np.nanmax(np.abs(values))
     if quantity in DEVIATIONS or shrinks:
@@ -287,11 +283,9 @@ def scalar_maps(
         A name of `labels.MAPS`; pressures leave the surface grey where nothing touches.
     directions : {week or run: (n, 3) vectors at the vertices}
         Drawn as lines in proportion to these, but for the longest tenth, which are alike.
-
-    InputError for another quantity or an unknown view.
     """
     every = np.concatenate([values for group in maps.values() for _, values in group.values()])
-    scale, keys, seen = scale_of(quantity, every), _ordered(*maps.values()), named_views(views)
+    scale, keys, seen = scale_of(quantity, every), _ordered(*maps.values()), [VIEWS[name] for name in views]
     shares: dict[Any, Floats] = {}
     if directions:
         lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
@@ -364,7 +358,7 @@ def influence_picture(
             mesh, of_mesh = whole_maps(halves, [quantity])
             maps[name] = mesh, of_mesh[quantity]
     scale = scale_of(quantity, np.empty(0))
-    seen, rows = named_views(views), []
+    seen, rows = [VIEWS[name] for name in views], []
     for view in seen:
         panels = [
             shown and Panel(shown[0], uniform_colours(shown[0], colours[name]), view) for name, shown in maps.items()
@@ -419,7 +413,7 @@ def regions_picture(
         legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     rows = [
         Row(f"{view.name} view", [Panel(mesh, shades, view) for mesh, shades in painted.values()])
-        for view in named_views(views)
+        for view in map(VIEWS.__getitem__, views)
     ]
     return panel_grid(list(painted), rows, legend=legend)
 
@@ -445,7 +439,7 @@ def zones_picture(
             legend.append(Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²"))
     panels = [
         Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, material=MAP)
-        for view in named_views(views)
+        for view in map(VIEWS.__getitem__, views)
     ]
     # a brain of one hemisphere has no medial view of the other
     panels = [panel for panel in panels if len(panel.mesh.faces)]

@@ -1,6 +1,5 @@
 """One surface seen from one side: cameras, light and off-screen rendering."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import matplotlib as mpl
@@ -11,7 +10,6 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, corners, submesh, vertex_normals
 from .style import NEUTRAL_COLOUR
 
@@ -112,14 +110,6 @@ def restricted(
     keep = left if hemisphere == "left" else ~left
     part, vertices = submesh(mesh, keep)
     return part, colours[vertices] if len(colours) == len(mesh.vertices) else colours[keep]
-
-
-def named_views(names: Sequence[str]) -> list[View]:
-    """Return the views of these names; InputError for an unknown one."""
-    unknown = [name for name in names if name not in VIEWS]
-    if unknown:
-        raise InputError("unknown view", found=unknown, expected=list(VIEWS))
-    return [VIEWS[name] for name in names]
 
 
 def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:

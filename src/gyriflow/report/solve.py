@@ -26,11 +26,6 @@ from .style import (
     week_axis,
 )
 
-FALLBACKS = {
-    "cg": "conjugate gradients",
-    "cg, tangent shifted": "tangent made definite",
-}
-"""What is said of steps by the linear solver that they needed, from the usual one on."""
 _MARKERS = {"FetalFoldSim": "s", "Wang et al. 2021": "^"}
 PUBLISHED = pd.DataFrame(
     {
@@ -52,7 +47,7 @@ def steps_chart(steps: pd.DataFrame, *, order: int) -> Figure:
     ----------
     steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, elements_through_cortex, radius_ratio_01, rung,
         seconds
-        One row per accepted step. Steps that another linear solver was needed for than for most are marked.
+        One row per accepted step. Steps that plain conjugate gradients did not solve are marked.
     order
         Of the elements: it says how many through the cortex are enough.
     """
@@ -77,12 +72,10 @@ def steps_chart(steps: pd.DataFrame, *, order: int) -> Figure:
     figure.align_ylabels(list(panels.values()))
     add_letters(panels.values())
     week_axis(panels["seconds"], week)
-    unusual = steps[steps["rung"] != steps["rung"].mode().iloc[0]]
-    for colour, (rung, rows) in zip(RUN_COLOURS[1:], unusual.groupby("rung", sort=False), strict=False):
-        panels["newton"].plot(
-            rows["week"], rows["newton"], "D", color=colour, markersize=3.5, label=FALLBACKS.get(rung, rung)
-        )
-    if len(unusual):
+    shifted = steps[steps["rung"] != "cg"]
+    if len(shifted):
+        look: dict[str, Any] = {"color": RUN_COLOURS[1], "markersize": 3.5, "label": "tangent made definite"}
+        panels["newton"].plot(shifted["week"], shifted["newton"], "D", **look)
         panels["newton"].legend(**above)
     return figure
 

@@ -41,20 +41,11 @@ def metric_rows(run: str, hemisphere: str, metric: str, values: dict[float, floa
 
 
 def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: bool = True) -> list[pd.DataFrame]:
+    of_all = {"subject": "s", "run": run, "week": week, "resolved": True}
+    of_all |= {"complete": complete, "denominator_complete": complete}
+    bands, powers = list(power), np.array(list(power.values()))
     return [
-        pd.DataFrame(
-            {
-                "subject": "s",
-                "run": run,
-                "week": week,
-                "hemisphere": side,
-                "band": list(power),
-                "relative_power": [factor * value for value in power.values()],
-                "complete": complete,
-                "denominator_complete": complete,
-                "resolved": True,
-            }
-        )
+        pd.DataFrame({**of_all, "hemisphere": side, "band": bands, "relative_power": factor * powers})
         for side, factor in (("left", 1.0), ("right", 0.5))
     ]
 

@@ -5,7 +5,6 @@ import pytest
 from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, sphere
 
-from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.report.labels import AREA_GROWTH
@@ -158,13 +157,6 @@ def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
     gyri, sulci = map(tone, (picture(figure, 0), picture(figure, 1)))
     assert gyri[0] > gyri[2]
     assert sulci[2] > sulci[0]
-
-
-def test_an_unknown_quantity_or_view_is_refused():
-    with pytest.raises(InputError, match="unknown quantity; found depth"):
-        scalar_maps({"simulated": {28.0: (BRAIN, np.zeros(8))}}, quantity="depth")
-    with pytest.raises(InputError, match=r"unknown view.*lateral"):
-        runs_by_week({"simulated": {21.0: BRAIN}}, {}, views=("lateral",))
 
 
 def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():

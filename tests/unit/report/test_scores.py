@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from gyriflow.errors import InputError
+from gyriflow.parameters.terms import SIDES
 from gyriflow.report.scores import (
     calibration_chart,
     influence_spectra,
@@ -131,14 +132,8 @@ def test_starts_are_told_apart_and_nothing_is_drawn_of_nothing():
 
 
 def spectrum(run: str, power: float) -> pd.DataFrame:
-    columns = {
-        "subject": "s",
-        "run": run,
-        "week": 28.0,
-        "band": [4, 5, 6],
-        "relative_power": [power, power / 2, power / 4],
-    }
-    sides = [pd.DataFrame(columns | {"subject": "s", "hemisphere": side}) for side in ("left", "right")]
+    shares = {"band": [4, 5, 6], "relative_power": [power, power / 2, power / 4]}
+    sides = [pd.DataFrame({"subject": "s", "run": run, "week": 28.0, **shares, "hemisphere": side}) for side in SIDES]
     return pd.concat(sides).assign(complete=True, denominator_complete=True, resolved=True)
 
 
@@ -173,12 +168,8 @@ def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
 
 
 def test_hemispheres_are_drawn_apart_and_the_published_value_is_a_line():
-    table = pd.concat(
-        [
-            distances({1.0: 2.0, 2.0: value}, hemisphere=side, measure="B4")
-            for side, value in (("left", 1.0), ("right", 3.0))
-        ]
-    )
+    of_side = {"left": 1.0, "right": 3.0}
+    table = pd.concat([distances({1.0: 2.0, 2.0: v}, hemisphere=s, measure="B4") for s, v in of_side.items()])
     figure = nearest_chart(table, pd.DataFrame({"measure": ["B4", "B4"], "paper": [2.25, 2.25]}), **OF_THE_STUDY)
     (axes,) = figure.axes
     assert sorted(text.get_text() for text in axes.texts) == ["1", "2"]
