@@ -78,27 +78,18 @@ def refused(workflow, outcome, log, *messages, brain="apart"):
     assert not [path for path in folder.glob("*") if path.is_file()]
 
 
-@pytest.fixture(scope="module")
-def gated(workflow):
-    return remeshing(workflow, min_radius_ratio=0.9, max_volume_change=1e-6, max_surface_distance_mm=1e-3)
-
-
 @pytest.mark.fault(23)
-def test_a_mesh_below_the_gates_is_refused_with_all_that_it_fails(workflow, gated):
+@pytest.mark.promise(9)
+def test_a_mesh_below_the_gates_is_refused_with_all_that_it_fails_and_can_be_looked_at(workflow):
     refused(
         workflow,
-        *gated,
+        *remeshing(workflow, min_radius_ratio=0.9, max_volume_change=1e-6, max_surface_distance_mm=1e-3),
         f"{REFUSED}/brain.xdmf: the mesh is not good enough",
         "elements with radius ratio to",
         "radius ratio at least 0.9",
         "% against the surface's",
         "at most 0.001 mm (mesh.max_surface_distance_mm)",
     )
-
-
-@pytest.mark.promise(9)
-@pytest.mark.usefixtures("gated")
-def test_what_was_refused_can_be_looked_at(workflow):
     quality = read_json(workflow.directory / REFUSED / "quality.json")
     assert quality["tets"] == len(read_tetrahedral_mesh(workflow.directory / REFUSED / "brain.xdmf").tets)
     assert quality["min_radius_ratio"] < 0.9

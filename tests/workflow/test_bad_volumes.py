@@ -6,8 +6,6 @@ import pytest
 from reliability import trying
 from shapes import phantom
 
-from gyriflow.io.files import read_json
-
 from .conftest import Workflow
 
 pytestmark = pytest.mark.slow
@@ -82,23 +80,12 @@ def test_a_bad_input_is_refused_with_a_message_and_nothing_is_left(study, name):
     study.require_refused(name, expected)
 
 
-@pytest.mark.fault(2)
-def test_matrices_that_disagree_are_both_printed(study):
-    log = study.log("headers")
-    for matrix, code in (("qform", 2), ("sform", 1)):
-        assert f"{matrix} (code {code})\n[[" in log
-    assert "affine_from: qform or sform" in log
-
-
-def measured(study, name):
-    report = study.report(name)
-    return np.array([*report["area_cm2"].values(), report["volume_mL"]])
-
-
 @pytest.mark.parametrize("name", trying({"told": (2, 6), "flat": 5}))
 def test_a_brain_is_the_same_however_it_is_stored(study, name):
-    tolerance = 0.06 if name == "flat" else 0.005
-    np.testing.assert_allclose(measured(study, name), measured(study, GOOD), rtol=tolerance)
+    sizes, expected = (
+        [*report["area_cm2"].values(), report["volume_mL"]] for report in map(study.report, (name, GOOD))
+    )
+    np.testing.assert_allclose(sizes, expected, rtol=0.06 if name == "flat" else 0.005)
 
 
 @pytest.mark.fault(5)
@@ -113,11 +100,8 @@ def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its
     report = study.report(GOOD)
     assert (report["week"], report["scheme"], report["euler_number"]) == (21.5, "mine", 2)
     assert abs(report["smoothing"]["volume_change"]) < 0.01
-    thickness = nib.load(folder / "thickness.shape.gii").darrays
-    assert [len(array.data) for array in thickness] == [report["vertices"]]
-    measured = read_json(folder / "thickness.json")
-    assert measured["mean_mm"] == pytest.approx(thickness[0].data.mean(), abs=0.2)
-    assert "a suggestion for thickness_mm" in study.log(GOOD, "cortical_thickness")
+    (thickness,) = nib.load(folder / "thickness.shape.gii").darrays
+    assert len(thickness.data) == report["vertices"]
 
 
 def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):
