@@ -7,6 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
+PROGRAMS = [*SCRIPTS, *(ROOT / "benchmarks").rglob("*.py"), *(ROOT / "atlases").rglob("*.py")]
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
 
@@ -15,11 +16,11 @@ def test_every_script_is_used_and_there():
     assert set(re.findall(r"\.\./scripts/(\w+\.py)", text)) == {path.name for path in SCRIPTS}
 
 
-def test_what_scripts_import_is_there():
+def test_what_scripts_and_benchmarks_import_is_there():
     # imports within functions too, which only a job would otherwise try
     imported = [
         (path.name, node.module, alias.name)
-        for path in SCRIPTS
+        for path in PROGRAMS
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gyriflow")
         for alias in node.names

@@ -18,11 +18,11 @@ from scipy.spatial import cKDTree
 
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.triangles import Floats, Ints, TriangleMesh, edges, vertex_areas
+from gyriflow.geometry.triangles import Floats, Ints, TriangleMesh, convex_hull, edges, vertex_areas
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml
 from gyriflow.metrics.curvature import curvature
-from gyriflow.metrics.gyrification import convex_hull, sulcal_depth
+from gyriflow.metrics.gyrification import sulcal_depth
 
 FOLDER = Path(__file__).parent
 SEEN_MM = 1.5

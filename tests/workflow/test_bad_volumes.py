@@ -80,6 +80,12 @@ def test_a_bad_input_is_refused_with_a_message_and_nothing_is_left(study, name):
     study.require_refused(name, expected)
 
 
+@pytest.mark.fault(2)
+def test_matrices_that_disagree_are_both_printed(study):
+    assert "qform (code 2)\n[[" in study.log("headers")
+    assert "sform (code 1)\n[[" in study.log("headers")
+
+
 @pytest.mark.parametrize("name", trying({"told": (2, 6), "flat": 5}))
 def test_a_brain_is_the_same_however_it_is_stored(study, name):
     sizes, expected = (
