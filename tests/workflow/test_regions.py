@@ -39,12 +39,7 @@ STUDY = {
     },
 }
 NAMES = ["front", "back"]
-TARGETS = [
-    "metrics",
-    "export",
-    "results/study/figures/regions.png",
-    "results/study/figures/norms.png",
-]
+TARGETS = ["metrics", "export", "results/study/figures/regions.png"]
 
 
 def middle(points: np.ndarray) -> float:
