@@ -24,39 +24,30 @@ from gyriflow.io.frames import (
 from gyriflow.io.tetmeshes import Regions, read_regions, read_tetrahedral_mesh, write_regions, write_tetrahedral_mesh
 
 
-def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path):
-    mesh = box_mesh((2, 2, 2), (2.0, 2.0, 2.0))
-    path = tmp_path / "brain.xdmf"
-    write_tetrahedral_mesh(path, mesh, {"x": mesh.vertices[:, 0], "p": mesh.vertices}, {"v": signed_volumes(mesh)})
-    read = read_tetrahedral_mesh(path)
-    np.testing.assert_array_equal(read.vertices, mesh.vertices)
-    np.testing.assert_array_equal(read.tets, mesh.tets)
+def by_vtk(path):
+    """Returns what VTK's reader, which is ParaView's, reads of an XDMF file."""
     reader = vtkXdmfReader()
     reader.SetFileName(str(path))
     reader.Update()
-    other = wrap(reader.GetOutputDataObject(0))
+    return wrap(reader.GetOutputDataObject(0))
+
+
+@pytest.mark.parametrize("make", [lambda mesh: mesh, quadratic])
+def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path, make):
+    mesh, path = make(box_mesh((2, 2, 2), (2.0, 2.0, 2.0))), tmp_path / "brain.xdmf"
+    shaken = np.random.default_rng(1).uniform(-0.05, 0.05, mesh.vertices.shape)
+    mesh = TetrahedralMesh(mesh.vertices + shaken, mesh.tets)
+    write_tetrahedral_mesh(path, mesh, {"x": mesh.vertices[:, 0], "p": mesh.vertices}, {"v": signed_volumes(mesh)})
+    read, other = read_tetrahedral_mesh(path), by_vtk(path)
+    np.testing.assert_array_equal(read.vertices, mesh.vertices)
+    np.testing.assert_array_equal(read.tets, mesh.tets)
     np.testing.assert_array_equal(other.point_data["p"], mesh.vertices)
     np.testing.assert_allclose(other.cell_data["v"], signed_volumes(mesh))
 
 
-def test_quadratic_meshes_come_back_curved_and_positive_readable_by_others(tmp_path):
-    mesh = quadratic(box_mesh((2, 2, 2), (2.0, 2.0, 2.0)))
-    mesh = TetrahedralMesh(
-        mesh.vertices + np.random.default_rng(1).uniform(-0.05, 0.05, mesh.vertices.shape), mesh.tets
-    )
-    write_tetrahedral_mesh(tmp_path / "brain.xdmf", mesh, {"x": mesh.vertices[:, 0]})
-    read = read_tetrahedral_mesh(tmp_path / "brain.xdmf")
-    np.testing.assert_array_equal(read.tets, mesh.tets)
-    np.testing.assert_array_equal(read.vertices, mesh.vertices)
-
-
 @pytest.mark.parametrize(
     ("point", "tet", "message"),
-    [
-        (np.nan, [0, 1, 2, 3], "1 points"),
-        (1.0, [0, 2, 1, 3], "found 1"),
-        (0.0, [0, 1, 2, 3], "found 1"),
-    ],
+    [(np.nan, [0, 1, 2, 3], "1 points"), (1.0, [0, 2, 1, 3], "found 1"), (0.0, [0, 1, 2, 3], "found 1")],
 )
 def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, message):
     points = np.vstack([np.zeros(3), np.eye(3)])
@@ -66,11 +57,12 @@ def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, me
         read_tetrahedral_mesh(tmp_path / "bad.xdmf")
 
 
-def test_missing_and_torn_meshes_are_refused(tmp_path):
+@pytest.mark.parametrize("read", [read_tetrahedral_mesh, read_regions])
+@pytest.mark.parametrize("name", ["torn", "missing"])
+def test_missing_and_torn_files_are_refused(tmp_path, read, name):
     (tmp_path / "torn.h5").write_bytes(b"HDF")
-    for name in ("torn", "missing"):
-        with pytest.raises(InputError, match=rf"{name}\.h5"):
-            read_tetrahedral_mesh(tmp_path / f"{name}.xdmf")
+    with pytest.raises(InputError, match=rf"{name}\.h5: cannot be read"):
+        read(tmp_path / f"{name}.xdmf")
 
 
 @pytest.fixture
@@ -154,14 +146,6 @@ def test_what_is_written_comes_back(written):
     np.testing.assert_array_equal(back.fields["normal"], mesh.vertices)
 
 
-def test_other_files_are_refused(written, tmp_path):
-    with pytest.raises(InputError, match=r"none\.h5: cannot be read as regions"):
-        read_regions(tmp_path / "none.xdmf")
-    (tmp_path / "torn.h5").write_bytes(written[0].with_suffix(".h5").read_bytes()[:3000])
-    with pytest.raises(InputError, match=r"torn\.h5: cannot be read as regions"):
-        read_regions(tmp_path / "torn.xdmf")
-
-
 @pytest.fixture(scope="module")
 def domain(written):
     """The mesh as dolfinx reads it, whose own order of elements is another one."""
@@ -199,10 +183,7 @@ def test_dolfinx_reads_every_tag_where_it_belongs(written, domain, grid, dimensi
 
 def test_paraview_opens_elements_and_facets_at_once(written):
     path, mesh, facets, cell_tags, facet_tags = written
-    reader = vtkXdmfReader()
-    reader.SetFileName(str(path))
-    reader.Update()
-    blocks = wrap(reader.GetOutputDataObject(0))
+    blocks = by_vtk(path)
     assert blocks.keys() == ["mesh", "facets"]
     assert [block.n_cells for block in blocks] == [len(mesh.tets), len(facets)]
     assert set(blocks["mesh"].point_data) == {"height_mm", "normal"}
