@@ -126,7 +126,7 @@ def runs_by_week(
     Parameters
     ----------
     runs : {run: {week: surface in RAS+ mm}}
-    real : {week: surface in RAS+ mm}
+    real : {week, or another heading: surface in RAS+ mm}
         A week that one of them lacks leaves its place empty.
     deviations : {week: (surface, maps)}
         Of which `labels.DISTANCE` is shown below.
@@ -148,15 +148,6 @@ def runs_by_week(
         panels["distance"] = {view: [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys] for view in seen}
         bar = scale, MAPS[DISTANCE]
     return panel_grid(*_side_by_side(keys, panels), colour_bar=bar)
-
-
-@styled
-def brains_picture(brains: Mapping[str, TriangleMesh], *, views: Sequence[str] = SIDE_VIEWS) -> Figure:
-    """Draw measured brains, {heading: surface in RAS+ mm}, side by side, a row per view."""
-    panels = {
-        view: _plain_panels(brains, list(brains), REAL_SURFACE_COLOUR, view) for view in map(VIEWS.__getitem__, views)
-    }
-    return panel_grid(*_side_by_side(list(brains), {"": panels}))
 
 
 @styled

@@ -176,11 +176,11 @@ def _of_brains(study: Study) -> Iterator[Figure]:
             )
         yield Figure("quality_page", f"{BRAIN}/figures/quality.png", names=names, target="quality")
     ends = dict.fromkeys(pick(study.brains.values(), key=lambda brain: brain.week) for pick in (min, max))
-    inputs = {"brains": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
-    options = {"views": THREE_SIDES}
+    inputs = {"runs": {}, "real": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
+    options = {"views": THREE_SIDES, "measured": ""}
     target = _technical(study)
     path = f"{OF_STUDY}/inputs.png"
-    yield Figure("inputs_figure", path, "pictures.brains_picture", inputs, options, target=target, paper=True)
+    yield Figure("inputs_figure", path, "pictures.runs_by_week", inputs, options, target=target, paper=True)
     quality = {start.id: MESH["quality"].format(brain=start.id) for start in study.starts}
     limits = study.config.mesh.model_dump()
     gates = {key: value for key, value in limits.items() if key.startswith(("min_", "max_"))}

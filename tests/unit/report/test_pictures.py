@@ -227,15 +227,6 @@ def test_a_study_has_renders_and_maps_of_all_members_and_says_which_did_not_come
     assert red > blue
 
 
-def test_a_legend_of_many_regions_does_not_lie_over_the_brains():
-    mesh = sphere(20.0, 2)
-    names = {number: f"region {number}" for number in range(1, 25)}
-    figure = regions_picture({"p": [(mesh, (np.arange(len(mesh.vertices)) % 25, names))]}, views=("left",))
-    figure.canvas.draw()
-    top = figure.legends[0].get_window_extent().y1
-    assert top <= min(axes.get_window_extent().y0 for axes in pictures(figure))
-
-
 @pytest.mark.parametrize(
     ("quantity", "label", "values"),
     [
