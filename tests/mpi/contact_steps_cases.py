@@ -54,6 +54,7 @@ def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
     assert (COMM.bcast(state.positions) == state.positions).all()
 
 
+@pytest.mark.slow
 @pytest.mark.one_rank
 def test_a_run_goes_on_in_the_middle_of_contact_as_if_it_had_not_stopped():
     tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
@@ -136,6 +137,7 @@ def pressed(step_s, days=4, **changes):
     return folding, state
 
 
+@pytest.mark.slow
 @pytest.mark.one_rank
 def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_the_step():
     rates = []
@@ -156,6 +158,7 @@ def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_t
     assert errors[1:, 2] / errors[:-1, 2] == pytest.approx([0.5, 0.5], abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
     tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
     state = after_steps(*closing_sulcus("global", **tight), 10)

@@ -8,6 +8,7 @@ from boxes import COMM
 from contact_bodies import closing_sulcus
 from petsc4py import PETSc
 
+pytestmark = pytest.mark.slow
 PETSc.Log.begin()
 COUNTED = ("Vector", "Matrix", "Matrix Null Space", "Index Set")
 SPARE = 2
@@ -34,8 +35,6 @@ def alive(folding, path):
     ("kind", "changes"),
     [
         ("global", {}),
-        pytest.param("planes", {}, marks=pytest.mark.one_rank),
-        pytest.param("none", {"support": "free"}, marks=pytest.mark.one_rank),
         # the tangent has to be raised in every step
         pytest.param("none", {"stress_memory_gw": "infinite"}, marks=pytest.mark.one_rank),
     ],

@@ -32,7 +32,7 @@ def bend(mesh):
 
 
 def wavy(height_mm):
-    ball = sphere(20.0, 5)
+    ball = sphere(20.0, 4)
     x, y, z = (ball.vertices / 20.0).T
     wave = np.sin(9 * x) * np.cos(8 * y + 1) + np.sin(8 * z + 2) * np.cos(7 * x)
     return TriangleMesh(ball.vertices * (1 + height_mm * wave / 20)[:, None], ball.faces)
