@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapes import box_mesh
 
-from gyriflow.geometry.jacobians import NODES, PARTS, jacobians, lower_bounds, shape_slopes, shape_values
+from gyriflow.geometry.jacobians import NODES, jacobians, lower_bounds, shape_slopes, shape_values
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_faces,
@@ -54,11 +54,6 @@ def test_shape_functions_are_one_at_their_node_and_reproduce_quadratic_functions
     np.testing.assert_allclose(shape_values(places) @ value(NODES), value(places), atol=1e-14)
     slope = np.stack([2 * places[:, 1] + 1, -2 * places[:, 3], -2 * places[:, 2]], axis=1)
     np.testing.assert_allclose(np.einsum("pni,n->pi", shape_slopes(places), value(NODES)), slope, atol=1e-14)
-
-
-def test_parts_of_an_element_fill_it():
-    volumes = [abs(np.linalg.det(NODES[list(part)])) for part in PARTS]
-    np.testing.assert_allclose(volumes, 1 / 8)
 
 
 @pytest.mark.parametrize("by", [0.05, 0.1, 0.15])

@@ -40,14 +40,6 @@ def test_a_wrong_length_names_both_files_and_counts(tmp_path, ball):
     assert caught.value.exit_code == 2
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_nan_and_infinity_are_counted(tmp_path, ball, value):
-    values = np.ones(len(ball.vertices), np.float32)
-    values[3:8] = value
-    with pytest.raises(InputError, match=r"a\.shape\.gii.*5 vertices"):
-        read_surface_map(gifti(tmp_path / "a.shape.gii", values), tmp_path / "ball.surf.gii")
-
-
 def test_maps_of_two_hemispheres_stand_side_by_side(tmp_path, ball):
     write_surface(tmp_path / "other.surf.gii", moved(ball, 50.0))
     paths = [tmp_path / "a.shape.gii", tmp_path / "b.shape.gii"]

@@ -109,13 +109,6 @@ def test_matrix_into_scanner_space_that_is_not_rigid_is_refused(tmp_path, ball, 
         read_surface(in_spaces(tmp_path / "a.gii", ball, (U, SCANNER, matrix)))
 
 
-def test_identity_in_a_template_space_says_nothing(tmp_path, ball, caplog):
-    # as Connectome Workbench writes surfaces of subjects
-    read_surface(in_spaces(tmp_path / "a.gii", ball, (TALAIRACH, TALAIRACH, np.eye(4))))
-    assert caplog.text == ""
-    assert declared(tmp_path / "a.gii")[0] == "NIFTI_XFORM_TALAIRACH"
-
-
 @pytest.mark.parametrize("name", ["a.vtk", "a.vtp"])
 def test_vtk_surfaces_are_read(tmp_path, ball, name):
     pv.PolyData.from_regular_faces(np.array(ball.vertices), np.array(ball.faces, dtype=int)).save(tmp_path / name)
@@ -202,13 +195,6 @@ def test_vertices_that_are_no_places_and_faces_beyond_the_vertices_are_refused(t
     ):
         with pytest.raises(InputError, match=said):
             read_surface(gifti(tmp_path / "a.gii", points, faces))
-
-
-def test_missing_file_and_map_instead_of_surface_are_refused(tmp_path, ball):
-    write_vertex_maps(tmp_path / "a.shape.gii", {"x": ball.vertices[:, 0]})
-    for name in ("a.shape.gii", "none.surf.gii", "none.stl"):
-        with pytest.raises(InputError, match=name):
-            read_surface(tmp_path / name)
 
 
 def test_named_maps_come_back_and_are_what_workbench_calls_metric_files(tmp_path):

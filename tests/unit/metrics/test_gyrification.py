@@ -13,7 +13,6 @@ from gyriflow.geometry.triangles import (
     convex_hull,
     is_closed,
     signed_volume,
-    submesh,
     vertex_areas,
 )
 from gyriflow.metrics.gyrification import (
@@ -93,15 +92,6 @@ def test_cap_of_half_a_sphere() -> None:
     assert signed_volume(closed) == pytest.approx(0.5 * signed_volume(sphere(25.0)), rel=1e-3)
     assert area(closed) - area(half) == pytest.approx(np.pi * 25.0**2, rel=0.01)
     np.testing.assert_array_equal(closed.faces[: len(half.faces)], half.faces)
-
-
-def test_two_cuts_are_closed_one_by_one() -> None:
-    mesh = sphere(25.0)
-    slab, _ = submesh(mesh, np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 2]) < 12.0)
-    closed = cap(slab)
-    assert is_closed(closed)
-    assert len(closed.vertices) == len(slab.vertices) + 2
-    assert signed_volume(closed) == pytest.approx(np.pi * (25.0**2 * 24 - 2 * 12.0**3 / 3), rel=0.03)
 
 
 def test_cut_is_left_out_of_the_index() -> None:

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import Delaunay
 from shapes import sphere
 
-from gyriflow.errors import InputError, MeshError
+from gyriflow.errors import InputError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
@@ -52,12 +52,6 @@ def test_the_border_is_carried_with_the_tissue(ball) -> None:
     pressed = mesh.vertices * (np.sqrt(RADIUS * radius) / np.maximum(radius, 1e-9))[:, None]
     found = simulated_thickness(mesh, depth_of(mesh), pressed, pial)
     assert found.mean() == pytest.approx(RADIUS - np.sqrt(RADIUS * (RADIUS - CORTEX)), abs=0.15)
-
-
-def test_a_brain_that_is_all_cortex_has_no_border(ball) -> None:
-    mesh, pial = ball
-    with pytest.raises(MeshError, match="no core"):
-        simulated_thickness(mesh, 0.1 * depth_of(mesh), mesh.vertices, pial)
 
 
 def test_values_of_a_part() -> None:
