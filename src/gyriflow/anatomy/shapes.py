@@ -41,7 +41,9 @@ def shape_surface(
             remedy="Set a smaller surface.edge_length_mm, or make the shape larger.",
         )
     points = size * _directions(int(np.ceil(np.pi * size.max() / edge_length_mm)))
-    mesh = remesh(convex_hull(TriangleMesh(points, np.empty((0, 3)))), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG)
+    mesh = remesh(
+        convex_hull(TriangleMesh(points, np.empty((0, 3), np.int64))), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG
+    )
     vertices = mesh.vertices / np.linalg.norm(mesh.vertices / size, axis=1, keepdims=True)
     heights = noise_mm * _pattern(vertices, seed)
     return TriangleMesh(vertices + heights[:, None] * unit(vertices / size**2), mesh.faces)

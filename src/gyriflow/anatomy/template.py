@@ -4,7 +4,7 @@ The template is the shipped atlas at three weeks, `atlases/spina-bifida/right.we
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -44,6 +44,7 @@ class Shape:
     normals: Floats
     centre: Floats
     size_mm: float
+    tree: cKDTree = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tree", cKDTree(self.features(self.points, self.normals)))

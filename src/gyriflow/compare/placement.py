@@ -154,7 +154,8 @@ def drawn_correlations(
 ) -> Floats:
     """Return the (DRAWS,) correlations of values at vertices over the patches that are drawn."""
     columns = _products(truth, other, areas).T
-    return _correlations(drawn @ np.stack([np.bincount(patch, column) for column in columns], axis=1))
+    sums: Floats = np.stack([np.bincount(patch, column) for column in columns], axis=1)
+    return _correlations(np.asarray(drawn @ sums, dtype=float))
 
 
 def _products(one: Floats, other: Floats, weights: Floats) -> Floats:

@@ -37,7 +37,7 @@ class Surrogate:
 
 def fit(runs: pd.DataFrame, bounds: Mapping[str, Sequence[float]], seed: int) -> Surrogate:
     """Fit the surrogate to the runs of a calibration: columns of the parameters, score (NaN: has diverged)."""
-    points, scores = in_unit_box(runs, bounds), runs["score"].to_numpy(dtype=float)
+    points, scores = in_unit_box(runs, bounds), np.asarray(runs["score"], dtype=float)
     finished = scores[np.isfinite(scores)]
     if len(finished) < 2:
         raise ValueError(f"{len(finished)} runs with a score; a surrogate needs two or more")

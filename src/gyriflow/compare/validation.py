@@ -147,7 +147,7 @@ def displacement_table(
             scaled[piece] = scale * (real_first - np.average(real_first, axis=0, weights=by_area))
         r, slope = vector_agreement(moved, moved_really, weights)
         r_scaling, slope_scaling = vector_agreement(scaled, moved_really, weights)
-        row = {"from_week": weeks[number], "to_week": weeks[number + 1]}
+        row: dict[str, Any] = {"from_week": weeks[number], "to_week": weeks[number + 1]}
         row |= {"test": "consistency" if registered else "comparison"}
         row |= {"displacement_r": r, "displacement_slope": slope}
         row |= {"displacement_r_scaling": r_scaling, "displacement_slope_scaling": slope_scaling}

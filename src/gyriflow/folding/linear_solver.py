@@ -127,7 +127,7 @@ def positive_inverses(matrices: Floats) -> Floats:
         sizes = np.abs(values)
         sizes = np.maximum(sizes, REGULARISED * sizes.max(axis=-1, keepdims=True))
         return (directions / sizes[..., None, :]) @ directions.swapaxes(-1, -2)
-    return np.linalg.inv(matrices)
+    return np.asarray(np.linalg.inv(matrices), dtype=float)
 
 
 class LinearSolver:

@@ -46,7 +46,7 @@ def diffuse(
     mass = vertex_sizes(vertices, cells)
     mass = np.where(mass > 0, mass, 1.0)
     matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / steps * stiffness_matrix(vertices, cells))
-    smooth = values.reshape(len(values), -1).astype(float)
+    smooth: Floats = values.reshape(len(values), -1).astype(float)
     for _ in range(steps):
         smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, tolerance)
     return smooth.reshape(values.shape)

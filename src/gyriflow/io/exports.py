@@ -196,9 +196,9 @@ def _write_maps(
     place: _Place, brain: ExportedBrain, space: str, reference: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
     """Write a file for each map, those at the template's vertices with its `space`; return their sidecars."""
-    sidecars = {}
+    sidecars: dict[str, dict[str, Any]] = {}
     # files by side, the entities `space-` and `desc-`, and what sidecars say of the space
-    kinds = (
+    kinds: tuple[tuple[Any, str, str, Mapping[str, Any]], ...] = (
         (brain.maps, "", place.desc, {}),
         (brain.template_maps, space, place.desc, reference),
         (brain.white_maps, "", "_desc-white", {}),
@@ -207,7 +207,7 @@ def _write_maps(
         for side, path in files.items():
             for quantity, values in read_vertex_maps(path).items():
                 suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
-                sidecars["_".join(filter(None, (entity, suffix)))] = {"Description": text, "Units": unit} | more
+                sidecars["_".join(filter(None, (entity, suffix)))] = {"Description": text, "Units": unit, **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
                 named = f"{place.folder / place.stem}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
                 write_vertex_maps(named, {quantity: values}, STRUCTURES[side])
