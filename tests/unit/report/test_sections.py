@@ -9,10 +9,7 @@ from shapes import ellipsoid_mesh, rigid
 from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.report.sections import (
-    outlines_chart,
-    surface_overlay,
-)
+from gyriflow.report.sections import outlines_chart, surface_overlay
 
 BALL = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
 SURFACE, _ = boundary_surface(BALL)
@@ -41,16 +38,8 @@ def figure():
     surface = isosurface((1.5 - away).astype(np.float32), oblique)
     pose = np.eye(4)
     pose[:3, 3] = 1, 2, 3
-    posed: TriangleMesh = transformed(surface, pose)
-    return (
-        surface_overlay(
-            100.0 * (away < 1),
-            pose @ oblique,
-            posed,
-        ),
-        centre + pose[:3, 3],
-        half,
-    )
+    drawn = surface_overlay(100.0 * (away < 1), pose @ oblique, transformed(surface, pose))
+    return drawn, centre + pose[:3, 3], half
 
 
 @pytest.mark.parametrize(

@@ -8,27 +8,13 @@ from pictures import words
 
 from gyriflow.parameters.terms import ELEMENTS_NEEDED
 from gyriflow.report.growth import growth_chart
-from gyriflow.report.solve import (
-    displacement_chart,
-    steps_chart,
-)
+from gyriflow.report.solve import displacement_chart, steps_chart
 
 AREAS = pd.DataFrame(
-    {"subject": ["a", "c", "b"], "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
-).assign(series="volume")
-RATES = pd.DataFrame({"from_week": [21.0, 22.0], "to_week": [22.0, 23.0], "rate_per_s": [1.2e-7, -0.3e-7]}).assign(
-    series="volume"
+    {"series": "volume", "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
 )
-NORMS = pd.DataFrame(
-    {
-        "run": "thin",
-        "subject": "s",
-        "from_week": [21.0, 21.0, 25.0],
-        "to_week": [22.0, 22.0, 26.0],
-        "nodes": ["all", "pial", "all"],
-        "max_mm": [3.31, 3.31, 2.5],
-        "mean_mm": [0.57, 0.8, 0.5],
-    }
+RATES = pd.DataFrame(
+    {"series": "volume", "from_week": [21.0, 22.0], "to_week": [22.0, 23.0], "rate_per_s": [1.2e-7, -0.3e-7]}
 )
 
 
@@ -96,23 +82,22 @@ def test_steps_are_drawn_and_those_that_needed_another_solver_are_marked():
         }
     )
     figure = steps_chart(steps, order=1)
-    newton, krylov, jacobian, displacement, through, quality, seconds = figure.axes
-    assert newton.lines[0].get_ydata().tolist() == [2, 1, 1, 3, 1, 1]
-    assert newton.lines[1].get_xydata().tolist() == [[steps["week"][3], 3]]
-    assert newton.lines[1].get_label() == "tangent made definite"
-    assert krylov.lines[0].get_ydata().tolist() == steps["krylov"].tolist()
-    assert jacobian.lines[0].get_ydata().min() == pytest.approx(0.7)
-    assert [line.get_label() for line in displacement.lines] == ["max", "mean"]
-    assert through.lines[0].get_ydata()[[0, -1]].tolist() == [2.3, 1.7]
-    assert through.lines[1].get_ydata()[0] == 2.0
+    newton, krylov, jacobian, displacement, through, quality, seconds = (axes.lines for axes in figure.axes)
+    drawn = (newton, krylov, jacobian, displacement, through, quality, seconds)
+    columns = ("newton", "krylov", "min_J", "max_u_mm", "elements_through_cortex", "radius_ratio_01", "seconds")
+    for lines, column in zip(drawn, columns, strict=True):
+        assert lines[0].get_ydata().tolist() == steps[column].tolist()
+    assert newton[1].get_xydata().tolist() == [[steps["week"][3], 3]]
+    assert newton[1].get_label() == "tangent made definite"
+    assert [line.get_label() for line in displacement] == ["max", "mean"]
+    assert through[1].get_ydata()[0] == 2.0
     assert steps_chart(steps, order=2).axes[4].lines[1].get_ydata()[0] == ELEMENTS_NEEDED[2]
-    assert quality.lines[0].get_ydata()[-1] == 0.3
-    assert seconds.lines[0].get_ydata().sum() == 21
-    assert "(s)" in seconds.get_ylabel()
+    assert "(s)" in figure.axes[-1].get_ylabel()
 
 
 def test_displacement_is_that_of_all_nodes_per_week_at_the_middle_of_the_interval():
-    norms = NORMS.assign(to_week=[22.0, 22.0, 27.0])
+    weeks = {"from_week": [21.0, 21.0, 25.0], "to_week": [22.0, 22.0, 27.0], "nodes": ["all", "pial", "all"]}
+    norms = pd.DataFrame({"run": "thin", "subject": "s", **weeks, "max_mm": 3.0, "mean_mm": [0.57, 0.8, 0.5]})
     largest, mean = displacement_chart(norms).axes
     lines = {line.get_label(): line.get_xydata().tolist() for line in mean.lines}
     assert lines["thin"] == [[21.5, 0.57], [26.0, 0.25]]
