@@ -116,7 +116,9 @@ class Workflow:
     def write(self, name: str, config: dict) -> str:
         """Writes a configuration, and labels that it calls `labelled`, and returns its name."""
         for brain in config.get("brains", []):
-            if given := re.fullmatch(r"phantom-(\d+)\.nii\.gz", brain.get("labels", "")):
+            given = re.fullmatch(r"phantom-(\d+)\.nii\.gz", brain.get("labels", ""))
+            # a newer file would have its surface made again
+            if given and not (self.directory / given[0]).exists():
                 save_labels(self.directory / given[0], *phantom(float(given[1]), 2.0))
         (self.directory / name).write_text(yaml.safe_dump(config))
         return name
