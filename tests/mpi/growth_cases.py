@@ -66,12 +66,3 @@ def test_gathering_and_placing_keep_every_vertex_in_its_place():
     assert total == pytest.approx(1.5**3 * signed_volumes(mesh).sum() * 1e-9, rel=1e-12)
     used = domain.mesh.geometry.x[domain.mesh.geometry.dofmap].mean(axis=1)
     np.testing.assert_allclose(used, moved[domain.vertex_of_node[domain.cells]].mean(axis=1), rtol=1e-12)
-
-
-def test_facet_tags_reach_the_right_facets():
-    mesh = distorted_box()
-    zones = zones_of(mesh, left=lambda c: c[:, 0] < -3.99, right=lambda c: c[:, 0] > 3.99)
-    domain = Domain(COMM, mesh)
-    tags = domain.local_facets(zones.facets, zones.facet_zone)
-    counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
-    np.testing.assert_array_equal(counts, np.bincount(zones.facet_zone, minlength=5))

@@ -46,12 +46,6 @@ def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
     np.testing.assert_allclose(state.predicted(1.5)[0], at(3.0) - at(1.5), rtol=1e-13)
 
 
-def test_before_the_second_step_there_is_no_change_of_rates():
-    assert some_state(0).predicted(100.0) == []
-    state = some_state(1)
-    np.testing.assert_allclose(state.predicted(50.0), [state.last / 2], rtol=1e-12)
-
-
 def test_a_checkpoint_comes_back_as_it_was(tmp_path):
     state = some_state()
     write_checkpoint(tmp_path / "state.h5", "key", state)

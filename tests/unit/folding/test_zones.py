@@ -61,14 +61,6 @@ def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
     np.testing.assert_allclose(np.sort(left.ravel()), np.sort(-right.ravel()), atol=1e-9)
 
 
-def test_the_fissure_need_not_be_at_zero(brain):
-    moved = TetrahedralMesh(brain.vertices + [7.0, 0.0, 0.0], brain.tets)
-    a = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
-    b = find_zones(moved, fissure_x_mm=7.0, **DEFAULTS)
-    np.testing.assert_array_equal(a.facet_zone, b.facet_zone)
-    np.testing.assert_array_equal(a.growth, b.growth)
-
-
 def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
     zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
     clamped = zones.vertices_of(CLAMPED)
