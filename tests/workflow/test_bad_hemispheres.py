@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from atlas_brains import atlas_halves
 from reliability import trying
-from shapes import hemisphere, moved, phantom_halves, rigid, save_gifti
+from shapes import hemisphere, moved, rigid, save_gifti
 
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import flipped, transformed
@@ -38,7 +39,7 @@ def study(checkout_copy, tmp_path_factory):
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("pairs"))
     pairs = {name: (left, right, None) for name, (left, right, *_) in BAD.items()}
     pairs["placed"] = (*(transformed(side, np.linalg.inv(MATRIX)) for side in (LEFT, RIGHT)), MATRIX)
-    halves = zip(phantom_halves(), MOTIONS.values(), strict=True)
+    halves = zip(atlas_halves(), MOTIONS.values(), strict=True)
     pairs["posed"] = (*(flipped(transformed(half, turn)) for half, turn in halves), None)
     pairs["exchanged"] = (*reversed(pairs["posed"][:2]), None)
     brains = []
@@ -77,4 +78,4 @@ def test_hemispheres_in_any_pose_are_posed(study):
     report = study.report("posed")
     assert (report["euler_number"], report["pose"]["together"]) == (4, False)
     for side, turn in MOTIONS.items():
-        assert angle_deg((np.array(report["pose"]["files"][side]) @ turn)[:3, :3]) < 3.0
+        assert angle_deg((np.array(report["pose"]["files"][side]) @ turn)[:3, :3]) < 5.0

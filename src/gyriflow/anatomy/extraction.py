@@ -41,7 +41,7 @@ REACH_MM = 4.0
 
 
 def crop(mask: Mask) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
-    """Returns the slices that cut an (i, j, k) volume to the mask's contents, and the (3,) first index of the cut
+    """Return the slices that cut an (i, j, k) volume to the mask's contents, and the (3,) first index of the cut
     volume once it has been padded with `PAD_VOXELS`.
     """
     box = ndimage.find_objects(mask.astype(np.uint8))[0]
@@ -49,21 +49,21 @@ def crop(mask: Mask) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
 
 
 def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
-    """Returns the affine of a volume that was cut (or padded) so that it begins at voxel `first`."""
+    """Return the affine of a volume that was cut (or padded) so that it begins at voxel `first`."""
     moved = np.array(affine, dtype=float)
     moved[:3, 3] += moved[:3, :3] @ first
     return moved
 
 
 def smooth_mask(mask: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
-    """Returns the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
+    """Return the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
 def remove_bridges(
     mask: Mask, field: NDArray[np.float32], smoothing_voxels: float, left_shut: Mask
 ) -> tuple[NDArray[np.float32], int]:
-    """Returns a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
+    """Return a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
 
     A slit is a group of voxels outside the mask, open to the outside: a sulcus, the fissure or the Sylvian opening,
     one voxel wide. Its voxels take the value with which the surface passes where the slit's walls are. Groups of a few
@@ -88,7 +88,7 @@ def remove_bridges(
 
 
 def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats]:
-    """Returns an (i, j, k) field on voxels `factor` times smaller, linear in between, and their affine."""
+    """Return an (i, j, k) field on voxels `factor` times smaller, linear in between, and their affine."""
     if factor == 1:
         return field, affine
     fine = np.array(affine, dtype=float)
@@ -99,7 +99,7 @@ def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats
 
 
 def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
-    """Returns the mask's largest part and those of comparable size, filled, without the other parts.
+    """Return the mask's largest part and those of comparable size, filled, without the other parts.
 
     The second and third value are the number of parts dropped and the number of voxels in them.
     """
@@ -115,16 +115,13 @@ def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, i
 def make_simple(
     field: NDArray[np.float32], comparable: float = COMPARABLE
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Returns the field with a level set of main parts only, without cavities and handles, and a report.
+    """Return the field with a level set of main parts only, without cavities and handles, and a report.
 
     Main parts are those of `comparable` times the largest one's size and more.
     """
     inside = field > LEVEL
     if not inside.any():
-        raise MeshError(
-            "nothing is left of the mask after smoothing",
-            remedy="The structure is thinner than the smoothing: lower smoothing_voxels, or check the labels.",
-        )
+        raise MeshError("nothing is left of the mask after smoothing")
     kept, parts, voxels = main_parts(inside, comparable)
     field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)).astype(np.float32)
     field, handles_repaired = without_handles(field)
@@ -133,7 +130,7 @@ def make_simple(
 
 
 def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
-    """Returns the outward surface in mm where an (i, j, k) field falls below one half.
+    """Return the outward surface in mm where an (i, j, k) field falls below one half.
 
     MeshError where it encloses no volume.
     """
@@ -146,14 +143,14 @@ def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
 
 
 def handles(mask: Mask) -> int:
-    """Returns the number of handles of an (i, j, k) mask: parts plus cavities minus Euler number."""
+    """Return the number of handles of an (i, j, k) mask: parts plus cavities minus Euler number."""
     parts = ndimage.label(mask, INSIDE)[1]
     cavities = ndimage.label(~np.pad(mask, 1), OUTSIDE)[1] - 1
     return parts + cavities - int(euler_number(mask, connectivity=FACES))
 
 
 def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, int]]:
-    """Returns the (i, j, k) field with the handles of its level set above one half cut or filled, and the counts.
+    """Return the (i, j, k) field with the handles of its level set above one half cut or filled, and the counts.
 
     Patches that an opening takes away or a closing adds are tried from the smallest to the largest. One that removes
     a handle is kept, less all voxels that can be given back without a change of topology (simple points, Bertrand and
@@ -193,7 +190,7 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
 
 
 def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Returns the field with diagonal neighbours set apart, so that its isosurface joins voxels by faces only.
+    """Return the field with diagonal neighbours set apart, so that its isosurface joins voxels by faces only.
 
     Where inside and outside voxels alternate around a square, or two opposite corners of a cube differ from the
     other six, marching cubes decides by the values what is joined; these values are moved so that it never is the
@@ -221,7 +218,6 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
-    """Returns (fills, box, patch) for what a closing adds and an opening takes, the smallest first."""
     far_outside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(~mask) <= reach) > reach
     far_inside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(mask) > reach) == 0
     opened = ndimage.distance_transform_edt(far_inside) <= reach
@@ -239,12 +235,12 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
 
 
 def euler_gain(before: Mask, after: Mask) -> int:
-    """Returns by how much the Euler number rises; inside a box that holds the change with a margin of one voxel."""
+    """Return by how much the Euler number rises; inside a box that holds the change with a margin of one voxel."""
     return int(euler_number(after, connectivity=FACES) - euler_number(before, connectivity=FACES))
 
 
 def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
-    """Returns `after` with every voxel set back to `before` that does not change the topology.
+    """Return `after` with every voxel set back to `before` that does not change the topology.
 
     The clearest voxels go back first, so that what stays changed lies where the field is closest to one half.
     """
@@ -266,7 +262,6 @@ def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask
 
 
 def _is_simple(around: Mask) -> bool:
-    """Returns whether the centre of a (3, 3, 3) neighbourhood can change sides without a change of topology."""
     inside, outside = around & EDGE_NEIGHBOURS, ~around
     inside[1, 1, 1] = outside[1, 1, 1] = False
     number, _ = ndimage.label(inside, INSIDE)
@@ -275,7 +270,7 @@ def _is_simple(around: Mask) -> bool:
 
 
 def hanging_parts(mask: Mask, size_mm: Floats) -> Mask:
-    """Returns which voxels of an (i, j, k) mask hang on it by thin stalks, these included.
+    """Return which voxels of an (i, j, k) mask hang on it by thin stalks, these included.
 
     A part hangs where a ball of 3.2 mm across cannot pass from the rest to it, and no more than 12 mm² join it to the
     rest: a gyrus, which may be as thin, is joined along its length. `size_mm` (3,) are the voxels' edges.
@@ -300,7 +295,7 @@ def hanging_parts(mask: Mask, size_mm: Floats) -> Mask:
 
 
 def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
-    """Returns the (i, j, k) mask without what hangs on it by stalks, and each part's volume, stalk and place in mm."""
+    """Return the (i, j, k) mask without what hangs on it by stalks, and each part's volume, stalk and place in mm."""
     size = np.linalg.norm(affine[:3, :3], axis=0)
     number, count = ndimage.label(hanging_parts(mask, size), INSIDE)
     left = mask & (number == 0)
@@ -315,7 +310,6 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
 
 
 def _contact_mm2(one: Mask, other: Mask, size_mm: Floats) -> float:
-    """Returns the area in mm² of the faces between voxels of two masks."""
     total = 0.0
     for axis in range(3):
         a, b = np.moveaxis(one, axis, 0), np.moveaxis(other, axis, 0)

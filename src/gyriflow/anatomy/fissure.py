@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.alignment import motion
+from ..geometry.deformations import transform_points
 from ..geometry.matching import nearest_on
 from ..geometry.triangles import (
     Ints,
@@ -85,7 +86,7 @@ class MidPlane:
 
 
 def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG, *, named: bool = False) -> MidPlane:
-    """Returns the mid-sagittal plane of a closed, outward surface whose left-right axis is within an angle of x.
+    """Return the mid-sagittal plane of a closed, outward surface whose left-right axis is within an angle of x.
 
     Planes of mirror symmetry are the candidates; each is fitted to the fissure, that is, to the middle between medial
     walls that face each other. The best has both little asymmetry and much fissure. In an asymmetric brain the plane
@@ -106,7 +107,6 @@ def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG, *, named: bool
 
 
 def _fit_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry: float) -> MidPlane:
-    """Returns the plane fitted to the fissure near a plane of symmetry, or that plane where it fits nearly as well."""
     middle = fissure_points(mesh, normal, offset)
     fitted = _plane_through(middle, normal, offset)
     if fitted is None:
@@ -122,7 +122,7 @@ def _fit_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry
 
 
 def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
-    """Returns (k, 3) places half-way between walls that face each other across the interhemispheric fissure.
+    """Return (k, 3) places half-way between walls that face each other across the interhemispheric fissure.
 
     Only walls in a band around the plane normal·p = offset are looked at: a fifth of the brain's width to each side.
     """
@@ -137,7 +137,6 @@ def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
 
 
 def _middles(mesh: TriangleMesh, height: Floats, wall: Ints, opposite: Ints, normal: Floats) -> Floats:
-    """Returns the places half-way from vertices of one wall to the nearest of the opposite wall straight above."""
     across = np.outer(height, normal)
     in_plane = mesh.vertices - across
     # distances along the plane count five times those across it
@@ -153,7 +152,7 @@ def _middles(mesh: TriangleMesh, height: Floats, wall: Ints, opposite: Ints, nor
 
 
 def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
-    """Returns the (4, 4) rotation about `centre` that turns the plane to x = const, and its angle in degrees.
+    """Return the (4, 4) rotation about `centre` that turns the plane to x = const, and its angle in degrees.
 
     It is the smallest such rotation, so that anterior and superior stay as the world coordinates have them.
     Below half a degree it is none.
@@ -167,7 +166,6 @@ def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
 
 
 def _symmetry_planes(sample: Floats, tree: cKDTree, search_deg: float) -> list[tuple[Floats, float, float]]:
-    """Returns normal, offset and asymmetry (mm) of planes of mirror symmetry with normals within an angle of x."""
     centre = sample.mean(axis=0)
     # a Fibonacci lattice on the cap of directions around x
     index = np.arange(DIRECTIONS) + 0.5
@@ -191,21 +189,18 @@ def _symmetry_planes(sample: Floats, tree: cKDTree, search_deg: float) -> list[t
 
 
 def _plane_near(x: Floats, base: Floats, aside: Floats, centre: Floats) -> tuple[Floats, float]:
-    """Returns the plane with its normal turned from `base` by x[:2] radians, and moved from `centre` by 10 x[2] mm."""
     normal = np.asarray(base + x[:2] @ aside, dtype=float)
     normal /= np.linalg.norm(normal)
     return normal, float(normal @ centre) + 10.0 * float(x[2])
 
 
 def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]:
-    """Returns how many points are within 3 mm of the plane, and their root mean square distance to it."""
     distance = points @ normal - offset
     near = distance[np.abs(distance) < 3.0]
     return len(near), float(np.sqrt(np.mean(near**2))) if len(near) else float("inf")
 
 
 def _apart(directions: Floats, scores: Floats) -> list[int]:
-    """Returns the numbers of the best directions that are at least 20° from each other."""
     chosen: list[int] = []
     for number in np.argsort(scores):
         if all(abs(directions[number] @ directions[other]) < np.cos(np.radians(20.0)) for other in chosen):
@@ -216,14 +211,12 @@ def _apart(directions: Floats, scores: Floats) -> list[int]:
 
 
 def _mirror_distance(normal: Floats, offset: float, sample: Floats, tree: cKDTree) -> float:
-    """Returns the mean distance in mm from the mirrored sample to the surface, without the largest ones."""
     mirrored = sample - 2.0 * np.outer(sample @ normal - offset, normal)
     distance, _ = tree.query(mirrored)
     return float(np.sort(distance)[: int(TRIMMED * len(distance))].mean())
 
 
 def _plane_through(points: Floats, normal: Floats, offset: float) -> tuple[Floats, float] | None:
-    """Returns the plane fitted to points with Tukey weights of shrinking scale, or None where they fix none."""
     for scale in (10.0, 6.0, 4.0, 3.0, 2.0, 2.0, 2.0):
         distance = points @ normal - offset
         weights = np.where(np.abs(distance) < scale, (1.0 - (distance / scale) ** 2) ** 2, 0.0)
@@ -255,7 +248,7 @@ class Fissure:
     heights: Floats
 
     def height_above(self, points: Floats) -> Floats:
-        """Returns the (n,) distances in mm from the mid-surface along the plane's normal, positive to the right."""
+        """Return the (n,) distances in mm from the mid-surface along the plane's normal, positive to the right."""
         index = ((points @ self.axes.T - self.corner) / SPACING_MM).T
         middle = ndimage.map_coordinates(self.heights, index, order=1, mode="nearest")
         return points @ self.plane.normal - self.plane.offset - middle
@@ -268,7 +261,7 @@ class Fissure:
         return np.asarray(flat @ self.axes + (self.plane.offset + self.heights)[..., None] * self.plane.normal)
 
     def hidden(self, mask: Mask, affine: Floats, gap_mm: float) -> Mask:
-        """Returns where a brain's (i, j, k) mask shows no fissure within half a gap of the mid-surface, (a, b) bool."""
+        """Return where a brain's (i, j, k) mask shows no fissure within half a gap of the mid-surface, (a, b) bool."""
         voxel = float(np.linalg.norm(affine[:3, :3], axis=0).min())
         reach = max(0.5 * gap_mm, voxel)
         shown = np.zeros(self.heights.shape, dtype=bool)
@@ -279,8 +272,8 @@ class Fissure:
         return ~ndimage.binary_opening(shown, iterations=SHOWN_CELLS)
 
     def near(self, shape: tuple[int, ...], affine: Floats, reach_mm: float, where: Mask) -> Mask:
-        """Returns which voxels of an (i, j, k) volume are within a distance of the mid-surface, where (a, b) holds."""
-        points = np.indices(shape).reshape(3, -1).T @ affine[:3, :3].T + affine[:3, 3]
+        """Return which voxels of an (i, j, k) volume are within a distance of the mid-surface, where (a, b) holds."""
+        points = transform_points(np.indices(shape).reshape(3, -1).T, affine)
         close = np.abs(self.height_above(points)) < reach_mm
         index = np.rint((points[close] @ self.axes.T - self.corner) / SPACING_MM).astype(int)
         index = np.clip(index, 0, np.array(where.shape) - 1)
@@ -289,7 +282,7 @@ class Fissure:
 
 
 def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
-    """Returns the mid-surface half-way between medial walls of a closed surface that face each other."""
+    """Return the mid-surface half-way between medial walls of a closed surface that face each other."""
     axes = np.linalg.svd(plane.normal[None])[2][1:]
     flat = walls.vertices @ axes.T
     corner = flat.min(axis=0) - MARGIN_MM
@@ -298,7 +291,7 @@ def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
 
 
 def between(walls: TriangleMesh, start: Fissure) -> Fissure:
-    """Returns a mid-surface moved to half-way between walls that face each other; where there are none, it stays."""
+    """Return a mid-surface moved to half-way between walls that face each other; where there are none, it stays."""
     plane, axes, corner, shape = start.plane, start.axes, start.corner, start.heights.shape
     middle = fissure_points(walls, plane.normal, plane.offset)
     height = middle @ plane.normal - plane.offset
@@ -319,7 +312,7 @@ def between(walls: TriangleMesh, start: Fissure) -> Fissure:
 def open_fissure(
     field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask | None = None
 ) -> NDArray[np.float32]:
-    """Returns the smoothed (i, j, k) mask with the fissure at least `gap_mm` wide down to what joins the hemispheres.
+    """Return the smoothed (i, j, k) mask with the fissure at least `gap_mm` wide down to what joins the hemispheres.
 
     Small fetal brains have no CSF label between their medial walls: there the cortex labels of both sides touch and
     hide the fissure. It lies half-way between the tissue inside the cortex (`core`) of the two sides, and ends where
@@ -342,7 +335,7 @@ def open_fissure(
     depth = np.where(reached, depth, -ndimage.distance_transform_edt(~reached) * SPACING_MM)
     # voxels near the mid-surface: outside the opening by this distance
     grid = np.indices(field.shape).reshape(3, -1).T
-    points = grid @ affine[:3, :3].T + affine[:3, 3]
+    points = transform_points(grid, affine)
     height = np.abs(fissure.height_above(points))
     near = height < gap_mm / 2 + 2.0 * voxel
     place = ((points[near] @ fissure.axes.T - fissure.corner) / SPACING_MM).T
@@ -354,13 +347,12 @@ def open_fissure(
 
 
 def _index(places: Floats, affine: Floats) -> Floats:
-    """Returns the (3, …) indices of voxels at (…, 3) places in mm."""
-    inverse = np.linalg.inv(affine)
-    return np.moveaxis(places @ inverse[:3, :3].T + inverse[:3, 3], -1, 0)
+    """Return the (3, …) indices of voxels at (…, 3) places in mm."""
+    return np.moveaxis(transform_points(places, np.linalg.inv(affine)), -1, 0)
 
 
 def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Floats) -> Floats:
-    """Returns for each voxel the distance in mm to the left hemisphere's labels less that to the right one's.
+    """Return for each voxel the distance in mm to the left hemisphere's labels less that to the right one's.
 
     It is negative on the left, positive on the right, and zero half-way between the two.
     """
@@ -372,30 +364,30 @@ def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Float
 
 
 def sample(field: Floats, affine: Floats, points: Floats) -> Floats:
-    """Returns the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
+    """Return the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
     return ndimage.map_coordinates(field, _index(points, affine), order=1, mode="nearest")
 
 
 def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
-    """Returns the plane through the places half-way between the labels of the two sides, in and around a brain.
+    """Return the plane through the places half-way between the labels of the two sides, in and around a brain.
 
     It is for brains whose hemispheres are too unequal for a plane of mirror symmetry. `side` is what `to_the_right`
     returns, `brain` (i, j, k) where the brain is.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     near = ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
-    places = np.argwhere(near & (np.abs(side) < size.max())) @ affine[:3, :3].T + affine[:3, 3]
+    places = transform_points(np.argwhere(near & (np.abs(side) < size.max())), affine)
     centre = places.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov(places.T))
     normal = axes[:, 0]
-    heights = (np.argwhere(near) @ affine[:3, :3].T + affine[:3, 3] - centre) @ normal
+    heights = (transform_points(np.argwhere(near), affine) - centre) @ normal
     normal = normal * np.sign(np.corrcoef(heights, side[near])[0, 1])
     scatter = float(np.sqrt(np.mean(((places - centre) @ normal) ** 2)))
     return MidPlane(normal, float(normal @ centre), float("nan"), len(places), scatter)
 
 
 def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fissure:
-    """Returns the mid-surface moved to half-way between the labels of the two sides.
+    """Return the mid-surface moved to half-way between the labels of the two sides.
 
     Where that is more than 5 mm away, it stays the mid-surface between facing walls, `fissure`. `side` (i, j, k) is
     what `to_the_right` returns, for voxels of the (4, 4) affine.
@@ -417,14 +409,14 @@ def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fi
 
 
 def doubts_of_shift(fissure: Fissure) -> list[str]:
-    """Returns what is doubtful about a mid-surface that bends far from its plane."""
+    """Return what is doubtful about a mid-surface that bends far from its plane."""
     shift = float(np.abs(fissure.heights).max())
     bends = f"the fissure bends away from its plane by up to {shift:.0f} mm: check it"
     return [bends] if shift > SHIFTED_MM else []
 
 
 def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
-    """Returns the (m,) mask of the faces of the left hemisphere.
+    """Return the (m,) mask of the faces of the left hemisphere.
 
     `heights` (m,) are the distances of the faces from the fissure, negative on the left. Two comparable closed pieces
     that lie mostly on different sides are the hemispheres, though they may reach over the fissure. Else patches that
@@ -464,13 +456,12 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
             "the surface cannot be parted at the fissure",
             found=f"a left and a right part in several pieces, {100 * share:.0f} % of the area beside the largest two",
             expected=f"one piece for each hemisphere, {100 * MOST_GIVEN_BACK:.0f} % beside them",
-            remedy="Is the left-right axis that of the coordinates? Give the hemispheres as two closed surfaces.",
         )
     return side
 
 
 def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> Mask:
-    """Returns the (m,) mask of the faces that lie on the left hemisphere, of a surface close to that of both.
+    """Return the (m,) mask of the faces that lie on the left hemisphere, of a surface close to that of both.
 
     A face belongs to the hemisphere whose given surface is nearer to its centroid: where a connected brain was cut
     along a curved fissure, so is `mesh`. Stray patches are given back as in `left_faces`.
@@ -481,7 +472,7 @@ def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> 
 
 
 def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
-    """Returns the left and the right hemisphere's pial surfaces; together they have every face of `mesh` once.
+    """Return the left and the right hemisphere's pial surfaces; together they have every face of `mesh` once.
 
     The fissure is the plane x = `fissure_x_mm` in RAS+. The parts are open where a connected brain is cut.
     """
@@ -489,7 +480,7 @@ def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, Triang
 
 
 def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMesh]:
-    """Returns the surfaces of the faces where the (m,) mask holds, and of the others.
+    """Return the surfaces of the faces where the (m,) mask holds, and of the others.
 
     InputError where one of the two has no face.
     """
@@ -498,13 +489,12 @@ def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMes
             "the brain lies on one side of the interhemispheric fissure",
             found=f"{int(left.sum())} of {len(left)} faces on the left",
             expected="two hemispheres",
-            remedy="Give both hemispheres, in RAS+ or LPS coordinates as named in the config.",
         )
     return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
 
 
 def least_gap(left: TriangleMesh, right: TriangleMesh) -> float:
-    """Returns the least distance in mm between two closed surfaces, negative by the depth where they overlap."""
+    """Return the least distance in mm between two closed surfaces, negative by the depth where they overlap."""
     gaps = []
     for one, other in ((left, right), (right, left)):
         inward = igl.fast_winding_number(other.vertices, other.faces, one.vertices) > 0.5
@@ -516,7 +506,7 @@ def least_gap(left: TriangleMesh, right: TriangleMesh) -> float:
 def set_apart(
     left: TriangleMesh, right: TriangleMesh, gap_mm: float, to_right: Floats
 ) -> tuple[TriangleMesh, TriangleMesh, float]:
-    """Returns the hemispheres moved apart, each by the same, until they are `gap_mm` from each other.
+    """Return the hemispheres moved apart, each by the same, until they are `gap_mm` from each other.
 
     They move along the direction `to_right` (3,), a unit vector from left to right.
 
@@ -534,7 +524,6 @@ def set_apart(
                 "the hemispheres overlap too much to be of one brain in one pose",
                 found=f"an overlap beyond {2 * FURTHEST_APART_MM:g} mm",
                 expected="hemispheres side by side",
-                remedy="Give both hemispheres of one subject and week, in the same coordinates.",
             )
         left = TriangleMesh(left.vertices - step * to_right, left.faces)
         right = TriangleMesh(right.vertices + step * to_right, right.faces)

@@ -30,7 +30,7 @@ QUARTERS_DEG = 15.0
 
 
 def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose | None:
-    """Returns the pose from cerebellum, brainstem and labelled sides; None where too few of them are labelled.
+    """Return the pose from cerebellum, brainstem and labelled sides; None where too few of them are labelled.
 
     It is the file's where the two differ by less than 60°, with a warning from 15° on. InputError where the labels of
     left and right are mirrored: no rotation brings them to their sides.
@@ -60,7 +60,7 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
 
 
 def judged_turn(rotation: Floats, witness: str, by: str, sided: bool) -> Pose:
-    """Returns the pose of a volume that seems to need a (3, 3) rotation about its origin to lie in RAS+.
+    """Return the pose of a volume that seems to need a (3, 3) rotation about its origin to lie in RAS+.
 
     Turns of 60° and more are made, by quarters where these are near; smaller ones are only warned of from 15° on.
     `witness` says so in warnings, `by` in the pose; `sided` is whether labels say which side is which.
@@ -77,19 +77,16 @@ def judged_turn(rotation: Floats, witness: str, by: str, sided: bool) -> Pose:
 
 
 def _require_outside(hindbrain: dict[str, Floats], size: float, scheme: LabelScheme) -> None:
-    """Raises InputError where cerebellum or brainstem lie inside a cerebrum of this size in mm."""
     for name, way in hindbrain.items():
         if (share := float(np.linalg.norm(way)) / size) < LEAST_OUTSIDE:
             raise InputError(
                 f"what the scheme {scheme.name!r} calls the {name} lies inside what it calls the cerebrum",
                 found=f"its centre {share:.2f} of the cerebrum's size (the cube root of its volume) from the middle",
                 expected=f"{LEAST_OUTSIDE} or more",
-                remedy="Choose the scheme of this volume.",
             )
 
 
 def _turn_of_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
-    """Returns the rotation (3, 3) to RAS+ that cerebellum and brainstem show; None where they do not fix it."""
     if len(hindbrain) < 2:
         return None
     theirs, ours = (
@@ -104,7 +101,7 @@ def _turn_of_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
 
 
 def _turn_of_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
-    """Returns the rotation (3, 3) to RAS+ that labelled sides and the hindbrain show together.
+    """Return the rotation (3, 3) to RAS+ that labelled sides and the hindbrain show together.
 
     InputError where they fit mirrored only: against the `rotation` that the hindbrain shows, or by themselves.
     """
@@ -121,13 +118,12 @@ def _turn_of_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats
 
 
 def _turn_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
-    """Returns the rotation (3, 3) that brings the first direction of each pair nearest to the second."""
     ours, theirs = zip(*pairs, strict=True)
     return np.asarray(Rotation.align_vectors(theirs, ours)[0].as_matrix())
 
 
 def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
-    """Returns whether exchanged sides explain a volume better than a turn does.
+    """Return whether exchanged sides explain a volume better than a turn does.
 
     Sides and one more direction fit some rotation, `turn`, even where they are mirrored: a half turn about an oblique
     axis. With the sides exchanged they fit `mirrored`, which is then as small as the brain's tilt. Wrong axis codes
@@ -140,12 +136,10 @@ def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
 
 
 def _nearest_quarters(rotation: Floats) -> Floats:
-    """Returns the rotation by quarter turns that is nearest to a (3, 3) rotation."""
     return np.asarray(min(CUBE_ROTATIONS, key=lambda turn: angle_deg(rotation @ turn.T)).round())
 
 
 def _turn_by_quarters(rotation: Floats) -> Floats:
-    """Returns the rotation by quarter turns that is within 15° of a (3, 3) rotation, else the rotation."""
     nearest = _nearest_quarters(rotation)
     return nearest if angle_deg(rotation @ nearest.T) < QUARTERS_DEG else rotation
 

@@ -25,7 +25,7 @@ LEAST_PARTED = 0.9
 # cortex at less than this fraction of the cerebrum's surface is reported
 LITTLE_CORTEX = 0.7
 # a loss beyond this fraction of a brain is reported
-TOLD_LOSS = 0.005
+REPORTED_LOSS = 0.005
 # where ventricles are labelled, atlases leave up to 0.8 % of the cerebrum empty inside; one lateral ventricle is 1.7 %
 FURTHER_VENTRICLES = 0.012
 # the cerebrum is at 0.98 of the surface of a lateral ventricle, at 0.7 of that of a gap beside a small hemisphere
@@ -61,7 +61,7 @@ class Cerebrum:
 
 
 def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cortex: float = 0.0) -> Cerebrum:
-    """Returns the cerebrum without ventricles that its tissue does not enclose, what hangs on it by thin stalks, and
+    """Return the cerebrum without ventricles that its tissue does not enclose, what hangs on it by thin stalks, and
     parts apart from it. Holes in it and ventricles without labels get the label of the nearest tissue.
 
     InputError where the labels are not the scheme's, and where cortex is at less than `least_cortex` of the cerebrum's
@@ -85,7 +85,7 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
     open_fluid = outside_ventricles(labels, scheme)
     whole, stalks = without_stalks((mask & ~open_fluid) | unlabelled, affine)
     kept, parts, apart = main_parts(whole, SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE)
-    if apart > TOLD_LOSS * kept.sum():
+    if apart > REPORTED_LOSS * kept.sum():
         lost_parts = f"{apart * voxel_ml:.2f} mL, {100 * apart / kept.sum():.1f} % of it"
         warnings.append(f"{parts} parts apart from the brain were dropped: {lost_parts}")
     tissue = np.where(mask & ~kept, 0, labels)
@@ -99,7 +99,7 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
     lost = report["outside"]["ventricles_mL"] + sum(stalk["volume_mm3"] for stalk in stalks) * ML_PER_MM3
     if lost > 0:
         said = f"{lost:.2f} mL of the cerebrum's labels lie outside it or hang on a thin stalk: left out"
-        if lost > TOLD_LOSS * mask.sum() * voxel_ml:
+        if lost > REPORTED_LOSS * mask.sum() * voxel_ml:
             warnings.append(said)
         else:
             log.info(said)
@@ -114,7 +114,7 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
-    """Returns where the (i, j, k) labels belong to the cerebrum.
+    """Return where the (i, j, k) labels belong to the cerebrum.
 
     InputError where the volume has labels that the scheme does not know, or lacks all labels of the cerebrum, of the
     cortex or of the white matter (where the scheme has these; without white matter, of all that is inside the cortex).
@@ -134,7 +134,6 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
             "no voxel belongs to the cerebrum",
             found=f"labels {_listed(sorted(present)) or 'none but 0'}",
             expected="voxels of " + _named(scheme.cerebrum, scheme),
-            remedy="Check that this is the label volume and the scheme is its own.",
         )
     inside = scheme.white_matter or tuple(set(scheme.cerebrum) - set(scheme.cortex) if scheme.cortex else ())
     for tissue, numbers in (("cortex", scheme.cortex), ("white matter", inside)):
@@ -143,13 +142,12 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
                 f"the {tissue} of the scheme {scheme.name!r} is missing from the label volume",
                 found=f"labels {_listed(sorted(present))}",
                 expected="voxels of " + _named(numbers, scheme),
-                remedy="Choose the scheme of this volume.",
             )
     return np.isin(labels, scheme.cerebrum)
 
 
 def missing_tissues(labels: Labels, scheme: LabelScheme) -> list[str]:
-    """Returns the tissues of the cerebrum, such as "8 corpus callosum", that a label volume does not have."""
+    """Return the tissues of the cerebrum, such as "8 corpus callosum", that a label volume does not have."""
     present = set(map(int, np.unique(labels)))
     return [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number not in present]
 
@@ -157,7 +155,7 @@ def missing_tissues(labels: Labels, scheme: LabelScheme) -> list[str]:
 def require_cortex_outside(
     labels: Labels, scheme: LabelScheme, least: float = LEAST_CORTEX_OUTSIDE, unlabelled: Mask | bool = False
 ) -> float:
-    """Returns how much of the cerebrum's surface has cortex at it, from 0 to 1; of it and its `unlabelled` ventricles.
+    """Return how much of the cerebrum's surface has cortex at it, from 0 to 1; of it and its `unlabelled` ventricles.
 
     InputError where it is less than `least`: the scheme is another volume's, whose labels happen to be known.
     """
@@ -170,13 +168,12 @@ def require_cortex_outside(
             f"what the scheme {scheme.name!r} calls cortex does not lie around what it calls the cerebrum",
             found=f"cortex at {100 * share:.0f} % of the surface",
             expected=f"{100 * least:.0f} % or more",
-            remedy="Choose the scheme of this volume.",
         )
     return share
 
 
 def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right: Floats) -> None:
-    """Raises InputError where labels of the left hemisphere lie to the right of those of the right one, or among them.
+    """Raise InputError where labels of the left hemisphere lie to the right of those of the right one, or among them.
 
     `to_right` (3,) is the direction from left to right in the coordinates that the (4, 4) affine leads to.
     """
@@ -191,7 +188,6 @@ def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right:
             "labels of the left hemisphere lie on the right",
             found=f"{-apart:.1f} mm to the right of those of the right hemisphere",
             expected="left at the smaller x (RAS+)",
-            remedy="The volume's affine mirrors the brain, or the scheme's sides are swapped.",
         )
     parted = float(np.searchsorted(left, right).mean() / len(left))
     if parted < LEAST_PARTED:
@@ -199,12 +195,11 @@ def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right:
             f"what the scheme {scheme.name!r} calls left and right are no hemispheres",
             found=f"voxels of the right one to the right of those of the left one in {100 * parted:.0f} % of pairs",
             expected=f"{100 * LEAST_PARTED:.0f} % or more",
-            remedy="Choose the scheme of this volume.",
         )
 
 
 def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
-    """Returns the voxels of the ventricles that the cerebrum's tissue does not enclose, (i, j, k) bool.
+    """Return the voxels of the ventricles that the cerebrum's tissue does not enclose, (i, j, k) bool.
 
     Labels of the ventricles often go on through the aqueduct to the fourth ventricle, between brainstem and
     cerebellum. A voxel of fluid is enclosed where it looks on tissue of the cerebrum in more than half of 26
@@ -234,12 +229,12 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
 
 
 def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
-    """Returns the voxels of ventricles that have no label of the cerebrum, (i, j, k) bool.
+    """Return the voxels of ventricles that have no label of the cerebrum, (i, j, k) bool.
 
     Such voxels look on tissue inside the cortex, or on labelled ventricles, in more than half of 26 directions. Sulci,
     fissures and cisterns look on cortex, or they are open. Where no cortex is labelled, nearly all directions count.
-    Less than `TOLD_LOSS` of the cerebrum is roughness of the labels, or `FURTHER_VENTRICLES` where some are labelled.
-    Then a gap that the cerebrum does not enclose is none.
+    Less than `REPORTED_LOSS` of the cerebrum, or `FURTHER_VENTRICLES` where some are labelled, is roughness of the
+    labels. Then a gap that the cerebrum does not enclose is none.
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)
@@ -261,14 +256,13 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
     found = np.isin(number, np.flatnonzero(sizes >= max(1, CRUMB * sizes.max())) + 1)
     around = ndimage.binary_dilation(found) & ~found
-    large = found.sum() > (FURTHER_VENTRICLES if labelled else TOLD_LOSS) * cerebrum.sum()
+    large = found.sum() > (FURTHER_VENTRICLES if labelled else REPORTED_LOSS) * cerebrum.sum()
     if large and (not labelled or tissue[around].mean() > AROUND_VENTRICLE):
         filled[box] = found[(slice(margin, -margin),) * 3]
     return filled
 
 
 def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> tuple[NDArray[np.int32], list[int]]:
-    """Returns the (i, j, k) number of each part of a mask, and the numbers of those at the cerebellum or brainstem."""
     number, count = ndimage.label(out, EVERY_NEIGHBOUR)
     hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
     if not hindbrain.any():
@@ -284,7 +278,6 @@ def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> tuple[N
 
 
 def _seen(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
-    """Returns in which part of the directions each clear voxel looks on tissue; 0 in other voxels."""
     pad = np.pad(clear, 1), np.pad(tissue, 1)
     start = np.argwhere(pad[0])
     hits = np.zeros(len(start), dtype=np.int32)
@@ -301,7 +294,7 @@ def _seen(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
 
 
 def border_share(mask: Mask) -> tuple[float, list[str]]:
-    """Returns the part of a mask's surface at the border of its volume, beyond which it is cut, and what is told."""
+    """Return the part of a mask's surface at the border of its volume, beyond which it is cut, and what is told."""
     surface = mask & ~ndimage.binary_erosion(mask, border_value=1)
     ends = [np.moveaxis(mask, axis, 0)[end] for axis in range(3) for end in (0, -1)]
     at_border = int(sum(end.sum() for end in ends))
@@ -310,7 +303,7 @@ def border_share(mask: Mask) -> tuple[float, list[str]]:
         f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface: what "
         "lies beyond is missing, and the surface is flat there"
     )
-    return share, [cut] if at_border and share > TOLD_LOSS else []
+    return share, [cut] if at_border and share > REPORTED_LOSS else []
 
 
 def _named(numbers: Iterable[int], scheme: LabelScheme) -> str:

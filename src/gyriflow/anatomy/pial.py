@@ -33,7 +33,6 @@ from .extraction import (
     crop,
     isosurface,
     main_parts,
-    make_simple,
     refine,
     remove_bridges,
     shifted_affine,
@@ -62,8 +61,8 @@ from .fissure import (
 from .hindbrain import pose_of_labels
 from .labels import (
     LEAST_CORTEX_OUTSIDE,
+    REPORTED_LOSS,
     SMALLEST_HEMISPHERE,
-    TOLD_LOSS,
     Labels,
     border_share,
     read_cerebrum,
@@ -89,7 +88,7 @@ from .pose import (
     pose_of_surface,
     pose_of_volume_by_shape,
 )
-from .repair import KEPT, after_repairs, make_sound, pieces, require_sound, sound_pieces, with_volume
+from .repair import make_sound, pieces, require_sound, sound_pieces, surface_of_mask
 
 log = logging.getLogger(__name__)
 
@@ -139,7 +138,7 @@ def from_labels(
     smoothing_iterations: int = 10,
     fissure_mm: float = 1.5,
 ) -> PialSurface:
-    """Returns the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
+    """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
     A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say, or without these its shape. The
     cerebrum's mask is smoothed (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an isosurface,
@@ -152,80 +151,114 @@ def from_labels(
     InputError for labels that don't fit the scheme or the week, for one hemisphere alone without `side`, and for a
     whole brain or labels of the other hemisphere with it. MeshError where the surface stays tangled.
     """
+    cerebrum, pose, warnings = _posed_cerebrum(labels, affine, scheme, side, week)
+    mask, affine, report = cerebrum.mask, cerebrum.affine, cerebrum.report
+    field = smooth_mask(mask, smoothing_voxels)
+    if not side:
+        warnings += logged(_require_both(cerebrum.tissue, scheme, field, affine, report["border_share"]))
+    if pose is None:
+        pose = _pose_by_shape(field, affine, scheme)
+        warnings += logged(pose.warnings)
+        affine = pose.world @ affine
+    if side:
+        even = surface_of_mask(field, affine, cerebrum.volume_mm3, smoothing_iterations, edge_length_mm)
+        require_one(even.mesh)
+        pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
+        report = {"source": "hemisphere", "side": side, **report, **even.report}
+        warnings += logged([*even.warnings, *pose.warnings])
+        return _single_hemisphere(even.mesh, side, pose, week, report, warnings)
+    grid, opened_ml = affine, 0.0
+    core = mask & ~np.isin(cerebrum.tissue, scheme.cortex)
+    # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
+    walls = isosurface(smooth_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
+    fissure, to_right, doubts = _fissure_of_labels(cerebrum.tissue, mask, walls, scheme, affine)
+    warnings += logged(doubts)
+    opens = bool(scheme.cortex) and fissure_mm > 0
+    # what smoothing would shut, and reopened slits leave shut, is not shown
+    slit, _ = remove_bridges(mask, field, smoothing_voxels, np.zeros_like(mask))
+    hidden = fissure.hidden(slit > LEVEL, affine, fissure_mm)
+    # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
+    left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if opens else np.zeros_like(mask)
+    field, report["slit_voxels_reopened"] = remove_bridges(mask, field, smoothing_voxels, left_shut)
+    if opens:
+        field, affine, opened_ml = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
+        report["fissure_opened_mL"] = opened_ml
+    # where labels say which side is which, a hemisphere may be far smaller than the other one
+    smallest = COMPARABLE if to_right is None else SMALLEST_HEMISPHERE
+    even = surface_of_mask(
+        field,
+        affine,
+        cerebrum.volume_mm3,
+        smoothing_iterations,
+        edge_length_mm,
+        smallest=smallest,
+        taken_mm3=opened_ml / ML_PER_MM3,
+    )
+    mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
+    warnings += logged(even.warnings)
+    # between the walls of the surface itself: cortex may be thicker on one side than on the other
+    heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
+    report = {"source": "labels", **report, **even.report}
+    return _upright(mesh, left_faces(mesh, heights), fissure.plane, pose, week, report, warnings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Voxels:
+    """A cerebrum's (i, j, k) mask and its tissue's labels, cut to their contents and padded, in the posed world."""
+
+    mask: Mask
+    tissue: Labels
+    affine: Floats
+    volume_mm3: float
+    report: dict[str, Any]
+
+
+def _posed_cerebrum(
+    labels: Labels, affine: Floats, scheme: LabelScheme, side: Side | None, week: float
+) -> tuple[_Voxels, Pose | None, list[str]]:
+    """Return the voxels of the cerebrum, its pose by the labels, None where they do not show it, and warnings."""
     # the wall of a hemisphere towards the side that is not there may have no cortex
     cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else LEAST_CORTEX_OUTSIDE)
-    warnings, tissue = told(cerebrum.warnings), cerebrum.tissue
+    warnings, tissue = logged(cerebrum.warnings), cerebrum.tissue
     pose = Pose() if side else pose_of_labels(labels, affine, scheme)
     if side:
         _require_no_other(tissue, scheme, side)
     if pose is not None:
-        warnings += told(pose.warnings)
+        warnings += logged(pose.warnings)
         affine = pose.world @ affine
     mask = np.isin(tissue, scheme.cerebrum)
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
     box, first = crop(mask)
     extents = np.linalg.norm(affine[:3, :3], axis=0) * [along.stop - along.start for along in box]
-    warnings += told(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
+    warnings += logged(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
     share, cut = border_share(mask)
-    warnings += told(cut)
+    warnings += logged(cut)
     report = {"scheme": scheme.name, **cerebrum.report, "mask_volume_mL": volume * ML_PER_MM3, "border_share": share}
     mask, tissue, affine = np.pad(mask[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS), shifted_affine(affine, first)
-    field = smooth_mask(mask, smoothing_voxels)
-    if not side:
-        warnings += told(_require_both(tissue, scheme, field, affine, share))
-    if pose is None:
-        every = max(int(OF_SHAPE_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
-        coarse = unambiguous(field[::every, ::every, ::every])
-        rough = isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
-        pose = pose_of_volume_by_shape(rough, sided=bool(scheme.left and scheme.right))
-        warnings += told(pose.warnings)
-        affine = pose.world @ affine
-    grid, to_right, opened = affine, None, {}
-    if not side:
-        core = mask & ~np.isin(tissue, scheme.cortex)
-        # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
-        walls = isosurface(smooth_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
-        plane = mid_plane(walls)
-        to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
-        if to_right is not None and abs(plane.normal @ _between_sides(tissue, scheme, affine)) < SAME_AXIS:
-            plane = plane_between_labels(to_right, affine, mask)
-            mirror = "the hemispheres are no mirror images of each other: the mid-plane is that of their labels"
-            warnings += told([mirror])
-        require_sides(tissue, scheme, affine, plane.normal)
-        fissure = fissure_between(walls, plane)
-        if to_right is not None:
-            fissure = fissure_between_labels(to_right, affine, fissure)
-        warnings += told(doubts_of_shift(fissure))
-        opens = bool(scheme.cortex) and fissure_mm > 0
-        # what smoothing would shut, and reopened slits leave shut, is not shown
-        slit, _ = remove_bridges(mask, field, smoothing_voxels, np.zeros_like(mask))
-        hidden = fissure.hidden(slit > LEVEL, affine, fissure_mm)
-        # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
-        left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if opens else np.zeros_like(mask)
-        field, report["slit_voxels_reopened"] = remove_bridges(mask, field, smoothing_voxels, left_shut)
-        if opens:
-            field, affine, opened["fissure_opened_mL"] = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
-    # where labels say which side is which, a hemisphere may be far smaller than the other one
-    field, topology = make_simple(field, COMPARABLE if to_right is None else SMALLEST_HEMISPHERE)
-    rough = isosurface(field, affine)
-    if side:
-        require_one(rough)
-    even = make_sound(rough, smoothing_iterations, edge_length_mm)
-    warnings += told(even.warnings)
-    expected = after_repairs(volume, topology, affine) - opened.get("fissure_opened_mL", 0.0) / ML_PER_MM3
-    mesh, smoothing = with_volume(even.mesh, expected, area(rough))
-    if abs(change := smoothing["volume_change"]) > KEPT:
-        lost = f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it"
-        warnings += told([lost])
-    report |= {**opened, "topology": topology, **even.report, "smoothing": smoothing}
-    if side:
-        pose = pose_of_hemisphere(mesh, side, "auto", of_volume=True)
-        warnings += told(pose.warnings)
-        return _single_hemisphere(mesh, side, pose, week, {"source": "hemisphere", "side": side, **report}, warnings)
-    centres = corners(mesh).mean(axis=1)
-    # between the walls of the surface itself: cortex may be thicker on one side than on the other
-    heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
-    return _upright(mesh, left_faces(mesh, heights), plane, pose, week, {"source": "labels", **report}, warnings)
+    return _Voxels(mask, tissue, affine, volume, report), pose, warnings
+
+
+def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:
+    every = max(int(OF_SHAPE_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
+    coarse = unambiguous(field[::every, ::every, ::every])
+    rough = isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
+    return pose_of_volume_by_shape(rough, sided=bool(scheme.left and scheme.right))
+
+
+def _fissure_of_labels(
+    tissue: Labels, mask: Mask, walls: TriangleMesh, scheme: LabelScheme, affine: Floats
+) -> tuple[Fissure, Floats | None, list[str]]:
+    """Return the fissure between walls or labelled sides, `to_the_right` of these if there are any, and warnings."""
+    plane, doubts = mid_plane(walls), []
+    to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
+    if to_right is not None and abs(plane.normal @ _between_sides(tissue, scheme, affine)) < SAME_AXIS:
+        plane = plane_between_labels(to_right, affine, mask)
+        doubts.append("the hemispheres are no mirror images of each other: the mid-plane is that of their labels")
+    require_sides(tissue, scheme, affine, plane.normal)
+    fissure = fissure_between(walls, plane)
+    if to_right is not None:
+        fissure = fissure_between_labels(to_right, affine, fissure)
+    return fissure, to_right, doubts + doubts_of_shift(fissure)
 
 
 def from_hemispheres(
@@ -241,7 +274,7 @@ def from_hemispheres(
     max_hole_mm: float = 3.0,
     limits: Limits = USUAL,
 ) -> PialSurface:
-    """Returns the pial surface of a brain from closed surfaces of its hemispheres.
+    """Return the pial surface of a brain from closed surfaces of its hemispheres.
 
     The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
@@ -252,29 +285,29 @@ def from_hemispheres(
     """
     given = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
     sides = [sound_pieces(transformed(mesh, given), max_hole_mm, one=True) for mesh in (left, right)]
-    warnings = told(warning for side in sides for warning in side.warnings)
+    warnings = logged(warning for side in sides for warning in side.warnings)
     left, right = (side.mesh for side in sides)
     volume = signed_volume(left) + signed_volume(right)
-    warnings += told(require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week))
+    warnings += logged(require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week))
     if coordinates == "auto":
         pose = pose_of_pair(left, right, declared=declared)
         left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
-        warnings += told(pose.warnings)
+        warnings += logged(pose.warnings)
     else:
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), given), by="configuration")
     length = float(np.ptp(merged(left, right).vertices, axis=0).max())
-    warnings += told(require_pair(left, right, limits, coordinates))
+    warnings += logged(require_pair(left, right, limits, coordinates))
     if coordinates != "auto":
-        warnings += told(doubts_of_hemispheres(left, right, coordinates))
+        warnings += logged(doubts_of_hemispheres(left, right, coordinates))
     even = [make_sound(mesh, smoothing_iterations, edge_length_mm) for mesh in (left, right)]
-    warnings += told(warning for side in even for warning in side.warnings)
+    warnings += logged(warning for side in even for warning in side.warnings)
     left, right = (side.mesh for side in even)
     plane = mid_plane(merged(left, right), named=coordinates != "auto")
     require_common_pose(plane.asymmetry_mm, length, limits)
     gap, to_right = least_gap(left, right), plane.normal
     left, right, moved = set_apart(left, right, gap_mm, to_right)
     if moved > 0:
-        warnings += told([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm"])
+        warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm"])
         plane = mid_plane(merged(left, right), named=coordinates != "auto")
     apart = {side: motion(shift=sign * moved * to_right) for side, sign in zip(SIDES, (-1.0, 1.0), strict=True)}
     pose = pose.each({side: shift @ pose.of_file(side) for side, shift in apart.items()})
@@ -298,7 +331,7 @@ def from_surface(
     smoothing_iterations: int = 10,
     max_hole_mm: float = 3.0,
 ) -> PialSurface:
-    """Returns the pial surface of a brain, or of the only hemisphere that there is, from one closed surface.
+    """Return the pial surface of a brain, or of the only hemisphere that there is, from one closed surface.
 
     It is repaired (holes up to `max_hole_mm`), smoothed and remeshed to `edge_length_mm`. A whole brain, of one piece
     or one for each hemisphere, is turned so that the mid-sagittal plane is x = const. With `side` it is that hemisphere
@@ -307,19 +340,19 @@ def from_surface(
     week's size; MeshError where it can't be made closed and free of handles and intersections.
     """
     clean = sound_pieces(mesh, max_hole_mm, one=side is not None)
-    warnings = told(clean.warnings)
+    warnings = logged(clean.warnings)
     volume, extents = signed_volume(clean.mesh), np.ptp(clean.mesh.vertices, axis=0)
-    warnings += told(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
+    warnings += logged(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
     if side:
         require_one(clean.mesh)
     even = make_sound(clean.mesh, smoothing_iterations, edge_length_mm)
-    warnings += told(even.warnings)
+    warnings += logged(even.warnings)
     if side:
         pose = pose_of_hemisphere(even.mesh, side, coordinates)
     else:
-        warnings += told(require_whole(even.mesh, "surface"))
+        warnings += logged(require_whole(even.mesh, "surface"))
         pose = pose_of_surface(even.mesh, coordinates)
-    warnings += told(pose.warnings)
+    warnings += logged(pose.warnings)
     # "lps" where these were found, else what the user has named
     found = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
     report = {"coordinates": found, **clean.report, **even.report}
@@ -329,13 +362,13 @@ def from_surface(
     mesh = transformed(even.mesh, pose.of_file())
     plane = mid_plane(mesh, named=coordinates != "auto")
     fissure = fissure_between(mesh, plane)
-    warnings += told(doubts_of_shift(fissure))
+    warnings += logged(doubts_of_shift(fissure))
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
     return _upright(mesh, left, plane, pose, week, {"source": "pial", **report}, warnings)
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
-    """Returns a simple geometry as it is, in the place of a brain: its left and right meet at x = 0.
+    """Return a simple geometry as it is, in the place of a brain: its left and right meet at x = 0.
 
     It has no fissure to be found and no size of its own, and smoothing would round its edges. MeshError where it is
     not closed or cuts itself.
@@ -344,12 +377,12 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
     return _pial_surface(mesh, *split(mesh, 0.0), 0.0, Pose(), week, {"source": "shape", "rotation_deg": 0.0})
 
 
-def told(warnings: Iterable[str]) -> list[str]:
-    """Returns warnings after they have been logged."""
-    found = list(warnings)
-    for warning in found:
+def logged(warnings: Iterable[str]) -> list[str]:
+    """Return warnings after they have been logged."""
+    warnings = list(warnings)
+    for warning in warnings:
         log.warning(warning)
-    return found
+    return warnings
 
 
 def _pial_surface(
@@ -362,7 +395,6 @@ def _pial_surface(
     report: Mapping[str, Any],
     warnings: Iterable[str] = (),
 ) -> PialSurface:
-    """Returns the surface with the whole report: what was found and done on the way, its pose, and its measures."""
     parts = {"whole": whole, "left": left, "right": right}
     measures = {
         "pose": pose.plain(),
@@ -390,7 +422,6 @@ def _upright(
     report: Mapping[str, Any],
     warnings: Iterable[str],
 ) -> PialSurface:
-    """Returns the surface, posed so far by `pose`, with its mid-sagittal plane turned to x = const, and its sides."""
     matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
     whole = transformed(mesh, matrix)
     left, right = cut_sides(whole, is_left)
@@ -410,7 +441,6 @@ def _upright(
             "one hemisphere is too small to be one",
             found=f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²",
             expected=f"at most {MOST_UNEQUAL:g} times as much",
-            remedy="Check the label scheme and the midline.",
         )
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
         doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
@@ -420,14 +450,13 @@ def _upright(
         "fissure_scatter_mm": plane.scatter_mm,
         "asymmetry_mm": plane.asymmetry_mm,
     }
-    warnings = [*warnings, *told(doubts)]
+    warnings = [*warnings, *logged(doubts)]
     return _pial_surface(whole, left, right, fissure_x, pose.then(matrix), week, {**report, **facts}, warnings)
 
 
 def _single_hemisphere(
     mesh: TriangleMesh, side: Side, pose: Pose, week: float, report: Mapping[str, Any], warnings: Iterable[str]
 ) -> PialSurface:
-    """Returns the surface of a hemisphere that is alone, posed with its medial wall beside the mid-sagittal plane."""
     whole = transformed(mesh, pose.of_file())
     x = whole.vertices[:, 0]
     fissure_x = float(x.max() + BESIDE_MM if side == "left" else x.min() - BESIDE_MM)
@@ -437,19 +466,16 @@ def _single_hemisphere(
 
 
 def _require_no_other(tissue: Labels, scheme: LabelScheme, side: Side) -> None:
-    """Raises InputError where a volume of one hemisphere has cortex of the other one."""
     others = np.intersect1d(scheme.right if side == "left" else scheme.left, scheme.cortex)
     if len(others) and np.isin(tissue, others).any():
         raise InputError(
             f"the volume holds labels of another hemisphere than the {side} one",
             found=", ".join(scheme.labels[n] for n in others if (tissue == n).any()),
             expected=f"those of the {side} hemisphere",
-            remedy="Set its side; or give the whole brain as labels.",
         )
 
 
 def _between_sides(tissue: Labels, scheme: LabelScheme, affine: Floats) -> Floats:
-    """Returns the unit vector (3,) from the middle of the left labels to that of the right ones."""
     left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
     vector = affine[:3, :3] @ (right - left)
     return np.asarray(vector / np.linalg.norm(vector))
@@ -458,7 +484,6 @@ def _between_sides(tissue: Labels, scheme: LabelScheme, affine: Floats) -> Float
 def _require_both(
     tissue: Labels, scheme: LabelScheme, field: NDArray[np.float32], affine: Floats, border_share: float
 ) -> list[str]:
-    """Returns what is doubtful about both sides; InputError where there is one only, by its labels or by its shape."""
     sides = {
         name: bool(np.isin(tissue, np.intersect1d(numbers, scheme.cortex or scheme.cerebrum)).any())
         for name, numbers in (("left", scheme.left), ("right", scheme.right))
@@ -483,13 +508,13 @@ def _require_both(
             remedy="Give a volume with both hemispheres; or the only one under hemisphere, with its side.",
         )
     # a brain that the field of view cuts off may be as flat, which has been reported already
-    return require_whole(cerebrum, "volume", refuses=border_share <= TOLD_LOSS)
+    return require_whole(cerebrum, "volume", refuses=border_share <= REPORTED_LOSS)
 
 
 def _with_fissure(
     field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask
 ) -> tuple[NDArray[np.float32], Floats, float]:
-    """Returns the field with the fissure opened, its affine, and the volume (mL) that this took.
+    """Return the field with the fissure opened, its affine, and the volume (mL) that this took.
 
     Where more than a thousandth of the brain is taken, the fissure was shut; voxels that are too coarse for its new
     walls are then made finer first.

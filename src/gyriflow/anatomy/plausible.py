@@ -47,13 +47,13 @@ USUAL = Limits()
 
 
 def expected_volume_ml(week: float) -> float:
-    """Returns the coarse volume of a cerebrum (mL) at a gestational week, growing exponentially."""
+    """Return the coarse volume of a cerebrum (mL) at a gestational week, growing exponentially."""
     rate = np.log(LATE[1] / EARLY[1]) / (LATE[0] - EARLY[0])
     return float(EARLY[1] * np.exp(rate * (week - EARLY[0])))
 
 
 def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -> list[str]:
-    """Returns what is doubtful about a cerebrum's volume at its week: below 0.55 or above 1.45 of the published one.
+    """Return what is doubtful about a cerebrum's volume at its week: below 0.55 or above 1.45 of the published one.
 
     InputError where it is out of all proportion, less than a fifth or more than six times, with a guess of the unit.
     `extents_mm` (3,) only appears in the message.
@@ -79,7 +79,7 @@ def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -
 
 
 def doubts_of_proportions(extents_mm: Floats) -> list[str]:
-    """Returns what is doubtful about a posed brain's width, length and height (3,): a wrong scale of an axis."""
+    """Return what is doubtful about a posed brain's width, length and height (3,): a wrong scale of an axis."""
     width, length, height = map(float, extents_mm)
     return [
         f"the {name} is {share:.2f} of the length, {least} to {most} in most brains: is the scale of each axis right?"
@@ -89,7 +89,7 @@ def doubts_of_proportions(extents_mm: Floats) -> list[str]:
 
 
 def narrowness(mesh: TriangleMesh) -> float:
-    """Returns the shortest over the longest extent of a surface along the axes of inertia of its vertices."""
+    """Return the shortest over the longest extent of a surface along the axes of inertia of its vertices."""
     points = mesh.vertices - mesh.vertices.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov(points.T))
     extents = np.ptp(points @ axes, axis=0)
@@ -97,18 +97,17 @@ def narrowness(mesh: TriangleMesh) -> float:
 
 
 def require_one(mesh: TriangleMesh) -> None:
-    """Raises InputError where a surface is that of a whole brain."""
+    """Raise InputError where a surface is that of a whole brain."""
     if (shape := narrowness(mesh)) > DOUBTFUL_BRAIN:
         raise InputError(
             "this is no single hemisphere",
             found=f"a narrowest extent that is {shape:.2f} of the longest",
             expected=f"at most {DOUBTFUL_BRAIN}",
-            remedy="Give a whole brain as labels or pial, or its hemispheres as hemispheres.",
         )
 
 
 def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> list[str]:
-    """Returns what is doubtful about the surface of both hemispheres, of a brain given as a "surface" or a "volume".
+    """Return what is doubtful about the surface of both hemispheres, of a brain given as a "surface" or a "volume".
 
     InputError where it is one hemisphere's, unless a narrow one is only to be told.
     """
@@ -118,32 +117,24 @@ def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> lis
             f"the {what} seems to {'hold' if what == 'volume' else 'be'} one hemisphere only",
             found=f"a cerebrum whose narrowest extent is {shape:.2f} of its longest",
             expected=f"{NARROWEST_BRAIN} or more, as in whole cerebra",
-            remedy="Give both hemispheres; or the only one under hemisphere, with its side.",
         )
     narrow = f"the cerebrum is narrow ({shape:.2f} of its length): are both hemispheres there?"
     return [narrow] if shape < DOUBTFUL_BRAIN else []
 
 
 def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits, coordinates: str) -> list[str]:
-    """Returns what is doubtful about two surfaces in RAS+ as the left and right hemisphere of one brain.
+    """Return what is doubtful about two surfaces in RAS+ as the left and right hemisphere of one brain.
 
     `coordinates` are those that the user has named, "ras", "lps" or "auto". InputError where their centroids are not in
     order (left is the smaller x), or their volumes too different.
     """
     x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
     if x_left >= x_right:
-        remedy = "The files seem to be swapped: swap `left` and `right`; or, if they are right, name the coordinates."
-        if other := {"ras": "lps", "lps": "ras"}.get(coordinates):
-            remedy = (
-                f"Either the coordinates are {other.upper()} (set coordinates: {other}) or the files are swapped (swap "
-                "`left` and `right`). Both changes together would turn the brain back to front; in doubt, set "
-                "coordinates: auto."
-            )
         raise InputError(
             "the left hemisphere lies to the right of the right one",
-            found=f"centroids at x = {x_left:.1f} (left) and {x_right:.1f} mm (right)",
+            found=f"centroids at x = {x_left:.1f} (left) and {x_right:.1f} mm (right) in coordinates {coordinates}",
             expected="left at the smaller x (RAS+)",
-            remedy=remedy,
+            remedy="Swap `left` and `right`, or set the other coordinates; both together turn the brain back to front.",
         )
     volumes = signed_volume(left), signed_volume(right)
     ratio = max(volumes) / min(volumes)
@@ -161,7 +152,7 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits, coordi
 
 
 def require_common_pose(asymmetry_mm: float, length_mm: float, limits: Limits) -> None:
-    """Raises InputError where two hemispheres together are no mirror images of each other in any plane.
+    """Raise InputError where two hemispheres together are no mirror images of each other in any plane.
 
     `asymmetry_mm` is the mean distance to the mirror image, `length_mm` the brain's length.
     """

@@ -70,7 +70,7 @@ class Hemisphere:
 
 
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
-    """Returns the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
+    """Return the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
     shape = shape_of(mesh)
     fit, confidence = register_from_all_sides(shape, hemispheres())
     mirrored, _ = register_from_all_sides(shape.mirrored(), hemispheres())
@@ -78,7 +78,6 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
 
 
 def _upright(shape: Shape, fit: Fit, confidence: float, sided: float) -> Hemisphere:
-    """Returns a hemisphere that is fitted to the template with its medial wall upright."""
     normal, offset = medial_wall(shape, -fit.rotation[0])
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
     rotation = turn.as_matrix() @ fit.rotation
@@ -86,7 +85,7 @@ def _upright(shape: Shape, fit: Fit, confidence: float, sided: float) -> Hemisph
 
 
 def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
-    """Returns the pose of a brain from two closed, outward surfaces, each in any rigid pose.
+    """Return the pose of a brain from two closed, outward surfaces, each in any rigid pose.
 
     Each is registered with the template, and the mirrored left one with the right one. Where both share coordinates
     near RAS or LPS, they keep the file's pose; where they share others, one motion poses both; else each has its own,
@@ -136,12 +135,10 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
 
 
 def _sided(shapes: list[Hemisphere]) -> float:
-    """Returns how many times worse the other sides fit, the geometric mean of hemispheres."""
     return float(np.exp(np.mean(np.log([one.sided for one in shapes]))))
 
 
 def _require_sides(shapes: list[Hemisphere]) -> None:
-    """Raises InputError where the left and the right hemisphere seem to be swapped, or of one side."""
     sided = [one.sided for one in shapes]
     fits = f"{sided[0]:.2f} (left) and {sided[1]:.2f} (right) times as far from the other side's template"
     if min(sided) < 1 / LEAST_SIDED and max(sided) > LEAST_SIDED:
@@ -165,7 +162,7 @@ def _unclear(one: Hemisphere, what: str) -> InputError:
 
 
 def _near_a_convention(shapes: list[Hemisphere]) -> list[Hemisphere]:
-    """Returns hemispheres posed from RAS or from LPS axes; empty where the two agree with neither.
+    """Return hemispheres posed from RAS or from LPS axes; empty where the two agree with neither.
 
     Both are to fit the template nearly as well as in their best poses, within 35° of the axes, with the left one on
     the left. Few random poses are so near: this is evidence where the shape leaves a choice.
@@ -184,14 +181,12 @@ def _near_a_convention(shapes: list[Hemisphere]) -> list[Hemisphere]:
 
 
 def _fit_near(axes: Floats, one: Hemisphere, targets: Sequence[Shape]) -> Fit | None:
-    """Returns the fit from (3, 3) axes of files, None where it is much worse than the best or leads away from them."""
     fit = register(one.shape, targets, axes)
     nearly = fit.residual < LEAST_CONFIDENCE * one.residual and fit.residual <= WORST_RESIDUAL
     return fit if nearly and angle_deg(fit.rotation @ axes.T) < CONVENTION_DEG else None
 
 
 def _kept_as_ras(one: Hemisphere, targets: Sequence[Shape], what: str) -> Pose:
-    """Returns the pose of a file in RAS+ where a doubtful shape fits that nearly as well; InputError else."""
     if _fit_near(np.eye(3), one, targets) is None:
         raise _unclear(one, what)
     doubt = "the shape fits other poses as well as RAS+, in which the coordinates were taken: set coordinates"
@@ -199,7 +194,6 @@ def _kept_as_ras(one: Hemisphere, targets: Sequence[Shape], what: str) -> Pose:
 
 
 def _motions(left: Hemisphere, right: Hemisphere, fit: Fit) -> tuple[Floats, Floats]:
-    """Returns the motions that put the medial walls beside x = 0, and the centre of both at y = z = 0."""
     # the left centre of volume less the right one, mirrored, once both are posed
     offset = right.rotation @ fit.shift * right.shape.size_mm
     posed = []
@@ -210,7 +204,6 @@ def _motions(left: Hemisphere, right: Hemisphere, fit: Fit) -> tuple[Floats, Flo
 
 
 def _share_coordinates(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hemisphere, declared: bool) -> bool:
-    """Returns whether the files have both hemispheres where one rigid motion brings them to a brain."""
     angle = angle_deg(to_right[:3, :3].T @ to_left[:3, :3])
     if declared and angle < DECLARED_TURN_DEG:
         return True
@@ -221,7 +214,6 @@ def _share_coordinates(to_left: Floats, to_right: Floats, left: Hemisphere, righ
 
 
 def _mean_motion(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hemisphere) -> Floats:
-    """Returns one motion half-way between two, measured at the brain's centre."""
     centre = 0.5 * (MIRROR[:3, :3] @ left.shape.centre + right.shape.centre)
     rotation = Rotation.from_matrix([to_left[:3, :3], to_right[:3, :3]]).mean().as_matrix()
     there = 0.5 * sum(side[:3, :3] @ centre + side[:3, 3] for side in (to_left, to_right))
@@ -229,7 +221,6 @@ def _mean_motion(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hem
 
 
 def _frame(to_ras: Floats) -> str | None:
-    """Returns "ras" or "lps" where a motion from a file's coordinates is near to that from these, else None."""
     for name, axes in CONVENTIONS.items():
         turn = to_ras[:3, :3] @ axes[:3, :3].T
         tilt = np.degrees(np.arccos(np.clip(turn[0, 0], -1.0, 1.0)))
@@ -239,13 +230,13 @@ def _frame(to_ras: Floats) -> str | None:
 
 
 def pitch_deg(rotation: Floats) -> float:
-    """Returns the angle in degrees of the rotation about x that is nearest to a (3, 3) rotation."""
+    """Return the angle in degrees of the rotation about x that is nearest to a (3, 3) rotation."""
     block = rotation[1:, 1:]
     return float(np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1])))
 
 
 def doubts_of_hemispheres(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> list[str]:
-    """Returns what the shapes of two hemispheres say against their sides and the coordinates, "ras" or "lps".
+    """Return what the shapes of two hemispheres say against their sides and the coordinates, "ras" or "lps".
 
     The surfaces are in RAS+ already, if these are right. Files of the wrong side in the wrong one of the two still
     lie side by side, but their mirror images fit better.
@@ -261,7 +252,7 @@ def doubts_of_hemispheres(left: TriangleMesh, right: TriangleMesh, coordinates: 
 
 
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
-    """Returns the pose of a whole brain's surface, in coordinates that the user names or leaves to "auto".
+    """Return the pose of a whole brain's surface, in coordinates that the user names or leaves to "auto".
 
     Named coordinates are kept, with a warning where the shape clearly contradicts them. InputError where the pose
     must come from the shape and is ambiguous.
@@ -283,7 +274,7 @@ def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
 
 
 def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
-    """Returns the pose of a label volume from the surface of its cerebrum, in the coordinates of the volume.
+    """Return the pose of a label volume from the surface of its cerebrum, in the coordinates of the volume.
 
     The file's is kept where the shape is within 60° of it or says none, with a warning. `sided` is whether labels say
     which side is which.
@@ -297,7 +288,7 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
 
 
 def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:
-    """Returns the pose of a clean hemisphere that is alone, in coordinates "ras", "lps" or "auto".
+    """Return the pose of a clean hemisphere that is alone, in coordinates "ras", "lps" or "auto".
 
     With "auto", the axes of the file are kept where its shape says that they are RAS or LPS within 35°, and its medial
     wall is then turned upright; else the shape's pose is taken. With `of_volume` it is the surface of a label volume,
@@ -314,7 +305,6 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
             f"the hemisphere seems to be the {'right' if side == 'left' else 'left'} one",
             found=f"{one.sided:.2f} times as far from the other side's template",
             expected="more than 1",
-            remedy="Set the other side; or, if it is right, pose the file yourself and set coordinates: ras.",
         )
     doubts = []
     if one.sided < LEAST_SIDED:
@@ -340,7 +330,6 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
 
 
 def _angles(rotation: Floats) -> dict[str, float]:
-    """Returns by how many degrees a (3, 3) rotation to RAS+ differs from that of each convention of files."""
     return {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}
 
 

@@ -38,8 +38,9 @@ from ..geometry.triangles import (
 )
 from ..parameters.terms import MOST_HOLE_MM
 from ..units import CM2_PER_MM2, ML_PER_MM3
+from .extraction import COMPARABLE as COMPARABLE_PARTS
 from .extraction import EDGE_SLOPE, Floats, isosurface, make_simple, without_stalks
-from .labels import TOLD_LOSS
+from .labels import REPORTED_LOSS
 
 log = logging.getLogger(__name__)
 
@@ -78,14 +79,14 @@ class Sound:
 
 
 def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> Sound:
-    """Returns a surface of one piece or two, or its largest piece, repaired and without parts that hang on stalks."""
+    """Return a surface of one piece or two, or its largest piece, repaired and without parts that hang on stalks."""
     mesh, repairs = clean(mesh, max_hole_mm)
     if one:
         mesh, *others = pieces(mesh)
         dropped = repairs["area_dropped_mm2"] + sum(area(piece) for piece in others)
         repairs |= {"pieces": 1, "pieces_dropped": repairs["pieces_dropped"] + len(others), "area_dropped_mm2": dropped}
     warnings, dropped, kept = [], repairs["area_dropped_mm2"], area(mesh)
-    if dropped > TOLD_LOSS * kept:
+    if dropped > REPORTED_LOSS * kept:
         warnings.append(
             f"{repairs['pieces_dropped']} pieces apart from the brain or inside it were dropped: "
             f"{100 * dropped / (kept + dropped):.1f} % of the area"
@@ -101,7 +102,7 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
 
 
 def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Returns a surface whose vertices far off it are set between those around them, and the number of them.
+    """Return a surface whose vertices far off it are set between those around them, and the number of them.
 
     They are groups of few vertices that only long edges join to the rest, and that are far from those around them.
     """
@@ -129,13 +130,12 @@ def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
 
 
 def _graph(pairs: NDArray[np.integer], number: int) -> sparse.coo_array:
-    """Returns the (n, n) matrix with ones for pairs of vertices that are joined."""
     both = np.concatenate([pairs, pairs[:, ::-1]])
     return sparse.coo_array((np.ones(len(both)), both.T), (number, number))
 
 
 def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:
-    """Returns the surface smoothed and remeshed, each piece a sphere that does not cut itself.
+    """Return the surface smoothed and remeshed, each piece a sphere that does not cut itself.
 
     Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length. The report has
     what `make_even` says as "mesh", and what `rebuild` says as "remade".
@@ -152,19 +152,18 @@ def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: fl
 
 
 def require_sound(mesh: TriangleMesh) -> None:
-    """Raises MeshError where the surface is not made of closed spheres without intersections."""
+    """Raise MeshError where the surface is not made of closed spheres without intersections."""
     found = faults(mesh)
     if found:
         raise MeshError(
             "the surface could not be made good",
             found=found,
             expected="closed pieces of Euler number 2 that do not cut themselves",
-            remedy="Look at the labels or the surface there; more smoothing or shorter edges may help.",
         )
 
 
 def faults(mesh: TriangleMesh) -> str:
-    """Returns what keeps the surface from being closed spheres without intersections; empty where nothing does."""
+    """Return what keeps the surface from being closed spheres without intersections; empty where nothing does."""
     euler = [euler_number(piece) for piece in pieces(mesh)]
     cutting = int(self_intersecting_faces(mesh).sum())
     found = [
@@ -176,7 +175,7 @@ def faults(mesh: TriangleMesh) -> str:
 
 
 def smooth_taubin(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
-    """Returns the surface after Taubin smoothing, which keeps volume (Taubin 1995, λ = 0.5, μ = −0.53)."""
+    """Return the surface after Taubin smoothing, which keeps volume (Taubin 1995, λ = 0.5, μ = −0.53)."""
     if iterations == 0:
         return mesh
     document = in_meshlab(mesh)
@@ -187,7 +186,7 @@ def smooth_taubin(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
 def make_even(
     mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float
 ) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Returns the surface smoothed, remeshed and untangled, and the number of cutting faces before and after."""
+    """Return the surface smoothed, remeshed and untangled, and the number of cutting faces before and after."""
     even = remesh(smooth_taubin(mesh, smoothing_iterations), edge_length_mm)
     before = int(self_intersecting_faces(even).sum())
     if before:
@@ -202,7 +201,7 @@ def make_even(
 
 
 def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Returns the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
+    """Return the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
     Equal vertices are joined, degenerate and double faces removed, vertices far off the surface set between their
     neighbours, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small
@@ -224,7 +223,6 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
             "the surface cannot be closed",
             found=f"{int((counts != 2).sum())} edges without exactly two faces after repair",
             expected="a closed surface",
-            remedy="Repair the surface by hand, or make it anew from a label volume.",
         )
     turned = {"pieces_turned_outward": int(sum(inward))}
     return mesh, {
@@ -239,7 +237,7 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
 
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
-    """Returns the connected pieces of a surface, the largest area first."""
+    """Return the connected pieces of a surface, the largest area first."""
     component = face_components(mesh)
     return [submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
 
@@ -291,7 +289,6 @@ def _main_pieces(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
 
 
 def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Returns the surface with a fan over each hole up to `max_hole_mm` across, and how many there were."""
     loops = [np.asarray(loop) for loop in igl.boundary_loop_all(mesh.faces)]
     sizes = [float(np.ptp(mesh.vertices[loop], axis=0).max()) for loop in loops]
     if sizes and max(sizes) > max_hole_mm:
@@ -318,7 +315,7 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, d
 
 
 def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
-    """Returns a closed surface without what hangs on it by stalks, closed where these were cut, and the parts."""
+    """Return a closed surface without what hangs on it by stalks, closed where these were cut, and the parts."""
     if not SMALLEST_MM < np.ptp(mesh.vertices, axis=0).max() < LARGEST_MM:
         # in another unit, which is reported elsewhere
         return mesh, []
@@ -342,15 +339,40 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
     return clean(open_, WIDEST_CUT_MM)[0], report
 
 
+def surface_of_mask(
+    field: NDArray[np.float32],
+    affine: Floats,
+    volume_mm3: float,
+    smoothing_iterations: int,
+    edge_length_mm: float,
+    *,
+    smallest: float = COMPARABLE_PARTS,
+    taken_mm3: float = 0.0,
+) -> Sound:
+    """Return the even surface around a smoothed (i, j, k) mask, with the mask's volume.
+
+    `volume_mm3` is that of the mask, `taken_mm3` what was taken from it; parts below `smallest` of the largest are left
+    out. The report has the "topology" and the "smoothing" too. MeshError where the surface stays tangled.
+    """
+    field, topology = make_simple(field, smallest)
+    rough = isosurface(field, affine)
+    even = make_sound(rough, smoothing_iterations, edge_length_mm)
+    mesh, smoothing = with_volume(even.mesh, after_repairs(volume_mm3, topology, affine) - taken_mm3, area(rough))
+    warnings = list(even.warnings)
+    if abs(change := smoothing["volume_change"]) > KEPT:
+        warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it")
+    return Sound(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)
+
+
 def after_repairs(mask_mm3: float, topology: dict[str, Any], affine: Floats) -> float:
-    """Returns the volume in mm³ of a mask after the repairs of its topology, with voxels of a (4, 4) affine."""
+    """Return the volume in mm³ of a mask after the repairs of its topology, with voxels of a (4, 4) affine."""
     voxels = sum(topology[f"voxels_{key}"] for key in ("filled", "filled_in_tunnels"))
     voxels -= sum(topology[f"voxels_{key}"] for key in ("dropped", "cut_from_bridges"))
     return mask_mm3 + voxels * float(abs(np.linalg.det(affine[:3, :3])))
 
 
 def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Returns a closed surface set along its normals so that it encloses a volume, and a report in plain values.
+    """Return a closed surface set along its normals so that it encloses a volume, and a report in plain values.
 
     Smoothing and remeshing draw a convex surface inwards by some hundredths of a mm: ΔV/A is given back. Walls so near
     to each other that they would cut stay where they are. So does the whole surface where more than 5 % of the volume
@@ -372,7 +394,6 @@ def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple
 
 
 def _set_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
-    """Returns the surface set along its normals to a volume, but for walls that would cut; unmoved where others do."""
     free = np.ones(len(mesh.vertices), dtype=bool)
     for _ in range(HELD_BACK + 1):
         moved = mesh
@@ -390,7 +411,7 @@ def _set_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 
 
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Returns the surface of the region that `mesh` winds around, without handles or intersections, and a report.
+    """Return the surface of the region that `mesh` winds around, without handles or intersections, and a report.
 
     The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) separates inside from outside
     even where the surface cuts itself. Details below the voxel size are lost.
@@ -420,7 +441,6 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
 
 
 def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> Floats:
-    """Returns points on the surface, so dense that no place on it is further than about a voxel from one."""
     triangles = mesh.vertices[mesh.faces]
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
     # of each face as many as its size asks for: one long face is not to fill the memory

@@ -25,7 +25,7 @@ def shape_surface(
     noise_mm: float = ShapeSettings.model_fields["noise_mm"].default,
     seed: int = ShapeSettings.model_fields["seed"].default,
 ) -> TriangleMesh:
-    """Returns an ellipsoid as a closed, outward surface of even triangles, its vertices on the shape.
+    """Return an ellipsoid as a closed, outward surface of even triangles, its vertices on the shape.
 
     Smooth bumps along the normal, which folding needs to start from, have the root mean square height `noise_mm`; their
     pattern follows from `seed`, not from the edge length. InputError where the edges are longer than half the smallest
@@ -35,14 +35,11 @@ def shape_surface(
     longest = 0.5 * size.min() ** 2 / size.max()
     if edge_length_mm > longest:
         raise InputError(
-            "the edges are too long for the shape",
-            found=f"{edge_length_mm:g} mm",
-            expected=f"at most {longest:.3g} mm",
-            remedy="Set a smaller surface.edge_length_mm, or make the shape larger.",
+            "the edges are too long for the shape", found=f"{edge_length_mm:g} mm", expected=f"at most {longest:.3g} mm"
         )
     points = size * _directions(int(np.ceil(np.pi * size.max() / edge_length_mm)))
     mesh = remesh(
-        convex_hull(TriangleMesh(points, np.empty((0, 3), np.int64))), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG
+        convex_hull(TriangleMesh(points, np.empty((0, 3), dtype=np.int64))), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG
     )
     vertices = mesh.vertices / np.linalg.norm(mesh.vertices / size, axis=1, keepdims=True)
     heights = noise_mm * _pattern(vertices, seed)
@@ -50,7 +47,6 @@ def shape_surface(
 
 
 def _directions(count: int) -> Floats:
-    """Returns unit vectors all around, `count` steps from one axis to the next, the axes among them."""
     i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
     lattice = np.stack([i, j, count - i - j], axis=-1)[i + j <= count].astype(float)
     signs = np.array([(x, y, z) for x in (1, -1) for y in (1, -1) for z in (1, -1)])
@@ -58,7 +54,6 @@ def _directions(count: int) -> Floats:
 
 
 def _pattern(points: Floats, seed: int) -> Floats:
-    """Returns a smooth random field of unit variance at (n, 3) points: a sum of plane waves of all directions."""
     random = np.random.default_rng(seed)
     waves = random.normal(size=(WAVES, 3))
     shortest, longest = np.log(WAVELENGTHS_MM)

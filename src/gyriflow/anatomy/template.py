@@ -4,8 +4,8 @@ The template is the shipped atlas at three weeks, `atlases/spina-bifida/right.we
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
@@ -44,24 +44,24 @@ class Shape:
     normals: Floats
     centre: Floats
     size_mm: float
-    tree: cKDTree = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "tree", cKDTree(self.features(self.points, self.normals)))
+    @cached_property
+    def tree(self) -> cKDTree:
+        return cKDTree(self.features(self.points, self.normals))
 
     @staticmethod
     def features(points: Floats, normals: Floats) -> Floats:
-        """Returns the (n, 6) places between which nearest points are looked for."""
+        """Return the (n, 6) places between which nearest points are looked for."""
         return np.hstack([points, NORMALS * normals])
 
     def mirrored(self) -> "Shape":
-        """Returns the shape of the other side."""
+        """Return the shape of the other side."""
         mirror = MIRROR[:3, :3]
         return Shape(self.points @ mirror, self.normals @ mirror, mirror @ self.centre, self.size_mm)
 
 
 def shape_of(mesh: TriangleMesh, *, deepest: float = np.inf) -> Shape:
-    """Returns the shape of a closed, outward surface, by points drawn at random in proportion to area.
+    """Return the shape of a closed, outward surface, by points drawn at random in proportion to area.
 
     Those `deepest` sizes and more below the convex hull are left out.
     """
@@ -81,19 +81,19 @@ def shape_of(mesh: TriangleMesh, *, deepest: float = np.inf) -> Shape:
 
 
 def shape_of_brain(mesh: TriangleMesh) -> Shape:
-    """Returns the shape of a whole brain without the depth of its fissure, which may be open or shut."""
+    """Return the shape of a whole brain without the depth of its fissure, which may be open or shut."""
     return shape_of(mesh, deepest=DEEPEST)
 
 
 @cache
 def hemispheres() -> tuple[Shape, ...]:
-    """Returns the right hemispheres of the template."""
+    """Return the right hemispheres of the template."""
     return tuple(map(shape_of, _surfaces()))
 
 
 @cache
 def brains() -> tuple[Shape, ...]:
-    """Returns the template's brains, of two hemispheres each."""
+    """Return the template's brains, of two hemispheres each."""
     return tuple(shape_of_brain(merged(transformed(right, MIRROR), right)) for right in _surfaces())
 
 
@@ -103,14 +103,14 @@ def _surfaces() -> list[TriangleMesh]:
 
 
 def register(shape: Shape, targets: Sequence[Shape], rotation: Floats, shift: Floats | None = None) -> Fit:
-    """Returns the best fit of a shape on one of several, from a (3, 3) rotation near it."""
+    """Return the best fit of a shape on one of several, from a (3, 3) rotation near it."""
     return min(
         (_descend(shape, target, rotation, shift, FINE, 30, 3) for target in targets), key=lambda fit: fit.residual
     )
 
 
 def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[Fit, float]:
-    """Returns the best fit of a shape on one of several, from 24 starts, and how many times worse the next pose is.
+    """Return the best fit of a shape on one of several, from 24 starts, and how many times worse the next pose is.
 
     The next pose is more than 40° away. Near 1, as for a body of revolution, the shape says no pose.
     """
@@ -131,7 +131,7 @@ def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[Fit
 def _descend(
     shape: Shape, target: Shape, rotation: Floats, shift: Floats | None, scale: float, rounds: int, every: int
 ) -> Fit:
-    """Returns the fit after rounds of iterative closest points, with every so many of the points.
+    """Return the fit after rounds of iterative closest points, with every so many of the points.
 
     Steps follow the symmetric point-to-plane distance, Rusinkiewicz 2019 (doi 10.1145/3306346.3323037), with
     Geman-McClure weights.
@@ -158,7 +158,7 @@ def _descend(
 
 
 def medial_wall(shape: Shape, normal: Floats) -> tuple[Floats, float]:
-    """Returns the plane normal·p = offset along a hemisphere's medial wall, which faces about the unit vector given.
+    """Return the plane normal·p = offset along a hemisphere's medial wall, which faces about the unit vector given.
 
     The normal (3,) is outward, the offset in sizes of the hemisphere.
     """
@@ -178,5 +178,4 @@ def medial_wall(shape: Shape, normal: Floats) -> tuple[Floats, float]:
 
 
 def _biweight(away: Floats) -> Floats:
-    """Returns Tukey's biweight: 1 at 0, 0 from ±1 on."""
     return np.where(np.abs(away) < 1.0, (1.0 - away**2) ** 2, 0.0)

@@ -67,7 +67,7 @@ class Thickness:
 def cortical_thickness(
     pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats, smoothing_voxels: float
 ) -> Thickness:
-    """Returns the cortical thickness at the vertices of a pial surface; InputError where it has no cortex under it.
+    """Return the cortical thickness at the vertices of a pial surface; InputError where it has no cortex under it.
 
     The inner border is the isosurface of the smoothed mask of the cerebrum without its cortex, which lies between
     voxels as the pial surface does. The thickness at a vertex is the mean of two distances: from the vertex to the
@@ -95,7 +95,6 @@ def cortical_thickness(
             "the labels of the cortex lie nowhere at the surface of the cerebrum",
             found=f"{int(cortex.sum())} voxels of cortex, all of them deep inside or thinner than a third of a voxel",
             expected="a layer around the cerebrum",
-            remedy="Check which labels the scheme calls cortex.",
         )
     _, known = cKDTree(points[measured]).query(points[~measured])
     filled = values.copy()
@@ -113,7 +112,7 @@ def thickness_from_labels(
     *,
     smoothing_voxels: float = 1.0,
 ) -> Thickness:
-    """Returns the cortical thickness at the vertices of the pial surface that `from_labels` made of the same labels.
+    """Return the cortical thickness at the vertices of the pial surface that `from_labels` made of the same labels.
 
     `surface` is the whole one, posed by `pose`; the scheme has to separate cortex from the tissue inside.
     """
@@ -127,7 +126,7 @@ def thickness_from_labels(
 
 
 def layers(labels: Labels, affine: Floats, scheme: LabelScheme) -> tuple[Mask, Mask, Floats]:
-    """Returns the (i, j, k) masks of the cerebrum and of its cortex, cut to their contents, and their (4, 4) affine."""
+    """Return the (i, j, k) masks of the cerebrum and of its cortex, cut to their contents, and their (4, 4) affine."""
     tissue = read_cerebrum(labels, affine, scheme).tissue
     box, first = crop(np.isin(tissue, scheme.cerebrum))
     tissue = np.pad(tissue[box], PAD_VOXELS)
@@ -135,7 +134,7 @@ def layers(labels: Labels, affine: Floats, scheme: LabelScheme) -> tuple[Mask, M
 
 
 def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
-    """Returns the summary of the thickness; means are weighted by area."""
+    """Return the summary of the thickness; means are weighted by area."""
     chosen, weights = values[measured], areas[measured]
     quantiles = np.quantile(chosen, [QUANTILES[0], 0.5, QUANTILES[1]], weights=weights, method="inverted_cdf")
     low, median, high = map(float, quantiles)
@@ -154,7 +153,7 @@ def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
 def thickness_from_white(
     surface: TriangleMesh, pose: Pose, fissure_x_mm: float, whites: Mapping[str, TriangleMesh]
 ) -> Thickness:
-    """Returns the cortical thickness on a pial surface: its distance from the white surface, as `cortical_thickness`.
+    """Return the cortical thickness on a pial surface: its distance from the white surface, as `cortical_thickness`.
 
     `surface` is the whole pial surface, `pose` its own and `fissure_x_mm` the place of its fissure. `whites` are the
     white surfaces in the coordinates of the files that the pial one was made from, by side: "left", "right", or
@@ -180,7 +179,6 @@ def thickness_from_white(
                 f"the white surface ({side}) crosses the pial one",
                 found=f"{100 * share:.0f} % of its area outside, by up to {distance[crossing].max():.1f} mm",
                 expected=f"at most {100 * MOST_OUTSIDE:.0f} % by more than {OUTSIDE_MM} mm",
-                remedy="Give white and pial surfaces of one subject in the same coordinates.",
             )
     inner = merged(*posed.values())
     values = layer_thickness(surface, inner)
@@ -190,11 +188,10 @@ def thickness_from_white(
             "the white surface is the pial one",
             found=f"{values.max():.2f} mm between them at most",
             expected=f"{LEAST_MM} mm and more",
-            remedy="Give the white surfaces under white.",
         )
     return Thickness(values, measured, summary(values, measured, vertex_areas(surface)))
 
 
 def posed_whites(pose: Pose, whites: Mapping[str, TriangleMesh]) -> dict[str, TriangleMesh]:
-    """Returns the white surfaces by side, moved as the pial ones were."""
+    """Return the white surfaces by side, moved as the pial ones were."""
     return {side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()}

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..geometry.poses import Pose
-from ..geometry.triangles import TriangleMesh, area
+from ..geometry.triangles import TriangleMesh
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import Side
-from .extraction import COMPARABLE, Floats, isosurface, make_simple, smooth_mask
+from .extraction import COMPARABLE, Floats, smooth_mask
 from .fissure import cut_sides, nearer_left
 from .labels import SMALLEST_HEMISPHERE, Labels
-from .repair import after_repairs, make_sound, sound_pieces, with_volume
+from .repair import make_sound, sound_pieces, surface_of_mask
 from .thickness import layers, posed_whites
 
 
@@ -26,7 +26,7 @@ def white_from_labels(
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
 ) -> dict[Side, TriangleMesh]:
-    """Returns by side the surface around what lies within the cortex of an (i, j, k) label volume.
+    """Return by side the surface around what lies within the cortex of an (i, j, k) label volume.
 
     It is made as `pial.from_labels` makes the pial one of these labels, and lies where that does. Where the cerebrum
     has no cortex, as on the medial wall, both are one. MeshError where it stays tangled.
@@ -34,12 +34,10 @@ def white_from_labels(
     cerebrum, cortex, affine = layers(labels, pose.world @ affine, scheme)
     core = cerebrum & ~cortex
     smallest = SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE
-    field, topology = make_simple(smooth_mask(core, smoothing_voxels), smallest)
-    rough = isosurface(field, affine)
-    even = make_sound(rough, smoothing_iterations, edge_length_mm)
     volume = float(core.sum() * abs(np.linalg.det(affine[:3, :3])))
-    mesh, _ = with_volume(even.mesh, after_repairs(volume, topology, affine), area(rough))
-    return _sides(mesh, pial)
+    field = smooth_mask(core, smoothing_voxels)
+    even = surface_of_mask(field, affine, volume, smoothing_iterations, edge_length_mm, smallest=smallest)
+    return _sides(even.mesh, pial)
 
 
 def white_from_surfaces(
@@ -51,7 +49,7 @@ def white_from_surfaces(
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
 ) -> dict[Side, TriangleMesh]:
-    """Returns by side the given white surfaces of "left" and "right" or of the "whole", posed and made even.
+    """Return by side the given white surfaces of "left" and "right" or of the "whole", posed and made even.
 
     MeshError where one can't be made a closed surface without handles and intersections.
     """
@@ -63,7 +61,6 @@ def white_from_surfaces(
 
 
 def _sides(mesh: TriangleMesh, pial: Mapping[Side, TriangleMesh]) -> dict[Side, TriangleMesh]:
-    """Returns a white surface cut where the pial one is; whole where there is one hemisphere."""
     if len(pial) == 1:
         return dict.fromkeys(pial, mesh)
     left, right = cut_sides(mesh, nearer_left(mesh, pial["left"], pial["right"]))

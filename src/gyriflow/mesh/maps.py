@@ -29,7 +29,7 @@ TIE = 1e-9
 def vertex_map_on_mesh(
     mesh_vertices_mm: Floats, pial_facets: Ints, surface: TriangleMesh, values: Floats, path: str | None = None
 ) -> Floats:
-    """Returns a map on a surface as (n,) values at the vertices of a mesh.
+    """Return a map on a surface as (n,) values at the vertices of a mesh.
 
     A vertex on the mesh's own surface takes the value at the nearest point of the surface, linear in its triangle; an
     inner vertex takes that of the nearest vertex on the mesh's surface, ties going to smaller coordinates.
@@ -50,7 +50,6 @@ def vertex_map_on_mesh(
             path=path,
             found=f"{far:.1f} mm for a twentieth of the mesh's surface, {np.median(distance):.1f} mm for half of it",
             expected=f"at most {FARTHEST_MM:g} mm",
-            remedy="Is it the surface of this brain, both hemispheres, in the same coordinates?",
         )
     on_pial = np.einsum("ij,ij->i", barycentric(nearest, corners(surface)[faces]), values[surface.faces[faces]])
     mapped = on_pial[_nearest_vertices(mesh_vertices_mm, points)]
@@ -59,7 +58,7 @@ def vertex_map_on_mesh(
 
 
 def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike, path: str | None = None) -> Floats:
-    """Returns a volume's (n,) values at the vertices of a mesh, linear between the centres of voxels.
+    """Return a volume's (n,) values at the vertices of a mesh, linear between the centres of voxels.
 
     In the outer half of the outermost voxels the value is constant outwards. `data` are (i, j, k), `affine` (4, 4)
     leads to the mesh's coordinates. InputError, with the volume's `path`, where vertices lie outside it, or between
@@ -77,7 +76,6 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
             path=path,
             found=f"{int((outside > 0).sum())} vertices outside it, by up to {outside.max():.1f} mm",
             expected=expected,
-            remedy="Is it a volume of this brain, in the same world coordinates? It has to cover the core too.",
         )
     values = map_coordinates(data, index.T, order=1, mode="nearest")
     missing = ~np.isfinite(values)
@@ -91,13 +89,12 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
             path=path,
             found=f"{int(missing.sum())} vertices at voxels that are NaN or infinite{depth}",
             expected=expected,
-            remedy="Continue the map over the whole brain, or give it on a surface.",
         )
     return values
 
 
 def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:
-    """Raises InputError where values of a map are not within the bounds (gt, ge, le) of its parameter.
+    """Raise InputError where values of a map are not within the bounds (gt, ge, le) of its parameter.
 
     `values` are (n,) at the vertices of the mesh, in the unit of the parameter.
     """
@@ -111,12 +108,11 @@ def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> No
             path=path,
             found=f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to {wrong.max():g}",
             expected=" and ".join(f"{signs[name]} {bound:g}" for name, bound in bounds.items()),
-            remedy="Fill places without a value, such as the medial wall, and check the map's unit.",
         )
 
 
 def move_to_mesh(points: Floats, surface: TriangleMesh, pose: ArrayLike) -> TriangleMesh:
-    """Returns the surface of a map where it is nearest to (k, 3) points on the mesh on average.
+    """Return the surface of a map where it is nearest to (k, 3) points on the mesh on average.
 
     Surfaces of the input are moved like the brain, by its (4, 4) pose; those that gyriflow made have been already.
     """
@@ -125,12 +121,10 @@ def move_to_mesh(points: Floats, surface: TriangleMesh, pose: ArrayLike) -> Tria
 
 
 def _solid(surface: TriangleMesh) -> TriangleMesh:
-    """Returns a surface without triangles that have no area: no place is inside, and their edges belong to others."""
     return TriangleMesh(surface.vertices, surface.faces[face_areas(surface) > 0])
 
 
 def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:
-    """Returns for each of (k, 3) points the index of the nearest vertex, of equally near ones the first in x, y, z."""
     count = min(NEIGHBOURS, len(vertices))
     gaps, candidates = (found.reshape(len(points), count) for found in cKDTree(vertices).query(points, k=count))
     rank = np.empty(len(vertices), dtype=np.int64)

@@ -34,7 +34,7 @@ OPTIMISED_DEG = 140
 
 
 def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> TetrahedralMesh:
-    """Returns the mesh that a mesher, "pytetwild" or "tetgen", makes in a process of its own; its lines are logged.
+    """Return the mesh that a mesher, "pytetwild" or "tetgen", makes in a process of its own; its lines are logged.
 
     `arrays` are `vertices` (n, 3) and `faces` (m, 3) of the surface, and what the mesher needs besides. MeshError where
     it is not installed, dies or takes longer than `time_limit_s`, with its last words.
@@ -68,7 +68,6 @@ def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> Tet
 
 
 def _run(name: str, sent: bytes, folder: str, time_limit_s: float) -> tuple[int | None, bytes, list[str]]:
-    """Returns a mesher's exit code (None where it was stopped), what it sent back, and the lines that it printed."""
     words: list[str] = []
     reading, printing = os.pipe()
 

@@ -50,7 +50,7 @@ class GapWalls:
 
 
 def fidelity(mesh: TriangleMesh, other: TriangleMesh) -> dict[str, float]:
-    """Returns how far two surfaces are from each other, in mm.
+    """Return how far two surfaces are from each other, in mm.
 
     `hausdorff99` is the distance within which 99 % of either surface's area lies from the other surface, the larger of
     both directions; `hausdorff` is the largest distance found. Every face is sampled at the centroids of the four
@@ -64,7 +64,7 @@ def fidelity(mesh: TriangleMesh, other: TriangleMesh) -> dict[str, float]:
 
 
 def gap_walls(mesh: TriangleMesh) -> GapWalls:
-    """Returns the walls of narrow gaps of a closed surface, such as the fissure and sulci.
+    """Return the walls of narrow gaps of a closed surface, such as the fissure and sulci.
 
     From every face's centroid a ray goes outwards; where it meets a parallel wall within 3 mm, there is a gap.
     """
@@ -78,7 +78,7 @@ def gap_walls(mesh: TriangleMesh) -> GapWalls:
 
 
 def gap_summary(walls: GapWalls) -> dict[str, float | None]:
-    """Returns the widths of gaps and the area of their walls.
+    """Return the widths of gaps and the area of their walls.
 
     `percentile1` and `median` are widths in mm below which 1 % and half of the walls' area lies (None where there is
     no gap; at the bottom of a gap the width ends in 0, so that the least one says nothing), `area_mm2` is that area.
@@ -91,7 +91,7 @@ def gap_summary(walls: GapWalls) -> dict[str, float | None]:
 
 
 def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
-    """Returns the share of the walls' area before which another surface leaves the gap open; None without a gap.
+    """Return the share of the walls' area before which another surface leaves the gap open; None without a gap.
 
     It is open where its middle is outside the closed surface `mesh`, and the walls of that are at least half as far
     apart there.
@@ -108,7 +108,6 @@ def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
 
 
 def _first_hits(mesh: TriangleMesh, start: Floats, direction: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """Returns the face that each of (n,) rays meets first within 3 mm, −1 where there is none, and its distance."""
     rays = igl.embree.EmbreeIntersector()
     rays.init(np.asfortranarray(mesh.vertices, dtype=np.float32), np.asfortranarray(mesh.faces, dtype=np.int32), True)
     hits = [
@@ -119,7 +118,6 @@ def _first_hits(mesh: TriangleMesh, start: Floats, direction: Floats) -> tuple[N
 
 
 def _distances(mesh: TriangleMesh, other: TriangleMesh) -> tuple[Floats, Floats]:
-    """Returns the distances in mm of (k,) points of a surface from another one, and the area in mm² of each."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
     centroids = [(a + b + c) / 3, (4 * a + b + c) / 6, (a + 4 * b + c) / 6, (a + b + 4 * c) / 6]
     distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), other)
@@ -127,12 +125,11 @@ def _distances(mesh: TriangleMesh, other: TriangleMesh) -> tuple[Floats, Floats]
 
 
 def _quantile(values: Floats, weights: Floats, share: float) -> float:
-    """Returns the value below which so much of the weight lies."""
     return float(np.quantile(values, share, weights=weights, method="inverted_cdf"))
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Returns for each of (m,) elements a lower bound of the determinant of its map, over the mean.
+    """Return for each of (m,) elements a lower bound of the determinant of its map, over the mean.
 
     It is 1 for straight sides with nodes on their middles, and positive only where the element folds over nowhere.
     """
@@ -142,7 +139,7 @@ def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
 
 
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Returns the (m, 6) angles in degrees between the faces at each edge, as they are between the corners."""
+    """Return the (m, 6) angles in degrees between the faces at each edge, as they are between the corners."""
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
     for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, OPPOSITE, strict=True)):
@@ -154,7 +151,7 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
 
 
 def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
-    """Returns per element radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3 and jacobian_ratio."""
+    """Return per element radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3 and jacobian_ratio."""
     angles = dihedral_angles(mesh)
     return pd.DataFrame(
         {
@@ -168,7 +165,7 @@ def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
 
 
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
-    """Returns counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
+    """Return counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
     `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
     that of the volume, relative to the one inside it. Of quadratic elements all of them are taken on the triangles
@@ -210,7 +207,7 @@ def refuse_bad_mesh(
     max_volume_change: float,
     max_surface_distance_mm: float,
 ) -> None:
-    """Raises MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
+    """Raise MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
 
     For elements the message has the number of bad ones and the worst place. Faces of the mesh's surface that cross
     each other are always refused. `path` is for the message: where the mesh can be looked at.

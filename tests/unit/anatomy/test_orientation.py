@@ -6,8 +6,7 @@ from phantoms import CENTRE_MM
 from scipy.spatial.transform import Rotation
 from shapes import cerebrum_surface, ellipsoid, phantom
 
-from gyriflow.anatomy.extraction import isosurface, smooth_mask
-from gyriflow.anatomy.fissure import fissure_between, mid_plane, open_fissure, upright
+from gyriflow.anatomy.fissure import fissure_between, mid_plane, upright
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 
@@ -29,7 +28,7 @@ def angle_to(plane, normal):
     return np.degrees(np.arccos(np.clip(plane.normal @ normal / np.linalg.norm(normal), -1, 1)))
 
 
-@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 45), (0, -45, 0), (30, 20, -30), (90, 0, 0)])
+@pytest.mark.parametrize("turn", [(0, 0, 45), (30, 20, -30), (90, 0, 0)])
 def test_turned_and_shifted_brain(brain, turn):
     rotation = Rotation.from_euler("xyz", turn, degrees=True).as_matrix()
     mesh, matrix = moved(brain, rotation, (31.0, -4.0, 9.0))
@@ -40,7 +39,7 @@ def test_turned_and_shifted_brain(brain, turn):
     assert plane.fissure_points > 500
 
 
-@pytest.mark.parametrize("shear", [(0.0, 0.15), (0.1, 0.0), (-0.1, 0.1)])
+@pytest.mark.parametrize("shear", [(0.0, 0.15), (-0.1, 0.1)])
 def test_sheared_brain_where_symmetry_and_fissure_differ(brain, shear):
     linear = np.eye(3)
     linear[0, 1:] = shear
@@ -91,27 +90,6 @@ def test_mid_surface_follows_a_bent_fissure(brain):
     in_fissure = np.stack([2.0 * np.cos(np.pi * y / 30.0), y, np.full(5, 14.0)], axis=1)
     assert np.abs(fissure.height_above(in_fissure)).max() < 0.7
     assert (fissure.height_above(in_fissure - [6.0, 0, 0]) < -5.0).all()
-
-
-def test_shut_fissure_is_opened_down_to_the_joint():
-    # two blocks of core in one block of cortex, joined by a bar: the fissure is hidden
-    brain, core = np.zeros((40, 40, 30), dtype=bool), np.zeros((40, 40, 30), dtype=bool)
-    brain[4:36, 4:36, 4:26] = True
-    core[6:18, 6:34, 6:24], core[22:34, 6:34, 6:24] = True, True
-    core[18:22, 12:28, 6:12] = True
-    affine = np.diag([0.8, 0.8, 0.8, 1.0])
-    walls = isosurface(smooth_mask(core, 1.0), affine)
-    plane = mid_plane(walls)
-    shut = smooth_mask(brain, 1.0)
-    field = open_fissure(shut, affine, core, fissure_between(walls, plane), 1.6)
-    assert plane.offset == pytest.approx(19.5 * 0.8, abs=0.2)
-    # open at the top above the joint and beside it, closed in the joint
-    assert not (field[19:21, 20, 16:26] > 0.5).any()
-    assert not (field[19:21, 5, 5:25] > 0.5).any()
-    assert (field[18:22, 20, 7:12] > 0.5).all()
-    # the walls are 1.6 mm, two voxels, apart: nothing further away is lost
-    assert ((shut > 0.5) & (field <= 0.5))[[17, 22]].sum() == 0
-    assert ((shut > 0.5) & (field <= 0.5))[:17].sum() == 0
 
 
 def test_named_coordinates_are_kept_by_a_body_with_many_mirror_planes(brain):

@@ -8,11 +8,12 @@ import numpy as np
 import odd_brains
 import pytest
 import shapes
+from atlas_brains import atlas_halves
 from phantoms import CENTRE_MM, phantom_labels
 from scipy.spatial.transform import Rotation
 from shapes import LPS, rigid, sphere
 
-from gyriflow.anatomy.fissure import least_gap, left_faces, set_apart, split
+from gyriflow.anatomy.fissure import least_gap, set_apart, split
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
 from gyriflow.anatomy.plausible import doubts_of_proportions, expected_volume_ml, require_plausible_size
 from gyriflow.anatomy.repair import pieces
@@ -98,10 +99,9 @@ def test_phantoms_of_all_ages_are_sound_and_fold():
 
 
 @pytest.mark.fault(1)
-@pytest.mark.parametrize("turn", [(0, 0, 45), (20, -30, 10)])
-def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom, turn):
+def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):
     labels, affine = volume
-    oblique = rigid(*turn)
+    oblique = rigid(20, -30, 10)
     turned = from_labels(labels, oblique @ affine, ATLAS, week=24.0, **QUICK)
     require_sound(turned)
     for part in ("whole", "left", "right"):
@@ -133,24 +133,12 @@ def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, unit):
         from_hemispheres(*(transformed(half, scale) for half in halves), week=24.0)
 
 
-@pytest.mark.parametrize(("week", "volume_ml"), [(21, 25.0), (21, 90.0), (29, 110.0), (36, 500.0), (36, 1300.0)])
-def test_small_large_and_adult_brains_pass(week, volume_ml):
-    require_plausible_size(volume_ml * 1e3, np.ones(3), week)
-
-
 @pytest.mark.parametrize(
     ("share", "doubted"), [(0.57, False), (1.27, False), (0.8**-3, True), (0.3, True), (0.5, True), (1.5, True)]
 )
 def test_a_volume_far_from_that_of_the_week_is_doubted(share, doubted):
     said = require_plausible_size(share * expected_volume_ml(24.0) * 1e3, np.ones(3), 24.0)
     assert [f"has {100 * share:.0f} % of the volume expected at week 24" in doubt for doubt in said] == [True] * doubted
-
-
-def test_a_brain_of_another_week_is_doubted():
-    size = expected_volume_ml(25.0) * 1e3
-    assert require_plausible_size(size, np.ones(3), 25.0) == []
-    assert "is the week right" in require_plausible_size(size, np.ones(3), 34.0)[0]
-    assert "is the week right" in require_plausible_size(1.3**3 * size, np.ones(3), 25.0)[0]
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -174,7 +162,6 @@ def test_a_surface_in_voxel_indices_is_told(phantom):
 def test_hemispheres_are_merged_apart_and_whole(halves):
     surface = from_hemispheres(*halves, week=24.0, **QUICK)
     require_sound(surface, surfaces=2)
-    assert not any("behind the middle" in warning for warning in surface.report["warnings"])
     assert surface.report["moved_apart_mm"] == 0.0
     assert is_closed(surface.left)
     assert signed_volume(surface.whole) == pytest.approx(sum(map(signed_volume, halves)), rel=0.01)
@@ -201,7 +188,8 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
 
 
 @pytest.mark.slow
-def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain(halves):
+def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain():
+    halves = [shapes.moved(half, shift) for half, shift in zip(atlas_halves(), (-0.6, 0.6), strict=True)]
     world = merged(*halves)
     sides, whole = [transformed(half, LPS) for half in halves], transformed(world, LPS)
     surfaces = {
@@ -222,16 +210,10 @@ def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain(halves
 
 @pytest.mark.fault(9)
 def test_swapped_hemispheres_are_refused(halves):
-    with pytest.raises(InputError, match=r"are LPS \(set coordinates: lps\) or the files are swapped.*Both changes"):
+    with pytest.raises(InputError, match=r"in coordinates ras.*both together"):
         from_hemispheres(*reversed(halves), week=24.0)
-    with pytest.raises(InputError, match=r"are RAS \(set coordinates: ras\) or the files are swapped.*Both changes"):
+    with pytest.raises(InputError, match=r"in coordinates lps.*both together"):
         from_hemispheres(*halves, week=24.0, coordinates="lps")
-
-
-@pytest.mark.fault(9)
-def test_hemispheres_that_are_swapped_and_in_other_coordinates_are_doubted(halves):
-    surface = from_hemispheres(*halves[::-1], week=24.0, coordinates="lps", edge_length_mm=2.5)
-    assert any("behind the middle" in warning for warning in surface.report["warnings"])
 
 
 @pytest.mark.fault(14)
@@ -287,11 +269,6 @@ def test_split_gives_bulges_back_to_their_hemisphere(phantom):
     assert len(pieces(left)) == len(pieces(right)) == 1
     assert len(left.faces) + len(right.faces) == len(mesh.faces)
     assert left.vertices[:, 0].max() > fissure + 0.3
-
-
-def test_face_on_each_side_belongs_to_that_side():
-    square = TriangleMesh([[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]], [[0, 2, 3], [1, 3, 2]])
-    assert left_faces(square, np.array([-0.3, 0.3])).tolist() == [True, False]
 
 
 def test_gap_between_balls_is_known():

@@ -14,7 +14,7 @@ from shapes import LPS, ellipsoid
 from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.fissure import least_gap
 from gyriflow.anatomy.pial import from_hemispheres
-from gyriflow.anatomy.pose import hemisphere_by_shape, pitch_deg, pose_of_pair
+from gyriflow.anatomy.pose import hemisphere_by_shape, pose_of_pair
 from gyriflow.anatomy.repair import pieces
 from gyriflow.anatomy.template import MIRROR, medial_wall, shape_of
 from gyriflow.errors import InputError
@@ -122,10 +122,6 @@ def test_a_wall_that_was_cut_is_found_to_half_a_degree():
     assert np.degrees(np.arccos(-(normal @ turn)[0])) < 0.5
     shape = shape_of(half)
     assert offset * shape.size_mm == pytest.approx(shape.centre[0], abs=0.01)
-
-
-def test_the_pitch_of_a_rotation_is_that_about_x():
-    assert pitch_deg(Rotation.from_euler("xyz", [20, 3, -2], degrees=True).as_matrix()) == pytest.approx(20, abs=0.5)
 
 
 def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):

@@ -48,11 +48,6 @@ def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet(bent):
         assert face_areas(part)[wrong].sum() < 0.005 * area(part)
 
 
-def test_a_scheme_of_ones_own_names_its_tissues():
-    scheme = LabelScheme(name="mine", cerebrum=(2, 1), cortex=(2,), known={9: "outer CSF", 1: "inside"})
-    assert scheme.labels == {1: "inside", 2: "cortex", 9: "outer CSF"}
-
-
 def test_a_side_of_a_few_voxels_is_no_hemisphere():
     labels, affine = phantom(21.0, 2.0)
     scheme, sided = SCHEMES["dhcp-19"], odd_brains.add_sides(labels, affine)
