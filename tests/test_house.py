@@ -159,10 +159,6 @@ def test_only_io_and_folding_open_files():
     assert [f"{short(path)}:{call}" for path in closed for call in opened_files(path)] == []
 
 
-def test_snakefile_is_short():
-    assert len((ROOT / "Snakefile").read_text().splitlines()) < 100
-
-
 def test_scripts_are_thin():
     # draw.py is that of all figures
     lengths = {short(path): len(path.read_text().splitlines()) for path in SCRIPTS if path.name != "draw.py"}
