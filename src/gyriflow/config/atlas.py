@@ -128,7 +128,7 @@ class AtlasSeries(Settings):
 
     @property
     def needed(self) -> list[FileKey]:
-        """The keys of the files that a week must have."""
+        # keys of the files that a week must have
         return [key for key in self.files if key != "image"]
 
 
@@ -209,7 +209,6 @@ class AtlasSettings(Settings):
 
     @property
     def description(self) -> Path:
-        """The `atlas.yaml`."""
         return Path(self.name) if self.name.endswith((".yaml", ".yml")) else ATLASES / self.name / "atlas.yaml"
 
     def located(self, base_dir: Path) -> "AtlasSettings":

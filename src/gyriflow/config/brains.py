@@ -100,7 +100,6 @@ class Brain(Settings):
 
     @property
     def synthetic(self) -> bool:
-        """Whether it is a shape in place of a brain."""
         return self.shape is not None
 
     @property
@@ -109,7 +108,6 @@ class Brain(Settings):
 
     @property
     def label_volume(self) -> str | None:
-        """The label volume; None where there is none."""
         if self.hemisphere is not None and self.scheme is not None:
             return self.hemisphere.file
         return self.labels

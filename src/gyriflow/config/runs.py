@@ -245,7 +245,7 @@ class Calibration(Compared):
 
     @property
     def runs(self) -> dict[str, int]:
-        """The round of each run by the run's name."""
+        # the round of each run by its name
         sizes = [self.first_runs, *[self.runs_per_round] * self.rounds]
         rounds = [number for number, size in enumerate(sizes) for _ in range(size)]
         return {f"calibration-{index:02d}": number for index, number in enumerate(rounds)}

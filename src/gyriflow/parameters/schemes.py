@@ -40,7 +40,7 @@ class SchemeSettings(Settings):
 
     @property
     def labels(self) -> dict[int, str]:
-        """Tissue name of each label; one without a name is called after the list that it is in."""
+        # a label without a name is called after the list that it is in
         named = dict.fromkeys(self.cerebrum, "cerebrum")
         for tissue in ("white_matter", "ventricles", "cortex", "cerebellum", "brainstem"):
             named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
