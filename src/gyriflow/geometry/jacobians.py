@@ -70,13 +70,13 @@ def determinants(matrices: Floats) -> Floats:
 
 def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Floats:
     """Return the (m, p) determinants of the maps of (m, 10) elements where shape functions have (p, 10, 3) slopes."""
-    found = np.empty((len(tets), len(slopes)))
+    values = np.empty((len(tets), len(slopes)))
     by_node = slopes.transpose(0, 2, 1).reshape(-1, 10)
     for first in range(0, len(tets), CHUNK):
         chunk = slice(first, first + CHUNK)
         maps = np.matmul(by_node, np.take(vertices, tets[chunk], axis=0))
-        found[chunk] = determinants(maps.reshape(len(maps), -1, 3, 3))
-    return found
+        values[chunk] = determinants(maps.reshape(len(maps), -1, 3, 3))
+    return values
 
 
 def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
@@ -93,11 +93,11 @@ def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
     It is positive only where the element is folded over nowhere. Elements for which it might be so, though the
     coefficients do not show it, are subdivided up to three times; a smaller part's bounds are closer.
     """
-    found = coefficients(vertices, tets)
-    bounds = found.min(axis=1)
-    open_ = np.flatnonzero((bounds <= 0) & (found[:, AT_CORNERS].min(axis=1) > 0))
+    whole = coefficients(vertices, tets)
+    bounds = whole.min(axis=1)
+    open_ = np.flatnonzero((bounds <= 0) & (whole[:, AT_CORNERS].min(axis=1) > 0))
     if len(open_):
-        bounds[open_] = _parted_bounds(found[open_], DEPTH)
+        bounds[open_] = _parted_bounds(whole[open_], DEPTH)
     return bounds
 
 

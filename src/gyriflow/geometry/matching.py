@@ -113,7 +113,7 @@ def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
     agrees; else the nearest of the 256 nearest vertices that does.
     """
     distance, face, on = nearest_on(points, mesh)
-    found = mesh.faces[face].astype(np.int64)
+    nearest_corners = mesh.faces[face].astype(np.int64)
     weights = barycentric(on, corners(mesh)[face])
     agrees = np.einsum("ij,ij->i", normals, face_normals(mesh)[face]) >= AGREEING
     tree, directions = cKDTree(mesh.vertices), vertex_normals(mesh)
@@ -127,11 +127,11 @@ def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
         some = good.any(axis=1)
         first = good.argmax(axis=1)[some]
         rows = left[some]
-        found[rows] = near[some, first][:, None]
+        nearest_corners[rows] = near[some, first][:, None]
         weights[rows] = [1.0, 0.0, 0.0]
         distance[rows] = away[some, first]
         agrees[rows] = True
-    return Match(found, weights, distance, agrees)
+    return Match(nearest_corners, weights, distance, agrees)
 
 
 def values_at(match: Match, values: NDArray) -> Floats:

@@ -70,8 +70,8 @@ def _check(path: Path, name: str, sha256: str | None) -> None:
             raise ValueError(f"no whole gzip file; it begins with {start!r}") from None
     if name.endswith(".gii") and not (b"<GIFTI" in content[:1024] and content.rstrip().endswith(b"</GIFTI>")):
         raise ValueError(f"no whole GIFTI file; it begins with {start!r}")
-    if sha256 is not None and (found := sha256_of(path)) != sha256:
-        raise ValueError(f"the SHA-256 {found} instead of {sha256}")
+    if sha256 is not None and (actual := sha256_of(path)) != sha256:
+        raise ValueError(f"the SHA-256 {actual} instead of {sha256}")
     if sha256 is None and name.endswith((".nii", ".nii.gz", ".gii")):
         import nibabel as nib
         import numpy as np

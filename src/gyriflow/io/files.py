@@ -188,23 +188,23 @@ def contents(files: Iterable[AnyPath], known: Mapping[str, Any]) -> dict[str, li
 
     A file whose size and times (ns, of the epoch) are those in `known`, an earlier answer, is not read again.
     """
-    found: dict[str, list[Any]] = {}
+    by_path: dict[str, list[Any]] = {}
     for path in map(str, files):
         with suppress(OSError, StorageError):
             state = Path(path).stat()
             # one that takes another's place keeps its date, but has been renamed
             now = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
-            found[path] = known[path] if known.get(path, [])[1:] == now else [sha256_of(path), *now]
-    return found
+            by_path[path] = known[path] if known.get(path, [])[1:] == now else [sha256_of(path), *now]
+    return by_path
 
 
 def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
     """Return for each file that is there its SHA-256, its size in bytes and when it was last written (UTC)."""
-    found = {}
+    by_path = {}
     for path, (sha256, size, written_ns, _) in contents(files, {}).items():
         written = datetime.fromtimestamp(written_ns // 10**9, UTC).isoformat(timespec="seconds")
-        found[path] = {"sha256": sha256, "bytes": size, "written": written}
-    return found
+        by_path[path] = {"sha256": sha256, "bytes": size, "written": written}
+    return by_path
 
 
 def files_in(folder: AnyPath, *left_out: str) -> list[Path]:

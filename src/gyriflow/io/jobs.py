@@ -50,11 +50,11 @@ class Message(NamedTuple):
 
 def messages_in(text: str) -> Iterator[Message]:
     """Yield the warnings and errors in a log or a piece of it, but for warnings of libraries."""
-    for found in MESSAGE.finditer(text):
-        logger = found["logger"] or ""
+    for match in MESSAGE.finditer(text):
+        logger = match["logger"] or ""
         if logger != OF_LIBRARIES:
-            level = (found["level"] or ("warning" if found["warning"] else "error")).lower()
-            content = found["logged"] or found["warning"] or found["error"] or ""
+            level = (match["level"] or ("warning" if match["warning"] else "error")).lower()
+            content = match["logged"] or match["warning"] or match["error"] or ""
             yield Message(level, content.strip(), logger in OWN or logger.startswith("gyriflow"))
 
 
@@ -64,7 +64,7 @@ def cause(text: str) -> str:
     A step that fails says so. Where its log ends without a word, it was killed.
     """
     # what the program has said last is what it says on the terminal, before what was logged
-    said = [found["error"].strip() for found in MESSAGE.finditer(text) if found["error"]]
+    said = [match["error"].strip() for match in MESSAGE.finditer(text) if match["error"]]
     errors = said or [message.text for message in messages_in(text) if message.own and message.level == "error"]
     if errors and not errors[0].startswith(UNEXPECTED):
         return errors[0]
@@ -119,8 +119,8 @@ def read_log(path: AnyPath) -> str:
 
 def read_messages(path: AnyPath) -> list[tuple[str, str]]:
     """Return ("warning" or "error", its first line) for each message of a step's log, each once; none without one."""
-    found = [(message.level, message.text.partition("\n")[0]) for message in messages_in(read_log(path))]
-    return list(dict.fromkeys(found))
+    messages = [(message.level, message.text.partition("\n")[0]) for message in messages_in(read_log(path))]
+    return list(dict.fromkeys(messages))
 
 
 def gather_messages(
@@ -156,10 +156,10 @@ def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFram
     Snakemake could not measure ("NA", "-") or the file is torn.
     """
     folder = Path(folder)
-    found = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/**/benchmarks/*.tsv"))
+    benchmarks = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/**/benchmarks/*.tsv"))
     rows = []
     for rule, pattern in patterns.items():
-        for path in found:
+        for path in benchmarks:
             if match := re.fullmatch(pattern, path):
                 of = {name: match.groupdict().get(name) for name in ("run", "brain")}
                 rows.append({"rule": rule, **of, **_measured(folder / path)})

@@ -108,10 +108,10 @@ def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, Trian
 
 def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
     """Return the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
-    found, expected = _structure(path), STRUCTURES[side]
-    if found in STRUCTURES.values() and found != expected:
+    named, expected = _structure(path), STRUCTURES[side]
+    if named in STRUCTURES.values() and named != expected:
         remedy = "Swap `left` and `right`, or mend what the file says of itself (AnatomicalStructurePrimary, lh or rh)."
-        raise InputError("is of the other hemisphere", path=path, found=found, expected=expected, remedy=remedy)
+        raise InputError("is of the other hemisphere", path=path, found=named, expected=expected, remedy=remedy)
     return read_surface(path)
 
 
@@ -198,8 +198,8 @@ def _structure(path: AnyPath) -> str | None:
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     if not points:
         return None
-    found: str | None = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
-    return found
+    named: str | None = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
+    return named
 
 
 def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
@@ -345,7 +345,7 @@ def coordinate_systems(path: AnyPath) -> list[System]:
     opener = nib.openers.ImageOpener(str(path), "rb")
     with opener as stream:
         root = ElementTree.parse(stream).getroot()
-    found: list[System] = []
+    systems: list[System] = []
     points = [array for array in root.iter("DataArray") if array.get("Intent") in ("NIFTI_INTENT_POINTSET", "1008")]
     for element in (element for array in points for element in array.iter("CoordinateSystemTransformMatrix")):
         numbers = (element.findtext("MatrixData") or "").split()
@@ -356,8 +356,8 @@ def coordinate_systems(path: AnyPath) -> list[System]:
             problem = "has a coordinate system that is no matrix"
             raise InputError(problem, path=path, found=f"{len(numbers)} entries") from error
         require_finite(matrix, path, "entries in a coordinate system", "rows")
-        found.append((data, to, matrix))
-    return found
+        systems.append((data, to, matrix))
+    return systems
 
 
 def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str | None]:

@@ -181,11 +181,11 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
     """
     links, boundary = _links(mesh)
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)
-    found = [
+    fits = [
         _fit(mesh.vertices, normals, areas, radii_mm, centres, balls, boundary)
         for centres, balls in _balls(mesh.vertices, radii_mm, links)
     ]
-    coefficients, fitted, one_sided = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    coefficients, fitted, one_sided = (np.concatenate(parts) for parts in zip(*fits, strict=True))
     return coefficients, fitted, one_sided
 
 

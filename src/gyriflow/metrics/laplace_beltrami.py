@@ -114,8 +114,8 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
 
 
 def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
-    if (found := solver.getConverged()) != number:
-        raise SolverError("the number of modes is wrong", found=found, expected=number, remedy=SLIVERS)
+    if (converged := solver.getConverged()) != number:
+        raise SolverError("the number of modes is wrong", found=converged, expected=number, remedy=SLIVERS)
     vector, _ = operator.createVecs()
     values, functions = np.empty(number), np.empty((vector.getSize(), number), order="F")
     for i in range(number):

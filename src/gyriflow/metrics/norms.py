@@ -74,15 +74,15 @@ def structure_volumes(
     Volumes are by label, in the norms' unit. A brain of another scheme has those of its nearest tissues, such as its
     cortex; a structure that it has no list for, or no voxel of, is left out.
     """
-    found, others = {}, []
+    structures, others = {}, []
     for name, norm in norms.items():
         same = norm.scheme == scheme.name
         labels = norm.labels if same else getattr(scheme, norm.tissue, ())
         total = sum(volumes.get(label, 0.0) for label in labels)
         if total > 0:
-            found[name] = total
+            structures[name] = total
             others += [] if same else [name]
-    return found, others
+    return structures, others
 
 
 def published_scores(
