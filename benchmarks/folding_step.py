@@ -21,18 +21,11 @@ import numpy as np
 import yaml
 
 
-def positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError("the first step is not counted, so at least 1 is needed")
-    return number
-
-
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("mesh", type=Path)
-    parser.add_argument("--steps", type=positive, default=6, help="counted steps of ours")
-    parser.add_argument("--paper-steps", type=positive, default=2, help="counted steps of the paper's set-up")
+    parser.add_argument("--steps", type=int, default=6, help="counted steps of ours")
+    parser.add_argument("--paper-steps", type=int, default=2, help="counted steps of the paper's set-up")
     parser.add_argument("--ranks", type=int, default=2, help="MPI ranks of both")
     parser.add_argument("--params", type=Path, help="parameters (YAML) instead of the paper's reference values")
     parser.add_argument("--inside-mpi", action="store_true", help=argparse.SUPPRESS)
@@ -40,7 +33,7 @@ def parse() -> argparse.Namespace:
 
 
 def relaxed_lu_step(problem, krylov, residual, direction, start: np.ndarray) -> int:
-    """Does a step as the paper's prototype does; returns the number of iterations."""
+    """Do a step as the paper's prototype does; the number of iterations."""
     from petsc4py import PETSc
 
     problem.set_displacement(start)
@@ -80,7 +73,7 @@ def measure(arguments: argparse.Namespace) -> None:
     refuse_impossible(mesh, zones)
     ours = Folding(comm, mesh, zones, p)
     states, seconds, newton, krylov = [State.at_start(mesh.vertices * M_PER_MM, p.step_s)], [], [], []
-    for step in range(arguments.steps + 1):
+    for _ in range(arguments.steps + 1):
         comm.barrier()
         began = time.perf_counter()
         state = ours.step(states[-1], p.step_s)
@@ -88,8 +81,6 @@ def measure(arguments: argparse.Namespace) -> None:
         newton.append(state.rows[-1]["newton"])
         krylov.append(state.rows[-1]["krylov"])
         states.append(state)
-        if comm.rank == 0:
-            print(f"ours  step {step}: {seconds[-1]:.2f} s, newton {newton[-1]}, krylov {krylov[-1]}", flush=True)
     memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
 
     paper = Folding(comm, mesh, zones, p, quadrature_degree=3)
@@ -100,7 +91,7 @@ def measure(arguments: argparse.Namespace) -> None:
     residual, direction = paper.problem.new_vector(), paper.problem.new_vector()
     domain, start = paper.domain, np.zeros_like(paper.problem.displacement)
     paper_seconds, paper_newton = [], []
-    for step in range(min(arguments.paper_steps, arguments.steps) + 1):
+    for _ in range(min(arguments.paper_steps, arguments.steps) + 1):
         comm.barrier()
         began = time.perf_counter()
         paper.begin(replace(states[len(paper_seconds)], positions=domain.positions), p.step_s)
@@ -109,8 +100,6 @@ def measure(arguments: argparse.Namespace) -> None:
         domain.place(domain.positions + domain.gathered(start[: domain.owned]))
         paper_seconds.append(time.perf_counter() - began)
         paper_newton.append(iterations)
-        if comm.rank == 0:
-            print(f"paper step {step}: {paper_seconds[-1]:.2f} s, newton {iterations}", flush=True)
     difference = np.linalg.norm(domain.positions - states[len(paper_seconds)].positions, axis=1).max() * MM_PER_M
     if comm.rank == 0:
         mine, theirs = float(np.median(seconds[1:])), float(np.median(paper_seconds[1:]))

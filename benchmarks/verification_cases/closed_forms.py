@@ -14,7 +14,7 @@ The root of ρ³ + ρ² + 3ρ = 1 is ρ = 0.2956, where ρ is the stretch along 
 
 
 def short_wave_rate(poisson_ratio: float) -> float:
-    """Returns the rate per growth of waves on a cortex without end where stress is forgotten: 3 + 2ν at any length.
+    """Return the rate per growth of waves on a cortex without end where stress is forgotten: 3 + 2ν at any length.
 
     Seen from the surface, the flat state rises by 2ν/(1 − ν) for each length (growth held back at the sides), turning
     normals add 2, and the held-back stress E/(1 − ν) on the slopes of the wave (1 − 2ν)(1 + ν)/(1 − ν).
@@ -32,7 +32,7 @@ class ThinFilm:
 
 
 def thin_film(slab: Slab) -> ThinFilm:
-    """Returns what the theory of thin plates says of a slab's cortex.
+    """Return what the theory of thin plates says of a slab's cortex.
 
     A plate of bending stiffness E'·I, E' = E/(1 − ν²), on a half space that resists a wave with Es'·k/2 (one side only:
     Biot's folds of an embedded layer have twice that), pressed alike in both directions by E/(1 − ν) times its growth:

@@ -25,7 +25,7 @@ LENGTHS = 0.4 * 0.5 ** np.arange(5)
 
 
 def cube(order: int) -> TetrahedralMesh:
-    """Returns a cube around the origin, in mm, whose inner vertices are moved at random (seeded): sides are curved."""
+    """Return a cube around the origin, in mm, whose inner vertices are moved at random (seeded): sides are curved."""
     mesh = grid([np.linspace(-SIDE_MM / 2, SIDE_MM / 2, 5)] * 3)
     mesh = _shaken(mesh, 0.3)
     return mesh if order == 1 else _shaken(quadratic(mesh), 0.08)
@@ -39,7 +39,7 @@ def _shaken(mesh: TetrahedralMesh, by: float) -> TetrahedralMesh:
 
 
 def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> Problem:
-    """Returns a problem on the cube with zones by the facets' centroids, growth, oblique normals and kept stretch."""
+    """Return a problem on the cube with zones by the facets' centroids, growth, oblique normals and kept stretch."""
     mesh = cube(order)
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, zone_of(mesh.vertices[facets].mean(axis=1)), np.ones(len(mesh.vertices)), 0.0, (-3.2, 3.2))
@@ -65,13 +65,13 @@ class Remainders:
     residual: Floats
 
     def slopes(self) -> Floats:
-        """Returns the (4, 2) slopes of their logarithms."""
+        """Return the (4, 2) slopes of their logarithms."""
         values = np.stack([self.energy, self.residual], axis=1)
         return np.diff(np.log(values), axis=0) / np.diff(np.log(LENGTHS))[:, None]
 
 
 def remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Remainders:
-    """Returns Taylor's remainders of a problem with all parts: layers, kept stress, a clamped base, both planes."""
+    """Return Taylor's remainders of a problem with all parts: layers, kept stress, a clamped base, both planes."""
 
     def zone_of(centre):
         zone = np.full(len(centre), FREE)
@@ -105,7 +105,7 @@ def remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Remainders:
 
 
 def patch_residual(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> float:
-    """Returns the force left inside a uniform body under an affine displacement, over that on its surface."""
+    """Return the force left inside a uniform body under an affine displacement, over that on its surface."""
     norms = []
     for zone in (CLAMPED, FREE):
         problem = problem_of(lambda centre, zone=zone: np.full(len(centre), zone), comm, uniform=True, order=order)

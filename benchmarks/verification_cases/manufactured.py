@@ -45,7 +45,7 @@ class Errors:
 
 
 def cube(cells: int, order: int) -> TetrahedralMesh:
-    """Returns a cube in mm whose inner vertices are moved smoothly: on an even grid, errors could cancel."""
+    """Return a cube in mm whose inner vertices are moved smoothly: on an even grid, errors could cancel."""
     x = grid([np.linspace(0.0, 1.0, cells + 1)] * 3)
     x = x if order == 1 else quadratic(x)
     bubble = np.sin(np.pi * x.vertices).prod(axis=1)[:, None]
@@ -82,7 +82,7 @@ class BodyForce:
 
 
 def layers(case: str, x, sin):
-    """Returns μ in Pa, dg, dr and the angle of the normal in radians at x, in sides, for any kind of sine."""
+    """Return μ in Pa, dg, dr and the angle of the normal in radians at x, in sides, for any kind of sine."""
     if case == GRADED:
         wave = sin(2 * x[0] + x[1])
         return 900 + 600 * wave, 0.10 + 0.05 * sin(3 * x[2] + x[0]), -0.04 + 0.03 * wave, 0.8 * x[2] + 0.5 * x[0]
@@ -90,18 +90,18 @@ def layers(case: str, x, sin):
 
 
 def exact_displacement(x):
-    """Returns the given displacement, in sides, at x in sides: zero on the surface, gradients up to 0.4."""
+    """Return the given displacement, in sides, at x in sides: zero on the surface, gradients up to 0.4."""
     bubble = ufl.sin(ufl.pi * x[0]) * ufl.sin(ufl.pi * x[1]) * ufl.sin(ufl.pi * x[2])
     return bubble * ufl.as_vector([0.1 * ufl.cos(2 * x[1]), 0.08 - 0.1 * x[0], 0.06 + 0.08 * x[1] * x[2]])
 
 
 def normal_at(angle):
-    """Returns the unit normal of an angle."""
+    """Return the unit normal of an angle."""
     return ufl.as_vector([0.6 * ufl.cos(angle), 0.6 * ufl.sin(angle), 0.8])
 
 
 def first_piola_stress(u, mu, dg, dr, N, V):
-    """Returns P = ∂ψ/∂F of Fe = F·V·Fg⁻¹ and ψ per volume of the state without stress, divided by det V, in Pa."""
+    """Return P = ∂ψ/∂F of Fe = F·V·Fg⁻¹ and ψ per volume of the state without stress, divided by det V, in Pa."""
     K = 2 * mu * (1 + POISSON_RATIO) / (3 * (1 - 2 * POISSON_RATIO))
     F = ufl.Identity(3) + ufl.grad(u)
     growth = (1 + dg) * (ufl.Identity(3) - ufl.outer(N, N)) + (1 + dr) * ufl.outer(N, N)
@@ -114,7 +114,7 @@ def first_piola_stress(u, mu, dg, dr, N, V):
 
 
 def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Errors:
-    """Returns the errors of the solver with elements of an order, on the cube with a case's body force."""
+    """Return the errors of the solver with elements of an order, on the cube with a case's body force."""
     mesh = cube(cells, order)
     facets = boundary_faces(mesh)[0]
     zones = Zones(facets, np.full(len(facets), CLAMPED), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
@@ -153,7 +153,7 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
 
 
 def rates(errors: list[Errors]) -> Floats:
-    """Returns the (k - 1, 2) observed orders in L2 and in the gradient from each of k meshes to the next."""
+    """Return the (k - 1, 2) observed orders in L2 and in the gradient from each of k meshes to the next."""
     values = np.array([[e.displacement, e.gradient] for e in errors])
     h = 1 / np.array([e.cells for e in errors])
     return np.diff(np.log(values), axis=0) / np.diff(np.log(h))[:, None]

@@ -43,7 +43,7 @@ class Asymmetry:
 
 
 def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
-    """Returns a right half in mm: an ellipsoid beside the midline, its vertices moved by up to `by` of a cell.
+    """Return a right half in mm: an ellipsoid beside the midline, its vertices moved by up to `by` of a cell.
 
     Moved at random (seeded), so that hardly any point has two nearest pial vertices.
     """
@@ -59,7 +59,7 @@ def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
 
 
 def rounded(half: TetrahedralMesh, part: float = 0.5) -> TetrahedralMesh:
-    """Returns a `hemisphere` as quadratic elements, whose outer edges go a part of the way to the ellipsoid."""
+    """Return a `hemisphere` as quadratic elements, whose outer edges go a part of the way to the ellipsoid."""
     straight = quadratic(half)
     pial = np.unique(boundary_faces(straight)[0])
     x = (straight.vertices[pial] - [MIDDLE_MM, 0.0, 0.0]) / SEMI_AXES_MM
@@ -69,13 +69,13 @@ def rounded(half: TetrahedralMesh, part: float = 0.5) -> TetrahedralMesh:
 
 
 def block(cells: int) -> TetrahedralMesh:
-    """Returns a right half in mm: a box of even cells, where most points have several nearest pial vertices."""
+    """Return a right half in mm: a box of even cells, where most points have several nearest pial vertices."""
     span = np.linspace(-1.0, 1.0, cells + 1)
     return grid([semi * span + middle for semi, middle in zip(SEMI_AXES_MM, (MIDDLE_MM, 0.0, 0.0), strict=True)])
 
 
 def reflected_and_merged(half: TetrahedralMesh) -> TetrahedralMesh:
-    """Returns a half and its mirror image at x = 0 side by side; vertex i of the first has its partner at n + i."""
+    """Return a half and its mirror image at x = 0 side by side; vertex i of the first has its partner at n + i."""
     image = half.vertices * [-1.0, 1.0, 1.0]
     # a mirrored element is inside out until two of its corners change places, and so do nodes on its edges
     tets = half.tets[:, TURNED[half.order]] + len(half.vertices)
@@ -83,7 +83,7 @@ def reflected_and_merged(half: TetrahedralMesh) -> TetrahedralMesh:
 
 
 def parameters(**changes) -> FoldingParameters:
-    """Returns the parameters of a run with tight tolerances."""
+    """Return the parameters of a run with tight tolerances."""
     values = {
         "start_week": 21.0,
         "end_week": 36.0,
@@ -101,7 +101,7 @@ def parameters(**changes) -> FoldingParameters:
 
 
 def asymmetry(mesh: TetrahedralMesh, state: State, zones: Zones) -> Asymmetry:
-    """Returns what tells the halves of a `reflected_and_merged` mesh apart in a state."""
+    """Return what tells the halves of a `reflected_and_merged` mesh apart in a state."""
     one, other = np.split(state.positions * MM_PER_M, 2)
     moved = np.linalg.norm(state.positions * MM_PER_M - mesh.vertices, axis=1).max()
     gap = np.linalg.norm(one - other * [-1.0, 1.0, 1.0], axis=1).max()
@@ -109,7 +109,7 @@ def asymmetry(mesh: TetrahedralMesh, state: State, zones: Zones) -> Asymmetry:
 
 
 def folded(half: TetrahedralMesh, steps: int, comm: MPI.Comm = MPI.COMM_WORLD, **changes) -> tuple[State, Asymmetry]:
-    """Returns the state after some steps of a half and its mirror image, and how much the two differ then."""
+    """Return the state after some steps of a half and its mirror image, and how much the two differ then."""
     mesh = reflected_and_merged(half)
     p = parameters(**changes)
     zones = zones_of_run(mesh, p)

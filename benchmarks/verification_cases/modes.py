@@ -95,7 +95,7 @@ class Fields(NamedTuple):
 
 
 def at_start(slab: Slab, wavenumber: Floats) -> Waves:
-    """Returns waves of height 1 on a slab without stress."""
+    """Return waves of height 1 on a slab without stress."""
     heights = [slab.finest]
     while sum(heights) < slab.depth:
         heights.append(heights[-1] * (1 + 1.5 * slab.finest if sum(heights) > 2 else 1.0))
@@ -110,7 +110,7 @@ def at_start(slab: Slab, wavenumber: Floats) -> Waves:
 
 
 def weight(slab: Slab, depth: NDArray) -> NDArray:
-    """Returns the cortical weight w = 1/(1 + exp(s (d/H − 1))) at depths d, complex ones included."""
+    """Return the cortical weight w = 1/(1 + exp(s (d/H − 1))) at depths d, complex ones included."""
     if np.isinf(slab.thickness):
         return np.ones_like(depth)
     if np.isinf(slab.steepness):
@@ -120,7 +120,7 @@ def weight(slab: Slab, depth: NDArray) -> NDArray:
 
 
 def fields_of(slab: Slab, waves: Waves, growth: float) -> Fields:
-    """Returns the fields of a step in which the cortex grows by `growth`."""
+    """Return the fields of a step in which the cortex grows by `growth`."""
     middle, _ = values_in_elements(waves.moved, waves.z)
     # depth below the waved surface of an element that has been moved itself
     depth = waves.z[-1] - (waves.z[1:] + waves.z[:-1]) / 2 + 0j
@@ -135,12 +135,12 @@ def fields_of(slab: Slab, waves: Waves, growth: float) -> Fields:
 
 
 def values_in_elements(nodal: Floats, z: Floats) -> tuple[Floats, Floats]:
-    """Returns means and slopes along z, in the elements, of (k, n + 1, 2) values at the nodes."""
+    """Return means and slopes along z, in the elements, of (k, n + 1, 2) values at the nodes."""
     return (nodal[:, 1:] + nodal[:, :-1]) / 2, np.diff(nodal, axis=1) / np.diff(z)[:, None]
 
 
 def gradient(waves: Waves, nodal: Floats) -> Floats:
-    """Returns the amplitudes (k, n, 3, 3) of the gradient of (p sin kx, q cos kx) with (k, n + 1, 2) values p, q."""
+    """Return the amplitudes (k, n, 3, 3) of the gradient of (p sin kx, q cos kx) with (k, n + 1, 2) values p, q."""
     middle, slope = values_in_elements(nodal, waves.z)
     amplitudes = np.zeros((*middle.shape[:2], 3, 3))
     amplitudes[..., 0, 0] = waves.wavenumber[:, None] * middle[..., 0]
@@ -150,7 +150,7 @@ def gradient(waves: Waves, nodal: Floats) -> Floats:
 
 
 def elastic_parts(after: NDArray, fields: Fields) -> tuple[NDArray, NDArray]:
-    """Returns B = G⁻¹·V·Fg⁻¹ and Fe = A·B, with A and G the gradients of the shapes after and before a step."""
+    """Return B = G⁻¹·V·Fg⁻¹ and Fe = A·B, with A and G the gradients of the shapes after and before a step."""
     across = fields.normal[..., :, None] * fields.normal[..., None, :]
     growth_inverse = (np.eye(3) - across) / (1 + fields.growth) + across
     before = np.linalg.inv(fields.place) @ fields.stretch @ growth_inverse
@@ -158,7 +158,7 @@ def elastic_parts(after: NDArray, fields: Fields) -> tuple[NDArray, NDArray]:
 
 
 def stress(slab: Slab, after: NDArray, fields: Fields) -> NDArray:
-    """Returns ∂/∂A of the energy ψ(Fe)·det G/det V per volume of the flat slab."""
+    """Return ∂/∂A of the energy ψ(Fe)·det G/det V per volume of the flat slab."""
     mu, ratio = fields.mu, 2 * (1 + slab.poisson_ratio) / (3 * (1 - 2 * slab.poisson_ratio))
     before, Fe = elastic_parts(after, fields)
     J = np.linalg.det(Fe)[..., None, None]
@@ -170,7 +170,7 @@ def stress(slab: Slab, after: NDArray, fields: Fields) -> NDArray:
 
 
 def flat_step(slab: Slab, fields: Fields) -> tuple[Floats, Floats]:
-    """Returns the gradients (n, 3, 3) of a step of the flat slab, which rises freely, and its tangents by `ENTRIES`."""
+    """Return the gradients (n, 3, 3) of a step of the flat slab, which rises freely, and its tangents by `ENTRIES`."""
     flat = Fields(*(values[0].real for values in fields))
     A = np.tile(np.eye(3), (len(flat.mu), 1, 1))
 
@@ -186,7 +186,7 @@ def flat_step(slab: Slab, fields: Fields) -> tuple[Floats, Floats]:
 
 
 def banded_system(waves: Waves, index: int, tangents: Floats, forces: Floats) -> tuple[Floats, Floats]:
-    """Returns stiffness (9 bands) and load of one wave, the base fixed, from tangents and stresses by `ENTRIES`."""
+    """Return stiffness (9 bands) and load of one wave, the base fixed, from tangents and stresses by `ENTRIES`."""
     k, dz = waves.wavenumber[index], np.diff(waves.z)
     B = np.zeros((len(dz), 4, 4))  # of p, q at the lower and p, q at the upper node
     B[:, 0, [0, 2]] = k / 2
@@ -205,7 +205,7 @@ def banded_system(waves: Waves, index: int, tangents: Floats, forces: Floats) ->
 
 
 def step(slab: Slab, waves: Waves, growth: float) -> Waves:
-    """Returns the waves after a step in which the cortex grows by `growth`."""
+    """Return the waves after a step in which the cortex grows by `growth`."""
     fields = fields_of(slab, waves, growth)
     A, tangents = flat_step(slab, fields)
     rows, columns = np.transpose(ENTRIES)
@@ -225,7 +225,7 @@ def step(slab: Slab, waves: Waves, growth: float) -> Waves:
 
 
 def relaxed_stretch(Fe: NDArray, part: float) -> tuple[Floats, Floats]:
-    """Returns V^part of the flat slab (n, 3) and its amplitudes (k, n, 3, 3), V² = Fe·Feᵀ.
+    """Return V^part of the flat slab (n, 3) and its amplitudes (k, n, 3, 3), V² = Fe·Feᵀ.
 
     The derivative of a power of a tensor at a diagonal one multiplies its entries by divided differences.
     """
@@ -239,7 +239,7 @@ def relaxed_stretch(Fe: NDArray, part: float) -> tuple[Floats, Floats]:
 
 
 def amplifications(slab: Slab, wavenumber: Floats, growth: float, steps: int) -> Floats:
-    """Returns the (steps + 1, k) heights of waves over those at the start, after equal steps."""
+    """Return the (steps + 1, k) heights of waves over those at the start, after equal steps."""
     waves, heights = at_start(slab, wavenumber), [np.ones(len(wavenumber))]
     for _ in range(steps):
         waves = step(slab, waves, growth)
@@ -248,12 +248,12 @@ def amplifications(slab: Slab, wavenumber: Floats, growth: float, steps: int) ->
 
 
 def growth_rates(slab: Slab, wavenumber: Floats, growth: float = 1e-6) -> Floats:
-    """Returns the (k,) rates ln(h'/h)/growth of the first step: where stress is forgotten, those of all steps."""
+    """Return the (k,) rates ln(h'/h)/growth of the first step: where stress is forgotten, those of all steps."""
     return np.log(amplifications(slab, wavenumber, growth, 1)[1]) / growth
 
 
 def critical_growth(slab: Slab, wavenumber: Floats, growth: float, most: float) -> Floats:
-    """Returns the growth at which the flat slab no longer resists each of the waves; NaN where that is beyond `most`.
+    """Return the growth at which the flat slab no longer resists each of the waves; NaN where that is beyond `most`.
 
     Where stress is kept: the tangent of a step without growth is no longer positive definite.
     """

@@ -68,11 +68,11 @@ class Waved:
         return Slab(self.contrast, self.poisson_ratio, depth=self.width_mm, memory=self.memory)
 
     def expected(self) -> Floats:
-        """Returns the (steps + 1, waves) heights over those at the start, from `modes`."""
+        """Return the (steps + 1, waves) heights over those at the start, from `modes`."""
         return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps)
 
     def parameters(self) -> FoldingParameters:
-        """Returns the parameters of the run."""
+        """Return the parameters of the run."""
         memory_gw = self.memory / RATE_PER_S / SECONDS_PER_GW
         values = {
             # no parameter depends on the week
@@ -96,7 +96,7 @@ class Waved:
 
 
 def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
-    """Returns a slab with `cells` cells to a cortical thickness, coarser below, and waves of a height on top."""
+    """Return a slab with `cells` cells to a cortical thickness, coarser below, and waves of a height on top."""
     down, size = [0.0], 1 / cells
     while down[-1] < case.width_mm:
         if down[-1] >= FINE_DEPTH_MM - 1e-9:
@@ -141,7 +141,7 @@ class FastestWave:
 
 
 def fastest_wave(case: Waved, cells: int, timed_steps: int = 4, comm: MPI.Comm = MPI.COMM_SELF) -> FastestWave:
-    """Returns the error of the fastest wave's rate in the first step, and what a step takes."""
+    """Return the error of the fastest wave's rate in the first step, and what a step takes."""
     exact = np.log(case.expected()[1])
     error = (np.log(amplified(case, cells, comm)[1]) / exact - 1)[exact.argmax()]
     mesh, p = mesh_of(case, cells, HEIGHT_MM), case.parameters()
@@ -158,7 +158,7 @@ def fastest_wave(case: Waved, cells: int, timed_steps: int = 4, comm: MPI.Comm =
 
 
 def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats:
-    """Returns the (steps + 1, waves) heights in mm of the waves at the start and after each step."""
+    """Return the (steps + 1, waves) heights in mm of the waves at the start and after each step."""
     mesh = mesh_of(case, cells, height_mm)
     p = case.parameters()
     folding = Folding(comm, mesh, zones_of_run(mesh, p), p)
@@ -176,6 +176,6 @@ def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats
 
 
 def amplified(case: Waved, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Floats:
-    """Returns the (steps + 1, waves) heights over those at the start, less what a flat slab shows."""
+    """Return the (steps + 1, waves) heights over those at the start, less what a flat slab shows."""
     flat, waved = (heights(case, cells, height, comm) for height in (0.0, HEIGHT_MM))
     return (waved - flat) / waved[0]
