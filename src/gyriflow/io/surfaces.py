@@ -261,9 +261,6 @@ def read_pose(path: AnyPath) -> Pose:
     return pose_from(content.get("pose", content))
 
 
-# --- matched surfaces ------------------------------------------------------------------------------------------
-
-
 def connectivity(path: Path) -> tuple[int, int, str]:
     """Return the numbers of vertices and of triangles of a surface file, and a digest of its triangles.
 
@@ -281,8 +278,6 @@ def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]
     digest = hashlib.sha256(np.ascontiguousarray(triangles)).hexdigest()
     return len(mesh.vertices), len(mesh.faces), digest
 
-
-# --- labels at the vertices ------------------------------------------------------------------------------------
 
 NO_REGION = 0
 UNNAMED = ("", "???", "unknown", "Unknown", "none")
@@ -326,8 +321,6 @@ def write_vertex_labels(
     with replaced(path) as temporary:
         nib.save(GiftiImage(darrays=[array], labeltable=table, meta=GiftiMetaData(_named(structure))), temporary)
 
-
-# --- the space of the coordinates ------------------------------------------------------------------------------
 
 UNKNOWN = "NIFTI_XFORM_UNKNOWN"
 SCANNER = "NIFTI_XFORM_SCANNER_ANAT"
