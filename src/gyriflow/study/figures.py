@@ -160,7 +160,7 @@ def _whole(one: Simulation) -> dict[float, str]:
     return {row.week: row.parts["whole"] for row in one.measured}
 
 
-def _beside(*runs: Simulation) -> dict[float, Brain]:
+def _measured_by_week(*runs: Simulation) -> dict[float, Brain]:
     """Return the measured brains that runs are shown beside, by week."""
     return {float(week): brain for one in runs for week, brain in one.beside.items()}
 
@@ -205,12 +205,12 @@ def _of_growth(study: Study) -> Iterator[Figure]:
 def _of_folding(study: Study) -> Iterator[Figure]:
     for start in study.starts:
         runs = [one for one in study.folded if one.start is start]
-        names, real = {"brain": start.id}, _beside(*runs)
+        names, real = {"brain": start.id}, _measured_by_week(*runs)
         options = {"measured": measured_name(real.values())}
         surfaces = {week: brain.pial for week, brain in real.items()}
         inputs: Given = {"runs": {one.run: _whole(one) for one in runs}, "real": surfaces}
         yield Figure("weekly_figure", WEEKLY, "pictures.runs_by_week", inputs, options, names, paper=True)
-        simulated = {one.run: {week: _whole(one)[week] for week in _beside(one)} for one in runs}
+        simulated = {one.run: {week: _whole(one)[week] for week in _measured_by_week(one)} for one in runs}
         inputs = {"runs": simulated, "real": surfaces}
         path = f"{OF_STUDY}/outlines.{{brain}}.png"
         yield Figure("outlines_figure", path, "sections.outlines_chart", inputs, options, names, paper=True)
@@ -259,7 +259,7 @@ def _of_metrics(study: Study) -> Iterator[Figure]:
     measures = list(SHAPE_MEASURES)[: None if _technical(study) else 1]
     for start in study.starts:
         runs = [one for one in study.folded if one.start is start]
-        real = _beside(*runs)
+        real = _measured_by_week(*runs)
         brains = {one.run: {row.week: _halves(row) for row in one.measured} for one in runs}
         brains[measured_name(real.values())] = {week: _halves(brain.measured) for week, brain in real.items()}
         for measure in measures:
@@ -322,7 +322,7 @@ def _of_validation(study: Study) -> Iterator[Figure]:
 
 
 def _of_expected(one: Simulation) -> Iterator[Figure]:
-    simulated, real = _whole(one), _beside(one)
+    simulated, real = _whole(one), _measured_by_week(one)
     away = {float(week): [simulated[float(week)], one.file(DEVIATION["maps"], week=week)] for week in one.real}
     # the last week and others, four at most
     weeks = sorted(away, reverse=True)[:: -(-len(away) // 4)]
