@@ -1,5 +1,6 @@
 """The commands of `gyriflow`, thin: each reads its arguments, calls one function and prints what it returns."""
 
+import json
 import os
 import shlex
 import shutil
@@ -255,7 +256,7 @@ def status(directory: Path, as_json: bool) -> None:
     from . import status as module
 
     study = module.status(directory)
-    click.echo(module.as_json(study) if as_json else "\n".join(module.as_text(study)))
+    click.echo(json.dumps(study, indent=2, ensure_ascii=False) if as_json else "\n".join(module.as_text(study)))
 
 
 @main.command()

@@ -1,6 +1,5 @@
 """How far a study is, from its working directory alone: the run that is live or was the last, and the results there."""
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -91,11 +90,6 @@ def as_text(study: Mapping[str, Any]) -> Iterator[str]:
             yield "\n" + tabulate(rows, headers="keys", tablefmt="plain", disable_numparse=True)
     if study["report"]:
         yield f"\nreport: {Path(study['report']).absolute()}"
-
-
-def as_json(study: Mapping[str, Any]) -> str:
-    """Return a status as JSON, for programs."""
-    return json.dumps(study, indent=2, ensure_ascii=False)
 
 
 def report_of(directory: Path) -> Path:

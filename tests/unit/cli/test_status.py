@@ -1,12 +1,10 @@
 """How far a study is, from what lies in its folder."""
 
-import json
-
 import pytest
 
 from gyriflow.cli.launch import hold_lock
 from gyriflow.cli.provenance import STUDY
-from gyriflow.cli.status import STATE, as_json, as_text, status
+from gyriflow.cli.status import STATE, as_text, status
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
 
@@ -78,7 +76,7 @@ def test_a_folder_without_a_study_is_named(tmp_path):
 def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(study):
     brain = "brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\nstart: a\nfolding: {end_week: 24}\n"
     (study / "gyriflow.yaml").write_text(brain + "runs: {r: {}, later: {}}\n")
-    found = json.loads(as_json(status(study)))
+    found = status(study)
     assert found["brains"][0] == {"brain": "a", "surface": "done", "mesh": "-", "metrics": "-"}
     assert [(row["run"], row["brain"], row["folding"]) for row in found["runs"]] == [
         ("r", "a", "-"),
