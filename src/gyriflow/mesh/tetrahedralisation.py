@@ -14,7 +14,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, grid, signe
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
 from ..parameters.terms import Mesher
 from .meshers import run_mesher
-from .nodes import curve_edges, improve
+from .nodes import curve_edges
 
 log = logging.getLogger(__name__)
 TIME_LIMIT_S = 3600.0
@@ -32,7 +32,7 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 def edge_length_at(
     depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> NDArray[np.float64]:
-    """Returns the wanted edge length in mm of elements of an order at depths in mm below the surface.
+    """Return the wanted edge length in mm of elements of an order at depths in mm below the surface.
 
     It is that of the surface down to a depth, grows from there on, and ends at that of the core. With depth, nodes of
     elements of both orders are as far apart.
@@ -44,7 +44,7 @@ def edge_length_at(
 def background_mesh(
     surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
-    """Returns a regular tetrahedral grid around the surface and the wanted edge length in mm at its vertices."""
+    """Return a regular tetrahedral grid around the surface and the wanted edge length in mm at its vertices."""
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
     counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
@@ -63,7 +63,7 @@ def tetrahedralise(
     mesher: Mesher = "pytetwild",
     order: int = 1,
 ) -> TetrahedralMesh:
-    """Returns a tetrahedral mesh of the inside of a closed, outward surface in mm, of one or more components.
+    """Return a tetrahedral mesh of the inside of a closed, outward surface in mm, of one or more components.
 
     `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the surface and deep inside: the edge
     length of linear elements (`order` 1), half of that of quadratic ones (2), which are curved to follow the surface.
@@ -71,14 +71,14 @@ def tetrahedralise(
 
     "pytetwild" (fTetWild) makes a surface of its own within `envelope_mm`, and sizes elements by their depth. "tetgen"
     keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as their
-    quality allows, and the poor ones are improved.
+    quality allows.
 
     MeshError where the surface is open or inside out, the mesher fails or takes too long, or its mesh is not the inside
     of the surface: other components or handles, inverted elements, a volume that differs by more than 5 %.
     """
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
-        raise MeshError("the surface to be filled must be closed and face outwards", remedy="Repair it first.")
+        raise MeshError("the surface to be filled must be closed and face outwards")
     edge = order * surface_edge_mm
     core = max(order * core_edge_mm, edge)
     if mesher == "tetgen":
@@ -97,8 +97,6 @@ def tetrahedralise(
         }
     mesh = run_mesher(mesher, arrays, time_limit_s)
     _refuse_other_shape(mesh, surface)
-    # fTetWild has optimised its elements itself
-    mesh = improve(mesh) if mesher == "tetgen" else mesh
     return curve_edges(mesh, surface) if order == 2 else mesh
 
 
@@ -117,7 +115,6 @@ def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
             "the surface cuts itself and cannot be kept as it is",
             found=f"{crossing} faces that cross others after remeshing to edges of {edge_mm:.2f} mm",
             expected="none",
-            remedy="Use mesh.mesher: pytetwild, or shorter edges, or repair or smooth the surface.",
         )
     return even
 
@@ -139,8 +136,4 @@ def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
     }
     found = [text for text, wrong in problems.items() if wrong]
     if found:
-        raise MeshError(
-            "the mesh is not the inside of the surface",
-            found="; ".join(found),
-            remedy="Mesh with a smaller mesh.envelope_mm, or smooth the surface more.",
-        )
+        raise MeshError("the mesh is not the inside of the surface", found="; ".join(found))
