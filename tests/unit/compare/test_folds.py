@@ -5,12 +5,12 @@ import trimesh
 from gyriflow.compare.shapes import Shape, against_real, cortex_dice
 from gyriflow.geometry.triangles import TriangleMesh
 
-BALL = trimesh.creation.icosphere(subdivisions=5, radius=30.0)
+BALL = trimesh.creation.icosphere(subdivisions=4, radius=15.0)
 SPHERE = TriangleMesh(BALL.vertices, BALL.faces)
 X, _, Z = SPHERE.vertices.T
 
 
-def shape(shape_index: np.ndarray, mean: np.ndarray | float = 1 / 30) -> Shape:
+def shape(shape_index: np.ndarray, mean: np.ndarray | float = 1 / 15) -> Shape:
     return Shape(SPHERE, np.broadcast_to(np.asarray(mean, dtype=float), shape_index.shape), shape_index)
 
 
@@ -23,8 +23,8 @@ def test_size_and_distance_of_curvature():
 
 
 def test_cortices_overlap_as_far_as_their_surfaces_are_the_same():
-    # the outer 2 mm of balls of 30 and 31 mm share those from 29 to 30 mm
-    shared, *whole = ((far**3 - near**3) for near, far in ((29, 30), (28, 30), (29, 31)))
-    larger = TriangleMesh(SPHERE.vertices * 31 / 30, SPHERE.faces)
+    # the outer 2 mm of balls of 15 and 16 mm share those from 14 to 15 mm
+    shared, *whole = ((far**3 - near**3) for near, far in ((14, 15), (13, 15), (14, 16)))
+    larger = TriangleMesh(SPHERE.vertices * 16 / 15, SPHERE.faces)
     assert cortex_dice(SPHERE, larger) == pytest.approx(2 * shared / sum(whole), abs=0.04)
     assert cortex_dice(SPHERE, SPHERE) == 1.0
