@@ -221,7 +221,7 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
     far_outside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(~mask) <= reach) > reach
     far_inside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(mask) > reach) == 0
     opened = ndimage.distance_transform_edt(far_inside) <= reach
-    found = []
+    patches = []
     for fills, difference in ((True, far_outside & ~mask), (False, mask & ~opened)):
         number, _ = ndimage.label(difference, OUTSIDE)
         for index, tight in enumerate(ndimage.find_objects(number), start=1):
@@ -229,9 +229,9 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
                 slice(max(side.start - 1, 0), min(side.stop + 1, n)) for side, n in zip(tight, mask.shape, strict=True)
             )
             patch = number[box] == index
-            found.append((int(patch.sum()), fills, box, patch))
-    found.sort(key=lambda item: item[0])
-    return [(fills, box, patch) for _, fills, box, patch in found]
+            patches.append((int(patch.sum()), fills, box, patch))
+    patches.sort(key=lambda item: item[0])
+    return [(fills, box, patch) for _, fills, box, patch in patches]
 
 
 def euler_gain(before: Mask, after: Mask) -> int:

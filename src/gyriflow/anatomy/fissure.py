@@ -141,8 +141,8 @@ def _middles(mesh: TriangleMesh, height: Floats, wall: Ints, opposite: Ints, nor
     in_plane = mesh.vertices - across
     # distances along the plane count five times those across it
     squeezed = in_plane + 0.2 * across
-    _, found = cKDTree(squeezed[opposite]).query(squeezed[wall], k=min(8, len(opposite)))
-    met = opposite[found]
+    _, nearest = cKDTree(squeezed[opposite]).query(squeezed[wall], k=min(8, len(opposite)))
+    met = opposite[nearest]
     gap = height[met] - height[wall][:, None]
     aside = np.linalg.norm(in_plane[met] - in_plane[wall][:, None], axis=-1)
     gap = np.where((gap > 0) & (gap < WIDEST_FISSURE * np.ptp(height)) & (aside < 2.0), gap, np.inf)
@@ -177,14 +177,14 @@ def _symmetry_planes(sample: Floats, tree: cKDTree, search_deg: float) -> list[t
     planes = []
     for start in _apart(directions, scores):
         base, aside = directions[start], np.linalg.svd(directions[start][None])[2][1:]
-        found = minimize(
+        best = minimize(
             lambda x, *frame: _mirror_distance(*_plane_near(x, *frame), sample, tree),
             np.zeros(3),
             args=(base, aside, centre),
             method="Nelder-Mead",
             options={"initial_simplex": np.vstack([np.zeros(3), 0.1 * np.eye(3)]), "xatol": 1e-4, "fatol": 1e-4},
         )
-        planes.append((*_plane_near(found.x, base, aside, centre), float(found.fun)))
+        planes.append((*_plane_near(best.x, base, aside, centre), float(best.fun)))
     return planes
 
 
@@ -401,10 +401,10 @@ def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fi
     moves = np.where(crossing, steps[:-1, None, None] + share * SPACING_MM, np.inf)
     nearest = np.abs(moves).argmin(axis=0)
     move = np.take_along_axis(moves, nearest[None], axis=0)[0]
-    found = np.isfinite(move)
+    crossed = np.isfinite(move)
     bend = 0.25 * BEND_MM / SPACING_MM
-    weight = ndimage.gaussian_filter(found.astype(float), bend)
-    total = ndimage.gaussian_filter(np.where(found, move, 0.0), bend)
+    weight = ndimage.gaussian_filter(crossed.astype(float), bend)
+    total = ndimage.gaussian_filter(np.where(crossed, move, 0.0), bend)
     return Fissure(plane, fissure.axes, fissure.corner, fissure.heights + total / (weight + 0.02))
 
 

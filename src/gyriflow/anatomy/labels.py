@@ -254,11 +254,11 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     seen /= np.maximum(ndimage.gaussian_filter(clear.astype(np.float32), 0.5 * SMOOTHING), 1e-6)
     number, _ = ndimage.label(clear & (seen > (ENCLOSED if scheme.cortex else WHOLLY)), EVERY_NEIGHBOUR)
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
-    found = np.isin(number, np.flatnonzero(sizes >= max(1, CRUMB * sizes.max())) + 1)
-    around = ndimage.binary_dilation(found) & ~found
-    large = found.sum() > (FURTHER_VENTRICLES if labelled else REPORTED_LOSS) * cerebrum.sum()
+    enclosed = np.isin(number, np.flatnonzero(sizes >= max(1, CRUMB * sizes.max())) + 1)
+    around = ndimage.binary_dilation(enclosed) & ~enclosed
+    large = enclosed.sum() > (FURTHER_VENTRICLES if labelled else REPORTED_LOSS) * cerebrum.sum()
     if large and (not labelled or tissue[around].mean() > AROUND_VENTRICLE):
-        filled[box] = found[(slice(margin, -margin),) * 3]
+        filled[box] = enclosed[(slice(margin, -margin),) * 3]
     return filled
 
 
@@ -268,13 +268,13 @@ def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> tuple[N
     if not hindbrain.any():
         return number, list(range(1, count + 1))
     elsewhere = ~hindbrain & ~np.isin(labels, scheme.cerebrum)
-    found = []
+    parts = []
     for part, box in enumerate(ndimage.find_objects(number), start=1):
         wide = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in box)
         around = ndimage.binary_dilation(number[wide] == part, EVERY_NEIGHBOUR)
         if (around & hindbrain[wide]).sum() > (around & elsewhere[wide]).sum():
-            found.append(part)
-    return number, found
+            parts.append(part)
+    return number, parts
 
 
 def _seen(clear: Mask, tissue: Mask) -> NDArray[np.float32]:

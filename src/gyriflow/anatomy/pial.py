@@ -313,8 +313,8 @@ def from_hemispheres(
     pose = pose.each({side: shift @ pose.of_file(side) for side, shift in apart.items()})
     measures = {"gap_before_mm": gap, "moved_apart_mm": moved}
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates, **measures}
-    for name, *found in zip(SIDES, sides, even, strict=True):
-        report |= {f"{key}_{name}": value for one in found for key, value in one.report.items() if key != "stalks"}
+    for name, *steps in zip(SIDES, sides, even, strict=True):
+        report |= {f"{key}_{name}": value for one in steps for key, value in one.report.items() if key != "stalks"}
     if stalks := [stalk for side in sides for stalk in side.report.get("stalks", [])]:
         report["stalks"] = stalks
     mesh = merged(left, right)
@@ -354,8 +354,8 @@ def from_surface(
         pose = pose_of_surface(even.mesh, coordinates)
     warnings += logged(pose.warnings)
     # "lps" where these were found, else what the user has named
-    found = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
-    report = {"coordinates": found, **clean.report, **even.report}
+    read_as = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
+    report = {"coordinates": read_as, **clean.report, **even.report}
     if side:
         report = {"source": "hemisphere", "side": side, **report}
         return _single_hemisphere(even.mesh, side, pose, week, report, warnings)

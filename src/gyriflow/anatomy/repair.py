@@ -143,8 +143,8 @@ def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: fl
     smooth, report = make_even(mesh, smoothing_iterations, edge_length_mm)
     remade: dict[str, Any] = {}
     warnings = []
-    if found := faults(smooth):
-        warnings.append(f"the surface was rebuilt through voxels, since it had {found}")
+    if remaining := faults(smooth):
+        warnings.append(f"the surface was rebuilt through voxels, since it had {remaining}")
         mesh, remade["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
         smooth, report = make_even(mesh, smoothing_iterations, edge_length_mm)
     require_sound(smooth)
@@ -153,11 +153,10 @@ def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: fl
 
 def require_sound(mesh: TriangleMesh) -> None:
     """Raise MeshError where the surface is not made of closed spheres without intersections."""
-    found = faults(mesh)
-    if found:
+    if problems := faults(mesh):
         raise MeshError(
             "the surface could not be made good",
-            found=found,
+            found=problems,
             expected="closed pieces of Euler number 2 that do not cut themselves",
         )
 
@@ -166,12 +165,12 @@ def faults(mesh: TriangleMesh) -> str:
     """Return what keeps the surface from being closed spheres without intersections; empty where nothing does."""
     euler = [euler_number(piece) for piece in pieces(mesh)]
     cutting = int(self_intersecting_faces(mesh).sum())
-    found = [
+    problems = [
         "edges without two faces" if not is_closed(mesh) else "",
         f"Euler numbers {euler}" if any(number != 2 for number in euler) else "",
         f"{cutting} faces that cut others" if cutting else "",
     ]
-    return ", ".join(fault for fault in found if fault)
+    return ", ".join(fault for fault in problems if fault)
 
 
 def smooth_taubin(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
@@ -214,9 +213,9 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
     mesh, opened = _make_manifold(mesh)
     mesh, dropped = _main_pieces(mesh)
     mesh, holes = _fill_holes(mesh, max_hole_mm)
-    found = pieces(mesh)
-    inward = [signed_volume(piece) < 0 for piece in found]
-    mesh = merged(*(flipped(piece) if turn else piece for piece, turn in zip(found, inward, strict=True)))
+    parts = pieces(mesh)
+    inward = [signed_volume(piece) < 0 for piece in parts]
+    mesh = merged(*(flipped(piece) if turn else piece for piece, turn in zip(parts, inward, strict=True)))
     if not is_closed(mesh):
         _, counts = edges(mesh)
         raise MeshError(
@@ -277,14 +276,14 @@ def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
 
 
 def _main_pieces(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
-    found = pieces(mesh)
-    areas = [area(piece) for piece in found]
-    kept = [found[0]]
-    for piece, size in zip(found[1:], areas[1:], strict=True):
-        inside = np.median(np.abs(igl.fast_winding_number(found[0].vertices, found[0].faces, piece.vertices))) > 0.5
+    parts = pieces(mesh)
+    areas = [area(piece) for piece in parts]
+    kept = [parts[0]]
+    for piece, size in zip(parts[1:], areas[1:], strict=True):
+        inside = np.median(np.abs(igl.fast_winding_number(parts[0].vertices, parts[0].faces, piece.vertices))) > 0.5
         if size >= COMPARABLE * areas[0] and not inside:
             kept.append(piece)
-    dropped = {"pieces_dropped": len(found) - len(kept), "area_dropped_mm2": sum(areas) - sum(map(area, kept))}
+    dropped = {"pieces_dropped": len(parts) - len(kept), "area_dropped_mm2": sum(areas) - sum(map(area, kept))}
     return merged(*kept), {"pieces": len(kept)} | dropped
 
 
@@ -445,8 +444,8 @@ def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> Floats:
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
     # of each face as many as its size asks for: one long face is not to fill the memory
     every = np.maximum(np.ceil(longest / voxel_mm), 1).astype(int)
-    found = []
+    points = []
     for steps in np.unique(every):
         weights = np.array([(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)]) / steps
-        found.append(np.einsum("wk,fkd->wfd", weights, triangles[every == steps]).reshape(-1, 3).round(3))
-    return np.unique(np.concatenate(found), axis=0)
+        points.append(np.einsum("wk,fkd->wfd", weights, triangles[every == steps]).reshape(-1, 3).round(3))
+    return np.unique(np.concatenate(points), axis=0)

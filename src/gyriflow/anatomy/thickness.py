@@ -96,9 +96,9 @@ def cortical_thickness(
             found=f"{int(cortex.sum())} voxels of cortex, all of them deep inside or thinner than a third of a voxel",
             expected="a layer around the cerebrum",
         )
-    _, known = cKDTree(points[measured]).query(points[~measured])
+    _, nearest = cKDTree(points[measured]).query(points[~measured])
     filled = values.copy()
-    filled[~measured] = values[measured][known]
+    filled[~measured] = values[measured][nearest]
     report = summary(values, measured, vertex_areas(pial))
     return Thickness(filled, measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
 

@@ -80,10 +80,10 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     values = map_coordinates(data, index.T, order=1, mode="nearest")
     missing = ~np.isfinite(values)
     if missing.any():
-        known = np.isfinite(data)
-        reach = distance_transform_edt(~known, sampling=np.linalg.norm(matrix[:3, :3], axis=0))
+        finite = np.isfinite(data)
+        reach = distance_transform_edt(~finite, sampling=np.linalg.norm(matrix[:3, :3], axis=0))
         voxels = np.clip(np.rint(index[missing]).astype(int), 0, np.array(data.shape) - 1)
-        depth = f", up to {reach[tuple(voxels.T)].max():.1f} mm from the nearest number" if known.any() else ""
+        depth = f", up to {reach[tuple(voxels.T)].max():.1f} mm from the nearest number" if finite.any() else ""
         raise InputError(
             "a map has no number in parts of the start brain",
             path=path,
@@ -126,7 +126,7 @@ def _solid(surface: TriangleMesh) -> TriangleMesh:
 
 def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:
     count = min(NEIGHBOURS, len(vertices))
-    gaps, candidates = (found.reshape(len(points), count) for found in cKDTree(vertices).query(points, k=count))
+    gaps, candidates = (values.reshape(len(points), count) for values in cKDTree(vertices).query(points, k=count))
     rank = np.empty(len(vertices), dtype=np.int64)
     rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
     tied = gaps <= gaps[:, :1] * (1 + TIE)

@@ -173,21 +173,21 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     given one's gaps that the mesh leaves open, None where it has none (see `fidelity`).
     """
     quality = element_quality(mesh)
-    own, _ = boundary_surface(mesh)
+    boundary, _ = boundary_surface(mesh)
     volume = quality["volume_mm3"]
     walls = gap_walls(surface)
     return {
         "order": mesh.order,
         "tets": len(mesh.tets),
         "vertices": len(mesh.vertices),
-        "pial_faces": len(own.faces),
-        "pial_edge_mm": mean_edge_length(own),
-        "pial_area_mm2": area(own),
-        "smallest_pial_face_mm2": float(face_areas(own).min()),
-        "crossing_faces": crossing_faces(own),
-        "surface_distance_mm": fidelity(own, surface),
-        "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(own))},
-        "gap_kept": gap_kept(walls, own),
+        "pial_faces": len(boundary.faces),
+        "pial_edge_mm": mean_edge_length(boundary),
+        "pial_area_mm2": area(boundary),
+        "smallest_pial_face_mm2": float(face_areas(boundary).min()),
+        "crossing_faces": crossing_faces(boundary),
+        "surface_distance_mm": fidelity(boundary, surface),
+        "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(boundary))},
+        "gap_kept": gap_kept(walls, boundary),
         "volume_mm3": float(volume.sum()),
         "volume_change": float(volume.sum() / signed_volume(surface) - 1),
         **{f"{name}_radius_ratio": float(quality["radius_ratio"].agg(name)) for name in ("min", "mean", "median")},
