@@ -68,9 +68,7 @@ class Pose:
 
 
 def pose_from(plain: Mapping[str, Any]) -> Pose:
-    """Return the pose that plain values hold; InputError where they are a refusal, for its reason."""
-    if "refused" in plain:
-        raise InputError(plain["refused"])
+    """Return the pose that plain values hold."""
     files = {name: np.array(one) for name, one in plain["files"].items()}
     judged = plain["by"], plain["together"], plain["evidence"], tuple(plain["warnings"])
     return Pose(np.array(plain["world"]), files, *judged)

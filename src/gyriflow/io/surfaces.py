@@ -256,9 +256,8 @@ def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:
 
 
 def read_pose(path: AnyPath) -> Pose:
-    """Read the pose in a `surface.json` or `pose.json`; InputError, for its reason, where it is a refusal."""
-    content = read_json(path)
-    return pose_from(content.get("pose", content))
+    """Read the pose in a `surface.json`."""
+    return pose_from(read_json(path)["pose"])
 
 
 def connectivity(path: Path) -> tuple[int, int, str]:
