@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
 from ..geometry.alignment import CUBE_ROTATIONS, Fit, Planes, fits_from_all_sides, follow_planes, margin
@@ -30,6 +31,8 @@ DISTINCT_DEG, REFINED = 40.0, 3
 # the medial wall: how near to its plane points are, in sizes, and how far their normals are from its own, in degrees
 WALL = ((0.30, 40.0), (0.15, 25.0), (0.075, 15.0), (0.075, 10.0))
 WALL_ROUNDS, WALL_COSINE = 6, 0.85
+# narrower looks that turn the plane by more follow a bend of the wall
+BEND_DEG = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,14 +171,28 @@ def medial_wall(shape: Shape, normal: Floats) -> tuple[Floats, float]:
     counts, edges = np.histogram(heights, bins=20)
     offset = edges[counts.argmax()] + 0.5 * (edges[1] - edges[0])
     # ever more narrowly, so that a wall that was cut along a plane gets that plane
-    for width, angle_deg in [step for step in WALL for _ in range(WALL_ROUNDS)]:
-        turned = np.degrees(np.arccos(np.clip(normals @ normal, -1.0, 1.0)))
-        weights = _biweight((points @ normal - offset) / width) * _biweight(turned / angle_deg)
-        _, axes = np.linalg.eigh(np.cov(points.T, aweights=weights))
-        normal = axes[:, 0] * np.sign(axes[:, 0] @ normal)
-        offset = np.average(points, axis=0, weights=weights) @ normal
+    for number, look in enumerate(WALL):
+        narrower, there = _wall_plane(points, normals, normal, offset, *look)
+        if number > 1 and _degrees(narrower @ normal) > BEND_DEG:
+            break
+        normal, offset = narrower, there
     return normal, float(offset)
 
 
-def _biweight(away: Floats) -> Floats:
+def _wall_plane(
+    points: Floats, normals: Floats, normal: Floats, offset: float, width: float, most_deg: float
+) -> tuple[Floats, float]:
+    for _ in range(WALL_ROUNDS):
+        weights = _biweight((points @ normal - offset) / width) * _biweight(_degrees(normals @ normal) / most_deg)
+        _, axes = np.linalg.eigh(np.cov(points.T, aweights=weights))
+        normal = np.asarray(axes[:, 0] * np.sign(axes[:, 0] @ normal), dtype=np.float64)
+        offset = float(np.average(points, axis=0, weights=weights) @ normal)
+    return normal, offset
+
+
+def _degrees(cosine: ArrayLike) -> Floats:
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), dtype=np.float64)
+
+
+def _biweight(away: NDArray[np.floating]) -> Floats:
     return np.where(np.abs(away) < 1.0, (1.0 - away**2) ** 2, 0.0)
