@@ -71,13 +71,6 @@ def displacement_maps(frames):
     return {"displacements": maps}
 
 
-def contact_maps(frames, quantity, **shown):
-    """Return contact pressure on the surface of the start, where no fold hides it."""
-    surface, pial = start_surface(frames)
-    maps = {week: (surface, read_field(frames, week, quantity)[pial]) for week in read_weeks(frames)[1:]}
-    return {"maps": {"simulated": maps}, "quantity": quantity, **shown}
-
-
 def growth_found_figure(frames, params, **shown):
     """Return growth of area in % per week on the surface at the interval's end, and its directions."""
     surface, pial = start_surface(frames)

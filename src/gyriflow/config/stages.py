@@ -93,8 +93,6 @@ class MetricsSettings(Settings):
 class ReportSettings(Settings):
     """Figures and report."""
 
-    figures: Literal["essential", "all"] = "essential"
-    """Whether figures of the zones and the solver, and all maps are drawn, too."""
     dpi: int = Field(300, ge=50, le=1200)
     """Resolution of PNG figures; journals ask for 300 to 600. [dots per inch]"""
     core_power_w: float = Field(12.0, gt=0, le=1000)

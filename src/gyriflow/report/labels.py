@@ -35,10 +35,6 @@ SIMPLER_WAYS = {
     "target": "what the run grows towards",
 }
 """Simpler ways to predict a brain, by the names of the study's table."""
-PRESSURES = {
-    "contact_pressure_pa": "contact pressure (Pa)",
-    "contact_pressure_pa_per_gw": "contact pressure built up in a week (Pa/GW)",
-}
 DISPLACEMENT = "displacement_mm"
 AREA_GROWTH = "area_growth_percent_per_gw"
 DISTANCE = "distance_mm"
@@ -50,23 +46,12 @@ DEVIATIONS = {
 """How a real brain deviates from the expected one."""
 MAPS = {
     **{name: measure.label for name, measure in SHAPE_MEASURES.items()},
-    **PRESSURES,
     **DEVIATIONS,
     DISPLACEMENT: "displacement since the start (mm)",
     AREA_GROWTH: "growth of area (% per week)",
 }
 """The quantities that are drawn as maps, with the labels of their colour bars."""
 WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth (% per week)", "shear modulus (Pa)"
-STEPS = {
-    "newton": "Newton\niterations",
-    "krylov": "CG iterations",
-    "min_J": "smallest\ndet F",
-    "max_u_mm": "|u| per step\n(mm)",
-    "elements_through_cortex": "elements through\nthe cortex",
-    "radius_ratio_01": "radius ratio,\n1 % quantile",
-    "seconds": "time per step\n(s)",
-}
-"""What a solve notes of each of its steps."""
 PARAMETERS = {
     "thickness": "cortical thickness",
     "shear_modulus_cortex": "shear modulus of the cortex",

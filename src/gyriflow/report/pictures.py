@@ -26,7 +26,7 @@ from ..parameters.terms import (
     ZONE_NAMES,
 )
 from ..units import CM2_PER_MM2
-from .labels import AREA_GROWTH, DEVIATIONS, DISTANCE, MAPS, PRESSURES, column_label, plain, value_labels
+from .labels import AREA_GROWTH, DEVIATIONS, DISTANCE, MAPS, column_label, plain, value_labels
 from .panels import MOST_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
@@ -59,7 +59,6 @@ Halves = Sequence[SurfaceMaps]
 SIDE_VIEWS = ("left", "top")
 ROUND_VIEWS = ("left", "right", "top", "bottom")
 MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
-PRESSURE_COLOURS = "YlOrRd"
 SIGNED = "RdBu_r"
 ROUNDING = 1e-9
 _MOST = 0.995
@@ -213,8 +212,6 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     shrinks = quantity == AREA_GROWTH and np.nanmin(values) < -ROUNDING * np.nanmax(np.abs(values))
     if quantity in DEVIATIONS or shrinks:
         return signed_scale(values)
-    if quantity in PRESSURES:
-        return magnitude_scale(values[values > 0], PRESSURE_COLOURS)
     measure = SHAPE_MEASURES.get(quantity)
     if measure is not None and measure.limits is not None:
         return colour_scale(measure.colours, *measure.limits)
@@ -271,7 +268,7 @@ def scalar_maps(
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
     quantity
-        A name of `labels.MAPS`; pressures leave the surface grey where nothing touches.
+        A name of `labels.MAPS`.
     directions : {week or run: (n, 3) vectors at the vertices}
         Drawn as lines in proportion to these, but for the longest tenth, which are alike.
     """
@@ -287,9 +284,7 @@ def scalar_maps(
         }
         for group, shown in maps.items()
     }
-    legend = [Patch(color=NEUTRAL_COLOUR, label="no contact")] if quantity in PRESSURES else []
-    if not np.isfinite(every).all():
-        legend.append(Patch(color=UNKNOWN_COLOUR, label="not measured"))
+    legend = [] if np.isfinite(every).all() else [Patch(color=UNKNOWN_COLOUR, label="not measured")]
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, MAPS[quantity]), legend=legend)
 
 
@@ -300,7 +295,7 @@ def _map_panel(
         return None
     mesh, values = shown
     lines = None if directions is None else direction_lines(mesh, directions, view)
-    return Panel(mesh, paint(values, scale, zero_is_nothing=quantity in PRESSURES), view, material=MAP, lines=lines)
+    return Panel(mesh, paint(values, scale), view, material=MAP, lines=lines)
 
 
 def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:

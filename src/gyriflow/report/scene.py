@@ -126,17 +126,11 @@ def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -
     return ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
 
 
-def paint(values: Floats, scale: ScalarMappable, *, zero_is_nothing: bool = False) -> Floats:
-    """Return the (n, 3) colours of values, grey where they are not finite, and, if asked for, where there is nothing.
-
-    Nothing is zero, and on a scale that begins at zero what is below, too.
-    """
+def paint(values: Floats, scale: ScalarMappable) -> Floats:
+    """Return the (n, 3) colours of values, grey where they are not finite."""
     values = np.asarray(values, dtype=float)
     colours = np.asarray(scale.to_rgba(values))[:, :3]
     colours[~np.isfinite(values)] = to_rgb(UNKNOWN_COLOUR)
-    if zero_is_nothing:
-        low, _ = scale.get_clim()
-        colours[values == 0 if low is not None and low < 0 else values <= 0] = to_rgb(NEUTRAL_COLOUR)
     return colours
 
 

@@ -10,14 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..parameters.terms import ELEMENTS_NEEDED
-from .labels import STEPS, week_label
+from .labels import week_label
 from .style import (
     MUTED_COLOUR,
-    RUN_COLOURS,
-    SINGLE_COLUMN_IN,
-    add_letters,
     from_zero,
-    new_figure,
     panel_figure,
     run_colours,
     run_legend,
@@ -37,47 +33,6 @@ PUBLISHED = pd.DataFrame(
     }
 )
 """Weekly displacement norms in mm: the FetalFoldSim paper's simulation (all nodes) and its quotation of real brains."""
-
-
-@styled
-def steps_chart(steps: pd.DataFrame, *, order: int) -> Figure:
-    """Draw what a folding solve did over its steps: iterations, smallest det F, displacement, resolution and time.
-
-    Parameters
-    ----------
-    steps : columns week, newton, krylov, min_J, max_u_mm, mean_u_mm, elements_through_cortex, radius_ratio_01, rung,
-        seconds
-        One row per accepted step. Steps that plain conjugate gradients did not solve are marked.
-    order
-        Of the elements: it says how many through the cortex are enough.
-    """
-    figure = new_figure(SINGLE_COLUMN_IN, 8.4)
-    panels = dict(zip(STEPS, figure.subplots(len(STEPS), 1, sharex=True), strict=True))
-    week = steps["week"]
-    dots: dict[str, Any] = {"markersize": 2.0, "linewidth": 0.8, "marker": "o"}
-    above: dict[str, Any] = {"loc": "lower right", "ncols": 2, "bbox_to_anchor": (1.0, 0.98), "borderaxespad": 0}
-    for column, axes in panels.items():
-        axes.plot(week, steps[column], color=RUN_COLOURS[0], **dots)
-        axes.set_ylabel(STEPS[column])
-        if column != "min_J":
-            from_zero(axes)
-    sizes = panels["max_u_mm"]
-    sizes.lines[0].set_label("max")
-    sizes.plot(week, steps["mean_u_mm"], color=RUN_COLOURS[1], label="mean", **dots)
-    sizes.legend(**above)
-    for column in ("newton", "krylov"):
-        panels[column].yaxis.get_major_locator().set_params(integer=True, nbins=5)
-    for column, limit in (("min_J", 0.0), ("elements_through_cortex", ELEMENTS_NEEDED[order])):
-        panels[column].axhline(limit, color=RUN_COLOURS[1], linestyle="--", linewidth=0.8)
-    figure.align_ylabels(list(panels.values()))
-    add_letters(panels.values())
-    week_axis(panels["seconds"], week)
-    shifted = steps[steps["rung"] != "cg"]
-    if len(shifted):
-        look: dict[str, Any] = {"color": RUN_COLOURS[1], "markersize": 3.5, "label": "tangent made definite"}
-        panels["newton"].plot(shifted["week"], shifted["newton"], "D", **look)
-        panels["newton"].legend(**above)
-    return figure
 
 
 @styled

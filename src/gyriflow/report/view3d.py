@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
-from .labels import DISPLACEMENT, MAPS, PRESSURES
+from .labels import DISPLACEMENT, MAPS
 from .pictures import Halves, scale_of, whole_maps
 from .style import REAL_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
 
@@ -21,12 +21,10 @@ BUDGET_BYTES = 12_000_000
 MOST_VERTICES = 8000
 """Vertices of a surface in the view; more would not be seen."""
 FEWEST_VERTICES = 500
-LABELS = {name: label for name, label in MAPS.items() if name not in PRESSURES}
-"""The maps of the view, with the labels of their colour bars."""
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
 # base64 writes three bytes as four letters; a vertex has about two triangles, of three indices of two bytes
-_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(LABELS), 12
+_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(MAPS), 12
 
 Timed = tuple[float, TriangleMesh, dict[str, Floats]]
 """A week, a surface in RAS+ mm and its maps by name; NaN where a value is not known."""
@@ -64,7 +62,7 @@ def surfaces_view(
     high = np.max([mesh.vertices.max(axis=0) for _, mesh, _ in everything], axis=0)
     box = low, float((high - low).max())
     scales = {}
-    for name in LABELS:
+    for name in MAPS:
         if values := [maps[name] for _, _, maps in everything if name in maps]:
             every = np.concatenate(values)
             scales[name] = scale_of(name, every[np.isfinite(every)])
@@ -85,7 +83,7 @@ def surfaces_view(
 
 def _timed(week: float, halves: Halves) -> Timed:
     mesh, maps = whole_maps(halves)
-    return week, mesh, {name: values for name, values in maps.items() if name in LABELS}
+    return week, mesh, {name: values for name, values in maps.items() if name in MAPS}
 
 
 def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
@@ -117,7 +115,7 @@ def thin_out(mesh: TriangleMesh, vertices: int) -> tuple[NDArray[np.int64], NDAr
 def _described(name: str, scale: ScalarMappable) -> dict[str, Any]:
     low, high = scale.get_clim()
     colours = scale.to_rgba(np.linspace(low, high, _VALUE_LEVELS + 1), bytes=True)[:, :3]
-    return {"name": name, "label": LABELS[name], "low": low, "high": high, "colours": _text(colours, "u1")}
+    return {"name": name, "label": MAPS[name], "low": low, "high": high, "colours": _text(colours, "u1")}
 
 
 def _frame(

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.terms import run_names
 from .paths import BRAIN, CALIBRATION, DEVIATION, FOLDING, GROWTH, MESH, PARAMETERS, REGIONS, RUN, STUDY
 from .records import Brain, Comparison, Measured, Simulation
@@ -41,7 +40,7 @@ class Figure:
     names
         Its wildcards, and what else its caption names.
     target
-        The target that asks for it; "" for one that is drawn by its name alone.
+        The target that asks for it; "" for one of the paper alone, which is not in the report.
     paper
         Whether the target `paper` asks for it, too.
     may_end
@@ -145,11 +144,6 @@ def _span(weeks: Sequence[float]) -> str:
     return f"{first:g}" if first == last else f"{first:g}-{last:g}"
 
 
-def _technical(study: Study) -> str:
-    """Return the target of pictures for those who look into the mesh or the solver."""
-    return "figures" if study.config.report.figures == "all" else ""
-
-
 def _halves(row: Measured) -> list[list[str]]:
     """Return the hemispheres of what is measured, each with its maps."""
     return [[row.parts[side], f"{row.folder}/{side}.shape.gii"] for side in row.sides]
@@ -178,9 +172,8 @@ def _of_brains(study: Study) -> Iterator[Figure]:
     ends = dict.fromkeys(pick(study.brains.values(), key=lambda brain: brain.week) for pick in (min, max))
     inputs = {"runs": {}, "real": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
     options = {"views": THREE_SIDES, "measured": ""}
-    target = _technical(study)
     path = f"{OF_STUDY}/inputs.png"
-    yield Figure("inputs_figure", path, "pictures.runs_by_week", inputs, options, target=target, paper=True)
+    yield Figure("inputs_figure", path, "pictures.runs_by_week", inputs, options, target="", paper=True)
     quality = {start.id: MESH["quality"].format(brain=start.id) for start in study.starts}
     limits = study.config.mesh.model_dump()
     gates = {key: value for key, value in limits.items() if key.startswith(("min_", "max_"))}
@@ -220,7 +213,7 @@ def _of_folding(study: Study) -> Iterator[Figure]:
     zones = set()
     for one in study.folded:
         zoned = repr((one.start.id, one.settings.model_dump(include=ZONES)))
-        yield from _of_run(study, one, first_with_zones=zoned not in zones)
+        yield from _of_run(one, first_with_zones=zoned not in zones)
         zones.add(zoned)
     yield Figure("study_runs", f"{STUDY}/runs.html", target="metrics")
     table, named = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
@@ -228,46 +221,29 @@ def _of_folding(study: Study) -> Iterator[Figure]:
     yield Figure("displacement_figure", path, "solve.displacement_chart", table, named, paper=True)
 
 
-def _of_run(study: Study, one: Simulation, *, first_with_zones: bool) -> Iterator[Figure]:
-    target, maps = _technical(study), "pictures.scalar_maps"
-    inputs: Given = {"frames": one.file(FOLDING["frames"])}
-    if "contact_pressure" in one.settings.fields and one.settings.contact.kind == "global":
-        # stress that each step forgets is written per week
-        quantity = "contact_pressure_pa" if one.settings.stress_memory_gw else "contact_pressure_pa_per_gw"
-        options: Given = {"quantity": quantity, "views": AROUND}
-        yield Figure("contact_maps", f"{OF_RUN}/contact_maps.png", maps, inputs, options, one.names, target=target)
+def _of_run(one: Simulation, *, first_with_zones: bool) -> Iterator[Figure]:
+    names = one.names
     if one.shapes and "growth" in one.settings.fields:
-        inputs = {**inputs, "params": one.file(PARAMETERS)}
+        inputs = {"frames": one.file(FOLDING["frames"]), "params": one.file(PARAMETERS)}
         options = {"quantity": "area_growth_percent_per_gw", "views": THREE_SIDES}
-        yield Figure("growth_found_figure", f"{OF_RUN}/growth_found.png", maps, inputs, options, one.names)
+        path = f"{OF_RUN}/growth_found.png"
+        yield Figure("growth_found_figure", path, "pictures.scalar_maps", inputs, options, names)
     if first_with_zones:
         inputs = {name: one.file(file) for name, file in {**REGIONS, "params": PARAMETERS}.items()}
-        yield Figure(
-            "zones_figure",
-            f"{OF_RUN}/zones.png",
-            "pictures.zones_picture",
-            inputs,
-            names=one.names,
-            target=target,
-            paper=True,
-        )
-    inputs, options = {"steps": one.file(FOLDING["steps"])}, {"order": study.config.mesh.order}
-    yield Figure("steps_figure", f"{OF_RUN}/steps.png", "solve.steps_chart", inputs, options, one.names, target=target)
+        path = f"{OF_RUN}/zones.png"
+        yield Figure("zones_figure", path, "pictures.zones_picture", inputs, names=names, target="", paper=True)
 
 
 def _of_metrics(study: Study) -> Iterator[Figure]:
-    measures = list(SHAPE_MEASURES)[: None if _technical(study) else 1]
     for start in study.starts:
         runs = [one for one in study.folded if one.start is start]
         real = _measured_by_week(*runs)
         brains = {one.run: {row.week: _halves(row) for row in one.measured} for one in runs}
         brains[measured_name(real.values())] = {week: _halves(brain.measured) for week, brain in real.items()}
-        for measure in measures:
-            names = {"brain": start.id, "measure": measure, "shows": SHAPE_MEASURES[measure].caption}
-            path, quantity = f"{OF_STUDY}/{{measure}}.{{brain}}.png", {"quantity": measure}
-            yield Figure("shape_maps", path, "pictures.shape_maps", {"brains": brains}, quantity, names)
+        path, options = f"{OF_STUDY}/shape_index.{{brain}}.png", {"quantity": "shape_index"}
+        yield Figure("shape_maps", path, "pictures.shape_maps", {"brains": brains}, options, {"brain": start.id})
     metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
-    options: Given = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
+    options = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
     yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)
     measured = {"measured": options["measured"]}
     yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_table", metrics, measured)

@@ -194,17 +194,6 @@ def test_how_far_real_brains_lie_outside_is_shown_below_them():
     assert [axes.get_label() for axes in pictures(figure)][-1] == "distance, column 1"
 
 
-def test_a_surface_that_nothing_touches_is_grey_in_the_map_of_pressure():
-    # the upper face is in contact, the side is not
-    values = np.where(BRAIN.vertices[:, 2] > 0, 100.0, 0.0)
-    values[(BRAIN.vertices[:, 0] < 0) & (BRAIN.vertices[:, 2] > 0)] = 0.0
-    figure = scalar_maps({"run": {28.0: (BRAIN, values)}}, quantity="contact_pressure_pa", views=("left", "right"))
-    left, right = (image[covered(image)].astype(float) for image in (picture(figure, 0), picture(figure, 1)))
-    assert np.ptp(left.mean(axis=0)) < 3
-    assert np.ptp(right.mean(axis=0)) > 30
-    assert "no contact" in words(figure)
-
-
 def test_a_map_that_one_hemisphere_lacks_is_grey_there():
     halves = [(box((8, 30, 20), (x, 0, 0)), maps) for x, maps in ((-6, {"curvedness": np.ones(8)}), (6, {}))]
     figure = shape_maps({"simulated": {21.0: halves}, "real brain": {}}, quantity="curvedness", views=("top",))
@@ -232,9 +221,6 @@ def test_a_study_has_renders_and_maps_of_all_members_and_says_which_did_not_come
     [
         ("curvedness", "(mm⁻¹)", [0.1] * 7 + [9.0]),
         ("sulcal_depth_mm", "sulcal depth (mm)", [0.1] * 7 + [9.0]),
-        # by what touches
-        ("contact_pressure_pa", "(Pa)", [100.0, 300.0]),
-        ("contact_pressure_pa_per_gw", "(Pa/GW)", [100.0, 300.0]),
     ],
 )
 def test_scales_go_from_zero_to_where_few_vertices_are_above(quantity, label, values):

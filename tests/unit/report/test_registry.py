@@ -28,8 +28,8 @@ STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"
 STUDY |= {"studies": {"rate": {"base": "thin", "vary": {"growth_rate_per_s": [1e-7, 2e-7]}, "compare_week": 22}}}
 
 
-def registry(**report):
-    return figures_of(resolve(load(STUDY | {"report": report})))
+def registry():
+    return figures_of(resolve(load(STUDY)))
 
 
 def drawn_by(row):
@@ -37,13 +37,13 @@ def drawn_by(row):
     return getattr(import_module(f"gyriflow.report.{module}"), function)
 
 
-def rows_of(rule, **report):
-    return list(by_rule(registry(**report))[rule].values())
+def rows_of(rule):
+    return list(by_rule(registry())[rule].values())
 
 
-@pytest.mark.parametrize("rule", by_rule(registry(figures="all")))
+@pytest.mark.parametrize("rule", by_rule(registry()))
 def test_a_figure_gives_its_function_what_that_takes(rule):
-    (row, *_) = rows_of(rule, figures="all")
+    (row, *_) = rows_of(rule)
     given = {**row.inputs, **row.options}
     code = DRAW.read_text()
     if f"\ndef {rule}(" in code:
@@ -54,21 +54,19 @@ def test_a_figure_gives_its_function_what_that_takes(rule):
 
 
 def test_all_files_are_drawn_once_and_the_report_has_words_on_them():
-    figures = registry(figures="all")
+    figures = registry()
     assert len({figure.path for figure in figures}) == len(figures)
-    assert {figure.name for figure in figures} - set(WORDS) == {"view_surfaces"}
+    assert {figure.name for figure in figures if figure.target} - set(WORDS) == {"view_surfaces"}
     for figure in figures:
         words = WORDS.get(figure.name, {"title": "", "caption": ""})
         assert "{" not in (words["title"] + words["caption"]).format(**figure.names)
 
 
-def test_technical_pictures_are_drawn_on_request_only():
-    essential, every = (set(asked_for(registry(figures=which), "figures")) for which in ("essential", "all"))
-    study = "results/study/figures"
-    assert {"results/runs/thin/a/figures/steps.png", f"{study}/curvedness.a.png"} <= every - essential
-    assert {f"{study}/shape_index.a.png", f"{study}/metrics.png"} <= essential < every
-    # runs that start alike have one figure of their zones
-    assert {file for file in every if file.endswith("zones.png")} == {"results/runs/thin/a/figures/zones.png"}
+def test_runs_that_start_alike_have_one_figure_of_their_zones_which_the_paper_alone_asks_for():
+    figures = registry()
+    zones = ["results/runs/thin/a/figures/zones.png", "results/runs/thin/a/figures/zones.pdf"]
+    assert [file for file in asked_for(figures, "paper") if "/zones." in file] == zones
+    assert not any("/zones." in file for file in asked_for(figures, "figures"))
 
 
 def test_simulated_and_measured_brains_are_not_exchanged():
@@ -123,7 +121,6 @@ def frames(tmp_path):
         for week, size in ((21, 1.0), (22, 1.2)):
             group = file.create_group(f"week_{week}.00")
             group["positions"] = size * CORNERS
-            group["contact_pressure_pa"] = [0.0, week, 2 * week, 0]
             group["tangential_growth_per_step"] = np.full(4, 0.01)
             group["growth_direction_per_step"] = np.eye(4, 3)
     return str(path)
@@ -137,19 +134,11 @@ def test_displacement_is_between_the_weeks_on_the_later_surface(monkeypatch, tmp
     assert surface.vertices.max() == pytest.approx(12)
 
 
-def test_pressure_is_shown_on_the_start_and_growth_of_area_on_the_later_surface(monkeypatch, tmp_path, frames):
-    inputs = {"frames": frames}
-    pressure = drawn(
-        monkeypatch, tmp_path, "contact_maps", "pictures.scalar_maps", inputs, quantity="contact_pressure_pa"
-    )
-    ((week, (surface, values)),) = pressure["maps"]["simulated"].items()
-    assert (week, surface.vertices.max()) == (22.0, pytest.approx(10))
-    assert sorted(values) == [0, 0, 22, 44]
+def test_growth_of_area_is_shown_on_the_later_surface(monkeypatch, tmp_path, frames):
     settings = tmp_path / "params.yaml"
     settings.write_text(yaml.safe_dump(RUN | {"step_s": SECONDS_PER_GW / 4}))
-    growth = drawn(
-        monkeypatch, tmp_path, "growth_found_figure", "pictures.scalar_maps", {**inputs, "params": str(settings)}
-    )
+    inputs = {"frames": frames, "params": str(settings)}
+    growth = drawn(monkeypatch, tmp_path, "growth_found_figure", "pictures.scalar_maps", inputs)
     ((interval, (surface, values)),) = growth["maps"]["growth"].items()
     assert (interval, surface.vertices.max()) == ((21.0, 22.0), pytest.approx(12))
     # four steps a week, in both directions of the surface

@@ -6,9 +6,8 @@ import pytest
 from matplotlib.colors import same_color
 from pictures import words
 
-from gyriflow.parameters.terms import ELEMENTS_NEEDED
 from gyriflow.report.growth import growth_chart
-from gyriflow.report.solve import displacement_chart, steps_chart
+from gyriflow.report.solve import displacement_chart
 
 AREAS = pd.DataFrame(
     {"series": "volume", "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
@@ -63,36 +62,6 @@ def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
         np.array([[-0.5, 1.0], [0.0, 1.0], [0.5, 1.5], [1.0, 2.0], [1.5, 2.5]])
     )
     assert "folding" in words(figure)
-
-
-def test_steps_are_drawn_and_those_that_needed_another_solver_are_marked():
-    count = 6
-    steps = pd.DataFrame(
-        {
-            "week": 21 + np.arange(count) / 14,
-            "newton": [2, 1, 1, 3, 1, 1],
-            "krylov": [20, 10, 11, 60, 12, 12],
-            "min_J": np.linspace(0.99, 0.7, count),
-            "max_u_mm": 0.3,
-            "mean_u_mm": 0.05,
-            "rung": ["cg", "cg", "cg", "cg, tangent shifted", "cg", "cg"],
-            "elements_through_cortex": np.linspace(2.3, 1.7, count),
-            "radius_ratio_01": np.linspace(0.4, 0.3, count),
-            "seconds": np.arange(1.0, count + 1),
-        }
-    )
-    figure = steps_chart(steps, order=1)
-    newton, krylov, jacobian, displacement, through, quality, seconds = (axes.lines for axes in figure.axes)
-    drawn = (newton, krylov, jacobian, displacement, through, quality, seconds)
-    columns = ("newton", "krylov", "min_J", "max_u_mm", "elements_through_cortex", "radius_ratio_01", "seconds")
-    for lines, column in zip(drawn, columns, strict=True):
-        assert lines[0].get_ydata().tolist() == steps[column].tolist()
-    assert newton[1].get_xydata().tolist() == [[steps["week"][3], 3]]
-    assert newton[1].get_label() == "tangent made definite"
-    assert [line.get_label() for line in displacement] == ["max", "mean"]
-    assert through[1].get_ydata()[0] == 2.0
-    assert steps_chart(steps, order=2).axes[4].lines[1].get_ydata()[0] == ELEMENTS_NEEDED[2]
-    assert "(s)" in figure.axes[-1].get_ylabel()
 
 
 def test_displacement_is_that_of_all_nodes_per_week_at_the_middle_of_the_interval():
