@@ -6,13 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from gyriflow.geometry.poses import pose_from
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_json, read_table, write_json
 from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
-from gyriflow.io.maps import read_volume_map
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
@@ -45,12 +43,6 @@ def read(inputs):
 
 
 # what is drawn is worked out from the files by functions that are called as the rules
-
-
-def overlay_figure(image, surface, report, affine_from):
-    """Return the image in the pose of the surface, which was turned upright."""
-    volume = read_volume_map(image, affine_from)
-    return {"values": volume.values, "affine": pose_from(report["pose"]).world @ volume.affine, "surface": surface}
 
 
 def start_surface(frames):

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import map_coordinates
 
 from ..geometry.triangles import Floats, TriangleMesh
@@ -17,7 +17,6 @@ from .style import (
     FULL_WIDTH_IN,
     REAL_BRAIN,
     REAL_COLOUR,
-    RUN_COLOURS,
     SINGLE_COLUMN_IN,
     add_letters,
     new_figure,
@@ -31,11 +30,12 @@ PLANES = {
     "axial": (2, 0, 1),
     "sagittal": (0, 1, 2),
 }
-AXIS_NAMES = ("x: left − to right + (mm)", "y: posterior − to anterior + (mm)", "z: inferior − to superior + (mm)")
 MOST_WEEKS = 5
 MARGIN_MM, PIXEL_MM = 8.0, 0.25
 """Of an image, beyond the surface and between the dots."""
 SCALE_BAR_MM = 20.0
+BESIDE_IN, BEYOND_IN, WIDEST_IN = 0.7, 0.9, 2.3
+"""Room beside and above the panels of outlines, and the most that one may be wide."""
 # grey values up to this quantile of those above zero are told apart
 _BRIGHTEST = 0.995
 
@@ -43,9 +43,7 @@ Extent = tuple[float, float, float, float]
 """Left, right, lower and upper end of a picture in mm."""
 
 
-def draw_outline(
-    axes: Axes, surface: TriangleMesh, plane: str, at: float, colour: str = RUN_COLOURS[4], thickness: float = 0.8
-) -> None:
+def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colour: str, thickness: float = 0.8) -> None:
     """Draw the lines in which a plane at a place in mm cuts a surface."""
     across, right, up = PLANES[plane]
     body = pv.PolyData.from_regular_faces(np.array(surface.vertices), np.array(surface.faces, dtype=int))
@@ -87,40 +85,6 @@ def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
 
 
 @styled
-def surface_overlay(values: Floats, affine: ArrayLike, surface: TriangleMesh) -> Figure:
-    """Draw a volume in grey with the outline of a surface, in a coronal, an axial and a sagittal plane.
-
-    The coronal and the axial plane pass the middle of the surface; the sagittal one passes the right hemisphere, at a
-    quarter of the width, since a mid-sagittal plane would only show the fissure. The left is on the picture's left.
-
-    Parameters
-    ----------
-    values : (i, j, k) float
-        Grey values of the volume.
-    affine : (4, 4) float
-        Voxel index to position in mm in the surface's coordinates.
-    surface
-        In RAS+ mm.
-    """
-    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
-    middle = (low + high) / 2
-    at = {"coronal": middle[1], "axial": middle[2], "sagittal": (middle[0] + high[0]) / 2}
-    spans = np.array([(high - low)[list(PLANES[plane][1:])] + 2 * MARGIN_MM for plane in PLANES])
-    # beside and above the panels is room for words
-    figure, grid = _plane_panels(list(spans[:, 0]), [spans[:, 1].max()], beside_in=1.7, beyond_in=0.9)
-    for axes, plane in zip(grid[0], PLANES, strict=True):
-        across, right, up = PLANES[plane]
-        points, extent = plane_grid(plane, at[plane], low, high)
-        draw_image(axes, values, affine, points, extent)
-        draw_outline(axes, surface, plane, at[plane])
-        axes.set(xlabel=AXIS_NAMES[right], ylabel=AXIS_NAMES[up], xlim=extent[:2], ylim=extent[2:], aspect="equal")
-        axes.set_title(f"{plane}, {'xyz'[across]} = {at[plane]:.1f} mm")
-        axes.grid(visible=False)
-    add_letters(grid[0])
-    return figure
-
-
-@styled
 def outlines_chart(
     runs: Mapping[str, Mapping[float, TriangleMesh]],
     real: Mapping[float, TriangleMesh],
@@ -146,7 +110,10 @@ def outlines_chart(
     high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1
     wide = max((high - low)[PLANES[plane][1]] for plane in planes)
     tall = [(high - low)[PLANES[plane][2]] for plane in planes]
-    figure, panels = _plane_panels([wide] * len(weeks), tall, beside_in=0.7, beyond_in=0.9, most_in=2.3)
+    inches_per_mm = min((FULL_WIDTH_IN - BESIDE_IN) / (len(weeks) * wide), WIDEST_IN / wide)
+    width = max(SINGLE_COLUMN_IN, BESIDE_IN + inches_per_mm * len(weeks) * wide)
+    figure = new_figure(width, inches_per_mm * sum(tall) + BEYOND_IN)
+    panels = figure.subplots(len(tall), len(weeks), squeeze=False, gridspec_kw={"height_ratios": tall})
     for row, plane in zip(panels, planes, strict=True):
         across, right, up = PLANES[plane]
         centre = (low[right] + high[right]) / 2
@@ -159,7 +126,7 @@ def outlines_chart(
             draw_outline(axes, real[week], plane, at, REAL_COLOUR, 1.7)
             for run in runs:
                 if week in runs[run]:
-                    draw_outline(axes, runs[run][week], plane, at, colours[run], 0.8)
+                    draw_outline(axes, runs[run][week], plane, at, colours[run])
             axes.set(xlim=(centre - wide / 2, centre + wide / 2), ylim=(low[up], high[up]), aspect="equal")
             axes.set_axis_off()
         row[0].text(-0.02, 0.5, plane, transform=row[0].transAxes, rotation=90, ha="right", va="center")
@@ -174,29 +141,3 @@ def outlines_chart(
     handles = [Line2D([], [], color=colour, label=label) for label, colour in named.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
-
-
-def _plane_panels(
-    wide: Sequence[float],
-    tall: Sequence[float],
-    *,
-    beside_in: float,
-    beyond_in: float,
-    most_in: float = FULL_WIDTH_IN,
-) -> tuple[Figure, NDArray]:
-    """Return a figure with a grid of panels at one scale, which is as wide as a page or less, and its panels.
-
-    Parameters
-    ----------
-    wide, tall
-        Widths of the columns and heights of the rows in mm.
-    beside_in, beyond_in
-        What the page has besides the panels, in width and in height, in inches.
-    most_in
-        The most that a panel may be wide, in inches.
-    """
-    inches_per_mm = min((FULL_WIDTH_IN - beside_in) / sum(wide), most_in / max(wide))
-    width = max(SINGLE_COLUMN_IN, beside_in + inches_per_mm * sum(wide))
-    figure = new_figure(width, inches_per_mm * sum(tall) + beyond_in)
-    ratios = {"width_ratios": wide, "height_ratios": tall}
-    return figure, figure.subplots(len(tall), len(wide), squeeze=False, gridspec_kw=ratios)

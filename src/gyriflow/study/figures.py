@@ -161,17 +161,10 @@ def _measured_by_week(*runs: Simulation) -> dict[float, Brain]:
 
 def _of_brains(study: Study) -> Iterator[Figure]:
     for brain in study.brains.values():
-        names = {"brain": brain.id}
-        if brain.given.image:
-            inputs: Given = {"image": brain.given.image, "surface": brain.pial, "report": brain.report}
-            options: Given = {"affine_from": brain.given.affine_from}
-            yield Figure(
-                "overlay_figure", f"{BRAIN}/figures/overlay.png", "sections.surface_overlay", inputs, options, names
-            )
-        yield Figure("quality_page", f"{BRAIN}/figures/quality.png", names=names, target="quality")
+        yield Figure("quality_page", f"{BRAIN}/figures/quality.png", names={"brain": brain.id}, target="quality")
     ends = dict.fromkeys(pick(study.brains.values(), key=lambda brain: brain.week) for pick in (min, max))
-    inputs = {"runs": {}, "real": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
-    options = {"views": THREE_SIDES, "measured": ""}
+    inputs: Given = {"runs": {}, "real": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
+    options: Given = {"views": THREE_SIDES, "measured": ""}
     path = f"{OF_STUDY}/inputs.png"
     yield Figure("inputs_figure", path, "pictures.runs_by_week", inputs, options, target="", paper=True)
     quality = {start.id: MESH["quality"].format(brain=start.id) for start in study.starts}

@@ -9,7 +9,8 @@ from shapes import ellipsoid_mesh, rigid
 from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.report.sections import outlines_chart, surface_overlay
+from gyriflow.report.quality import Brain, quality_page
+from gyriflow.report.sections import outlines_chart
 
 BALL = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
 SURFACE, _ = boundary_surface(BALL)
@@ -28,7 +29,7 @@ def test_outlines_are_those_of_both_brains_at_one_scale():
 
 @pytest.fixture(scope="module")
 def figure():
-    """An ellipsoid in a volume stored obliquely, and the figure with both turned upright."""
+    """An ellipsoid in a volume stored obliquely, and the page of quality with both turned upright."""
     centre, half = np.array([12.0, -7.0, 3.0]), np.array([15.0, 21.0, 12.0])
     oblique = np.eye(4)
     oblique[:3, :3] = rigid(25, -10, 40)[:3, :3] * 0.8
@@ -38,8 +39,9 @@ def figure():
     surface = isosurface((1.5 - away).astype(np.float32), oblique)
     pose = np.eye(4)
     pose[:3, 3] = 1, 2, 3
-    drawn = surface_overlay(100.0 * (away < 1), pose @ oblique, transformed(surface, pose))
-    return drawn, centre + pose[:3, 3], half
+    centre = centre + pose[:3, 3]
+    brain = Brain(transformed(surface, pose), centre[0], image=(100.0 * (away < 1), pose @ oblique))
+    return quality_page(brain, title="a", verdict="fine", facts={}, warnings=[]), centre, half
 
 
 @pytest.mark.parametrize(
