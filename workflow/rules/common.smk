@@ -88,7 +88,7 @@ def brains_with(condition):
 
 
 wildcard_constraints:
-    **dict.fromkeys(("brain", "earlier", "later", "measured"), one_of(study.brains)),
+    **dict.fromkeys(("brain", "earlier", "later"), one_of(study.brains)),
     study=one_of(study.comparisons),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",

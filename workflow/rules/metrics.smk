@@ -68,24 +68,6 @@ rule displacement:
         "../scripts/displacement.py"
 
 
-rule similarity:
-    input:
-        simulated=lambda w: list(study.simulations[w.run, w.brain].at(float(w.week)).parts.values()),
-        real=lambda w: list(study.brains[w.measured].measured.parts.values()),
-    output:
-        SIMILARITY,
-    params:
-        labels=lambda w: {
-            "subject": w.brain,
-            "run": w.run,
-            "week": float(w.week),
-            "real": w.measured,
-        },
-        parts=lambda w: ["whole", *study.brains[w.brain].sides],
-    script:
-        "../scripts/similarity.py"
-
-
 rule label_volumes:
     input:
         labels=from_brain("given.label_volume"),

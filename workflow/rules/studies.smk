@@ -5,19 +5,19 @@
 PUBLISHED = f"{workflow.basedir}/workflow/published/fetalfoldsim.yaml"
 
 
-def tables_of_member(wildcards):
-    """Return the tables of a run at the week of comparison and of the real brains, none where it has not come there."""
+def files_of_member(wildcards):
+    """Return the files of a run at the week of comparison and of the real brains, none where it has not come there."""
     run, brain, compared = (
         wildcards.run,
         wildcards.brain,
         study.comparisons[wildcards.study],
     )
-    return compared.tables(run, brain) if reaches(run, brain, compared.week) else {}
+    return compared.files(run, brain) if reaches(run, brain, compared.week) else {}
 
 
 rule compare_member:
     input:
-        unpack(tables_of_member),
+        unpack(files_of_member),
         # solved in any case
         summary=FOLDING["summary"],
     output:
@@ -25,6 +25,7 @@ rule compare_member:
     params:
         real=lambda w: {real.id: real.population for real in study.comparisons[w.study].real[w.brain]},
         population=from_brain("population"),
+        parts=lambda w: ["whole", *study.brains[w.brain].sides],
     script:
         "../scripts/compare_member.py"
 

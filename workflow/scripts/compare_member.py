@@ -1,9 +1,13 @@
 """How far a run of a study is from the real brains of its week; a table without rows where it has not come there."""
 
+from itertools import batched
+
 import pandas as pd
 
 from gyriflow.compare.members import COLUMNS, distances_to
 from gyriflow.io.files import read_table, write_table
+from gyriflow.io.surfaces import read_surface
+from gyriflow.metrics.similarity import aligned_distance
 from gyriflow.metrics.spangy import spectral_distances
 from gyriflow.step import step
 
@@ -13,15 +17,17 @@ LABELS = ("subject", "run", "real", "real_population", "same_population")
 with step(snakemake.log[0]):
     parts = [pd.DataFrame(columns=[*LABELS, *COLUMNS])]
     if files.get("metrics"):
-        metrics, spectra, similarity = (
-            pd.concat(map(read_table, paths), ignore_index=True)
-            for paths in (files.metrics, files.spectra, files.similarity)
+        metrics, spectra = (
+            pd.concat(map(read_table, paths), ignore_index=True) for paths in (files.metrics, files.spectra)
         )
         spectral = spectral_distances(spectra)
         spectral = spectral[spectral["run"] != "real"]
-        for real, population in params.real.items():
+        simulated, every_real = list(map(read_surface, files.simulated)), batched(files.measured, len(params.parts))
+        for (real, population), of_real in zip(params.real.items(), every_real, strict=True):
             same = params.population == population
             labels = dict(zip(LABELS, (names.brain, names.run, real, population, same), strict=True))
-            rows = distances_to(real, metrics, spectra, spectral, similarity)
+            pairs = zip(params.parts, simulated, map(read_surface, of_real), strict=True)
+            surfaces = {part: aligned_distance(mesh, measured) for part, mesh, measured in pairs}
+            rows = distances_to(real, metrics, spectra, spectral, surfaces)
             parts.append(rows.assign(**labels)[[*LABELS, *COLUMNS]])
     write_table(snakemake.output[0], pd.concat([part for part in parts if len(part)] or parts, ignore_index=True))

@@ -12,7 +12,6 @@ SIZES = ("area", "volume", "gyrification_index")
 """Metrics of whole brains whose relative difference from the real one is a measure."""
 MODES = "weyl_number"
 """The metric that says at how many modes the spectrum of a hemisphere is cut."""
-SURFACE_DISTANCES = ("symmetric_mean", "hausdorff95")
 COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
 NOT_RESOLVED = "not resolved by the mesh"
@@ -20,7 +19,11 @@ ENDS = "at the end of the range"
 
 
 def distances_to(
-    real: str, metrics: pd.DataFrame, spectra: pd.DataFrame, spectral: pd.DataFrame, similarity: pd.DataFrame
+    real: str,
+    metrics: pd.DataFrame,
+    spectra: pd.DataFrame,
+    spectral: pd.DataFrame,
+    surfaces: Mapping[str, Mapping[str, float]],
 ) -> pd.DataFrame:
     """Tell how far one simulated brain is from a real one, a row per hemisphere and measure.
 
@@ -30,14 +33,15 @@ def distances_to(
     `gyrification_index` (distance: the absolute relative difference); `weyl_number` (no distance).
 
     `real` is the id of the real brain. Metrics and spectra are rows of the simulated brain and of the real one, whose
-    `run` is "real"; spectral and similarity those of the simulated brain, with the column `real`. The columns are
-    `COLUMNS`; `flag` is "ok" or says what is wrong with the value.
+    `run` is "real"; spectral those of the simulated brain, with the column `real`; surfaces by hemisphere the distances
+    of `metrics.similarity.aligned_distance` in mm. The columns are `COLUMNS`; `flag` is "ok" or says what is wrong with
+    the value.
     """
     rows = [*_band_rows(real, spectra), *_size_rows(real, metrics)]
     for row in spectral[spectral["real"] == real].itertuples():
         rows.append((row.hemisphere, row.metric, np.nan, np.nan, row.value, "1", row.flag))
-    for row in similarity[(similarity["real"] == real) & similarity["metric"].isin(SURFACE_DISTANCES)].itertuples():
-        rows.append((row.hemisphere, f"surface_{row.metric}", np.nan, np.nan, row.value, row.unit, "ok"))
+    for hemisphere, distances in surfaces.items():
+        rows += [(hemisphere, f"surface_{name}", np.nan, np.nan, mm, "mm", "ok") for name, mm in distances.items()]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

@@ -1,24 +1,8 @@
 """How far two surfaces are from each other, for example a simulated and a real brain of a week, once aligned."""
 
-import pandas as pd
-
 from ..geometry.alignment import fit_onto
 from ..geometry.matching import nearest_on, surface_distance
 from ..geometry.triangles import TriangleMesh, transformed, vertex_areas
-
-
-def brain_distances(simulated: dict[str, TriangleMesh], real: dict[str, TriangleMesh]) -> pd.DataFrame:
-    """Return the distances between two brains: a row per part (such as whole, left and right) and metric.
-
-    Each part is aligned by itself. Columns hemisphere, metric, value, unit; the metrics are those of
-    `aligned_distance`.
-    """
-    rows = [
-        (part, metric, value, "mm")
-        for part, mesh in simulated.items()
-        for metric, value in aligned_distance(mesh, real[part]).items()
-    ]
-    return pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"])
 
 
 def aligned_distance(a: TriangleMesh, b: TriangleMesh) -> dict[str, float]:

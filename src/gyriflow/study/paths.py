@@ -101,7 +101,6 @@ FOLDING = {
 MEASURES = {name: f"results/{{where}}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
 """Tables that are made for every brain, whatever hemispheres it has."""
 DISPLACEMENT = f"{RUN}/metrics/displacement.csv"
-SIMILARITY = f"{RUN}/metrics/{WEEK}/similarity.{{measured}}.csv"
 VOLUMES = {"volumes": f"{BRAIN}/metrics/volumes.csv", "scores": f"{BRAIN}/metrics/published_centiles.csv"}
 
 READY = {

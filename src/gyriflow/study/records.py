@@ -342,12 +342,19 @@ class Comparison:
         """The run, the brain and the varied values of each member."""
         return [{"run": one.run, "subject": one.start.id, "values": dict(values)} for one, values in self.members]
 
-    def tables(self, run: str, brain: str) -> dict[str, list[str]]:
-        """Return the tables of a run at the week of comparison and of the real brains."""
-        at = f"results/runs/{run}/{brain}/metrics/week-{week_tag(self.week)}"
-        folders = [at, *(real.measured.folder for real in self.real[brain])]
-        tables = {name: [f"{folder}/{name}.csv" for folder in folders] for name in ("metrics", "spectra")}
-        return tables | {"similarity": [f"{at}/similarity.{real.id}.csv" for real in self.real[brain]]}
+    def files(self, run: str, brain: str) -> dict[str, list[str]]:
+        """Return the tables and surfaces of a run at the week of comparison and of the real brains, by kind.
+
+        The surfaces are the whole and its hemispheres, those of the real brains one after the other.
+        """
+        simulated = next(one for one, _ in self.members if one.names == {"run": run, "brain": brain}).at(self.week)
+        real = [brain.measured for brain in self.real[brain]]
+        folders = [row.folder for row in (simulated, *real)]
+        return {
+            **{name: [f"{folder}/{name}.csv" for folder in folders] for name in ("metrics", "spectra")},
+            "simulated": list(simulated.parts.values()),
+            "measured": [path for row in real for path in row.parts.values()],
+        }
 
 
 @dataclass(frozen=True)

@@ -195,12 +195,6 @@ class Study:
             "volumes": [paths.VOLUMES["volumes"].format(brain=id) for id in labelled],
             "published_centiles": [paths.VOLUMES["scores"].format(brain=id) for id in labelled],
             "displacement": self.files(paths.DISPLACEMENT),
-            "similarity": [
-                one.file(paths.SIMILARITY, week=week, measured=brain.id)
-                for one in self.folded
-                for week, brains in one.compared.items()
-                for brain in brains
-            ],
         }
 
     @property

@@ -27,15 +27,12 @@ METRICS = pd.DataFrame(
 )
 SPECTRAL = pd.DataFrame([("b", "left", "spectral_distance_B4", 0.2, "ok")],
                         columns=["real", "hemisphere", "metric", "value", "flag"])  # fmt: skip
-SIMILARITY = pd.DataFrame(
-    [("b", "whole", "symmetric_mean", 1.5, "mm"), ("b", "whole", "rotation", 3.0, "deg")],
-    columns=["real", "hemisphere", "metric", "value", "unit"],
-)
+SURFACES = {"whole": {"symmetric_mean": 1.5}}
 
 
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))])
-    table = distances_to("b", METRICS, both, SPECTRAL, SIMILARITY).set_index(["hemisphere", "measure"])
+    table = distances_to("b", METRICS, both, SPECTRAL, SURFACES).set_index(["hemisphere", "measure"])
     cut_off = table.loc[("left", "relative_power_B6_weyl")]
     assert (cut_off["flag"], cut_off["distance"] == cut_off["distance"]) == ("cut off", False)
     assert table["distance"].dropna().to_dict() == {
@@ -56,7 +53,7 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
 
 def test_a_band_that_is_cut_off_has_no_distance():
     both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1), complete=False), spectra("real", "b", (0.4, 0.3, 0.1))])
-    table = distances_to("b", METRICS, both, SPECTRAL, SIMILARITY).set_index("measure")
+    table = distances_to("b", METRICS, both, SPECTRAL, SURFACES).set_index("measure")
     assert table.loc["relative_power_B4", "distance"] != table.loc["relative_power_B4", "distance"]
     assert table.loc["relative_power_B4", "flag"] == "cut off"
 

@@ -174,7 +174,7 @@ def test_runs_are_compared_with_the_population_and_the_sides_of_their_start_only
         {"id": "half", "week": 22, "hemisphere": {"file": str(files / "left.gii"), "side": "left"}},
     ]
     found = study(brains)
-    assert found.tables["similarity"] == ["results/runs/reference/b21/metrics/week-22.00/similarity.b22.csv"]
+    assert ids(found.simulations["reference", "b21"].compared["22.00"]) == ["b22"]
     assert [ids(pair) for pair in found.references.values()] == [["b22", "b21"]]
     assert found.places["brains/half/metrics"].parts == {
         "whole": surface("half"),
@@ -196,7 +196,7 @@ def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_wor
     assert {week: brain.id for week, brain in one.beside.items()} == {"21.00": "b21", "22.00": "b22"}
     assert one.real == {}
     alone = study([{"id": "b21", "week": 21, **SPHERE}])
-    assert alone.growing == alone.tables["similarity"] == alone.validated == []
+    assert alone.growing == alone.validated == []
 
 
 def test_what_validates_a_run_is_its_surface_and_the_real_one_of_each_week(real):
@@ -375,8 +375,10 @@ def test_a_study_is_compared_at_its_week_and_its_members_are_measured_there(real
     assert place.labels == {"subject": "b21", "run": "thick-2", "week": 23}
     assert place.thickness == "results/runs/thick-2/b21/surfaces/week-23.00/thickness.shape.gii"
     assert place.where not in found.measured
-    tables = compared.tables("thick-2", "b21")["metrics"]
-    assert tables == [f"{place.folder}/metrics.csv", "results/brains/b23/metrics/metrics.csv"]
+    files = compared.files("thick-2", "b21")
+    assert files["metrics"] == [f"{place.folder}/metrics.csv", "results/brains/b23/metrics/metrics.csv"]
+    assert files["simulated"] == list(place.parts.values())
+    assert files["measured"][0] == surface("b23")
     assert [brain.population for brain in compared.real["b21"]] == ["unknown"]
 
 
