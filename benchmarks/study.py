@@ -3,12 +3,10 @@
     ./run python benchmarks/study.py STUDY_FOLDER
 
 STUDY_FOLDER is where the study ran, with `results/study/` in it. Of the tables there `validation.csv`,
-`displacement_agreement.csv`, `folding_agreement.csv` and `prediction.csv` are read, as far as they exist. The last line
-is one JSON object:
+`displacement_agreement.csv` and `prediction.csv` are read, as far as they exist. The last line is one JSON object:
 
 - `runs`: by run `kind`, `last_week`, `worst_area_error`, `worst_volume_error` of all weeks; `skill_shape_index`,
-  `skill_mean_curvature`, `curvature_rms_ratio`, `displacement_r`, `displacement_slope` of the last week or interval;
-  `largest_difference` of either hemisphere from the real one in the last week, by metric
+  `skill_mean_curvature`, `curvature_rms_ratio`, `displacement_r`, `displacement_slope` of the last week or interval
 - `predictions`: numbers of `prediction.csv` for each run, start and week, and those of each simpler way under its name
 - `better`: by run, start and simpler way in how many weeks the run is nearer to the real brain, in how many its shape
   index correlates better, and of how many
@@ -36,18 +34,14 @@ PREDICTION += ["cortex_dice", "curvature_rms_ratio"]
 KEYS = ["run", "start", "horizon", "week"]
 
 
-def summary(rows: pd.DataFrame, moves: pd.DataFrame, folds: pd.DataFrame) -> dict[str, Any]:
-    """Sum up one run's rows of validation, displacement and folding; None where there is no number."""
+def summary(rows: pd.DataFrame, moves: pd.DataFrame) -> dict[str, Any]:
+    """Sum up one run's rows of validation and displacement; None where there is no number."""
     last = rows[rows["week"] == rows["week"].max()]
     numbers = {f"worst_{name}": rows[name].abs().max() for name in ("area_error", "volume_error")}
     numbers |= last[WORTH].mean().to_dict()
     numbers |= moves[moves["to_week"] == moves["to_week"].max()][MOVES].mean().to_dict()
     row: dict[str, Any] = {"kind": str(rows["kind"].iloc[0]), "last_week": float(last["week"].iloc[0])}
-    row |= {name: float(value) if pd.notna(value) else None for name, value in numbers.items()}
-    if len(folds):
-        final = folds[folds["week"] == folds["week"].max()]
-        row["largest_difference"] = final["difference"].abs().groupby(final["metric"]).max().to_dict()
-    return row
+    return row | {name: float(value) if pd.notna(value) else None for name, value in numbers.items()}
 
 
 def better(table: pd.DataFrame) -> dict[str, dict[str, dict[str, int]]]:
@@ -69,7 +63,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("study", type=Path)
     folder = parser.parse_args().study / "results" / "study"
-    names = ("validation", "displacement_agreement", "folding_agreement", "prediction")
+    names = ("validation", "displacement_agreement", "prediction")
     tables = {name: read_table(folder / f"{name}.csv") for name in names if (folder / f"{name}.csv").exists()}
     if not {"validation", "prediction"} & set(tables):
         raise InputError("has neither validation.csv nor prediction.csv", path=folder)
@@ -78,10 +72,8 @@ def main() -> None:
         validation = tables["validation"]
         print(validation.reindex(columns=[*VALIDATION, *WORTH]).to_string(index=False, float_format="%.3f"))
         moves = tables.get("displacement_agreement", pd.DataFrame(columns=["run", "to_week", *MOVES]))
-        folds = tables.get("folding_agreement", pd.DataFrame(columns=["run"]))
         result["runs"] = {
-            str(run): summary(rows, moves[moves["run"] == run], folds[folds["run"] == run])
-            for run, rows in validation.groupby("run", sort=False)
+            str(run): summary(rows, moves[moves["run"] == run]) for run, rows in validation.groupby("run", sort=False)
         }
     if "prediction" in tables:
         prediction = tables["prediction"]

@@ -122,4 +122,3 @@ rule metrics:
         rules.centiles.output,
         rules.group_tables.output,
         rules.validate.input,
-        rules.folding_agreement.output if study.validated else [],

@@ -131,22 +131,6 @@ rule onset:
         "../scripts/onset.py"
 
 
-rule folding_agreement:
-    input:
-        metrics=f"{STUDY}/metrics.csv",
-        spectra=f"{STUDY}/spectra.csv",
-    output:
-        f"{STUDY}/folding_agreement.csv",
-    params:
-        pairs=[
-            (one.run, one.start.id, float(week), real.id)
-            for one in study.validated
-            for week, real in one.real.items()
-        ],
-    script:
-        "../scripts/folding_agreement.py"
-
-
 rule validate:
     input:
         [f"{STUDY}/{name}.csv" for name, files in study.validation_tables.items() if files],

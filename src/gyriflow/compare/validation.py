@@ -1,7 +1,4 @@
-"""What a study's simulations are worth: a row per run and week.
-
-Beside them how the surface moves and how much it is folded, each against the real brain.
-"""
+"""What a study's simulations are worth, a row per run and week, and how their surfaces move beside the real brain's."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,16 +18,10 @@ from ..geometry.triangles import (
     transformed,
     vertex_areas,
 )
-from ..parameters.terms import MEASURED
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .placement import placement
 from .prediction import apart, distances
 from .shapes import Shape, against_real, cortex_dice
-
-AGREEMENT = ("gyrification_index", "gyrification_index_envelope", "mean_sulcal_depth", "mean_curvedness")
-"""What is compared of the table of metrics."""
-BAND = "spangy_share_B"
-"""What the names of the spectrum's shares begin with: relative power of a band."""
 
 
 def validation_row(
@@ -158,25 +149,3 @@ def displacement_table(
 
 def _rms(vectors: Floats, weights: Floats) -> float:
     return float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights)))
-
-
-def folding_agreement(
-    metrics: pd.DataFrame, spectra: pd.DataFrame, pairs: Sequence[tuple[str, str, float, str]]
-) -> pd.DataFrame:
-    """Join metrics of simulated brains with those of the real ones, a row per brain, week, hemisphere and metric.
-
-    Metrics have the columns subject, run ("real" for real brains), week, hemisphere, metric, value; spectra subject,
-    run, week, hemisphere, band, relative_power; pairs are (run, start brain, week, real brain). Columns run, subject,
-    week, real, hemisphere, metric (of `AGREEMENT`, and `BAND` with a number), value, real_value, difference (value less
-    real_value). Metrics that one of the two lacks are left out.
-    """
-    shares = spectra.dropna(subset="relative_power")
-    shares = shares.assign(metric=BAND + shares["band"].astype(str), value=shares["relative_power"])
-    keys = ["run", "subject", "week", "hemisphere", "metric", "value"]
-    both = pd.concat([metrics.loc[metrics["metric"].isin(AGREEMENT), keys], shares[keys]])
-    real = both[both["run"] == MEASURED].drop(columns=["run", "week"])
-    real = real.rename(columns={"subject": "real", "value": "real_value"})
-    table = pd.DataFrame(pairs, columns=["run", "subject", "week", "real"])
-    table = table.merge(both, on=["run", "subject", "week"]).merge(real, on=["real", "hemisphere", "metric"])
-    table = table.assign(difference=table["value"] - table["real_value"])
-    return table[["run", "subject", "week", "real", "hemisphere", "metric", "value", "real_value", "difference"]]
