@@ -207,11 +207,3 @@ def test_the_bids_validator_finds_no_error(tmp_path, brain):
     done = subprocess.run([VALIDATOR, folder, "--format", "json"], capture_output=True, text=True, check=False)
     found = json.loads(done.stdout)["issues"]["issues"]
     assert [issue for issue in found if issue["severity"] == "error"] == []
-
-
-def test_a_hemisphere_that_is_alone_and_maps_of_any_name_are_exported(tmp_path, brain):
-    left, maps = {"left": brain.surfaces["left"]}, {"left": str(tmp_path / "own.shape.gii")}
-    write_vertex_maps(maps["left"], {"distance_to_pial_mm": np.zeros(3)})
-    export_bids(tmp_path / "bids", [replace(brain, surfaces=left, maps=maps, regions={})], {}, "1", {})
-    names = {path.name.removeprefix("sub-case1_") for path in (tmp_path / "bids").glob("sub-*/anat/*")}
-    assert names == {"hemi-L_pial.surf.gii", "hemi-L_distanceToPial.shape.gii"}

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from gyriflow.io.jobs import KILLED, GrowingFile, cause, gather_messages, read_benchmarks, read_messages
+from gyriflow.io.jobs import KILLED, cause, gather_messages, read_benchmarks, read_messages
 
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 PATTERNS = {
@@ -97,20 +97,6 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path):
 )  # fmt: skip
 def test_the_cause_is_gyriflows_own_message_or_else_the_exception_or_the_end(log, expected):
     assert cause(log) == expected
-
-
-def test_a_growing_file_gives_each_whole_line_once(tmp_path):
-    log = GrowingFile(tmp_path / "log")
-    assert log.new_text() == ""
-    log.path.write_text("one\ntw")
-    assert log.new_text() == "one\n"
-    with log.path.open("a") as file:
-        file.write("o\nthree\n")
-    assert log.new_text() == "two\nthree\n"
-    assert log.new_text() == ""
-    # the job is tried again
-    log.path.write_text("new\n")
-    assert log.new_text() == "new\n"
 
 
 def write(folder, name, *lines, head=HEAD):

@@ -179,15 +179,3 @@ def test_dolfinx_reads_every_tag_where_it_belongs(written, domain, grid, dimensi
     assert tags.dim == dimension
     assert len(tags.values) == (len(facets) if dimension == 2 else len(mesh.tets))
     np.testing.assert_array_equal(tags.values, expected(midpoints(tags, domain)))
-
-
-def test_paraview_opens_elements_and_facets_at_once(written):
-    path, mesh, facets, cell_tags, facet_tags = written
-    blocks = by_vtk(path)
-    assert blocks.keys() == ["mesh", "facets"]
-    assert [block.n_cells for block in blocks] == [len(mesh.tets), len(facets)]
-    assert set(blocks["mesh"].point_data) == {"height_mm", "normal"}
-    for block, tags in (("mesh", cell_tags), ("facets", facet_tags)):
-        assert set(blocks[block].cell_data) == set(tags)
-        for name, tag in tags.items():
-            np.testing.assert_array_equal(blocks[block].cell_data[name], tag)

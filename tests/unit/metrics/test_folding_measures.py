@@ -41,14 +41,6 @@ def test_measures_of_a_torus() -> None:
     assert found == pytest.approx(expected(), rel=0.06)
 
 
-@pytest.mark.parametrize("radius", [5.0, 40.0])
-def test_measures_of_a_sphere_know_no_size(radius: float) -> None:
-    areas = np.full(10, 4 * np.pi * radius**2 / 10)
-    bend = Curvature(*np.full((2, 10), 1 / radius), np.ones(10, bool), np.ones(10))
-    wanted = dict.fromkeys(expected(), 1.0) | {"folding_index": 0.0}
-    assert curvature_integrals(bend, areas) == pytest.approx(wanted, abs=1e-12)
-
-
 def test_a_cylinder_folds_but_has_no_intrinsic_curvature() -> None:
     # κ = 1/r and 0, area 2πrh: FI = 1/4π · h 2π/r = h/2r, inwards as outwards
     for sign in (1.0, -1.0):

@@ -51,12 +51,6 @@ def dented(depth: float, width: float, subdivisions: int = 5) -> TriangleMesh:
     return TriangleMesh(shape.vertices * (1 - dent / 25.0)[:, None], shape.faces)
 
 
-def test_sphere_has_no_folds() -> None:
-    mesh = sphere(25.0)
-    assert index(mesh, convex_hull(mesh)) == pytest.approx(1.0, abs=1e-9)
-    assert index(mesh, envelope(mesh)) == pytest.approx(1.0, abs=0.01)
-
-
 def test_envelope_bridges_a_sulcus_and_follows_a_wide_dent() -> None:
     def depth(mesh: TriangleMesh, around: TriangleMesh) -> float:
         bottom = mesh.vertices[[np.linalg.norm(mesh.vertices, axis=1).argmin()]]

@@ -86,16 +86,6 @@ def test_neither_the_fissure_nor_a_cut_is_a_sulcus(apart: BrainMetrics, cut: Bra
     assert value(cut, "whole", "sulcal_depth_95") < 0.05
 
 
-def test_cut_bands_are_no_metrics(apart: BrainMetrics) -> None:
-    flags = apart.spectra.query("hemisphere == 'left'").set_index("band")
-    cut_off = flags.index[~flags["complete"] & (flags["modes"] > 0)]
-    assert len(cut_off)
-    assert np.isfinite(flags.loc[cut_off, "power"]).all()
-    assert all(np.isnan(value(apart, "left", f"spangy_B{band}_power")) for band in cut_off)
-    assert not flags["denominator_complete"].any()
-    assert np.isnan(value(apart, "left", "spangy_B1_relative_power"))
-
-
 def test_processes_change_nothing_but_the_time() -> None:
     left, right = (ellipsoid((20.0, 20.0, 26.0), 3, (x, 0, 0)) for x in (-21.0, 21.0))
     thickness = np.linspace(1.0, 2.0, 2 * len(left.vertices))
@@ -142,13 +132,6 @@ def test_cut_is_left_out(cut: BrainMetrics) -> None:
         # nothing of the cut's edge in the spectrum
         total = cut.spectra.query("hemisphere == @name and band > 0")["power"].sum()
         assert total < 1e-3 * value(cut, name, "spangy_B0_power")
-
-
-def test_table_is_tidy(apart: BrainMetrics) -> None:
-    assert apart.table.columns.tolist() == ["hemisphere", "metric", "value", "unit"]
-    assert not apart.table.duplicated(["hemisphere", "metric"]).any()
-    units = apart.table.drop_duplicates("metric").set_index("metric")["unit"]
-    assert units[["volume", "area", "mean_curvedness", "spangy_B4_power"]].tolist() == ["mL", "cm2", "1/mm", "mm2"]
 
 
 def test_surfaces_that_cut_each_other_are_counted() -> None:

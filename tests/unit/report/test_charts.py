@@ -13,7 +13,7 @@ from gyriflow.errors import InputError
 from gyriflow.metrics.norms import measured_norms, measured_scores, norm_curves
 from gyriflow.report.charts import metrics_chart, norms_chart, regions_chart, spectra_chart, spectra_weeks_chart
 from gyriflow.report.pictures import region_colours
-from gyriflow.report.tables import centiles_table, region_table
+from gyriflow.report.tables import centiles_table
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
 REGIONS = pd.DataFrame(
@@ -53,14 +53,6 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
 BLUE = {"thin": "#0072B2"}
 
 
-def test_measured_brains_are_called_by_what_they_are():
-    metrics = metric_rows("real", "whole", "area", {21.0: 100.0}, "cm2")
-    assert "real brain" in words(metrics_chart(metrics))
-    shown = words(metrics_chart(metrics, measured="ellipsoid"))
-    assert "ellipsoid" in shown
-    assert "real brain" not in shown
-
-
 def test_metrics_of_runs_are_lines_and_measured_ones_stars():
     metrics = pd.concat(
         [
@@ -91,27 +83,6 @@ def test_a_table_without_metrics_or_spectra_is_refused():
         spectra_chart(pd.concat(spectrum_rows("thin", 28.0, {4: 0.2})), week=30.0, colours=BLUE)
 
 
-def test_many_runs_have_distinct_colours_and_a_legend_within_the_figure():
-    runs = [f"thickness_{i}_with_a_long_name" for i in range(12)]
-    figure = metrics_chart(
-        pd.concat([metric_rows(run, "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2") for run in runs])
-    )
-    (axes,) = figure.axes
-    assert len({str(line.get_color()) for line in axes.lines}) == 12
-    box = figure.legends[0].get_window_extent()
-    assert box.x0 >= 0
-    assert box.x1 <= figure.bbox.width
-
-
-def test_a_run_keeps_its_colour_in_charts_of_other_runs():
-    def colours(*runs):
-        rows = pd.concat([metric_rows(run, "whole", "area", {21.0: 1.0, 22.0: 2.0}, "cm2") for run in runs])
-        return [line.get_color() for line in metrics_chart(rows, runs=["thin", "thick"]).axes[0].lines]
-
-    thin, thick = colours("thin", "thick")
-    assert colours("thick") == [thick] != [thin]
-
-
 def test_spectra_bars_are_the_relative_powers_of_each_side():
     rows = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15})]
     spectra = pd.concat([*rows, *spectrum_rows("thin", 27.0, {4: 0.9})])
@@ -140,15 +111,6 @@ def test_bands_that_are_cut_off_are_marked_and_keyed(run, shown):
     assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, True][: 1 + shown[0]]
     assert hatches_and_open_stars(spectra_chart(pd.concat(good), week=28.0, colours=BLUE)) == (False, False)
     assert hatches_and_open_stars(spectra_weeks_chart(spectra)) == (False, run == "real")
-
-
-def test_bands_without_modes_are_said_to_be_beyond_them():
-    rows = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("thin", 28.0, {6: np.nan}, complete=False)]
-    figure = spectra_chart(pd.concat(rows), week=28.0, bands=(4, 6), colours=BLUE)
-    texts = [text for text in figure.axes[0].texts if "modes computed" in text.get_text()]
-    assert [text.get_position()[0] for text in texts] == [1]
-    # nothing is drawn of it, so the legend has no mark for it
-    assert hatches_and_open_stars(figure) == (False, False)
 
 
 def test_spectra_over_weeks_have_a_row_per_side_and_a_column_per_band():
@@ -182,14 +144,6 @@ def test_regions_chart_sums_areas_and_averages_depths():
     assert points(depth, "back", "None") == [(22, 22.5)]
     # that of the hemispheres is no region
     assert points(asymmetry, "front", "*") == [(21, 0.1)]
-
-
-def test_table_of_regions_has_left_right_and_asymmetry():
-    table = region_table(REGIONS, ASYMMETRY)
-    row = table.loc[("a", "real", 21.0, "front")]
-    columns = ["pial area (cm²), left", "pial area (cm²), right", "pial area, asymmetry"]
-    assert row[columns].tolist() == [11.0, 10.0, 0.1]
-    assert len(table) == 6
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,10 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from gyriflow.io.figures import picture_addresses, read_body, write_figure, write_html
+from gyriflow.io.figures import picture_addresses, write_figure
 from gyriflow.report.page import (
     brains_table,
     caption_html,
-    grouped,
     hide_paths,
     methods_text,
     page_content,
@@ -22,7 +21,6 @@ from gyriflow.report.page import (
     scores_table,
     sections,
     shown_figures,
-    what_was_done,
 )
 from gyriflow.report.solve import resolution_over_steps
 from gyriflow.report.tables import html_table
@@ -117,32 +115,11 @@ def test_what_a_user_has_written_is_shown_as_text(monkeypatch):
     assert "<script" not in shown_text
 
 
-def test_without_surfaces_there_is_no_3d_view():
-    assert 'id="view3d"' not in page([])
-
-
 def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_through():
     figures = [{**item, "section": name} for item, name in zip(shown("steps", "maps", "rates"), "AAB", strict=True)]
     found = [(name, [(item["number"], item["technical"]) for item in items]) for name, items in sections(figures)]
     assert found == [("A", [(1, False), (2, True)]), ("B", [(3, False)])]
     assert "<details><summary>2. a</summary>" in page(figures)
-
-
-def test_titles_name_brains_where_there_are_several():
-    words = {"maps": {"section": "Metrics", "title": "Maps of the {measure}", "caption": "*{brain}*"}}
-    figures = [("maps", f"{b}.png", {"brain": b, "measure": "sulcal_depth_mm"}) for b in "ab"] + [("view", "v", {})]
-    both = shown_figures(words, figures, {"a.png": ("data:,", 7.2), "b.png": "<p>"})
-    assert [item["title"] for item in both] == ["Maps of the sulcal depth · a", "Maps of the sulcal depth · b"]
-    assert 'alt="Maps of the sulcal depth · a" width="1080"' in both[0]["content"]
-    assert "<em>a</em>" in both[0]["caption"]
-    (alone,) = shown_figures(words, figures[:1], {"a.png": ""})
-    assert alone["title"] == "Maps of the sulcal depth"
-
-
-def test_a_warning_of_several_brains_is_told_once():
-    said = {"step": "surface", "level": ["warning", "warning", "error"], "message": ["thin", "thin", "wide"]}
-    table = grouped(pd.DataFrame({"subject": ["a", "b", "a"], "run": [np.nan, np.nan, "r"]} | said))
-    assert table[["message", "brain, run"]].to_numpy().tolist() == [["thin", "a; b"], ["error: wide", "a, r"]]
 
 
 def test_paths_and_commands_are_hidden():
@@ -197,12 +174,6 @@ def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, verd
     assert "inverted" in run_verdict(run | {"min_J": -0.1})
 
 
-def test_what_was_done_names_brains_weeks_and_runs():
-    said = what_was_done(BRAINS, RUNS)
-    assert said.startswith("2 brains of 21 to 23 GW (healthy) went in. young was filled")
-    assert "1 simulation of" in said
-
-
 def test_pictures_are_made_smaller_until_they_fit(tmp_path):
     figure = Figure(figsize=(8, 4))
     figure.subplots().imshow(np.random.default_rng(0).random((200, 400)))
@@ -214,11 +185,6 @@ def test_pictures_are_made_smaller_until_they_fit(tmp_path):
     # a figure is as wide on the page as its letters need, whatever its pixels
     assert inches == pytest.approx(8, rel=1e-4)
     assert 'width="1200"' in picture(large, inches, "noise")
-
-
-def test_the_body_of_a_written_page_is_read_back(tmp_path):
-    write_html(tmp_path / "a.html", "<p>a</p>\n<p>b</p>")
-    assert read_body(tmp_path / "a.html") == "<p>a</p>\n<p>b</p>"
 
 
 def test_the_methods_say_what_was_run():

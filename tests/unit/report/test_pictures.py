@@ -6,14 +6,11 @@ from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, sphere
 
 from gyriflow.geometry.triangles import merged
-from gyriflow.io.figures import write_figure
 from gyriflow.report.labels import AREA_GROWTH
 from gyriflow.report.pictures import (
-    ABSENT,
     LINES_MM,
     direction_lines,
     displacement_maps,
-    influence_picture,
     regions_picture,
     round_up,
     runs_by_week,
@@ -21,7 +18,7 @@ from gyriflow.report.pictures import (
     shape_maps,
     zones_picture,
 )
-from gyriflow.report.scene import MAP, TISSUE, VIEWS, render, uniform_colours
+from gyriflow.report.scene import VIEWS, render, uniform_colours
 
 BRAIN = box((20, 30, 20))
 SMOOTH = ellipsoid((20.0, 26.0, 18.0))
@@ -51,29 +48,6 @@ def test_up_is_superior_and_in_the_top_view_anterior():
         assert 0 < width[:30].max() < width[-30:].max()
 
 
-def test_light_makes_no_difference_between_the_hemispheres_and_less_shade_on_maps():
-    spread = []
-    for material in (TISSUE, MAP):
-        image = seen(SMOOTH, uniform_colours(SMOOTH, "#8FB4DC"), "top", mm=30, material=material)
-        inside = covered(image)
-        assert np.abs(image - image[:, ::-1])[inside & inside[:, ::-1]].mean() < 2.0
-        spread.append(np.ptp(np.percentile(image[inside].sum(axis=-1), [5, 95])))
-    assert spread[1] < 0.7 * spread[0]
-
-
-def test_many_weeks_go_on_below_and_columns_are_as_wide_as_they_need():
-    figure = runs_by_week({"simulated": {float(week): BRAIN for week in range(21, 31)}}, {}, views=("left",))
-    places = [axes.get_position() for axes in pictures(figure)]
-    assert len({round(place.y0, 6) for place in places}) == 2
-    assert max(place.x1 for place in places) <= 1
-    # views that do not fit beside each other stand below
-    weeks = {float(week): BRAIN for week in range(21, 26)}
-    assert {"21 GW", "simulated\ntop view"} <= words(runs_by_week({"simulated": weeks}, {}, views=("left", "top")))
-    # 30 mm from the left, 20 mm from above, and a margin that keeps rows and columns apart
-    beside = pictures(runs_by_week({"simulated": {22.0: BRAIN}}, {}, views=("left", "top")))
-    assert [np.ptp(axes.get_xlim()) for axes in beside] == pytest.approx([1.12 * 30, 1.12 * 21], abs=0.1)
-
-
 def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps():
     small, large = BRAIN, box((25, 36, 25))
     figure = runs_by_week({"simulated": {22.0: small, 23.5: large}}, {22.0: small}, views=("left", "top"))
@@ -95,15 +69,6 @@ def test_all_panels_have_one_scale_and_the_bar_its_length():
     length = np.ptp(bar.get_xlim())
     assert f"{length:g} mm" in words(figure)
     assert length / bar.get_window_extent().width == pytest.approx(scales[0])
-
-
-def test_simulated_and_measured_brains_differ_in_colour_and_a_shape_is_named():
-    figure = runs_by_week({"simulated": {22.0: BRAIN}}, {22.0: BRAIN}, views=("left",), measured="sphere")
-    simulated, measured = map(tone, (picture(figure, 0), picture(figure, 1)))
-    assert simulated[2] > simulated[0]
-    assert measured[0] > measured[2]
-    assert "sphere" in words(figure)
-    assert "real brain" not in words(figure)
 
 
 def test_displacement_maps_share_their_colour_scale():
@@ -133,20 +98,6 @@ def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed
     assert [ring.get_linestyle() for ring in (*above, *below)] == ["-", ":"]
     middle = (SMOOTH.vertices.min(axis=0) + SMOOTH.vertices.max(axis=0)) / 2
     assert above[0].center == pytest.approx((SMOOTH.vertices[top] - middle)[:2])
-
-
-def test_pictures_keep_their_pixels_in_print(tmp_path):
-    figure = runs_by_week({"simulated": {22.0: SMOOTH}}, {}, views=("top",))
-    write_figure(tmp_path / "a.png", tmp_path / "a.pdf", figure, dpi=300)
-    ((axes, image),) = [(axes, axes.images[0]) for axes in figure.axes if axes.images]
-    rows, columns, _ = np.asarray(image.get_array()).shape
-    assert f"/Height {rows}" in (pdf := (tmp_path / "a.pdf").read_bytes().decode("latin-1"))
-    assert f"/Width {columns}" in pdf
-    # the panel covers whole dots of 300 to the inch
-    box = axes.get_window_extent()
-    inches = np.array([box.x0, box.y0, box.width, box.height]) / figure.dpi
-    assert 300 * inches == pytest.approx(np.round(300 * inches), abs=1e-6)
-    assert (columns, rows) == tuple(np.round(600 * inches[2:]).astype(int))
 
 
 def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
@@ -186,14 +137,6 @@ def test_lines_on_a_map_run_along_directions_where_these_are_seen():
     assert dark[1] == 0
 
 
-def test_how_far_real_brains_lie_outside_is_shown_below_them():
-    away = np.linspace(-1, 2, 8)
-    runs, deviations = {"simulated": {22.0: BRAIN, 23.0: BRAIN}}, {23.0: (BRAIN, {"distance_mm": away})}
-    figure = runs_by_week(runs, {23.0: BRAIN}, deviations=deviations, views=("left",))
-    assert colour_bar(figure, "outwards (mm)").get_xlim() == (-2.0, 2.0)
-    assert [axes.get_label() for axes in pictures(figure)][-1] == "distance, column 1"
-
-
 def test_a_map_that_one_hemisphere_lacks_is_grey_there():
     halves = [(box((8, 30, 20), (x, 0, 0)), maps) for x, maps in ((-6, {"curvedness": np.ones(8)}), (6, {}))]
     figure = shape_maps({"simulated": {21.0: halves}, "real brain": {}}, quantity="curvedness", views=("top",))
@@ -201,19 +144,6 @@ def test_a_map_that_one_hemisphere_lacks_is_grey_there():
     image = picture(figure).astype(float)
     left, right = tone(image[:, : image.shape[1] // 2]), tone(image[:, image.shape[1] // 2 :])
     assert np.ptp(right) < 3 < np.ptp(left)
-
-
-def test_a_study_has_renders_and_maps_of_all_members_and_says_which_did_not_come_so_far():
-    halves = [(SMOOTH, {"shape_index": np.linspace(-1, 1, len(SMOOTH.vertices))})]
-    members = {"a": None, "b": halves, "c": halves}
-    values = {run: {"thickness_mm": value} for run, value in zip(members, (0.8, 1.5, 2.25), strict=True)}
-    figure = influence_picture(members, halves, values=values, views=("left",))
-    assert len(pictures(figure)) == 6
-    assert {"0.8 mm", "1.5 mm", "2.25 mm", "real brain", ABSENT, "a", "b"} <= words(figure)
-    assert colour_bar(figure, "shape index").get_xlim() == (-1.0, 1.0)
-    # the measured brain is beige
-    red, _, blue = tone(picture(figure, 2))
-    assert red > blue
 
 
 @pytest.mark.parametrize(

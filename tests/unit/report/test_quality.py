@@ -1,16 +1,12 @@
 """The page of a brain for quality control, its verdict, and the table of all brains."""
 
 import numpy as np
-import pytest
 from pictures import words
 from shapes import sphere
 
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
-from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.report.quality import (
-    LINE_IN,
-    MOST_LINES,
     Brain,
     facts,
     quality_page,
@@ -56,24 +52,6 @@ def test_the_page_shows_planes_views_and_warnings():
     rings = [path.vertices for artist in coronal.collections for path in artist.get_paths()]
     radii = [np.linalg.norm(ring, axis=1) for ring in rings if len(ring) > 20]
     assert min(abs(radius.mean() - 18.0) for radius in radii) < 0.7
-
-
-def test_thickness_takes_the_place_of_the_last_views():
-    figure = page(Brain(BALL, 0.0, thickness_mm=np.full(len(BALL.vertices), 2.0)))
-    assert "front" not in words(figure)
-    assert any(axes.get_ylabel() == "thickness (mm)" for axes in figure.axes)
-
-
-def test_a_hemisphere_alone_has_one_medial_view():
-    shown = words(page(Brain(TriangleMesh(BALL.vertices - [25.0, 0, 0], BALL.faces), 0.0)))
-    assert "left medial" in shown
-    assert "right medial" not in shown
-
-
-def test_pages_end_below_their_warnings_and_long_lists_end_in_the_table():
-    long, none = page(Brain(BALL, 0.0), [f"warning {n}" for n in range(30)], "look"), page(Brain(BALL, 0.0))
-    assert long.get_figheight() - none.get_figheight() == pytest.approx(MOST_LINES * LINE_IN)
-    assert any("more in quality.csv" in text for text in words(long))
 
 
 def test_verdicts_and_refused_brains_stand_in_one_table():

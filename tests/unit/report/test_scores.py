@@ -7,10 +7,8 @@ import pandas as pd
 import pytest
 
 from gyriflow.errors import InputError
-from gyriflow.parameters.terms import SIDES
 from gyriflow.report.scores import (
     calibration_chart,
-    influence_spectra,
     nearest_chart,
     onset_chart,
     prediction_chart,
@@ -71,12 +69,6 @@ def test_gains_are_drawn_with_their_kind_and_the_real_week_before():
     assert any(line.get_linestyle() == ":" for line in axes.lines)
 
 
-def test_what_registration_gives_is_seen_with_a_single_week_too():
-    axes = validation_chart(gains(["measured"], [23]), gains(["registration"], [23])).axes[0]
-    ends = [segment[:, 0] for lines in axes.collections for segment in lines.get_segments() if np.ptp(segment[:, 0])]
-    np.testing.assert_allclose(ends, [[22.75, 23.25]])
-
-
 def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():
     rows = [
         {"run": run, "start": start, "horizon": horizon, "model": model, "distance_mm": 0.1 * horizon}
@@ -122,36 +114,10 @@ def test_each_sulcus_has_a_row_with_its_weeks():
     assert never.get_xdata().tolist() == [29.0]
 
 
-def test_starts_are_told_apart_and_nothing_is_drawn_of_nothing():
-    both = pd.concat([onsets(real=(26.0, 28.0, np.nan)), onsets(real=(27.0, 28.5, np.nan)).assign(subject="b")])
-    names = [label.get_text() for label in onset_chart(both).axes[0].get_yticklabels()]
-    assert set(names) == {f"{sulcus} · {start}" for sulcus in ("left central", "left 2") for start in "ab"}
-    nothing = onsets(real=(26.0, 28.0, np.nan)).assign(there_at_start=True)
-    assert "No sulcus begins" in (empty := onset_chart(nothing)).texts[0].get_text()
-    assert not empty.axes
-
-
-def spectrum(run: str, power: float) -> pd.DataFrame:
-    shares = {"band": [4, 5, 6], "relative_power": [power, power / 2, power / 4]}
-    sides = [pd.DataFrame({"subject": "s", "run": run, "week": 28.0, **shares, "hemisphere": side}) for side in SIDES]
-    return pd.concat(sides).assign(complete=True, denominator_complete=True, resolved=True)
-
-
 def distances(values: dict[float, float], flag: str = "ok", **labels: str) -> pd.DataFrame:
     table = pd.DataFrame({"thickness_mm": list(values), "distance": list(values.values())})
     table = table.assign(subject="s", real="r", unit="mm", flag=flag, resolution="ok")
     return table.assign(**({"hemisphere": "whole", "measure": "hausdorff95"} | labels))
-
-
-def test_spectra_of_a_study_stand_in_its_order_from_pale_to_dark():
-    values = {run: {"thickness_mm": value} for run, value in (("a", 0.8), ("b", 1.5), ("c", 6.0))}
-    members = {"c": spectrum("c", 0.3), "a": spectrum("a", 0.1), "b": spectrum("b", 0.2)}
-    figure = influence_spectra(members, [spectrum("real", 0.15)], values=values, week=28.0)
-    left = figure.axes[0]
-    assert [bar.get_height() for bar in left.patches[::3]] == pytest.approx([0.1, 0.2, 0.3])
-    brightness = [sum(bar.get_facecolor()[:3]) for bar in left.patches[::3]]
-    assert brightness == sorted(brightness, reverse=True)
-    assert [text.get_text() for text in figure.legends[0].get_texts()][:3] == ["0.8 mm", "1.5 mm", "6 mm"]
 
 
 def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
@@ -165,15 +131,6 @@ def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
     marks = [line for line in axes.lines if line.get_marker() == "o" and line.get_markersize() == 4.5]
     shown = {line.get_markerfacecolor() == "white": line.get_xdata().tolist() for line in marks}
     assert shown == {False: [0.8, 1.5, 2.25], True: [6.0]}
-
-
-def test_hemispheres_are_drawn_apart_and_the_published_value_is_a_line():
-    of_side = {"left": 1.0, "right": 3.0}
-    table = pd.concat([distances({1.0: 2.0, 2.0: v}, hemisphere=s, measure="B4") for s, v in of_side.items()])
-    figure = nearest_chart(table, pd.DataFrame({"measure": ["B4", "B4"], "paper": [2.25, 2.25]}), **OF_THE_STUDY)
-    (axes,) = figure.axes
-    assert sorted(text.get_text() for text in axes.texts) == ["1", "2"]
-    assert [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == "--"] == [2.25]
 
 
 def test_a_study_without_distances_is_refused():

@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import same_color
 from pictures import words
 
 from gyriflow.report.growth import growth_chart
@@ -33,25 +32,6 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     assert line_of(rate_axes, "folding")[:, 1] == pytest.approx([2.0, 2.0])
     assert area_axes.lines[0].get_xydata().tolist() == [[21, 100], [22, 115], [23, 130]]
     assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
-
-
-def test_series_have_bars_on_one_scale():
-    areas = pd.concat([AREAS.assign(series="surface"), AREAS.assign(area_cm2=2 * AREAS["area_cm2"])])
-    rates = pd.concat([RATES.assign(series="surface", rate_per_s=[3e-7, 1e-7]), RATES])
-    figure = growth_chart(areas, rates, folding_rate_per_s=2e-7)
-    area_axes, _, surface_axes, volume_axes = figure.axes
-    sizes = [line_of(area_axes, series)[:, 1].tolist() for series in ("surface", "volume")]
-    assert sizes == [[100, 115, 130], [200, 230, 260]]
-    assert [bar.get_height() for bar in surface_axes.patches] == pytest.approx([3.0, 1.0])
-    assert [bar.get_height() for bar in volume_axes.patches] == pytest.approx([1.2, -0.3])
-    assert surface_axes.get_ylim() == volume_axes.get_ylim()
-    assert {"tangential growth rate:\nsurface", "tangential growth rate:\nvolume"} <= words(figure)
-    # a series is of one colour in all panels, and not that of the folding
-    folding = next(line.get_color() for line in surface_axes.lines if str(line.get_label()).startswith("folding"))
-    surface, volume = ({bar.get_facecolor() for bar in axes.patches} for axes in (surface_axes, volume_axes))
-    assert len(surface) == len(volume) == 1
-    assert surface != volume
-    assert not any(same_color(colour, folding) for colour in surface | volume)
 
 
 def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pandas as pd
 
-from gyriflow.report.tables import html_table, mesh_quality_table, metrics_table, prediction_table, runs_table
+from gyriflow.report.tables import html_table, metrics_table, runs_table
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
 
@@ -73,24 +73,3 @@ def test_html_is_escaped_and_marks_numbers_and_verdicts():
         ("verdict look", "look"), ("whole", "a &amp; b"), ("number", "0.3333"), ("number", "–"), ("number", "7")
     ]  # fmt: skip
     assert "<th>brain</th>" in html_table(table.rename_axis("brain"))
-
-
-def test_simpler_ways_of_several_runs_are_one_row():
-    columns = ("r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error")
-    numbers = dict.fromkeys((*columns, "crossing_faces", "roughness_ratio", "skill"), 0.1234)
-    rows = [
-        {"run": run, "start": "a", "week": 24.0, "model": model} | numbers
-        for run in ("expected", "stiff")
-        for model in ("run", "atlas")
-    ]
-    table = prediction_table(pd.DataFrame(rows))
-    assert table.index.get_level_values("way").tolist() == ["expected", "the atlas' brain, scaled", "stiff"]
-    assert table.shape == (3, 8)
-
-
-def test_the_quality_of_a_mesh_stands_beside_its_limits():
-    quality = {"tets": 8, "min_radius_ratio": 0.2, "surface_distance_mm": {"hausdorff99": 0.05}, "gap_kept": None}
-    table = mesh_quality_table({"young": quality}, {"min_radius_ratio": 0.1, "max_surface_distance_mm": 0.3})
-    assert table.loc["least radius ratio"].tolist() == [0.2, 0.1]
-    assert table.loc["99 % of the surface within (mm)"].tolist() == [0.05, 0.3]
-    assert table.loc["share of narrow gaps that is open"].isna().all()

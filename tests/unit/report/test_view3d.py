@@ -79,13 +79,3 @@ def test_displacement_is_measured_from_the_first_week():
 def test_surfaces_of_a_run_with_other_vertices_are_refused():
     with pytest.raises(InputError, match="differ in their vertices"):
         surfaces_view({"thin": [growing()[0], (22.0, [(ball(count=20), {})])]}, [], measured="real brain")
-
-
-def test_many_surfaces_are_thinned_more_to_fit_the_budget():
-    runs = {f"run{number}": growing() for number in range(8)}
-    small = surfaces_view(runs, growing(), measured="real brain", budget_bytes=200_000)
-    sent = sum(
-        len(frame["positions"]) + len(frame.get("faces", "")) for group in small["groups"] for frame in group["frames"]
-    ) + sum(len(group.get("faces", "")) for group in small["groups"])
-    assert sent < 200_000
-    assert [group["kind"] for group in small["groups"]] == ["simulated"] * 8 + ["real"]
