@@ -78,19 +78,6 @@ def test_a_failed_subject_holds_up_no_other_and_the_call_ends_in_its_code(cohort
     assert set(metrics["subject"]) == {"sub-01", "sub-02"}
 
 
-def test_the_table_of_quality_has_all_with_their_causes(cohort):
-    table = pd.read_csv(cohort.results / "study" / "quality.csv").set_index("subject")
-    assert list(table.index) == [row[0] for row in (*ROWS[1:4], ROWS[5], ROWS[4])]
-    assert set(table["verdict"][["sub-03", "sub-04", "sub-05"]]) == {"refused"}
-    assert "torn.nii.gz" in table["cause"]["sub-03"]
-    assert "found n/a" in table["cause"]["sub-04"]
-    assert "one hemisphere only" in table["cause"]["sub-05"]
-    for brain in ("sub-01", "sub-02"):
-        assert table["verdict"][brain] in ("fine", "look")
-        assert 0.5 < table["share_of_expected_volume"][brain] < 1.5
-        assert (cohort.results.parent / table["page"][brain]).exists()
-
-
 @pytest.mark.parametrize("brain", ["sub-01", "sub-02"])
 def test_a_hemisphere_has_surfaces_and_maps_of_its_side_only(cohort, brain):
     folder = cohort.results / "brains" / brain

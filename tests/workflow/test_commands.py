@@ -25,32 +25,6 @@ def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflo
     assert "Traceback" not in outcome.stderr
 
 
-def test_an_input_of_another_scheme_is_found_by_check(workflow):
-    labels = workflow.checkout / "atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz"
-    brains = [{"id": "x", "week": 21, "labels": str(labels), "scheme": "dhcp-19"}]
-    name = workflow.write("study.yaml", SMALL_STUDY | {"brains": brains, "start": "x"})
-    outcome = gyriflow(workflow, "check", name)
-    assert outcome.returncode == 2
-    assert "  brain x: " in outcome.stdout
-    assert "scheme 'dhcp-19'" in outcome.stdout
-    assert not (workflow.directory / "results").exists()
-
-
-@pytest.mark.slow
-def test_check_says_what_will_run_and_what_it_takes(workflow):
-    workflow.write("gyriflow.yaml", SMALL_STUDY)
-    outcome = gyriflow(workflow, "check", "--cores", "2")
-    assert outcome.returncode == 0, outcome.stderr
-    said = outcome.stdout
-    assert said.startswith("gyriflow.yaml: 2 brains, 2 simulations (reference, thick)")
-    assert "\n  Missing output files: " in said
-    for rule in ("pial_from_labels", "tetrahedralise", "simulate", "html_report"):
-        assert f"{rule}" in said
-    for need in ("\ntime    about ", "\nmemory  about ", "\ndisk    about "):
-        assert need in said
-    assert not (workflow.directory / "results").exists()
-
-
 @pytest.mark.slow
 def test_a_study_of_fifty_runs_is_planned_with_its_core_hours_and_cost(workflow):
     brains = [{"id": "a", "week": 21, **labelled(21)}, {"id": "b", "week": 22, **labelled(22)}]
@@ -69,11 +43,3 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours_and_cost(workflow)
     assert cost == pytest.approx(hours / 2, rel=0.1)
     # the memory of a cluster is not that of this machine
     assert "are there" not in re.search(r"\nmemory .*", said)[0]
-
-
-def test_view_and_status_say_what_is_missing(workflow):
-    for command in ("view", "status"):
-        outcome = gyriflow(workflow, command)
-        assert outcome.returncode == 2
-        assert outcome.stderr.startswith("gyriflow: ")
-        assert "Traceback" not in outcome.stderr

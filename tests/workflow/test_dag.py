@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from .conftest import CHECKOUT, SMALL_STUDY
+from .conftest import CHECKOUT
 
 EXAMPLES = CHECKOUT / "config" / "examples"
 
@@ -58,16 +58,3 @@ def test_an_example_is_planned(workflow, example):
     jobs = workflow.jobs(target, "--configfile", "config/examples/study.yaml")
     assert {rule: jobs.get(rule) for rule in expected} == expected
     assert ("atlas_file" in jobs) == ("atlas_file" in expected)
-
-
-@pytest.mark.slow
-def test_the_solver_is_told_of_the_maps_of_a_run(workflow):
-    for name in ("left.gii", "right.gii"):
-        (workflow.directory / name).touch()
-    pair = ["left.gii", "right.gii"]
-    runs = {"plain": {}, "thick": {"thickness_mm": {"map": pair, "surface": pair}}}
-    with_maps = workflow.write("maps.yaml", SMALL_STUDY | {"runs": runs})
-    shown = workflow.run("-n", "folding", "--printshellcmds", "--configfile", with_maps).stdout
-    commands = [line for line in shown.splitlines() if "gyriflow.folding" in line]
-    told = ["--maps results/runs/thick/a/folding/maps.h5 --out" in command for command in commands]
-    assert sorted(told) == [False, True]

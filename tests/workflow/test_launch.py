@@ -4,44 +4,13 @@ import subprocess
 
 import pytest
 
-from gyriflow.cli.launch import clear_stale_lock, hold_lock, refuse_bad_configfiles
-from gyriflow.errors import InputError, StorageError
-
-from .conftest import SMALL_STUDY
+from gyriflow.cli.launch import clear_stale_lock, hold_lock
+from gyriflow.errors import StorageError
 
 
 def message(outcome):
     assert "Traceback" not in outcome.stderr
     return outcome.stderr
-
-
-@pytest.mark.fault(27, 28)
-def test_three_mistakes_are_shown_at_once_and_end_in_2(workflow):
-    study = SMALL_STUDY | {"folding": {"end_week": 50, "poisson_ratio": 0.5, "thicknes_mm": 2}}
-    outcome = workflow.run("-n", "--configfile", workflow.write("study.yaml", study))
-    assert outcome.returncode == 2
-    said = message(outcome)
-    assert "the configuration has 3 problems" in said
-    assert "folding.poisson_ratio: Input should be less than 0.5; found 0.5" in said
-    assert "folding.thicknes_mm: unknown key; did you mean thickness_mm?" in said
-    assert "folding.end_week: Input should be less than or equal to 45; found 50" in said
-
-
-@pytest.mark.fault(31)
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ("runs:\n  x: {}\n  x: {}\n", "line 3: the key 'x' of line 2 is there again"),
-        (None, "study.yaml: cannot be read.*Targets stand before --configfile"),
-        ("", "holds no keys; found nothing"),
-    ],
-)
-def test_a_file_that_is_no_configuration_is_refused(tmp_path, content, said):
-    study = tmp_path / "study.yaml"
-    if content is not None:
-        study.write_text(content)
-    with pytest.raises(InputError, match=said):
-        refuse_bad_configfiles([study], tmp_path)
 
 
 def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(workflow):

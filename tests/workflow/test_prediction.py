@@ -1,7 +1,5 @@
 """A brain foretold by another population's growth, with the real commands, from phantoms given as labels or surface."""
 
-import re
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -45,24 +43,6 @@ def brains_of(workflow, population, seed, *weeks):
         known = {"labels": file, "scheme": "spina-bifida-atlas", "population": population}
         entries.append({"id": f"{population}{week}", "week": week} | known)
     return entries
-
-
-@pytest.mark.slow
-def test_a_refused_brain_of_the_atlas_holds_up_only_the_runs_that_it_leads(workflow, monkeypatch):
-    brains = []
-    for name in ("a21", "a22", "a23", "b21"):
-        (workflow.directory / f"{name}.nii.gz").touch()
-        known = {"labels": f"{name}.nii.gz", "scheme": "spina-bifida-atlas", "population": name[0]}
-        brains.append({"id": name, "week": int(name[1:])} | known)
-    runs = STUDY["runs"] | {"plain": {"start": "a21"}}
-    name = workflow.write("study.yaml", STUDY | {"brains": brains, "start": "b21", "runs": runs})
-    refused = workflow.directory / "refused.json"
-    refused.write_text('{"a23": "torn"}')
-    monkeypatch.setenv("GYRIFLOW_REFUSED_FILE", str(refused))
-    outcome = workflow.run("-n", "folding", "--configfile", name)
-    assert outcome.returncode == 0, outcome.stderr
-    assert "not folded: run expected from b21 is to grow towards brains that are not there" in outcome.stderr
-    assert re.search(r"^simulate +1$", outcome.stdout + outcome.stderr, re.MULTILINE)
 
 
 @pytest.mark.slow

@@ -1,8 +1,5 @@
 """Regions, centiles, change and export with the real commands, on phantoms whose regions are known."""
 
-import shutil
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,12 +8,9 @@ from shapes import LPS, hemisphere, save_gifti
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.io.surfaces import (
-    read_pose,
     read_surface,
     read_vertex_labels,
     read_vertex_maps,
-    write_surface,
-    write_vertex_labels,
 )
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
@@ -117,35 +111,6 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(made):
     assert set(white.index) == {(brain, part) for brain in ("p21", "p22") for part in ("whole", *SIDES)}
     measured = whole[:, "real"].droplevel("week").reindex(white.index)
     assert (white / measured).between(0.6, 0.95).all()
-
-
-@pytest.mark.slow
-def test_labels_of_surfaces_are_given_as_well(made, tmp_path):
-    """Labels of both hemispheres' own surfaces, with the names of their tables."""
-    workflow = replace(made, directory=tmp_path / "study")
-    shutil.copytree(made.directory, workflow.directory)
-    folder, given = workflow.directory / "results/brains/p22/surface", {}
-    back = read_pose(folder / "surface.json").inverse
-    for side in SIDES:
-        posed = read_surface(folder / f"{side}.pial.surf.gii")
-        vertices, surface = posed.vertices, workflow.directory / f"{side}.surf.gii"
-        # in the coordinates of the brain's own files
-        write_surface(surface, transformed(posed, back))
-        labels = workflow.directory / f"{side}.label.gii"
-        # numbers differ between the sides, names do not
-        first = {"left": 5, "right": 8}[side]
-        inside = np.where(vertices[:, 1] > middle(vertices), first, first + 1)
-        write_vertex_labels(labels, inside, {first: "front", first + 1: "back"})
-        given[side] = {"labels": str(labels), "surface": str(surface)}
-    config = STUDY | {"metrics": {"regions": {"p22": given}}}
-    target = "results/brains/p22/metrics/left.regions.label.gii"
-    outcome = workflow.run(target, "--cores", "2", "--configfile", workflow.write("study.yaml", config))
-    assert outcome.returncode == 0, outcome.stderr[-2000:]
-    for side in SIDES:
-        found, names = read_vertex_labels(workflow.directory / f"results/brains/p22/metrics/{side}.regions.label.gii")
-        assert names == {1: "front", 2: "back"}
-        vertices = read_surface(folder / f"{side}.pial.surf.gii").vertices
-        np.testing.assert_array_equal(found, np.where(vertices[:, 1] > middle(vertices), 1, 2))
 
 
 @pytest.mark.slow

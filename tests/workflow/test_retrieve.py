@@ -114,22 +114,6 @@ def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
 
 
 @pytest.mark.fault(40)
-@pytest.mark.promise(8)
-def test_half_a_file_is_refused_and_not_kept(workflow, server):
-    """What else may come in the place of a file is tried in tests/unit/io/test_downloads.py."""
-    path = "w21/labels.nii.gz"
-    server.files[path] = FILES[path][:50_000]
-    name = workflow.write("study.yaml", study(workflow.directory, server.url))
-    outcome = workflow.run("retrieve", "--cores", "1", "--keep-going", "--configfile", name)
-    assert outcome.returncode == 5
-    assert "Traceback" not in outcome.stderr
-    assert f"{server.url}/{path}: the server sent something else than the file" in outcome.stderr
-    # what was good stays, and nothing torn
-    good = {"w22/labels.nii.gz": FILES["w22/labels.nii.gz"]}
-    assert files_in(workflow.directory / "resources" / "atlases" / "far") == good
-
-
-@pytest.mark.fault(40)
 def test_no_network_ends_in_5_and_nothing_torn(workflow):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -3,7 +3,6 @@
 import hashlib
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -122,46 +121,8 @@ def test_exit_code_is_handed_on(command, code):
     assert run("bash", "-c", command).returncode == code
 
 
-def test_without_a_command_it_says_how_it_is_used():
-    done = run()
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("gyriflow: usage: ./run CMD")
-
-
-def test_inside_the_environment_it_becomes_the_command():
-    process = start("bash", "-c", "echo $$", env=None)
-    out, err = process.communicate(timeout=30)
-    assert (int(out), err) == (process.pid, "")
-
-
-def test_settings_are_made_where_the_user_has_none():
-    env = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-    show = "echo $OMP_NUM_THREADS $OPENBLAS_NUM_THREADS $OMPI_MCA_btl $PYTHONPATH"
-    done = run("bash", "-c", show, env=env | {"OMP_NUM_THREADS": "3"})
-    assert done.stdout.split() == ["3", "1", "self,sm", str(ROOT / "src")]
-
-
-def test_stdin_is_handed_on_or_may_be_closed():
-    assert run(RUN, "cat", input="hello").stdout == "hello"
-    done = subprocess.run(["bash", "-c", f"exec '{RUN}' cat <&-"], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
 def test_arguments_reach_the_command_as_they_are():
     assert run("printf", "%s|", "a b", "", "*", "$HOME", "'").stdout == "a b||*|$HOME|'|"
-
-
-def test_in_a_folder_of_an_unusual_name(tmp_path):
-    here = tmp_path / "a b'é"
-    shutil.copytree(ROOT / "envs", here / "envs")
-    shutil.copy(RUN, here)
-    link = tmp_path / "link"
-    link.symlink_to(here / "run")
-    for launcher in (here / "run", link):
-        done = subprocess.run(
-            [launcher, "bash", "-c", "echo $PYTHONPATH; pwd"], cwd=here, capture_output=True, text=True
-        )
-        assert done.stdout.splitlines() == [str(here / "src"), str(here)]
 
 
 # --- conda ---------------------------------------------------------------------------------------------------
@@ -212,13 +173,6 @@ def test_failing_set_up_shows_why_and_is_tried_again(outside, tmp_path):
     assert run("tool", "now", env=outside).stdout == "from the environment: now\n"
 
 
-def test_folder_that_cannot_be_made(outside, tmp_path):
-    (tmp_path / "file").touch()
-    done = run("tool", env=outside | {"GYRIFLOW_CACHE": str(tmp_path / "file" / "cache")})
-    assert done.returncode == 2
-    assert "set GYRIFLOW_CACHE" in done.stderr
-
-
 def test_two_at_once_make_one_environment(outside, tmp_path):
     held = tmp_path / "record.wait"
     held.touch()
@@ -248,20 +202,6 @@ def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_pa
     assert run("tool", "again", env=outside).stdout == "from the environment: again\n"
 
 
-def test_interrupted_while_waiting_for_another(outside, tmp_path):
-    held = tmp_path / "record.wait"
-    held.touch()
-    first = start("tool", "first", env=outside)
-    assert wait_until((tmp_path / "record").exists)
-    second = start("tool", "second", env=outside)
-    assert "waiting" in second.stderr.readline()
-    second.send_signal(signal.SIGINT)
-    assert second.wait(20) == 130
-    assert first.poll() is None
-    held.unlink()
-    assert first.communicate(timeout=30)[0] == "from the environment: first\n"
-
-
 # --- the Debian tree, entered once more by chroot from inside itself -------------------------------------------
 
 
@@ -289,19 +229,6 @@ def tree(outside, tmp_path):
     if probe.returncode:
         pytest.skip(f"a chroot cannot be entered here: {probe.stderr}")
     return env
-
-
-@pytest.mark.parametrize("code", [0, 7])
-def test_tree_hands_on_exit_code_and_stdin(tree, code):
-    done = run("bash", "-c", f"cat; exit {code}", env=tree, input="hello")
-    assert (done.stdout, done.returncode, done.stderr) == ("hello", code, "")
-
-
-def test_tree_keeps_the_folder(tree, tmp_path):
-    here = tmp_path / "a b"
-    here.mkdir()
-    assert run("bash", "-c", "pwd; touch made", env=tree, cwd=here).stdout == f"{here}\n"
-    assert (here / "made").exists()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -339,10 +266,3 @@ def test_two_mpi_runs_in_trees_do_not_meet(tree):
     for process in both:
         out, err = process.communicate(timeout=60)
         assert (process.returncode, out) == (0, "done\n"), err
-
-
-def test_snakemake_goes_through_the_launcher(tmp_path):
-    done = run("snakemake", "--version", cwd=tmp_path)
-    assert done.returncode == 0
-    assert done.stdout.split(".")[0] == "9"
-    assert sys.version_info >= (3, 12)

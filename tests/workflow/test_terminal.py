@@ -53,20 +53,3 @@ def test_a_run_shows_a_bar_and_all_else_is_in_the_log(workflow):
     # Snakemake's own messages are a word away
     as_before = workflow.run(*arguments, "--verbose")
     assert "Nothing to be done" in as_before.stdout + as_before.stderr
-
-
-@pytest.mark.slow
-def test_a_failure_is_told_by_its_cause_once_and_first(workflow):
-    (workflow.directory / "labels.nii.gz").write_bytes(b"not an image")
-    brains = [{"id": "x", "week": 21, "labels": "labels.nii.gz", "scheme": "binary"}]
-    name = workflow.write("study.yaml", SMALL_STUDY | {"brains": brains, "start": "x"})
-    outcome = workflow.run("--cores", "1", "surface", "--configfile", name)
-    assert outcome.returncode == 2
-    lines = outcome.stderr.splitlines()
-    first = next(index for index, line in enumerate(lines) if "labels.nii.gz" in line)
-    assert lines[first].startswith("failed  pial_from_labels x: ")
-    assert lines[first + 1].endswith("log: results/brains/x/logs/pial_from_labels.log")
-    assert outcome.stderr.count("cannot be read as an image") == 1
-    assert "CalledProcessError" not in outcome.stderr
-    assert "Traceback" not in outcome.stderr
-    assert not list((workflow.directory / ".snakemake").glob("gyriflow-exit-*"))

@@ -1,12 +1,10 @@
 """What the commands hand on to Snakemake, and what they tell to type next."""
 
-import shutil
-
 import pytest
 import yaml
 from click.testing import CliRunner
 
-from gyriflow.cli import beginning, launch
+from gyriflow.cli import launch
 from gyriflow.cli.commands import main
 from gyriflow.config import load
 from gyriflow.shipped import SHIPPED
@@ -46,16 +44,6 @@ def test_a_missing_configuration_is_an_error(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(main, [command])
     assert (done.exit_code, "there is no configuration" in done.output) == (2, True)
-
-
-@pytest.mark.parametrize(("installed", "typed"), [(None, "./run gyriflow"), ("/usr/bin/gyriflow", "gyriflow")])
-def test_what_to_type_next_can_be_typed(monkeypatch, tmp_path, installed, typed):
-    monkeypatch.setattr(shutil, "which", lambda name: installed)
-    monkeypatch.setattr(beginning, "write_configuration", lambda folder, path, force, quick: ["1 brain"])
-    folder = tmp_path / "brains of our lab"
-    folder.mkdir()
-    said = CliRunner().invoke(main, ["init", str(folder)]).output
-    assert said.endswith(f"; next: {typed} check '{folder}/gyriflow.yaml'\n")
 
 
 @pytest.fixture
@@ -102,10 +90,3 @@ def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until
     assert done.exit_code == 2
     assert told in done.output
     assert not (tmp_path / "gyriflow.yaml").exists()
-
-
-def test_a_prediction_by_an_atlas_whose_licence_is_accepted_says_so(predicted, tmp_path):
-    assert predicted("--week", "22.4", "--until", "30", "--atlas", "crl", "--accept-licence").exit_code == 0
-    weeks = [float(week) for week in range(22, 31)]
-    atlas = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())["atlas"]
-    assert atlas == {"name": "crl", "series": "normative", "weeks": weeks, "accept_licence": True}

@@ -50,16 +50,6 @@ def test_a_folding_takes_as_long_as_measured_ones_within_the_error(elements, ste
     assert seconds / ERROR < predicted < ERROR * seconds
 
 
-def test_a_folding_takes_as_long_as_it_has_elements_and_steps():
-    def seconds(mesh=(), **folding):
-        study = STUDY | {"folding": STUDY["folding"] | folding, "mesh": STUDY["mesh"] | dict(mesh)}
-        return folding_needs(*reference(study)).seconds
-
-    assert seconds(end_week=29) == pytest.approx(2 * seconds())
-    assert seconds(step_s=43200) == pytest.approx(2 * seconds())
-    assert seconds({"surface_edge_mm": 0.5}) > 1.5 * seconds()
-
-
 def test_runs_of_studies_and_calibrations_cost_what_runs_do():
     later = [{"id": f"w{week}", "week": week, "shape": {"semi_axes_mm": [22, 22, 22]}} for week in (23, 25)]
     study = STUDY | {

@@ -85,17 +85,6 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
     assert load(yaml.safe_load(path.read_text()), tmp_path).mesh.surface_edge_mm == 1.5
 
 
-def test_what_files_do_not_tell_is_left_to_be_filled_in(tmp_path):
-    (tmp_path / "mine_seg.nii.gz").write_bytes(LABELS.read_bytes())
-    path = tmp_path / "gyriflow.yaml"
-    said = list(write_configuration(tmp_path, path, force=False))
-    assert said[1] == "  to be filled in: week: not told by its name"
-    written = yaml.safe_load(path.read_text())
-    assert written["brains"][0]["week"] == UNSET
-    with pytest.raises(InputError, match=r"brains\[0\].week"):
-        load(written, tmp_path)
-
-
 def test_a_folder_without_brains_says_what_is_expected(tmp_path):
     touched(tmp_path, "notes.txt")
     with pytest.raises(InputError, match="no brain was recognised; found 1 files; expected tissue label volumes"):
@@ -129,20 +118,6 @@ def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
     list(write_configuration(tmp_path, path, force=False))
     config = load(yaml.safe_load(path.read_text()), tmp_path)
     assert [brain.subject for brain in config.brains] == ["sub-01", "sub-01"]
-
-
-def test_an_ambiguous_age_is_asked_for_by_file_and_column(tmp_path):
-    (tmp_path / "sub-01_dseg.nii.gz").write_bytes(LABELS.read_bytes())
-    (tmp_path / "sub-01_dseg_copy.nii.gz").write_bytes(LABELS.read_bytes())
-    (tmp_path / "participants.tsv").write_text("participant_id\tage\nsub-01\t31\n")
-    first, second = recognise(tmp_path)
-    assert first.entry["week"] == UNSET
-    assert (
-        f"week: {tmp_path}/participants.tsv: has no column of gestational ages; found participant_id, age"
-        in first.notes[0]
-    )
-    assert second.entry["id"] == "sub-01-2"
-    assert "2 files are of sub-01: keep one" in second.notes
 
 
 @pytest.fixture
@@ -182,11 +157,3 @@ def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     assert (written["start"], written["runs"], written["mesh"]) == ("sub-01_ses-2", {"mine": {}}, {"order": 1})
     assert written["folding"] == {"end_week": 25.43, "poisson_ratio": 0.4}
     assert "no such participants and sessions" in app("participant", "--participant-label", "07", code=2)
-
-
-def test_a_bids_app_asks_which_of_several_files_is_meant(app, tmp_path):
-    place = tmp_path / "data" / "derivatives" / "seg" / "sub-01" / "ses-1" / "anat"
-    (place / "sub-01_ses-1_desc-other_dseg.nii.gz").write_bytes(LABELS.read_bytes())
-    assert "2 files are of sub-01_ses-1: keep one" in app("participant", code=2)
-    _, written = app("participant", "--files", "*_desc-brain_dseg.nii.gz")
-    assert len(written["brains"]) == 2

@@ -3,7 +3,6 @@
 import pytest
 
 from gyriflow.cli.launch import hold_lock
-from gyriflow.cli.provenance import STUDY
 from gyriflow.cli.status import STATE, as_text, status
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
@@ -49,13 +48,6 @@ def test_a_run_that_was_killed_is_called_interrupted(study):
     assert "interrupted at 2026-01-01 10:05:00, 3 of 10 steps done" in text(study)
 
 
-def test_failures_are_told_with_their_cause_and_log(study):
-    write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "failed": FAILED})
-    said = text(study)
-    assert "last run: 2026-01-01 10:00:00 to 2026-01-01 10:05:00" in said
-    assert "failed: surface, brain b: b.nii: is no image\n          log: b.log" in said
-
-
 def test_stages_of_brains_and_runs_are_told_from_their_files(study):
     found = status(study)
     assert [list(row.values()) for row in found["brains"]] == [["a", "done", "-", "-"], ["b", "-", "-", "-"]]
@@ -71,20 +63,3 @@ def test_stages_of_brains_and_runs_are_told_from_their_files(study):
 def test_a_folder_without_a_study_is_named(tmp_path):
     with pytest.raises(InputError, match=f"{tmp_path}: holds no study"):
         status(tmp_path)
-
-
-def test_a_program_gets_all_configured_runs_with_the_names_of_what_is_known(study):
-    brain = "brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\nstart: a\nfolding: {end_week: 24}\n"
-    (study / "gyriflow.yaml").write_text(brain + "runs: {r: {}, later: {}}\n")
-    found = status(study)
-    assert found["brains"][0] == {"brain": "a", "surface": "done", "mesh": "-", "metrics": "-"}
-    assert [(row["run"], row["brain"], row["folding"]) for row in found["runs"]] == [
-        ("r", "a", "-"),
-        ("later", "a", "-"),
-    ]
-    # the configuration may lie elsewhere
-    elsewhere = study / "elsewhere.yaml"
-    (study / "gyriflow.yaml").rename(elsewhere)
-    assert [row["run"] for row in status(study)["runs"]] == ["r"]
-    write_json(study / STUDY, {"configuration": [str(elsewhere)], "brains": []})
-    assert [row["run"] for row in status(study)["runs"]] == ["r", "later"]

@@ -13,11 +13,6 @@ from gyriflow.step import EXIT_FILE, recorded_exit_code
 STEP = '{{"event": "step", "week": {week}, "end_week": 23, "left_s": {left}}}\n'
 
 
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
 class Run:
     """A run that Snakemake tells of, and what its display has written."""
 
@@ -73,21 +68,6 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
     assert len(run.lines) == 22
     assert "\x1b" not in "".join(run.lines)
     assert (run.state["done"], run.state["total"], run.state["running"]) == (100, 100, [])
-
-
-def test_a_terminal_has_a_bar_with_the_time_left(tmp_path, monkeypatch):
-    monkeypatch.setenv("TERM", "xterm")
-    run = Run(tmp_path, Terminal())
-    run.tell("run_info", stats={"measure": 10})
-    for number in range(5):
-        run.begin("measure", number, brain="a")
-        run.now += 20.0
-        run.end(number, number + 1, 10)
-        run.display.tick()
-    run.display.end()
-    # five more at 20 s each
-    assert "50 %" in "".join(run.lines)
-    assert "0:01:40" in "".join(run.lines)
 
 
 def test_a_folding_tells_its_size_weeks_and_warnings(run):

@@ -40,15 +40,6 @@ def test_the_optimum_is_found():
     assert best["score"].iloc[0] == pytest.approx(0.1, abs=0.02)
 
 
-def test_rounds_look_where_the_least_is_and_apart_from_each_other():
-    runs = scored(sobol_design(BOUNDS, 12, seed=0))
-    chosen = propose(fit(runs, BOUNDS, seed=0), 3)
-    assert scored(chosen)["score"].min() < runs["score"].min()
-    points = in_unit_box(chosen, BOUNDS)
-    gaps = [np.linalg.norm(points[i] - points[j]) for i in range(3) for j in range(i)]
-    assert min(gaps) >= 0.02
-
-
 def test_a_diverged_run_keeps_others_away():
     runs = scored(sobol_design(BOUNDS, 12, seed=0))
     thick = runs["thickness_mm"] > 2.4

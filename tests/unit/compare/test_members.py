@@ -4,7 +4,6 @@ import pandas as pd
 import pytest
 
 from gyriflow.compare.members import distances_to, member_row, nearest
-from gyriflow.compare.published import comparison_caption, with_published_nearest
 
 
 def spectra(run, subject, powers, *, complete=True):
@@ -51,13 +50,6 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
 
 
-def test_a_band_that_is_cut_off_has_no_distance():
-    both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1), complete=False), spectra("real", "b", (0.4, 0.3, 0.1))])
-    table = distances_to("b", METRICS, both, SPECTRAL, SURFACES).set_index("measure")
-    assert table.loc["relative_power_B4", "distance"] != table.loc["relative_power_B4", "distance"]
-    assert table.loc["relative_power_B4", "flag"] == "cut off"
-
-
 def member(run, thickness, through=2.0, diverged=None):
     return member_row(
         {"study": "thickness", "run": run, "subject": "a", "compare_week": 28},
@@ -90,18 +82,3 @@ def test_the_nearest_run_is_named_with_the_next():
 def test_what_stands_against_the_nearest_is_said():
     (row,) = nearest(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
-
-
-def test_the_papers_value_stands_beside_ours_where_it_reports_one():
-    published = {"nearest": [{"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 2.25}]}
-    table = nearest(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
-    assert with_published_nearest(table, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
-    cut = table.assign(measure="relative_power_B4_weyl")
-    assert with_published_nearest(cut, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
-    assert with_published_nearest(table, published, ["thickness_mm"], 27)["paper"].isna().all()
-    assert with_published_nearest(table, published, ["poisson_ratio"], 28)["paper"].isna().all()
-
-
-def test_another_population_is_said():
-    assert "other is another population" in comparison_caption("s", 28, compared(t1=0.1))
-    assert "another" not in comparison_caption("s", 28, compared(t1=0.1).assign(same_population=True))

@@ -66,15 +66,6 @@ def test_noise_has_the_correlation_that_it_leaves():
     assert row["gain_low_mean_curvature"] > 0
 
 
-def test_patches_cover_the_surface_evenly():
-    areas = np.full(len(REAL.vertices), 4 * np.pi * RADIUS**2 / len(REAL.vertices))
-    patch = patches(REAL.vertices, areas, 10.0)
-    sizes = np.bincount(patch, areas)
-    assert len(sizes) == round(4 * np.pi * RADIUS**2 / 100)
-    assert sizes.min() > 25
-    assert sizes.max() < 300
-
-
 def test_interval_is_as_wide_as_gains_scatter_from_surface_to_surface():
     points, areas = SMOOTH.vertices, np.ones(len(SMOOTH.vertices))
     directions = points / RADIUS

@@ -24,12 +24,6 @@ def lying_apart(found, real):
     return distances(apart(found, real, ready(real, real)))
 
 
-def test_spheres_in_each_other_are_apart_by_the_difference_of_their_radii():
-    found = lying_apart(sphere(12.0), sphere(10.0))
-    assert found["distance_mm"] == pytest.approx(2.0, abs=0.03)
-    assert found["distance95_mm"] == pytest.approx(2.0, abs=0.03)
-
-
 def test_distances_are_weighted_by_area_and_the_far_ones_are_a_quantile():
     ball = sphere(10.0)
     # the two caps beyond 0.9 of a radius have a tenth of a ball's area

@@ -1,7 +1,5 @@
 """Rows of validation, and what the benchmark says of a finished study."""
 
-import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -56,20 +54,3 @@ def test_a_row_holds_sizes_errors_placement_and_folds(table):
     assert 0.7 < found["cortex_dice"] < table["cortex_dice"].iloc[0] == 1.0
     assert found["curvature_rms_ratio"] == pytest.approx(1.0)
     assert table[["run", "week"]].to_numpy().tolist() == [["measured", 22.0], ["measured", 23.0], ["reference", 22.0]]
-
-
-def test_the_benchmark_sums_up_a_study(tmp_path, table):
-    folder = tmp_path / "results" / "study"
-    folder.mkdir(parents=True)
-    table.to_csv(folder / "validation.csv", index=False)
-    moves = pd.DataFrame({"run": "measured", "to_week": [22.0, 23.0], "displacement_r": [0.5, 0.8]})
-    moves.assign(displacement_slope=0.9).to_csv(folder / "displacement_agreement.csv", index=False)
-    printed = subprocess.run(
-        [sys.executable, str(BENCHMARK), str(tmp_path)], capture_output=True, text=True, check=True
-    ).stdout
-    measured, reference = json.loads(printed.splitlines()[-1])["runs"].values()
-    assert (measured["kind"], measured["last_week"]) == ("predicted", 23)
-    assert measured["worst_volume_error"] == pytest.approx(1.02**3 - 1)
-    assert measured["skill_shape_index"] == pytest.approx(table["skill_shape_index"].iloc[1])
-    assert (measured["displacement_r"], measured["displacement_slope"]) == (0.8, 0.9)
-    assert (reference["worst_area_error"], reference["displacement_r"]) == (None, None)

@@ -123,16 +123,6 @@ def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_
     assert twice == [f"brains: 2 brains have the id {name}; ids are unique" for name in dhcp]
 
 
-def test_surfaces_of_hemispheres_and_labels(tmp_path):
-    sections = [{"name": "dhcp-surface", "weeks": [21]}, {"name": "dhcp-volume", "weeks": [21], "accept_licence": True}]
-    surface, volume = load(study(sections, "dhcp-surface-21"), tmp_path).brains
-    root = f"{tmp_path}/resources/atlases"
-    assert (surface.source, surface.coordinates) == ("hemispheres", "auto")
-    assert surface.hemispheres.right == f"{root}/dhcp-surface/atlas/fetal.week21.right.pial.surf.gii"
-    assert (volume.source, volume.scheme) == ("labels", "dhcp-19")
-    assert volume.labels == f"{root}/dhcp-volume/parcellations/tissue-t21.00_dhcp-19.nii.gz"
-
-
 # files in a folder
 
 
@@ -197,15 +187,6 @@ def test_an_atlas_of_ones_own_is_one_file(tmp_path):
         config = load(study(given, "mine-21", folding={"end_week": 22}), tmp_path)
         assert [(brain.id, brain.population) for brain in config.brains] == [("mine-21", "sheep"), ("mine-22", "sheep")]
         assert config.brains[1].labels == str(tmp_path / "mine" / "w22.nii.gz")
-
-
-def test_a_file_that_neither_lies_there_nor_has_an_address_is_named(tmp_path):
-    put(tmp_path, "w21.nii.gz")
-    own_atlas(tmp_path)
-    assert problems(study("atlas.yaml", "mine-21"), tmp_path) == [
-        f"atlas.weeks: {tmp_path}/resources/atlases/mine/w22.nii.gz is missing and cannot be fetched, as mine has no "
-        "url for it"
-    ]
 
 
 @pytest.mark.parametrize(
@@ -279,15 +260,3 @@ def test_mistakes_in_a_section_are_named_at_once(tmp_path, atlas, found):
     for expected, line in zip(found, named, strict=False):
         assert expected.format(folder=tmp_path) in line if "{folder}" in expected else expected in line
     assert named[-2:] == ["folding.end_week: Field required", "folding.end_weak: unknown key; did you mean end_week?"]
-
-
-def test_checksums_of_the_descriptions_have_no_twins():
-    seen: dict[str, str] = {}
-    for name in shipped_atlases():
-        for series in Atlas(**read_yaml(ATLASES / name / "atlas.yaml")).series.values():
-            for week, records in series.weeks.items():
-                for key, record in records.items():
-                    if record.sha256:
-                        place = f"{name} {week:g} {key}"
-                        assert seen.setdefault(record.sha256, place) == place
-    assert len(seen) == 18 * 2 + 14 * 2 - 1 + 15 * 2

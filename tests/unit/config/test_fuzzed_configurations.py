@@ -104,12 +104,6 @@ def test_changed_values(tmp_path, raw):
 
 
 @BOUNDED
-@given(raw=st.dictionaries(st.sampled_from(sorted(Config.model_fields)), VALUES, max_size=5))
-def test_sections_of_anything(tmp_path, raw):
-    loaded(raw, tmp_path)
-
-
-@BOUNDED
 @given(content=damaged(yaml.safe_dump(STUDY).encode()))
 @example(content=b"a: &x [*x]\n")
 @example(content=b"- brains\n")

@@ -101,11 +101,6 @@ def test_a_growth_model_has_its_own_keys(growth, told):
     assert not found if not told else any(told in line for line in found)
 
 
-def test_rates_are_refused_with_another_model():
-    (found,) = problems(study({"growth": "sizes", "growth_rate_per_s": 1e-7}))
-    assert found == "folding.growth_rate_per_s: has no meaning with the growth model sizes"
-
-
 def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
     runs = {"smooth": {"growth": {"smoothing_mm": 3}}, "sizes": {"growth": "sizes"}, "same": {"growth": "shapes"}}
     config = load(study({"preset": "expected", "growth": {"smoothing_mm": 2}}, runs=runs))

@@ -146,26 +146,3 @@ def test_a_participant_has_a_brain_for_each_session(folder):
         ("sub-2_ses-2", 23.5, "sub-2"),
     ]
     assert resolve(found).scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
-
-
-def test_rows_of_one_id_are_problems_where_one_cannot_be_used(folder):
-    head, row = ("id", "week", "labels", "scheme"), ("a.nii.gz", "feta-7")
-    write(folder, head, ("sub-1", "24", *row), ("sub-2", "n/a", *row), ("sub-2", "170", *row))
-    with pytest.raises(InputError, match=r"2 problems(.|\n)*sub-2: week: found n/a(.|\n)*sub-2: week: found 170"):
-        config(folder)
-    write(folder, head, ("sub-1", "24", *row), ("sub-1", "n/a", *row))
-    with pytest.raises(InputError, match=r"sub-1: week: found n/a(.|\n)*the id is that of 2 rows; ids are unique"):
-        config(folder, keep_going=True)
-
-
-@pytest.mark.parametrize(
-    ("files", "side", "said"),
-    [
-        ("lh.surf.gii; rh.surf.gii; a.nii.gz", "n/a", "found 3, lh.surf.gii; rh.surf.gii; a.nii.gz; expected a left"),
-        ("lh.surf.gii; rh.surf.gii", "left", "found 2, lh.surf.gii; rh.surf.gii; expected the one of its side"),
-    ],
-)
-def test_more_files_than_are_used_are_refused(folder, files, side, said):
-    write(folder, ("id", "week", "files", "side"), ("sub-1", "24", files, side))
-    with pytest.raises(InputError, match=f"sub-1: files: {said}"):
-        config(folder)

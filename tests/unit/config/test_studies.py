@@ -144,13 +144,3 @@ def test_a_calibration_knows_its_runs_beforehand():
 )
 def test_what_is_wrong_with_a_calibration_is_said(change, said):
     assert said in refusal(calibrate=CALIBRATION | change)
-
-
-def test_curves_of_the_base_run_may_be_scaled():
-    runs = {"reference": {"growth_rate_per_s": {"weeks": {21: 1e-7, 25: 2e-7}}}, "led": {"growth": "sizes"}}
-    config(runs=runs, calibrate=CALIBRATION | {"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}})
-    led = {"base": "led", "parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}
-    config(runs=runs, calibrate=CALIBRATION | led)
-    # growth towards shapes follows none
-    closed = {"led": {"preset": "measured"}, "reference": {}}
-    assert "growth.area_cm2 is no curve in the base run" in refusal(runs=closed, calibrate=CALIBRATION | led)

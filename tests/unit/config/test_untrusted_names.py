@@ -28,12 +28,6 @@ def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
     assert "studies" in refusal(study(studies={name: vary}, brains=later))
 
 
-def test_the_study_without_such_a_name_is_valid():
-    vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
-    later = labelled(21, 22)
-    assert load(study(studies={"a": vary}, runs={"größe": {}, "reference": {}}, brains=later))
-
-
 @pytest.mark.fault(56)
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "a\n"])
 def test_rows_of_a_table_have_such_names_neither(tmp_path, name):

@@ -31,20 +31,6 @@ def package(tmp_path, monkeypatch):
     sources._files_of.cache_clear()
 
 
-@pytest.mark.parametrize(
-    ("module", "rooms"),
-    [
-        ("surface/repair.py", {"units"}),
-        ("surface/labels.py", {"surface"}),
-        ("mesh/quality.py", {"units"}),
-        ("mesh/__init__.py", set()),
-        ("mesh/fill.py", {"surface", "units", "unused"}),
-    ],
-)
-def test_imports_are_found_at_the_top_and_in_functions(package, module, rooms):
-    assert {room_of(path) for path in imported_modules(package / module)} - {"__init__"} == rooms
-
-
 def test_modules_behind_a_program_are_followed_through_others(package, tmp_path):
     program = tmp_path / "measure.py"
     program.write_text("from gyriflow.surface.labels import read")

@@ -106,16 +106,6 @@ def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):
     np.testing.assert_array_equal(grid.cell_data["zone"], np.arange(8))
 
 
-def test_fields_of_another_length_are_refused(tmp_path):
-    mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
-    with pytest.raises(ValueError, match="positions 8, w 7"):
-        write_frame(tmp_path / "a.h5", 21.0, {"positions": mesh.vertices, "w": np.zeros(7)})
-    write_frame(tmp_path / "b.h5", 21.0, {"positions": mesh.vertices}, {"stress": np.zeros(5)})
-    with pytest.raises(ValueError, match=r"6 elements in week_21\.00 .*stress 5"):
-        join_frames(tmp_path / "frames.h5", mesh.tets, [tmp_path / "b.h5"])
-    assert not (tmp_path / "frames.h5").exists()
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """A box tagged by place: elements by the side of x = 0 and by height, facets by the side and where they face up."""

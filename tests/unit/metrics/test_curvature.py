@@ -46,15 +46,6 @@ def grid(size: int) -> TriangleMesh:
     return TriangleMesh(np.column_stack([(size - 1) * vertices, np.zeros(len(vertices))]), faces)
 
 
-def test_sphere_is_a_gyrus_of_curvature_one_over_radius() -> None:
-    bend = curvature(sphere(25.0))
-    np.testing.assert_allclose(bend.maximum, 1 / 25, rtol=0.02)
-    np.testing.assert_allclose(bend.minimum, 1 / 25, rtol=0.02)
-    np.testing.assert_allclose(bend.curvedness, 1 / 25, rtol=0.02)
-    assert bend.shape_index.min() > 0.99
-    assert bend.reliable.all()
-
-
 def test_torus() -> None:
     mesh, angle = torus_and_angle()
     assert signed_volume(mesh) > 0

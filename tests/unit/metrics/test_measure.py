@@ -99,12 +99,6 @@ def test_processes_change_nothing_but_the_time() -> None:
     np.testing.assert_allclose(one.maps["left"]["thickness_mm"], thickness[: len(left.vertices)])
 
 
-def test_errors_come_out_of_processes() -> None:
-    left, right, far = (sphere(20.0, 3, (x, 0, 0)) for x in (-21.0, 21.0, 81.0))
-    with pytest.raises(MeshError, match="one piece"):
-        measure_brain(merged(left, right), left, merged(right, far), spangy_modes=10, threads=2)
-
-
 def test_maps_and_spectra(apart: BrainMetrics) -> None:
     assert set(apart.maps) == {"left", "right"}
     assert {name: len(values) for name, values in apart.maps["left"].items()} == dict.fromkeys(

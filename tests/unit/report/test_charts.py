@@ -113,19 +113,6 @@ def test_bands_that_are_cut_off_are_marked_and_keyed(run, shown):
     assert hatches_and_open_stars(spectra_weeks_chart(spectra)) == (False, run == "real")
 
 
-def test_spectra_over_weeks_have_a_row_per_side_and_a_column_per_band():
-    kinds = [("thin", 22.0), ("thin", 21.0), ("real", 22.0), ("real", 21.0)]
-    powers = {4: 0.01, 5: 0.02, 6: np.nan}
-    rows = [f for run, week in kinds for f in spectrum_rows(run, week, {b: week * p for b, p in powers.items()})]
-    figure = spectra_weeks_chart(pd.concat(rows))
-    # a band that no brain has takes no place
-    assert len(figure.axes) == 4
-    assert figure.axes[0].lines[0].get_xydata().tolist() == [[21, 0.21], [22, 0.22]]
-    assert figure.axes[2].lines[0].get_ydata().tolist() == pytest.approx([0.105, 0.11])
-    assert {line.get_marker() for line in figure.axes[0].lines} == {"None", "o", "*"}
-    assert all(figure.axes[place].get_ylim()[0] == 0 and figure.axes[place].get_ylim()[1] > 0.22 for place in (0, 2))
-
-
 def test_regions_chart_sums_areas_and_averages_depths():
     area, depth, asymmetry = regions_chart(REGIONS, ASYMMETRY).axes[:3]
     assert "area" in area.get_title()

@@ -6,16 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
-from gyriflow.io.figures import picture_addresses, write_figure
 from gyriflow.report.page import (
     brains_table,
     caption_html,
     hide_paths,
     methods_text,
     page_content,
-    picture,
     report_page,
     run_verdict,
     scores_table,
@@ -172,19 +169,6 @@ def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, verd
     assert verdict in run_verdict(run)
     assert verdict or run_verdict(run) == "reached 23 GW"
     assert "inverted" in run_verdict(run | {"min_J": -0.1})
-
-
-def test_pictures_are_made_smaller_until_they_fit(tmp_path):
-    figure = Figure(figsize=(8, 4))
-    figure.subplots().imshow(np.random.default_rng(0).random((200, 400)))
-    write_figure(tmp_path / "a.png", tmp_path / "a.pdf", figure, dpi=300)
-    ((large, inches),) = picture_addresses([tmp_path / "a.png"], 1e9)
-    ((small, _),) = picture_addresses([tmp_path / "a.png"], 0.6 * len(large))
-    assert large.startswith("data:image/webp;base64,")
-    assert len(small) < 0.8 * len(large)
-    # a figure is as wide on the page as its letters need, whatever its pixels
-    assert inches == pytest.approx(8, rel=1e-4)
-    assert 'width="1200"' in picture(large, inches, "noise")
 
 
 def test_the_methods_say_what_was_run():

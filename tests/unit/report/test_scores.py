@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.errors import InputError
 from gyriflow.report.scores import (
     calibration_chart,
     nearest_chart,
@@ -131,8 +130,3 @@ def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
     marks = [line for line in axes.lines if line.get_marker() == "o" and line.get_markersize() == 4.5]
     shown = {line.get_markerfacecolor() == "white": line.get_xdata().tolist() for line in marks}
     assert shown == {False: [0.8, 1.5, 2.25], True: [6.0]}
-
-
-def test_a_study_without_distances_is_refused():
-    with pytest.raises(InputError, match="no distance"):
-        nearest_chart(distances({1.0: np.nan}), NOTHING_PUBLISHED, **OF_THE_STUDY)

@@ -4,9 +4,7 @@ import pytest
 from configurations import LABELLED, labelled, series_for, series_of, study, touched
 
 from gyriflow.config import load
-from gyriflow.report.style import REAL_BRAIN
 from gyriflow.study import resolve
-from gyriflow.study.figures import measured_name
 
 
 def both_kinds(folder, weeks):
@@ -36,21 +34,6 @@ def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_estimat
     assert series_of(chosen) == {"volume": ["v21", "v22"]}
 
 
-def test_kinds_of_which_one_has_a_single_week_are_one_series(tmp_path):
-    raw = both_kinds(tmp_path, (21, 22))
-    for chosen, series in ((["s21", "v22"], ["v22", "s21"]), (["s21", "v21", "v22"], ["v21", "v22", "s21"])):
-        found = resolve(load(raw | {"growth": {"brains": chosen}}, tmp_path))
-        assert series_of(found) == {"all": series}
-
-
-def test_series_may_be_named(tmp_path):
-    raw = both_kinds(tmp_path, (21, 22, 23))
-    named = {"early": ["s21", "s22"], "late": ["v22", "s23"]}
-    found = resolve(load(raw | {"growth": {"brains": named, "estimated_from": "late"}}, tmp_path))
-    assert series_of(found) == {"early": ["s21", "s22"], "late": ["v22", "s23"]}
-    assert series_for(found, "s21") == "late"
-
-
 def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(tmp_path):
     brains = [
         {"id": f"{side}{week}", "week": week, "hemisphere": {"file": "lh.surf.gii", "side": side}}
@@ -65,25 +48,3 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
         "volume": ["p24", "p25"],
     }
     assert series_for(found, "left24") == "left hemisphere, surface"
-
-
-@pytest.mark.parametrize(
-    ("shown", "name"),
-    [
-        (["real"], REAL_BRAIN),
-        ([], REAL_BRAIN),
-        (["ball"], "sphere"),
-        (["ball", "egg"], "simple shape"),
-        (["real", "egg"], "real brain or ellipsoid"),
-        (["real", "ball", "egg"], "real brain or simple shape"),
-    ],
-)
-def test_only_real_brains_are_called_so(tmp_path, shown, name):
-    touched(tmp_path, "a.stl")
-    brains = [{"id": "real", "week": 22, "pial": "a.stl"}]
-    brains += [
-        {"id": "ball", "week": 21, "shape": {"semi_axes_mm": [23, 23, 23]}},
-        {"id": "egg", "week": 21, "shape": {}},
-    ]
-    known = resolve(load(study(brains, start="ball"), tmp_path)).brains
-    assert measured_name(known[brain] for brain in shown) == name

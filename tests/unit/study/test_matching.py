@@ -61,11 +61,6 @@ def test_others_are_not_and_say_why(folder, file, cause):
     assert cause in found.unmatched["surface"]
 
 
-def test_the_setting_says_no(folder):
-    found = series(folder, "a.gii", "b.gii", growth={"matched_surfaces": False})
-    assert found.unmatched == {"surface": "growth.matched_surfaces is false"}
-
-
 def test_hemispheres_match_side_by_side(folder):
     pair = {"hemispheres": {"left": "a.gii", "right": "fine.gii"}}
     assert series(folder, pair, pair).matched == {"surface": {"a", "b"}}
@@ -83,10 +78,3 @@ def test_an_atlas_is_believed_until_its_files_are_there(folder):
     found = resolve(load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)).series
     assert found.matched == {}
     assert np.all(["dhcp-surface-22 has 642 vertices" in cause for cause in found.unmatched.values()])
-
-
-def test_label_volumes_are_none_of_it(folder):
-    (folder / "a.nii.gz").write_bytes(b"")
-    labels = {"labels": "a.nii.gz", "scheme": "binary"}
-    found = series(folder, labels, labels)
-    assert found.matched == found.unmatched == {}

@@ -4,11 +4,9 @@ import pytest
 from configurations import LABELLED
 
 from gyriflow.config import load
-from gyriflow.errors import InputError
 from gyriflow.study import resolve
 
 BRAINS = [{"id": f"p{week}", "week": week, **LABELLED} for week in (21, 22, 25)]
-NAMES = {"names": {1: "frontal", 2: "frontal", 3: "parietal"}}
 
 
 def study(brains=None, runs=None, **metrics: object) -> dict:
@@ -21,21 +19,6 @@ def study(brains=None, runs=None, **metrics: object) -> dict:
 def volume(tmp_path) -> str:
     (tmp_path / "regions.nii.gz").touch()
     return str(tmp_path / "regions.nii.gz")
-
-
-def test_brains_get_the_regions_of_the_nearest_week(volume):
-    given = {"volume": volume, **NAMES}
-    found = resolve(load(study(regions={"p21": given, "p25": given})))
-    assert [found.giver_of_regions(brain).id for brain in ("p21", "p22", "p25")] == ["p21", "p21", "p25"]
-
-
-def test_scans_of_a_subject_by_week():
-    brains = [{"id": "b", "week": 24, "subject": "one", **LABELLED}, *BRAINS]
-    brains += [{"id": "a", "week": 22.5, "subject": "one", **LABELLED}]
-    brains += [{"id": "c", "week": 22.5, "subject": "two", **LABELLED}]
-    assert resolve(load(study(brains))).scans == {"one": ["a", "b"]}
-    with pytest.raises(InputError, match="2 scans of the subject one are of week 24"):
-        load(study([*brains, {"id": "d", "week": 24, "subject": "one", **LABELLED}]))
 
 
 def test_the_norm_is_of_all_measured_brains_of_one_kind():

@@ -9,7 +9,7 @@ from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.study import resolve
-from gyriflow.study.paths import CURVES, FOLDING, READY, THICKNESS, job_files, one_of
+from gyriflow.study.paths import CURVES, FOLDING
 
 EXAMPLES = Path(__file__).parents[3] / "config" / "examples"
 CURVE = {21: 99, 24: 150}
@@ -69,19 +69,6 @@ def refusal(brains, **sections):
 
 
 # what is folded
-
-
-@pytest.mark.parametrize(
-    "atlas",
-    [
-        [{"name": "dhcp-volume", "accept_licence": True}, {"name": "dhcp-surface"}],
-        {"name": "crl", "accept_licence": True},
-    ],
-)
-def test_the_paper_is_planned_of_another_atlas_by_one_line(atlas):
-    paper = read_yaml(EXAMPLES / "paper.yaml")
-    own, other = (resolve(load(paper | one, EXAMPLES)) for one in ({}, {"atlas": atlas}))
-    assert (len(own.folded), len(own.may_diverge)) == (len(other.folded), len(other.may_diverge)) == (2, 10)
 
 
 def test_the_paper_is_planned_with_the_paper_s_steps_and_ratios():
@@ -199,28 +186,6 @@ def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_wor
     assert alone.growing == alone.validated == []
 
 
-def test_what_validates_a_run_is_its_surface_and_the_real_one_of_each_week(real):
-    found = study(real[:3], folding={"end_week": 23})
-    validated = found.simulations["reference", "b21"].validation_files
-    assert validated["whole"] == [surface("b22"), surface("b23")]
-    assert validated["simulated"][1] == "results/runs/reference/b21/surfaces/week-23.00/pial.surf.gii"
-    assert validated["adjacent"][1] == READY["adjacent"].format(brain="b21", week="23.00")
-    assert [ids(pair) for pair in found.references.values()] == [["b22", "b21"], ["b23", "b22"]]
-
-
-def test_tables_of_validation_are_joined_from_the_runs_that_are_compared(real):
-    tables = study(real, runs={"a": {}, "late": {"start": "b24", "end_week": 26}}).validation_tables
-    assert tables["validation"] == ["results/runs/a/b21/metrics/validation.csv"]
-    assert tables["onset"] == ["results/runs/a/b21/metrics/onset.csv"]
-    assert tables["registration_ceiling"] == ["results/study/validation/b21/registration.csv"]
-
-
-def test_what_registration_alone_is_worth_is_asked_at_compared_weeks(real):
-    found = study(real, folding={"end_week": 24, "output_every_gw": 2})
-    assert found.ceiling_weeks("b21") == [23, 24]
-    assert found.ceiling_files("b21")["whole"] == [surface("b23"), surface("b24")]
-
-
 def test_a_week_is_explained_by_growth_that_knows_it_and_else_predicted(real):
     runs = {"plain": {}, "given": {"growth": SIZES}, "sizes": {"growth": "sizes"}, "shapes": {"growth": "shapes"}}
     found = study(real, runs=runs).folded
@@ -261,11 +226,6 @@ def test_a_brain_is_expected_from_the_atlas_week_before_it_to_the_first_past_the
         f"results/study/registration/{one}/{two}.h5" for one, two in pairwise([start, *chain])
     ]
     assert found.simulations["a", start].targets == f"results/brains/{start}/mesh/targets.atlas.h5"
-
-
-def test_a_start_before_all_weeks_of_the_atlas_is_led_by_two(of_two):
-    found = study(of_two(20.5), folding={"end_week": 21}, **EXPECTED)
-    assert ids(found.chains["own20.5", "atlas"].later) == ["b21", "b22"]
 
 
 def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_the_end(of_two, labels):
@@ -420,12 +380,6 @@ def test_named_sulci_are_those_of_real_whole_brains_and_name_what_begins(real):
     assert [brain.has_regions for brain in everywhere] == [True] * 4 + [False]
 
 
-def test_thickness_is_known_of_labels_of_the_cortex(labels):
-    found = study([labels(21), labels(22, scheme="binary")]).brains
-    assert found["b21"].measured.thickness == THICKNESS["measured"].format(brain="b21")
-    assert found["b22"].measured.thickness == []
-
-
 def test_maps_are_brought_to_a_template_that_is_there(labels):
     found = study([labels(21), labels(22)], metrics={"template": "b22"})
     inputs = found.template_inputs("runs/reference/b21/metrics/week-24.00", "left")
@@ -437,33 +391,4 @@ def test_maps_are_brought_to_a_template_that_is_there(labels):
     assert {len(one["template_maps"]) for one in found.exported} == {2}
 
 
-def test_white_surfaces_of_labels_are_measured_where_they_are_asked_for(labels, files):
-    brains = [labels(21), labels(22, scheme="binary")]
-    found = study(brains, metrics={"white_surfaces": "all"})
-    assert [path for path in found.tables["metrics"] if "white" in path] == ["results/brains/b21/metrics/white.csv"]
-    assert found.brains["b21"].white_from == {"labels": str(files / "labels.nii.gz")}
-    assert [sorted(one["white"]) for one in found.exported[:2]] == [["left", "right"], []]
-    assert study(brains).brains["b21"].white_from == {}
-
-
 # names of files
-
-
-@pytest.mark.parametrize(
-    ("output", "log"),
-    [
-        ("results/brains/{brain}/mesh/brain.xdmf", "results/brains/{brain}/logs/r.log"),
-        ("results/runs/{run}/{brain}/a/week-{week}/b.stl", "results/runs/{run}/{brain}/logs/r.week-{week}.log"),
-        ("results/{where}/metrics.csv", "results/{where}/logs/r.log"),
-        ("results/study/{table}.csv", "results/study/logs/r.{table}.log"),
-        ("results/study/{study}/members/{run}/{brain}.csv", "results/study/{study}/logs/r.{run}.{brain}.log"),
-        ("results/export", "results/study/logs/r.log"),
-    ],
-)
-def test_logs_and_benchmarks_lie_beside_results_and_name_all_wildcards(output, log):
-    assert job_files("r", output) == (log, log.replace("logs", "benchmarks").replace(".log", ".tsv"))
-
-
-def test_a_pattern_of_no_names_matches_nothing():
-    assert one_of(["a.b", "c"]) == r"a\.b|c"
-    assert one_of([]) == r"(?!)"
