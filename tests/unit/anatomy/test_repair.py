@@ -19,6 +19,7 @@ def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
     return sphere(radius, centre=centre)
 
 
+@pytest.mark.fault(17)
 def test_small_hole_is_closed_and_reported():
     whole = ball()
     near = np.linalg.norm(whole.vertices[whole.faces].mean(axis=1) - [0, 0, RADIUS], axis=1) < 1.2
@@ -29,6 +30,7 @@ def test_small_hole_is_closed_and_reported():
     assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.01)
 
 
+@pytest.mark.fault(17)
 def test_large_hole_is_refused_with_its_size():
     whole = ball()
     mesh, _ = submesh(whole, whole.vertices[whole.faces][:, :, 2].max(axis=1) < 8.0)
@@ -82,6 +84,7 @@ def test_faces_inside_out_are_turned():
     assert report["pieces_turned_outward"] == 1
 
 
+@pytest.mark.fault(19)
 def test_faces_partly_inside_out_are_turned():
     faces = ball().faces.copy()
     faces[100:300] = faces[100:300, ::-1]
@@ -110,6 +113,7 @@ def test_degenerate_and_double_faces_are_removed():
     assert (report["double_faces_removed"], report["degenerate_faces_removed"]) == (5, 1)
 
 
+@pytest.mark.fault(18)
 def test_non_manifold_fin_is_removed():
     whole = ball()
     vertices = np.vstack([whole.vertices, whole.vertices[whole.faces[0, 0]] * 1.02])
@@ -139,9 +143,11 @@ def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
     assert report["self_intersections_before"] == report["self_intersections_after"] == 0
 
 
+@pytest.mark.fault(20)
 def test_overlapping_balls_are_made_one_surface():
     both = merged(ball((-6, 0, 0)), ball((6, 0, 0)))
-    assert self_intersecting_faces(both).any()
+    crossing = self_intersecting_faces(both).sum()
+    assert clean(both, 3.0)[1]["faces_that_cut_others"] == crossing > 0
     one, report = rebuild(both, 0.7)
     assert is_closed(one)
     assert euler_number(one) == 2
@@ -151,8 +157,9 @@ def test_overlapping_balls_are_made_one_surface():
     assert report["handles_left"] == 0
 
 
+@pytest.mark.fault(21)
 def test_handle_of_a_torus_is_closed_when_remade():
-    mesh, report = clean(torus(10.0, 7.5, 60, 40), 3.0)
+    mesh, _ = clean(torus(10.0, 7.5, 60, 40), 3.0)
     assert euler_number(mesh) == 0
     simple, report = rebuild(remesh(mesh, 1.0), 0.8)
     assert euler_number(simple) == 2
