@@ -1,4 +1,5 @@
 # What all rules share: the validated configuration, names, and where results lie.
+import os
 from operator import attrgetter
 
 from gyriflow.errors import GyriflowError
@@ -7,7 +8,7 @@ from gyriflow.parameters.terms import SIDES
 from gyriflow.study import resolve
 from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of
 from gyriflow.study.paths import *
-from gyriflow.cli.launch import hold_lock, keeps_going, refused_brains, runs_nothing
+from gyriflow.cli.launch import GOES_ON, LOOKS, hold_lock, refused_brains
 from gyriflow.cli.provenance import input_contents, require_own_results
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
@@ -18,6 +19,10 @@ shell.prefix(
     if CHECKED_OUT
     else "set -euo pipefail; "
 )
+
+
+# whether this is the process that runs the study; others run a job of it, or only look
+RUNS = workflow.is_main_process and LOOKS not in os.environ
 
 
 def validated_study():
@@ -35,13 +40,12 @@ def validated_study():
             file = Path(workflow.workdir_init, path)
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
-        found = load(config, base, keep_going=keeps_going())
+        found = load(config, base, keep_going=GOES_ON in os.environ)
         study = resolve(found, refused_brains())
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
-            require_own_results(Path.cwd(), files, found, record=not runs_nothing())
-        record = workflow.is_main_process and not runs_nothing()
-        return study, input_contents(Path.cwd(), found, record)
+            require_own_results(Path.cwd(), files, found, record=RUNS)
+        return study, input_contents(Path.cwd(), found, record=RUNS)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
@@ -68,7 +72,7 @@ if workflow.is_main_process:
         print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 
 # held as long as this process lives: how `gyriflow.cli.launch` tells a live run from one that was interrupted
-if workflow.is_main_process and not runs_nothing():
+if RUNS:
     LOCK = hold_lock(Path.cwd())
 
 

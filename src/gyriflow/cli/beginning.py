@@ -53,9 +53,7 @@ def write_configuration(folder: Path, path: Path, force: bool, quick: bool = Fal
     InputError where nothing was recognised, or a configuration is there and `force` is not set.
     """
     if path.exists() and not force:
-        raise InputError(
-            "is there already", path=path, remedy="Choose another file with --output, or replace it: --force"
-        )
+        raise InputError("is there already", path=path, remedy="Choose another file with --output, or add --force.")
     brains = recognise(folder)
     inside = path.resolve().parent == folder.resolve()
     lines = []
@@ -154,13 +152,9 @@ def write_bids(
 
 
 def _growing(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[str, Any]:
-    """Return the series and the weeks of an atlas that lead from one week to another; InputError where none does."""
     if atlas.licence.accept and not accepted:
-        raise InputError(
-            f"the licence of the atlas {atlas.name} is to be accepted",
-            found=f"{atlas.licence.name} ({atlas.licence.url}): {atlas.licence.terms.rstrip('.')}",
-            remedy="Add --accept-licence if you accept it.",
-        )
+        terms = f"{atlas.licence.name} ({atlas.licence.url}): {atlas.licence.terms.rstrip('.')}"
+        raise InputError(f"the licence of {atlas.name} is not accepted", found=terms, remedy="Add --accept-licence.")
     for name, series in atlas.series.items():
         there = sorted(series.weeks)
         first = max((week for week in there if week <= weeks[0]), default=there[0])
@@ -168,11 +162,9 @@ def _growing(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[s
         if last is not None and weeks[0] < weeks[1] and first <= weeks[0] + BEFORE_GW:
             return {"series": name, "weeks": [week for week in there if first <= week <= last]}
     spans = (f"{name}: {min(series.weeks):g} to {max(series.weeks):g} GW" for name, series in atlas.series.items())
-    raise InputError(
-        f"no series of the atlas {atlas.name} leads from {weeks[0]:g} to {weeks[1]:g} GW",
-        found="; ".join(spans),
-        remedy="Choose another --atlas, or another --until, after --week.",
-    )
+    problem = f"no series of the atlas {atlas.name} leads from {weeks[0]:g} to {weeks[1]:g} GW"
+    remedy = "Choose another --atlas, or another --until, after --week."
+    raise InputError(problem, found="; ".join(spans), remedy=remedy)
 
 
 def _absolute(value: object, folder: Path) -> object:

@@ -126,7 +126,6 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
 
 
 def _contents(study: Study) -> str:
-    """Return how many brains and simulations a study has, and the names of its runs or of the first ones."""
     runs = list(study.config.runs)
     names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
     brains, folded = len(study.brains), len(study.folded)
@@ -206,7 +205,6 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
 def _needs(
     jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int, price: float | None
 ) -> Iterator[tuple[str, bool]]:
-    """Yield what jobs will take of time, memory and disk."""
     foldings = [
         (job, folding_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
         for job in jobs
@@ -234,7 +232,6 @@ def _needs(
 
 
 def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:
-    """Yield how much memory or disk is needed, and whether that is more than what is there, if that is known."""
     if there_mib is None:
         yield f"{name:<7} about {_gib(mib)}, of the foldings that run side by side", False
     else:

@@ -15,7 +15,6 @@ from click.core import ParameterSource
 from ..errors import GyriflowError, InputError
 from ..shipped import CONFIG, DEMO, SHIPPED
 
-CONFIG_SUFFIXES = (".yaml", ".yml", ".json")
 LEVELS = ("participant", "group")
 LABELS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
 """Options of BIDS apps with several values after each other."""
@@ -33,7 +32,6 @@ cores_option = click.option(
 )
 stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Up to this target only. May be repeated.")
 dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
-config_argument = click.argument("config", type=FILE, required=False)
 
 
 class Commands(click.Group):
@@ -55,7 +53,6 @@ class Commands(click.Group):
 
 
 def _one_by_one(args: Sequence[str]) -> list[str]:
-    """Return the arguments of a BIDS app with each label under an option of its own."""
     single, option = [], ""
     for argument in args:
         if argument.startswith("-"):
@@ -124,7 +121,7 @@ def init(folder: Path, output: Path | None, force: bool, quick: bool) -> None:
 
 
 @main.command()
-@config_argument
+@click.argument("config", type=FILE, required=False)
 @directory_option
 @cores_option
 @stages_option
@@ -159,7 +156,7 @@ def run(
 
     CONFIG is gyriflow.yaml where none is named. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
     """
-    named = bool(further) and further[0].endswith(CONFIG_SUFFIXES)
+    named = bool(further) and further[0].endswith((".yaml", ".yml", ".json"))
     config = _chosen(Path(further[0]) if named else None, directory)
     # an option of one value stands before the targets
     arguments = ["--verbose"] if verbose else []
@@ -180,7 +177,6 @@ def run(
 
 
 def _run(directory: Path, cores: int, dry_run: bool, *further: str) -> None:
-    """Run a configuration that another command has written."""
     context = click.get_current_context()
     context.invoke(run, directory=directory, cores=cores, stages=(), dry_run=dry_run, verbose=False, further=further)
 
@@ -273,7 +269,6 @@ def view(directory: Path, only_print: bool) -> None:
 
 
 def _chosen(config: Path | None, directory: Path) -> Path:
-    """Return the configuration that is meant, the one named or gyriflow.yaml; InputError without one."""
     chosen = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)
     if chosen is None:
         remedy = f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}."

@@ -12,7 +12,6 @@ import signal
 import subprocess
 import sys
 import time
-from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
 from datetime import datetime
@@ -46,7 +45,8 @@ SAYS_ITSELF = (
 )
 """Options under which Snakemake's own messages are wanted, or no steps are run."""
 GOES_ON, LOOKS = "GYRIFLOW_KEEP_GOING", "GYRIFLOW_LOOKS_ONLY"
-"""Environment variables that are set where a call goes on after a failure, and where it runs nothing."""
+"""Environment variables that are set where a call goes on after a failed step or row of a table, and where it runs
+nothing."""
 REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 """Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
 FULL_BYTES = 4 * 2**20
@@ -83,11 +83,9 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
     deadline = time.monotonic() + patience_s
     while (file := hold_lock(directory)) is None:
         if time.monotonic() > deadline:
-            raise StorageError(
-                "another gyriflow run is live in this working directory",
-                path=directory.resolve(),
-                remedy="Wait for it to end, or give this run a folder of its own with --directory",
-            )
+            remedy = "Wait for it to end, or give this run a folder of its own with --directory"
+            problem = "another gyriflow run is live in this working directory"
+            raise StorageError(problem, path=directory.resolve(), remedy=remedy)
         time.sleep(0.2)
     with file:
         stale = list((directory / ".snakemake" / "locks").glob("*.lock"))
@@ -125,16 +123,6 @@ def refused_brains() -> dict[str, str]:
     """Return the cause by the id of each brain that an earlier pass of this call has refused."""
     path = os.environ.get(REFUSED_FILE)
     return read_json(path) if path else {}
-
-
-def keeps_going() -> bool:
-    """Return whether the call that this process belongs to goes on where a step or a row of a table fails."""
-    return GOES_ON in os.environ
-
-
-def runs_nothing() -> bool:
-    """Return whether the call that this process belongs to only looks at what would be done."""
-    return LOOKS in os.environ
 
 
 def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
@@ -188,7 +176,10 @@ def main(arguments: Sequence[str]) -> int:
     looks = any(getattr(options, name, None) not in (None, False) for name in LOOKS_ONLY)
     if not looks:
         clear_stale_lock(directory)
-    set_variables(options, looks)
+    os.environ |= SETTINGS | os.environ
+    # steps call `python`, which is to be this one
+    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
+    os.environ |= {name: "1" for name, applies in ((GOES_ON, options.keep_going), (LOOKS, looks)) if applies}
     # beside the results, where jobs on other machines of a cluster find it too
     exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
     os.environ[EXIT_FILE] = str(exit_file)
@@ -221,15 +212,6 @@ def main(arguments: Sequence[str]) -> int:
     if code and may_finish and (brains := failed_brains(directory, began)):
         finish_without(brains, arguments, directory)
     return exit_code(code, recorded, directory)
-
-
-def set_variables(options: Namespace, looks: bool) -> None:
-    """Set what the Snakefile and the steps find in the environment."""
-    for name, value in SETTINGS.items():
-        os.environ.setdefault(name, value)
-    # steps call `python`, which is to be this one
-    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
-    os.environ.update({name: "1" for name, applies in ((GOES_ON, options.keep_going), (LOOKS, looks)) if applies})
 
 
 if __name__ == "__main__":

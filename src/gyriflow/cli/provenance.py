@@ -55,14 +55,11 @@ def require_own_results(directory: Path, files: Sequence[Path], config: Config, 
     there = [brain[0] for brain in recorded["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
     shared = recorded["configuration"] == study["configuration"] or any(b in recorded["brains"] for b in brains)
     if there and not shared:
-        raise InputError(
-            "the results here are those of another study",
-            path=path.parents[1].resolve(),
-            found=f"{', '.join(there)} of {', '.join(recorded['configuration'])}",
-            expected=f"{', '.join(brain[0] for brain in brains)} of {', '.join(study['configuration'])}",
-            remedy="Give this study a folder of its own with --directory; or delete these results, or "
-            f"study/{path.name} in them to have both in one folder.",
-        )
+        found = f"{', '.join(there)} of {', '.join(recorded['configuration'])}"
+        expected = f"{', '.join(brain[0] for brain in brains)} of {', '.join(study['configuration'])}"
+        remedy = f"Choose another --directory; or delete these results, or study/{path.name} to have both here."
+        problem, results = "the results here are those of another study", path.parents[1].resolve()
+        raise InputError(problem, path=results, found=found, expected=expected, remedy=remedy)
     if record and (recorded != study or not path.is_file()):
         write_json(path, study)
 

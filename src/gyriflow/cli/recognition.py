@@ -59,10 +59,8 @@ def recognise(folder: Path, pattern: str = "*") -> list[Recognised]:
         scans, no_ages = [], str(error) if (folder / "participants.tsv").is_file() else "not told by its name"
     brains = [*_hemispheres(files, scans), *_volumes(folder, files, scans)]
     if not brains:
-        raise InputError(
-            "no brain was recognised", path=folder, found=f"{len(files)} files",
-            expected="tissue label volumes (.nii.gz), or pairs of surfaces with left and right in their names",
-        )  # fmt: skip
+        expected = "tissue label volumes (.nii.gz), or pairs of surfaces with left and right in their names"
+        raise InputError("no brain was recognised", path=folder, found=f"{len(files)} files", expected=expected)
     seen: Counter[str] = Counter()
     counts = Counter(brain.entry["id"] for brain in brains)
     for brain in brains:
@@ -114,7 +112,6 @@ def _is_own(description: Path) -> bool:
 
 
 def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
-    """Yield the brains with pial surfaces: of both sides, with their white ones if they are there, or of one side."""
     surfaces: dict[tuple[str, str], dict[str, Path]] = {}
     for file in files:
         kind, side = KINDS.search(file.name), SIDES.search(file.name)
@@ -135,7 +132,6 @@ def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recog
 
 
 def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
-    """Yield the brains with label volumes, each with the only T2-weighted volume of its folder."""
     volumes = [file for file in files if file.name.lower().endswith(VOLUMES)]
     for file in volumes:
         if LABELS.search(file.name):
@@ -149,7 +145,6 @@ def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iter
 
 
 def _recognised(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Recognised:
-    """Return the brain of a file: of the scan that its path names, or of the age in its name or that of a folder."""
     entities = SUBJECT_AND_SESSION.search(file.as_posix())
     named = [scan for scan in scans if _names(file, scan.subject or scan.id) and _names(file, scan.session)]
     # a participant's row holds for its sessions too, but the session's own comes first
@@ -168,7 +163,6 @@ def _names(file: Path, part: str | None) -> bool:
 
 
 def _id(file: Path) -> str:
-    """Return an id for a file's brain: its participant and session, or its name without what says what it holds."""
     if entities := SUBJECT_AND_SESSION.search(file.as_posix()):
         return "_".join(filter(None, entities.groups()))
     name = SUFFIXES.sub("", KINDS.sub("", SIDES.sub("", file.name)))

@@ -101,7 +101,6 @@ def report_of(directory: Path) -> Path:
 
 
 def _configured(directory: Path) -> list[tuple[str, str]]:
-    """Return the runs, each with its start brain, of the configuration whose results a working directory has."""
     path = directory / CONFIG
     # what is wrong with a configuration is for the command that runs it to say
     with suppress(InputError):
@@ -139,7 +138,6 @@ def _row(run: str, folder: Path) -> dict[str, str]:
 
 
 def _folding(folder: Path) -> str:
-    """Return how far a folding is: `done, GW 23.00`, `GW 21.43 of 23`, or that it has not begun."""
     with suppress(InputError, KeyError, IndexError):
         return f"done, GW {week_tag(read_json(folder / 'folding' / 'summary.json')['weeks'][-1])}"
     steps = [event for event in events_in(read_log(folder / "logs" / "simulate.jsonl")) if event["event"] == "step"]

@@ -117,7 +117,6 @@ class RunDisplay:
                     self.console.print(text)
 
     def _fail(self, said: Mapping[str, Any]) -> None:
-        """Say what failed and why, after its warnings; Snakemake's message is told where the job's log is silent."""
         job = self.running.pop(said["jobid"], None)
         if job is not None:
             self._tell_warnings(job)
@@ -181,7 +180,6 @@ class RunDisplay:
             self.console.print(f"gyriflow: done in {took}{report}")
 
     def _follow(self, job: Job) -> None:
-        """Read a folding's size, weeks and warnings."""
         for event in events_in(job.events.new_text()) if job.events else ():
             match event:
                 case {"event": "warning", "message": str(text)}:

@@ -31,7 +31,6 @@ NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 
 
 def _names_weeks(pattern: str) -> bool:
-    """Return whether the fields of a pattern are weeks, as plain numbers: what fills them out cannot be a path."""
     try:
         fields = [(name, kind, flag) for _, name, kind, flag in Formatter().parse(pattern) if name is not None]
     except ValueError:
@@ -263,12 +262,6 @@ class UsedAtlas:
         """Those that are to be fetched."""
         return [file for file in self.files if not file.copies]
 
-    @property
-    def checksums(self) -> dict[str, tuple[str, str]]:
-        """The atlas and the SHA-256 of each file where it is known, by the file's path."""
-        known = {str(file.path): file.record.sha256 for file in self.files}
-        return {path: (self.atlas.name, sha256) for path, sha256 in known.items() if sha256 is not None}
-
     def _files_of(self, name: str) -> Iterator[AtlasFile]:
         series = self.atlas.series[name]
         root = (self.settings.url or self.atlas.url or "").rstrip("/")
@@ -283,7 +276,6 @@ class UsedAtlas:
                 yield AtlasFile(name, week, key, place, url, record, tuple(copies))
 
     def _weeks_of(self, name: str) -> list[float]:
-        """Return the weeks of a series that are used: published ones, and others of which the folder has files."""
         if self.settings.weeks is None:
             return sorted(self.atlas.series[name].weeks)
         return [week for week in sorted(self.settings.weeks) if week in self.known_weeks(name)]
@@ -296,12 +288,10 @@ class UsedAtlas:
 
     @cached_property
     def _in_folder(self) -> dict[str, dict[float, list[Path]]]:
-        """The files of each pattern in the folder."""
         patterns = {pattern for series in self.atlas.series.values() for pattern in series.files.values()}
         return {pattern: self._copies(pattern) for pattern in patterns}
 
     def _copies(self, pattern: str) -> dict[float, list[Path]]:
-        """Return the files of a pattern anywhere in the folder by week; the path from the week on has to match."""
         parts = pattern.split("/")
         tail = "/".join(parts[max(number for number, part in enumerate(parts) if "{week" in part) :])
         pieces = list(Formatter().parse(tail))
@@ -314,7 +304,6 @@ class UsedAtlas:
         return copies
 
     def _shipped(self, path: str) -> list[Path]:
-        """Return the file that comes with the atlas, if it does."""
         if self.atlas.folder is None:
             return []
         place = (self.settings.description.parent / self.atlas.folder / path).resolve()
@@ -360,9 +349,7 @@ def atlas_problems(used: UsedAtlas) -> Iterator[Problem]:
         if len(file.copies) > 1:
             yield Problem(f"found {' and '.join(map(str, file.copies))}; keep one of them", ("folder",))
         elif not file.copies and file.url is None:
-            yield Problem(
-                f"{file.path} is missing and cannot be fetched, as {atlas.name} has no url for it", ("weeks",)
-            )
+            yield Problem(f"{file.path} is missing, and {atlas.name} has no url for it", ("weeks",))
 
 
 def retrieval_note(used: UsedAtlas) -> str:

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from ..io.yaml_files import SCHEMES
 from ..parameters.folding import VARYING, value_problems
 from ..parameters.settings import Key, Problem, messages, nearest
-from ..parameters.terms import AMPLITUDE, STIFFNESS_RATIO
+from ..parameters.terms import AMPLITUDE, MEASURED, STIFFNESS_RATIO
 from ..parameters.varying import Varying
 from .root import Config
 from .runs import (
@@ -28,8 +28,6 @@ from .runs import (
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Names that stand for something else in results, tables and settings."""
-RESERVED_RUNS = ("real",)
-"""What stands for the run in tables of measured brains."""
 RESERVED_STUDIES = ("benchmarks", "calibration", "figures", "growth", "logs", "registration", "tables")
 """Folders of the study's results that are no studies."""
 
@@ -55,7 +53,7 @@ def names(config: Config) -> Iterator[Problem]:
     for first, second in _equal_but_for_case(config.runs):
         text = f"is the same folder as that of the run {first} on some disks; rename one"
         yield Problem(text, ("runs", second))
-    reserved = {"runs": RESERVED_RUNS, "studies": RESERVED_STUDIES, "schemes": tuple(SCHEMES)}
+    reserved = {"runs": (MEASURED,), "studies": RESERVED_STUDIES, "schemes": tuple(SCHEMES)}
     for section, taken in reserved.items():
         for name in sorted(set(getattr(config, section)) & set(taken)):
             yield Problem("the name is taken; choose another", (section, name))
@@ -119,7 +117,6 @@ def runs(config: Config) -> Iterator[Problem]:
 
 
 def _place(run: str, key: Key, config: Config) -> Key:
-    """Return the path of a run's key: that of `folding` where all runs share the value."""
     values = [getattr(settings, str(key[0])) for settings in config.runs.values()]
     return ("folding", *key) if all(value == values[0] for value in values) else ("runs", run, *key)
 
@@ -142,9 +139,9 @@ def growth(config: Config) -> Iterator[Problem]:
         mixed = sorted({brain.population or "of no known population" for brain in brains})
         if named and len(mixed) > 1:
             yield Problem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", key)
-    series, wanted = growth_series(config.brains, config.growth.brains), config.growth.estimated_from
+    series, wanted = growth_series(config.brains, config.growth.brains), config.growth.series
     if wanted is not None and series and wanted not in series:
-        yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "estimated_from"))
+        yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "series"))
 
 
 def metrics(config: Config) -> Iterator[Problem]:

@@ -69,7 +69,6 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
 def _participants(
     section: Any, folder: Path, problems: list[str]
 ) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
-    """Return the brains of `participants` and its rows that can't be used, or add what is wrong to `problems`."""
     if section is None:
         return [], {}
     try:
@@ -85,7 +84,6 @@ def _participants(
 
 
 def _plain(value: Any) -> Any:
-    """Return nested mappings and sequences as plain dictionaries and lists."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -126,7 +124,6 @@ def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
 
 
 def _merged_growth(base: Any, override: Any) -> Any:
-    """Return growth with the keys of `base` too where both have one model; either may be the model's name alone."""
     old, new = ({"model": given} if isinstance(given, str) else given for given in (base, override))
     if not isinstance(old, dict) or not isinstance(new, dict):
         return new
@@ -134,7 +131,6 @@ def _merged_growth(base: Any, override: Any) -> Any:
 
 
 def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:
-    """Return the atlases that can be used, and what is wrong with others and their sections."""
     several = isinstance(raw, list)
     sections = raw if several else [] if raw is None else [raw]
     atlases: list[UsedAtlas] = []
@@ -160,7 +156,6 @@ def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:
 
 
 def _lines(problems: list[tuple[Key, str]]) -> list[str]:
-    """Return problems as lines but those of atlases; what a run has from `folding` is said there only."""
     others = [(path, text) for path, text in dict.fromkeys(problems) if path[0] != "atlas"]
     of_folding = {(path[1:], text) for path, text in others if path[0] == "folding"}
     return [line(path, text) for path, text in others if path[0] != "runs" or (path[2:], text) not in of_folding]

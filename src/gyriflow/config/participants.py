@@ -94,7 +94,6 @@ def _refuse_mistyped_columns(path: Path, columns: Mapping[str, str]) -> None:
 
 
 def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
-    """Return the entry of a scan, and what it lacks, empty where nothing is missing."""
     values = {key: value for key, value in scan.values.items() if value not in NOTHING}
     entry: dict[str, Any] = {"id": scan.id, "week": scan.week} | covariates(scan)
     if scan.subject is not None:
@@ -123,7 +122,6 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
 
 
 def _of_files(files: list[str], side: str | None) -> dict[str, str]:
-    """Return the columns that files stand for, by their number and kind."""
     if side is not None:
         return {"hemisphere.file": files[0], "hemisphere.side": side}
     if len(files) == 2:

@@ -87,4 +87,9 @@ class Config(Settings):
     @cached_property
     def known_files(self) -> dict[str, tuple[str, str]]:
         """The atlas and the SHA-256 of each file of an atlas where it is known, by the file's path."""
-        return {path: known for used in self.atlases for path, known in used.checksums.items()}
+        return {
+            str(file.path): (used.atlas.name, file.record.sha256)
+            for used in self.atlases
+            for file in used.files
+            if file.record.sha256 is not None
+        }

@@ -24,7 +24,6 @@ Start = Annotated[
 ]
 """The id of a brain, a list of ids, `first` or `all`."""
 
-
 RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=LONGEST_NAME)]
 StudyName = Annotated[str, Field(pattern=r"^[^\W_][\w-]*$", max_length=LONGEST_NAME)]
 """Names of folders: letters, digits and these marks, first a letter or digit."""
@@ -61,15 +60,9 @@ PRESETS: dict[str, dict[str, Any]] = {
         "no_growth": {"kind": "ellipsoid", "shift_y": 0.05, "shift_z": -0.15, "semi_axes": [0.35, 0.40, 0.50]},
     },
     # growth that takes the brain to its measured shapes
-    "measured": {
-        **FREE_GROWTH,
-        "growth": {"model": "shapes"},
-    },
+    "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},
     # the brain as it is to be expected: as `measured`, towards where the growth of another population would take it
-    "expected": {
-        **FREE_GROWTH,
-        "growth": {"model": "shapes", "of": "atlas"},
-    },
+    "expected": {**FREE_GROWTH, "growth": {"model": "shapes", "of": "atlas"}},
 }
 """Sets of parameters by name, from which a configuration starts; its own keys come on top."""
 
@@ -114,7 +107,7 @@ class GrowthSettings(Settings):
     """Ids of the brains whose areas and volumes are used, of at least two weeks; or several such lists by name,
     as `{surface: [...], volume: [...]}`. `null`: all brains. Each population is then a series of its own, as
     are surfaces (`surface`) and label volumes (`volume`) if both have two weeks."""
-    estimated_from: str | None = None
+    series: str | None = None
     """Series that gives measured curves or an atlas' growth, of several; `null`: the start brain's."""
     matched_surfaces: bool = True
     """Whether equal vertices and triangles of a series' surfaces mean equal places, so that brains
@@ -147,7 +140,6 @@ def growth_series(
 
 
 def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
-    """Return brains by kind of data, or all together if one kind has fewer than two ages."""
     volumes = [brain for brain in brains if brain.has_labels]
     surfaces = [brain for brain in brains if not brain.has_labels]
     by_kind: dict[str, Sequence[Brain]] = {"surface": surfaces, "volume": volumes}
@@ -169,8 +161,6 @@ Value = Annotated[
 """A value of a parameter that a study varies."""
 NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields")
 """Keys of a run that say nothing of its model, or that the study sets."""
-
-
 CURVES = tuple(f"growth.{size}" for size in SIZES)
 """Further curves than those of parameters that may vary."""
 MOST_PARAMETERS = 3
@@ -317,5 +307,4 @@ def members_of(
 
 
 def _model(run: Run) -> str:
-    """Return what makes two runs the same but for their ends and what does not change their shapes."""
     return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields"})

@@ -46,8 +46,6 @@ class Scan:
 
 @dataclass(frozen=True)
 class _Table:
-    """A table with its path, and the column with the gestational age and its unit, empty where it has none."""
-
     path: Path
     rows: list[dict[str, str]]
     column: str
@@ -106,7 +104,6 @@ def read_week(text: str, unit: str = "weeks") -> tuple[float | None, str]:
 
 
 def _read(path: Path) -> _Table:
-    """Return a table; InputError where it cannot be read."""
     rows = read_tab_separated(path)
     units = {name: unit for name, unit in UNIT_OF_AGE.items() if name in rows[0]}
     places = (path.with_suffix(".json"), path.parents[1] / f"{path.stem.rpartition('_')[2]}.json")

@@ -5,13 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from ..parameters.settings import Settings
-from ..parameters.terms import (
-    CURVATURE_RADIUS_MM,
-    MOST_HOLE_MM,
-    SPANGY_MODES,
-    LastBand,
-    Mesher,
-)
+from ..parameters.terms import CURVATURE_RADIUS_MM, MOST_HOLE_MM, SPANGY_MODES, LastBand, Mesher
 from .brains import GivenRegions
 
 

@@ -109,7 +109,6 @@ def follow_planes(
 
 
 def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floats]]:
-    """Return a function that gives, for (n, 3) points, the nearest ones of a surface and the normals there."""
     tree, normals = igl.AABB(), face_normals(mesh)
     tree.init(mesh.vertices, mesh.faces)
 

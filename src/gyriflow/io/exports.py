@@ -95,8 +95,6 @@ class ExportedBrain:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where the files of a brain go: its folder, the beginning of their names, and the entity of its simulation."""
-
     folder: Path
     stem: str
     desc: str
@@ -151,7 +149,6 @@ def export_bids(
 
 
 def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list[_Place]:
-    """Return where each brain goes; InputError where two have the same names."""
     taken: dict[tuple[str, str], ExportedBrain] = {}
     places = []
     for brain in brains:
@@ -169,7 +166,6 @@ def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list
 
 
 def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[_Place]) -> dict[str, str]:
-    """Return what each entity `desc-` of the names of files means."""
     descriptions = {
         place.desc[1:]: f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
         for brain, place in zip(brains, places, strict=True)
@@ -181,7 +177,6 @@ def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[_Place]) -> 
 
 
 def _write_surfaces(place: _Place, brain: ExportedBrain, back: Floats) -> dict[str, dict[str, Any]]:
-    """Write surfaces, moved by a (4, 4) motion, and regions; return the sidecars of the kinds of surface."""
     kinds = {"pial": (brain.surfaces, place.desc)} | ({"white": (brain.white, "")} if brain.white else {})
     for kind, (files, desc) in kinds.items():
         for side, path in files.items():
@@ -195,7 +190,6 @@ def _write_surfaces(place: _Place, brain: ExportedBrain, back: Floats) -> dict[s
 def _write_maps(
     place: _Place, brain: ExportedBrain, space: str, reference: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Write a file for each map, those at the template's vertices with its `space`; return their sidecars."""
     sidecars: dict[str, dict[str, Any]] = {}
     # files by side, the entities `space-` and `desc-`, and what sidecars say of the space
     kinds: tuple[tuple[Any, str, str, Mapping[str, Any]], ...] = (
@@ -215,7 +209,6 @@ def _write_maps(
 
 
 def _template(measured: Sequence[ExportedBrain], names: Names) -> tuple[str, dict[str, Any]]:
-    """Return the entity of BIDS of a study's template, and what sidecars say of its surfaces; nothing without one."""
     template = next((brain for brain in measured if brain.brain == brain.template), None)
     if template is None:
         return "", {}

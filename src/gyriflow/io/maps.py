@@ -5,15 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from nibabel.nifti1 import intent_codes
-from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.triangles import TriangleMesh, merged
+from ..geometry.triangles import Floats, TriangleMesh, merged
+from ..parameters.terms import AffineSource
 from .files import AnyPath, new_hdf5, reading_hdf5, require_finite
 from .surfaces import load_gifti, read_surface
-from .volumes import AffineSource, read_values
-
-Floats = NDArray[np.float64]
+from .volumes import read_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +34,11 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
     surface = read_surface(surface_path)
     arrays = load_gifti(path).darrays
     if len(arrays) != 1 or arrays[0].data.dtype.kind not in "biuf" or arrays[0].data.size != len(arrays[0].data):
-        found = (
-            ", ".join(f"{intent_codes.niistring[array.intent]} {array.data.shape}" for array in arrays) or "no arrays"
-        )
+        found = [f"{intent_codes.niistring[array.intent]} {array.data.shape}" for array in arrays]
         expected = "one array of numbers (.shape.gii, .func.gii)"
-        raise InputError("is not a map of one value per vertex", path=path, found=found, expected=expected)
+        raise InputError(
+            "is not a map of one value per vertex", path=path, found=", ".join(found) or "none", expected=expected
+        )
     values = np.asarray(arrays[0].data, dtype=float).ravel()
     if len(values) != len(surface.vertices):
         expected = f"{len(surface.vertices)}, the number of vertices of {surface_path}"

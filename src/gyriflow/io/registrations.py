@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import h5py
 import numpy as np
 
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
@@ -29,10 +28,6 @@ def write_deformation(path: AnyPath, deformation: Deformation, report: Mapping[s
         file.attrs["report"] = json.dumps(dict(report))
 
 
-def _deformation(file: h5py.File) -> Deformation:
-    return Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
-
-
 def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapping[str, Any]) -> None:
     """Write the data sets first (n, 3) and second (n, 3) in mm, and faces (m, 3); the `report` as a deformation's."""
     with new_hdf5(path) as file:
@@ -48,7 +43,7 @@ def read_correspondence(path: AnyPath) -> Correspondence:
     with reading_hdf5(path, "a correspondence of brains", expected, AGAIN) as file:
         if "faces" in file:
             return MatchedSurfaces(TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:])
-        return _deformation(file)
+        return Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,19 +15,12 @@ from xml.etree import ElementTree
 import nibabel as nib
 import numpy as np
 from nibabel.freesurfer.io import read_geometry
-from nibabel.gifti import (
-    GiftiCoordSystem,
-    GiftiDataArray,
-    GiftiImage,
-    GiftiLabel,
-    GiftiLabelTable,
-    GiftiMetaData,
-)
+from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiLabel, GiftiLabelTable, GiftiMetaData
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.poses import Pose, pose_from
-from ..geometry.triangles import TriangleMesh, is_closed
+from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed
 from ..parameters.terms import STRUCTURES, Side
 from .files import AGAIN, AnyPath, read_json, reading, replaced, require_finite
 
@@ -35,8 +28,6 @@ if TYPE_CHECKING:
     import pyvista as pv
 
 log = logging.getLogger(__name__)
-
-Floats = NDArray[np.float64]
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 MESH_SUFFIXES = (".stl", ".ply", ".obj")
@@ -67,17 +58,13 @@ def read_surface(path: AnyPath) -> TriangleMesh:
             vertices, faces = _read_freesurfer_surface(path)
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
         found = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
-        raise InputError(
-            "holds no surface", path=path, found=found, expected="(n, 3) points and (m, 3) faces", remedy=AGAIN
-        )
+        raise InputError("holds no surface", path=path, found=found, expected="(n, 3) points and (m, 3) faces")
     require_finite(vertices, path, "coordinates", "vertices")
     if not (np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)) or (
         np.abs(faces - np.rint(faces)).max() > 1e-3
     ):
-        found, expected = (
-            f"indices {faces.min():.6g} to {faces.max():.6g}",
-            f"whole numbers from 0 to {len(vertices) - 1}",
-        )
+        found = f"indices {faces.min():.6g} to {faces.max():.6g}"
+        expected = f"whole numbers from 0 to {len(vertices) - 1}"
         raise InputError("has faces that name vertices which do not exist", path=path, found=found, expected=expected)
     return TriangleMesh(vertices, np.rint(faces).astype(np.int64))
 
@@ -170,7 +157,7 @@ def _named(structure: Structure | None) -> dict[str, str]:
     return {"AnatomicalStructurePrimary": structure} if structure else {}
 
 
-def read_vertex_maps(path: AnyPath) -> dict[str, NDArray[np.float64]]:
+def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
     """Return the named per-vertex values of a GIFTI shape file."""
     arrays = enumerate(load_gifti(path).darrays)
     return {array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float) for n, array in arrays}
@@ -202,7 +189,7 @@ def _structure(path: AnyPath) -> str | None:
     return named
 
 
-def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
+def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray]:
     image = load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
@@ -216,7 +203,7 @@ def _read_gifti_surface(path: Path) -> tuple[NDArray[np.float64], NDArray]:
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], np.asarray(triangles[0].data)
 
 
-def _read_with_pyvista(path: Path) -> tuple[NDArray[np.float64], NDArray]:
+def _read_with_pyvista(path: Path) -> tuple[Floats, NDArray]:
     import pyvista as pv
 
     data = pv.read(path)
@@ -247,7 +234,7 @@ def _require_sound_cells(data: "pv.UnstructuredGrid | pv.PolyData", path: Path) 
     require_finite(np.asarray(data.points), path, "coordinates", "vertices")
 
 
-def _read_with_trimesh(path: Path) -> tuple[NDArray[np.float64], NDArray]:
+def _read_with_trimesh(path: Path) -> tuple[Floats, NDArray]:
     import trimesh
 
     # process=True joins equal vertices: STL stores each corner of each face
@@ -285,7 +272,7 @@ UNNAMED = ("", "???", "unknown", "Unknown", "none")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#F0E442")
 
 
-def read_vertex_labels(path: AnyPath) -> tuple[NDArray[np.int64], dict[int, str]]:
+def read_vertex_labels(path: AnyPath) -> tuple[Ints, dict[int, str]]:
     """Return the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
 
     InputError for missing or truncated files, another number of arrays than one, and values that are no whole numbers.
@@ -360,13 +347,12 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
     The space is None where the file does not say it. InputError for matrices into scanner space that change sizes, and
     for coordinates in Talairach or MNI space that a matrix leads out of.
     """
-    nothing = np.eye(4)
-    moving = [system for system in systems if not np.allclose(system[2], nothing, atol=1e-6)]
+    moving = [system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)]
     own = next((data for data, _, _ in systems if data in SUBJECT), None)
     if own is not None:
         for _, to, _ in moving:
             log.warning("%s: the coordinates are in %s already; its matrix to %s was not applied", path, own, to)
-        return nothing, own
+        return np.eye(4), own
     for space in SUBJECT:
         for data, to, matrix in moving:
             if to != space:
@@ -382,9 +368,9 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
         said = "%s: its matrix to %s, which scales by %.3g, was not applied: sizes are the subject's own"
         log.warning(said, path, to, size)
     if moving:
-        return nothing, None
+        return np.eye(4), None
     named = next((to for data, to, _ in systems if UNKNOWN not in (data, to)), None)
-    return nothing, named or next((to for _, to, _ in systems if to in SUBJECT), None)
+    return np.eye(4), named or next((to for _, to, _ in systems if to in SUBJECT), None)
 
 
 def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
@@ -406,7 +392,7 @@ def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
         log.warning(said, path, *centre)
 
 
-def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, NDArray[np.int64]]:
+def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, Ints]:
     """Return vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, in scanner space.
 
     Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file.
@@ -419,7 +405,7 @@ def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, NDArray[np.int64]]:
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces
 
 
-def _volume(path: AnyPath) -> tuple[Floats, NDArray[np.int64], Floats | None]:
+def _volume(path: AnyPath) -> tuple[Floats, Ints, Floats | None]:
     # the warnings are about missing geometry, which is reported
     with reading(path, "a surface", SURFACE_KINDS), warnings.catch_warnings(action="ignore", category=UserWarning):
         vertices, faces, info = read_geometry(str(path), read_metadata=True)

@@ -4,7 +4,6 @@ import logging
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import nibabel as nib
 import numpy as np
@@ -12,11 +11,11 @@ from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..geometry.triangles import Floats
+from ..parameters.terms import AffineSource
 from .files import AGAIN, AnyPath, reading, replaced, require_finite
 
 log = logging.getLogger(__name__)
-
-AffineSource = Literal["auto", "sform", "qform"]
 
 MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 # two header matrices that place every corner within this part of a voxel say the same thing
@@ -32,7 +31,7 @@ class LabelVolume:
     """The (i, j, k) tissue label of each voxel, and the (4, 4) affine from voxel indices to RAS+ positions in mm."""
 
     labels: NDArray[np.int32]
-    affine: NDArray[np.float64]
+    affine: Floats
 
 
 def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:
@@ -49,9 +48,7 @@ def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, crop
     return LabelVolume(_whole_numbers(values, path), affine)
 
 
-def _without_empty_border(
-    values: NDArray[np.number], affine: NDArray[np.float64]
-) -> tuple[NDArray[np.number], NDArray[np.float64]]:
+def _without_empty_border(values: NDArray[np.number], affine: Floats) -> tuple[NDArray[np.number], Floats]:
     box = []
     for axis, size in enumerate(values.shape):
         filled = np.flatnonzero(values.any(axis=tuple({0, 1, 2} - {axis})))
@@ -74,9 +71,7 @@ def voxels_of(path: AnyPath) -> tuple[int, float]:
     return math.prod(map(int, image.shape[:3])), float(size.prod())
 
 
-def read_values(
-    path: AnyPath, affine_from: AffineSource, content: str
-) -> tuple[NDArray[np.number], NDArray[np.float64]]:
+def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
     """Return the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
 
     `content` says in messages what the values are: "labels". InputError for missing or truncated files, other numbers
@@ -116,12 +111,11 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
     size = data.stat().st_size
     if needed < 0 or needed > size * (MOST_PACKED if packed else 1):
         expected = f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}"
-        raise InputError(
-            "is shorter than its header says", path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN
-        )
+        found = f"{size} bytes"
+        raise InputError("is shorter than its header says", path=data, found=found, expected=expected, remedy=AGAIN)
 
 
-def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> NDArray[np.float64]:
+def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Floats:
     # a single NIfTI file is a special kind of pair to nibabel, and a pair a special kind of Analyze
     if isinstance(image, nib.Nifti1Pair):
         return _nifti_affine(image, affine_from, path)
@@ -131,7 +125,7 @@ def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> ND
     return image.affine
 
 
-def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath) -> NDArray[np.float64]:
+def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath) -> Floats:
     header = image.header
     try:
         matrices = {"sform": header.get_sform(), "qform": header.get_qform()}
@@ -171,12 +165,12 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
     return unit
 
 
-def _farthest_corner(difference: NDArray[np.float64], shape: tuple[int, ...]) -> float:
+def _farthest_corner(difference: Floats, shape: tuple[int, ...]) -> float:
     ends = np.array(np.meshgrid(*[[0, n - 1] for n in shape[:3]])).reshape(3, -1)
     return float(np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max())
 
 
-def _checked_affine(affine: NDArray[np.float64], path: AnyPath) -> NDArray[np.float64]:
+def _checked_affine(affine: Floats, path: AnyPath) -> Floats:
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
     if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
         raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")

@@ -33,9 +33,8 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
         if not isinstance(key, yaml.ScalarNode):
             raise yaml.constructor.ConstructorError(None, None, "a key is no single word", key.start_mark)
         if key.value in first and key.tag != "tag:yaml.org,2002:merge":
-            raise yaml.constructor.ConstructorError(
-                None, None, f"the key {key.value!r} of line {first[key.value]} is there again", key.start_mark
-            )
+            problem = f"the key {key.value!r} of line {first[key.value]} is there again"
+            raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
         first[str(key.value)] = line
     loader.flatten_mapping(node)
     return loader.construct_mapping(node, deep=True)

@@ -55,9 +55,7 @@ class Varying(Settings):
     def problems(self) -> Iterator[Problem]:
         if not self.weeks and self.map is None:
             yield Problem("found no values; expected a number, `weeks` or a `map`")
-        maps, surfaces = (
-            [value] if isinstance(value, str) else list(value or ()) for value in (self.map, self.surface)
-        )
+        maps, surfaces = files_of(self.map), files_of(self.surface)
         if surfaces and not maps:
             yield Problem("has a `surface` but no `map`", ("surface",))
         elif surfaces and len(maps) != len(surfaces):

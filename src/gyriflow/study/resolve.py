@@ -235,7 +235,7 @@ def _unreachable(foldings: Iterable[_Folding], series: Series, chains: Chains) -
             names = series.of_others(start)
             near = len(chain.brains) > 2 and start.week >= chain.later[0].week - BEFORE_GW
             expected = "one series of another population with the same hemispheres"
-            remedy = "Add an atlas of these weeks, or name one of several series in growth.estimated_from."
+            remedy = "Add an atlas of these weeks, or name one of several series in growth.series."
         if near and chain.weeks[-1] >= end:
             continue
         if not names:

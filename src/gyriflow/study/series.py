@@ -85,7 +85,7 @@ def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
             else:
                 unmatched[name] = cause
     series = {name: tuple(brains[brain] for brain in ids) for name, ids in names.items()}
-    return Series(series, config.growth.estimated_from, matched, unmatched)
+    return Series(series, config.growth.series, matched, unmatched)
 
 
 def why_unmatched(brains: Sequence[GivenBrain], believed: Collection[str] = ()) -> str | None:

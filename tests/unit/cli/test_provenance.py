@@ -22,7 +22,7 @@ def made(tmp_path):
 
 
 def test_another_study_is_refused_with_what_to_do(made):
-    with pytest.raises(InputError, match=r"found a of .*one\.yaml; expected c of .*two\.yaml\. Give .*--directory"):
+    with pytest.raises(InputError, match=r"found a of .*one\.yaml; expected c of .*two\.yaml\. Choose .*--directory"):
         require_own_results(made, [made / "two.yaml"], study("c"), record=True)
     # a brain of the same name may be another one
     with pytest.raises(InputError, match="another study"):

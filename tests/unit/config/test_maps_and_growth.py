@@ -72,7 +72,7 @@ def both_kinds(tmp_path, weeks):
         ),
         ({"brains": []}, ["growth.brains: found brains of 0 week(s); growth needs two or more"]),
         ({"brains": ["s21", "v22"]}, []),
-        ({"estimated_from": "volumes"}, ["growth.estimated_from: found 'volumes'; the series are surface, volume"]),
+        ({"series": "volumes"}, ["growth.series: found 'volumes'; the series are surface, volume"]),
         ({"brains": {"one": "v21"}}, ["growth.brains.one: Input should be a valid tuple; found 'v21'"]),
     ],
 )

@@ -240,12 +240,12 @@ def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_th
         said = refusal(brains, **EXPECTED)
         assert f"found {found}; expected brains of one series of another population" in said
         assert "from 22 to 24 GW" in said
-    named = study(both, growth={"estimated_from": "third"}, **EXPECTED)
+    named = study(both, growth={"series": "third"}, **EXPECTED)
     assert ids(named.chains["own22", "atlas"].later) == ["third22", "third24"]
 
 
 def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(of_two):
-    named = {"growth": {"estimated_from": "atlas"}, "runs": {"a": {"preset": "measured"}}}
+    named = {"growth": {"series": "atlas"}, "runs": {"a": {"preset": "measured"}}}
     assert ids(study(of_two(22, 23, 24), **named).chains["own22", "self"].later) == ["own23", "own24"]
     assert "found none; the growth series are atlas" in refusal(of_two(22), **named)
     early = refusal(of_two(22, 23), runs=named["runs"])
