@@ -231,21 +231,6 @@ def tree(outside, tmp_path):
     return env
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_tree_hands_on_signals(tree, number):
-    code = (
-        "import signal, sys, time\n"
-        f"signal.signal({int(number)}, lambda *_: (print('stopped', flush=True), sys.exit(9)))\n"
-        "print('up', flush=True)\n"
-        "time.sleep(60)"
-    )
-    process = start("python", "-c", code, env=tree)
-    assert process.stdout.readline() == "up\n"
-    process.send_signal(number)
-    assert process.stdout.read() == "stopped\n"
-    assert process.wait(20) == 9
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_tree_leaves_nothing_behind(tree, number):
     process = start("bash", "-c", f"sleep {OWN} & echo up; wait", env=tree)

@@ -18,7 +18,6 @@ RUNNING = {
     "details": "run.log",
     "interrupted": False,
 }
-FAILED = [{"what": "surface, brain b", "why": "b.nii: is no image", "logs": ["b.log"]}]
 
 
 @pytest.fixture

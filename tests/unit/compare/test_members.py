@@ -4,12 +4,13 @@ import pandas as pd
 import pytest
 
 from gyriflow.compare.members import distances_to, member_row, nearest
+from gyriflow.compare.published import with_published_nearest
 
 
-def spectra(run, subject, powers, *, complete=True):
+def spectra(run, subject, powers):
     rows = [
         {"subject": subject, "run": run, "hemisphere": "left", "band": band, "relative_power": power,
-         "relative_power_weyl": float("nan") if band == 6 else 2 * power, "complete": complete, "resolved": band < 6}
+         "relative_power_weyl": float("nan") if band == 6 else 2 * power, "complete": True, "resolved": band < 6}
         for band, power in zip((4, 5, 6), powers, strict=True)
     ]  # fmt: skip
     return pd.DataFrame(rows)
@@ -82,3 +83,13 @@ def test_the_nearest_run_is_named_with_the_next():
 def test_what_stands_against_the_nearest_is_said():
     (row,) = nearest(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
+
+
+def test_the_papers_value_stands_beside_ours_where_it_reports_one():
+    published = {"nearest": [{"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 2.25}]}
+    table = nearest(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
+    assert with_published_nearest(table, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
+    cut = table.assign(measure="relative_power_B4_weyl")
+    assert with_published_nearest(cut, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
+    assert with_published_nearest(table, published, ["thickness_mm"], 27)["paper"].isna().all()
+    assert with_published_nearest(table, published, ["poisson_ratio"], 28)["paper"].isna().all()

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import pandas as pd
+import pytest
 
-from gyriflow.compare.published import StudyTables, replication
+from gyriflow.compare.published import NOT_ALIKE, StudyTables, replication
 from gyriflow.io.yaml_files import read_yaml
 
 PUBLISHED = read_yaml(Path(__file__).parents[3] / "workflow" / "published" / "fetalfoldsim.yaml")
@@ -81,3 +82,10 @@ def test_findings_of_a_study_are_checked_one_by_one():
     # the real 0.35 is above 0.3 on the right, not above 0.4 on the left
     assert found["B5 of the real brain is above that of any simulation"] == ("1 of 2 cases", "in part")
     assert found["ratios of 1 to 20 come to 29 GW"] == ("–", "not run")
+
+
+@pytest.mark.parametrize(("week", "varied"), [(27, ["thickness_mm"]), (28, ["thickness_mm", "poisson_ratio"])])
+def test_another_study_is_not_the_papers(week, varied):
+    own = study(SHARES, (0.4, 0.35), 0.01)
+    other = StudyTables(varied, week, own.members, own.comparison, own.nearest)
+    assert {verdict for _, verdict in verdicts(moves(), other).values()} == {"not run", NOT_ALIKE}

@@ -1,4 +1,4 @@
-"""Rows of validation, and what the benchmark says of a finished study."""
+"""Rows of validation."""
 
 import sys
 from pathlib import Path
@@ -13,7 +13,6 @@ from gyriflow.geometry.triangles import area, signed_volume, transformed
 sys.path.insert(0, str(Path(__file__).parent))
 from bumpy import RADIUS, bumpy, shaped
 
-BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "study.py"
 REAL = bumpy(1)
 SHAPES = {"real": shaped(REAL), "start": shaped(bumpy(2)), "adjacent": shaped(bumpy(1, height=0.8))}
 

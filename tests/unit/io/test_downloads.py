@@ -88,12 +88,3 @@ def test_a_page_in_the_place_of_a_file_is_refused(tmp_path, server, name):
         fetched(tmp_path, server, name, sha256="0" * 64)
     assert "it begins with b'<!DOCTYPE html>" in str(caught.value)
     assert files_in(tmp_path) == {}
-
-
-def test_a_folder_that_cannot_be_made_and_a_full_disk_are_refused(tmp_path, server):
-    (tmp_path / "file").touch()
-    with pytest.raises(StorageError, match="cannot be written or read"):
-        fetched(tmp_path / "file", server, SHORT)
-    with pytest.raises(StorageError, match="no room for"):
-        fetched(tmp_path, server, SHORT, size=2**60)
-    assert server.asked == []

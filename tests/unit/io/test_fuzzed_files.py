@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from fuzzing import MANY, damaged, outcome
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 from nibabel.freesurfer.io import write_geometry
 from shapes import sphere
@@ -114,20 +114,6 @@ def test_damaged_files_give_something_sound_or_are_refused(tmp_path, wholes, nam
         assert abs(np.linalg.det(found.affine)) > 0
     elif read is read_tab_separated and found is not None:
         assert all(isinstance(value, str) for row in found for value in row.values())
-
-
-@MANY
-@given(content=st.text("[]{}:-&*!?|>'\"# ab1\n\t%@`,.", max_size=40).map(str.encode))
-@example(content=b"[" * 10_000)
-@example(content=b"? [a, b]\n: c\n")
-@example(content=b"a: 2001-99-99\n")
-@example(content=b"a: &x [*x]\n")
-@example(content=b"a: 0b\n")
-@example(content=b"a: 0x_\n")
-@example(content=b"<<: 3\n")
-@example(content=b"a: " + b"9" * 5000 + b"\n")
-def test_odd_yaml(tmp_path, content):
-    tried(tmp_path, "study.yaml", content, read_yaml)
 
 
 @pytest.mark.fault(60)

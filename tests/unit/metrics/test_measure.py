@@ -1,7 +1,4 @@
-"""All metrics of brains made of spheres, closed and cut, and of two real hemispheres."""
-
-import os
-from pathlib import Path
+"""All metrics of brains made of spheres, closed and cut."""
 
 import numpy as np
 import pandas as pd
@@ -12,8 +9,6 @@ from shapes import ellipsoid, sphere
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh
 from gyriflow.metrics.measure import BrainMetrics, measure_brain
-
-DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).resolve().parents[4] / "shared/data"))
 
 
 def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
@@ -148,11 +143,3 @@ def test_inside_out_is_refused() -> None:
     mesh = sphere(20.0, 2)
     with pytest.raises(MeshError, match="look inwards"):
         measure_brain(flipped(mesh), mesh, mesh)
-
-
-def test_coefficients_make_up_the_bands(apart) -> None:
-    squares = apart.coefficients.assign(power=apart.coefficients["coefficient"] ** 2)
-    power = squares[squares["band"] >= 0].groupby(["hemisphere", "band"])["power"].sum()
-    bands = apart.spectra.set_index(["hemisphere", "band"])["power"].dropna()
-    pd.testing.assert_series_equal(power, bands, rtol=1e-9)
-    assert apart.coefficients.groupby("hemisphere")["mode"].max().tolist() == [59, 59]

@@ -53,17 +53,6 @@ def test_power_of_one_mode_is_in_its_band(solved) -> None:
     np.testing.assert_array_equal(found.dominant_band[clear], np.where(proxy > 0, 3, -3)[clear])
 
 
-def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
-    modes, mass = solved
-    band = bands_of_modes(modes.eigenvalues)
-    slow, fast = (modes.functions[:, np.flatnonzero(band == k)[1]] for k in (1, 3))
-    proxy = 10.0 * slow + fast
-    found = spectrum(proxy, modes, mass, edge_length_mm=1.0).dominant_band
-    expected = np.where(proxy > 0, np.where(10 * slow > fast, 1, 3), np.where(10 * slow < fast, -1, -3))
-    clear = np.abs(proxy) > 1e-3
-    np.testing.assert_array_equal(found[clear], expected[clear])
-
-
 def test_parseval_with_all_modes() -> None:
     mesh = ellipsoid((35.0, 25.0, 20.0), 2)
     stiffness, mass = laplacian(mesh)
@@ -212,3 +201,25 @@ def test_who_is_compared_with_whom() -> None:
     pairs = table["subject"] + " " + table["run"] + " " + table["hemisphere"] + ", " + table["real"]
     assert sorted(set(pairs)) == ["a real left, b", "a sim left, a", "a sim left, b", "b real left, a"]
     assert len(table) == 3 * 4
+
+
+def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
+    modes, mass = solved
+    band = bands_of_modes(modes.eigenvalues)
+    slow, fast = (modes.functions[:, np.flatnonzero(band == k)[1]] for k in (1, 3))
+    proxy = 10.0 * slow + fast
+    found = spectrum(proxy, modes, mass, edge_length_mm=1.0).dominant_band
+    expected = np.where(proxy > 0, np.where(10 * slow > fast, 1, 3), np.where(10 * slow < fast, -1, -3))
+    clear = np.abs(proxy) > 1e-3
+    np.testing.assert_array_equal(found[clear], expected[clear])
+
+
+def test_a_band_that_is_cut_off_dominates_nowhere(solved) -> None:
+    modes, mass = solved
+    band = bands_of_modes(modes.eigenvalues)
+    slow, cut = (modes.functions[:, np.flatnonzero(band == k)[1]] for k in (2, 4))
+    found = spectrum(slow + 10.0 * cut, modes, mass, edge_length_mm=1.0)
+    assert not found.bands["complete"][4]
+    assert set(np.abs(found.dominant_band)) <= {1, 2, 3}
+    few = Modes(modes.eigenvalues[:3], modes.functions[:, :3])
+    np.testing.assert_array_equal(spectrum(slow, few, mass, edge_length_mm=1.0).dominant_band, 0)
