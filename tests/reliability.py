@@ -90,9 +90,8 @@ def page_of(tests):
     lines = [
         "# Reliability",
         "",
-        "What goes wrong, and what a user then gets. Messages name the file, what was found, what was expected and",
-        "what to do; the exit codes are under [Questions](questions.md). Each row is tried by tests; an outcome is",
-        "given where not all of them passed.",
+        "What goes wrong, and what a user then gets ([exit codes](questions.md)). Each row is tried by tests; an outcome",
+        "is given where not all of them passed.",
         "`./run pytest --reliability=docs/reliability.md` writes this page from `tests/faults.yaml`.",
         "",
         f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
