@@ -90,8 +90,8 @@ def page_of(tests):
     lines = [
         "# Reliability",
         "",
-        "What goes wrong, and what a user then gets ([exit codes](questions.md)). Each row is tried by tests; an outcome",
-        "is given where not all of them passed.",
+        "What goes wrong, and what a user then gets ([exit codes](questions.md)). Each row is tried by tests; an",
+        "outcome is given where not all of them passed.",
         "`./run pytest --reliability=docs/reliability.md` writes this page from `tests/faults.yaml`.",
         "",
         f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
