@@ -1,7 +1,6 @@
 """Runs, and what differs between them: growth's series of brains, studies, calibration."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Annotated, Any
 
@@ -241,18 +240,6 @@ class Calibration(Compared):
         return {f"calibration-{index:02d}": number for index, number in enumerate(rounds)}
 
 
-@dataclass(frozen=True)
-class Member:
-    """A run of a study: its name, the varied values by their keys, and its complete settings.
-
-    The name is that of an equal run of `runs` or of an earlier study, where there is one.
-    """
-
-    run: str
-    values: Mapping[str, Any]
-    settings: Run
-
-
 def changed(run: Run, changes: Mapping[str, Any]) -> Run:
     """Return a run with some settings changed, by keys with dots for inner ones.
 
@@ -275,36 +262,3 @@ def variants(name: str, study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
     for values in product(*study.vary.values()):
         texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
         yield "-".join([name, *texts]), dict(zip(study.vary, values, strict=True))
-
-
-def members_of(
-    studies: Mapping[str, Study], runs: Mapping[str, Run], passes: Callable[[str, float], bool]
-) -> dict[str, list[Member]]:
-    """Return the members of each study; equal ones share a run, which ends at the latest of their weeks.
-
-    `passes` says whether a run of `runs`, by its name, has a given week among its output weeks.
-    """
-    wanted = [
-        (name, own, values, changed(runs[study.base], study.changes(values)))
-        for name, study in studies.items()
-        for own, values in variants(name, study)
-    ]
-    weeks: dict[str, set[float]] = {}
-    for *_, settings in wanted:
-        weeks.setdefault(_model(settings), set()).add(settings.end_week)
-    solved = {
-        _model(run): name
-        for name, run in reversed(list(runs.items()))
-        if all(passes(name, week) for week in weeks.get(_model(run), ()))
-    }
-    members: dict[str, list[Member]] = {name: [] for name in studies}
-    for name, own, values, settings in wanted:
-        model = _model(settings)
-        run = solved.setdefault(model, own)
-        complete = runs.get(run) or changed(settings, {"end_week": max(weeks[model])})
-        members[name].append(Member(run, values, complete))
-    return members
-
-
-def _model(run: Run) -> str:
-    return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields"})

@@ -45,11 +45,10 @@ def untangle(mesh: TriangleMesh) -> TriangleMesh:
     The number of vertices and the topology stay; each round takes in a wider neighbourhood.
     """
     for round_ in range(UNTANGLING_ROUNDS):
-        cutting = self_intersecting_faces(mesh)
-        if not cutting.any():
-            break
         document = in_meshlab(mesh)
         document.compute_selection_by_self_intersections_per_face()
+        if not document.current_mesh().face_selection_array().any():
+            break
         for _ in range(1 + round_ // 2):
             document.apply_selection_dilatation()
         document.compute_selection_transfer_face_to_vertex()

@@ -95,8 +95,7 @@ class ExportedBrain:
 
 @dataclass(frozen=True)
 class _Place:
-    folder: Path
-    stem: str
+    prefix: Path
     desc: str
 
 
@@ -125,7 +124,7 @@ def export_bids(
         sidecars |= _write_surfaces(place, brain, pose.inverse if pose.together else np.eye(4))
         sidecars |= _write_maps(place, brain, space, reference)
         if brain.volume and pose.together:
-            write_label_volume(place.folder / f"{place.stem}{place.desc}_dseg.nii.gz", _labels(brain, pose.inverse))
+            write_label_volume(f"{place.prefix}{place.desc}_dseg.nii.gz", _labels(brain, pose.inverse))
             _write_tsv(folder / "dseg.tsv", pd.DataFrame(TISSUES, columns=["index", "name"]))
     for suffix, sidecar in sidecars.items():
         write_json(folder / f"{suffix}.json", sidecar)
@@ -149,16 +148,15 @@ def export_bids(
 
 
 def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list[_Place]:
-    taken: dict[tuple[str, str], ExportedBrain] = {}
+    taken: dict[_Place, ExportedBrain] = {}
     places = []
     for brain in brains:
         subject, session = names[brain.brain]
         stem = "_".join(filter(None, (subject, session)))
         simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
-        places.append(
-            _Place(folder / subject / (session or "") / "anat", stem, "" if brain.run == MEASURED else simulated)
-        )
-        if (other := taken.setdefault((stem, places[-1].desc), brain)) is not brain:
+        place = _Place(folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated)
+        places.append(place)
+        if (other := taken.setdefault(place, brain)) is not brain:
             found = f"{other.brain} ({other.run}) and {brain.brain} ({brain.run})"
             expected = "ids and runs that differ in their letters and digits"
             raise InputError(f"two brains have the same BIDS name {stem}", found=found, expected=expected)
@@ -180,10 +178,10 @@ def _write_surfaces(place: _Place, brain: ExportedBrain, back: Floats) -> dict[s
     kinds = {"pial": (brain.surfaces, place.desc)} | ({"white": (brain.white, "")} if brain.white else {})
     for kind, (files, desc) in kinds.items():
         for side, path in files.items():
-            named = f"{place.folder / place.stem}_hemi-{side[0].upper()}{desc}_{kind}.surf.gii"
+            named = f"{place.prefix}_hemi-{side[0].upper()}{desc}_{kind}.surf.gii"
             write_surface(named, transformed(read_surface(path), back), STRUCTURES[side])
     for side, path in brain.regions.items():
-        _copy(path, f"{place.folder / place.stem}_hemi-{side[0].upper()}{place.desc or '_desc-regions'}_dseg.label.gii")
+        _copy(path, f"{place.prefix}_hemi-{side[0].upper()}{place.desc or '_desc-regions'}_dseg.label.gii")
     return {kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"} for kind in kinds}
 
 
@@ -203,7 +201,7 @@ def _write_maps(
                 suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
                 sidecars["_".join(filter(None, (entity, suffix)))] = {"Description": text, "Units": unit, **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
-                named = f"{place.folder / place.stem}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
+                named = f"{place.prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
                 write_vertex_maps(named, {quantity: values}, STRUCTURES[side])
     return sidecars
 

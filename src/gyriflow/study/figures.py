@@ -233,8 +233,8 @@ def _of_metrics(study: Study) -> Iterator[Figure]:
         real = _measured_by_week(*runs)
         brains = {one.run: {row.week: _halves(row) for row in one.measured} for one in runs}
         brains[measured_name(real.values())] = {week: _halves(brain.measured) for week, brain in real.items()}
-        path, options = f"{OF_STUDY}/shape_index.{{brain}}.png", {"quantity": "shape_index"}
-        yield Figure("shape_maps", path, "pictures.shape_maps", {"brains": brains}, options, {"brain": start.id})
+        path, quantity = f"{OF_STUDY}/shape_index.{{brain}}.png", {"quantity": "shape_index"}
+        yield Figure("shape_maps", path, "pictures.shape_maps", {"brains": brains}, quantity, {"brain": start.id})
     metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
     options = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
     yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 from ..config.brains import Brain as GivenBrain
 from ..config.root import Config
-from ..config.runs import Compared, Member, Run, members_of, starts_of
+from ..config.runs import Compared, Run, changed, starts_of, variants
 from ..errors import InputError
 from ..parameters.folding import output_weeks
 from ..parameters.growth import BEFORE_GW, SIZES
@@ -108,6 +108,18 @@ class _Folding:
     weeks: list[float]
 
 
+@dataclass(frozen=True)
+class Member:
+    """A run of a study: its name, the varied values by their keys, and its complete settings.
+
+    The name is that of an equal run of `runs` or of an earlier study, where there is one.
+    """
+
+    run: str
+    values: Mapping[str, Any]
+    settings: Run
+
+
 def _foldings(
     config: Config, brains: Mapping[str, Brain], left_out: Collection[str] = ()
 ) -> tuple[list[_Folding], dict[str, list[Member]]]:
@@ -124,11 +136,7 @@ def _foldings(
         for name, run in config.runs.items()
         for start in starts[name]
     ]
-    members = members_of(
-        config.studies,
-        config.runs,
-        lambda name, week: all(week in one.weeks for one in foldings if one.run == name),
-    )
+    members = _members(config, foldings)
     varied: dict[str, tuple[Run, list[Brain], set[float]]] = {}
     for name, study in config.studies.items():
         for member in members[name]:
@@ -149,6 +157,37 @@ def _foldings(
             for start in starts[calibrate.base]
         ]
     return foldings, members
+
+
+def _members(config: Config, foldings: Sequence[_Folding]) -> dict[str, list[Member]]:
+    """Return the members of each study; equal ones share a run, which ends at the latest of their weeks.
+
+    They share one of the `foldings` of `runs` where these have all of their weeks.
+    """
+    wanted = [
+        (name, own, values, changed(config.runs[study.base], study.changes(values)))
+        for name, study in config.studies.items()
+        for own, values in variants(name, study)
+    ]
+    weeks: dict[str, set[float]] = {}
+    for *_, settings in wanted:
+        weeks.setdefault(_model(settings), set()).add(settings.end_week)
+    solved = {
+        _model(run): name
+        for name, run in reversed(list(config.runs.items()))
+        if all(weeks.get(_model(run), set()) <= set(one.weeks) for one in foldings if one.run == name)
+    }
+    members: dict[str, list[Member]] = {name: [] for name in config.studies}
+    for name, own, values, settings in wanted:
+        run = solved.setdefault(_model(settings), own)
+        complete = config.runs.get(run) or changed(settings, {"end_week": max(weeks[_model(settings)])})
+        members[name].append(Member(run, values, complete))
+    return members
+
+
+def _model(run: Run) -> str:
+    # what may differ between runs of the same shapes is left out
+    return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields"})
 
 
 def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]:
