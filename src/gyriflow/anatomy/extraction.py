@@ -89,8 +89,6 @@ def remove_bridges(
 
 def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats]:
     """Return an (i, j, k) field on voxels `factor` times smaller, linear in between, and their affine."""
-    if factor == 1:
-        return field, affine
     fine = np.array(affine, dtype=float)
     fine[:3, :3] /= factor
     # the first fine voxel's centre lies nearer to the first coarse voxel's corner
@@ -106,8 +104,7 @@ def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, i
     number, count = ndimage.label(mask)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0
-    kept = sizes >= comparable * sizes.max()
-    kept[0] = False
+    kept = (sizes >= comparable * sizes.max()) & (sizes > 0)
     dropped = ~kept & (sizes > 0)
     return ndimage.binary_fill_holes(kept[number]), int(dropped.sum()), int(sizes[dropped].sum())
 
@@ -269,36 +266,32 @@ def _is_simple(around: Mask) -> bool:
     return len(touching) == 1 and ndimage.label(outside, OUTSIDE)[1] == 1
 
 
-def hanging_parts(mask: Mask, size_mm: Floats) -> Mask:
-    """Return which voxels of an (i, j, k) mask hang on it by thin stalks, these included.
+def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
+    """Return the (i, j, k) mask without what hangs on it by stalks, and each part's volume, stalk and place in mm.
 
     A part hangs where a ball of 3.2 mm across cannot pass from the rest to it, and no more than 12 mm² join it to the
-    rest: a gyrus, which may be as thin, is joined along its length. `size_mm` (3,) are the voxels' edges.
+    rest: a gyrus, which may be as thin, is joined along its length.
     """
-    hanging = np.zeros_like(mask)
-    depth = ndimage.distance_transform_edt(mask, sampling=size_mm)
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    depth = ndimage.distance_transform_edt(mask, sampling=size)
     number, count = ndimage.label(depth > NECK_RADIUS_MM, INSIDE)
     if count < 2:
-        return hanging
+        return mask, []
     sizes = np.bincount(number.ravel())[1:]
-    main = np.isin(number, np.flatnonzero(sizes >= MOST_SHARE * sizes.sum()) + 1)
-    solid = mask & (ndimage.distance_transform_edt(~main, sampling=size_mm) <= NECK_RADIUS_MM)
-    for part in np.flatnonzero(sizes < MOST_SHARE * sizes.sum()) + 1:
+    large = sizes >= MOST_SHARE * sizes.sum()
+    main = np.isin(number, np.flatnonzero(large) + 1)
+    solid = mask & (ndimage.distance_transform_edt(~main, sampling=size) <= NECK_RADIUS_MM)
+    hanging = np.zeros_like(mask)
+    for part in np.flatnonzero(~large) + 1:
         ball = number == part
-        near = ndimage.distance_transform_edt(~ball, sampling=size_mm) <= NECK_RADIUS_MM + REACH_MM
+        near = ndimage.distance_transform_edt(~ball, sampling=size) <= NECK_RADIUS_MM + REACH_MM
         loose, _ = ndimage.label(mask & ~solid & near, INSIDE)
         cut = np.isin(loose, np.setdiff1d(loose[ball], 0))
-        large_enough = cut.sum() * size_mm.prod() >= LEAST_MM3 and cut.sum() < MOST_SHARE * mask.sum()
-        if large_enough and 0 < _contact_mm2(cut, mask & ~cut, size_mm) <= MOST_NECK_MM2:
+        large_enough = cut.sum() * size.prod() >= LEAST_MM3 and cut.sum() < MOST_SHARE * mask.sum()
+        if large_enough and 0 < _contact_mm2(cut, mask & ~cut, size) <= MOST_NECK_MM2:
             hanging |= cut
-    return hanging
-
-
-def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
-    """Return the (i, j, k) mask without what hangs on it by stalks, and each part's volume, stalk and place in mm."""
-    size = np.linalg.norm(affine[:3, :3], axis=0)
-    number, count = ndimage.label(hanging_parts(mask, size), INSIDE)
-    left = mask & (number == 0)
+    number, count = ndimage.label(hanging, INSIDE)
+    left = mask & ~hanging
     return left, [
         {
             "volume_mm3": float(part.sum() * size.prod()),

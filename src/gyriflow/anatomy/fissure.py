@@ -75,17 +75,16 @@ class MidPlane:
 
     `asymmetry_mm` is the mean distance from the surface to its image in the plane of best symmetry, without the largest
     fifth; `fissure_points` the number of places between facing walls of the fissure that the plane was fitted to, 0
-    where too few were found and it is that of mirror symmetry; `scatter_mm` their root mean square distance to it.
+    where too few were found and it is that of mirror symmetry.
     """
 
     normal: Floats
     offset: float
     asymmetry_mm: float
     fissure_points: int
-    scatter_mm: float
 
 
-def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG, *, named: bool = False) -> MidPlane:
+def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
     """Return the mid-sagittal plane of a closed, outward surface whose left-right axis is within an angle of x.
 
     Planes of mirror symmetry are the candidates; each is fitted to the fissure, that is, to the middle between medial
@@ -96,7 +95,7 @@ def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG, *, named: bool
     weights = vertex_areas(mesh)
     chosen = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
     sample, tree = mesh.vertices[chosen], cKDTree(mesh.vertices)
-    planes = _symmetry_planes(sample, tree, search_deg)
+    planes = _symmetry_planes(sample, tree)
     if named:
         x, middle = np.array([1.0, 0.0, 0.0]), float(weights @ mesh.vertices[:, 0] / weights.sum())
         distance = _mirror_distance(x, middle, sample, tree)
@@ -107,18 +106,17 @@ def mid_plane(mesh: TriangleMesh, search_deg: float = SEARCH_DEG, *, named: bool
 
 
 def _fit_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry: float) -> MidPlane:
-    middle = fissure_points(mesh, normal, offset)
-    fitted = _plane_through(middle, normal, offset)
+    fitted = _plane_through(fissure_points(mesh, normal, offset), normal, offset)
     if fitted is None:
-        return MidPlane(normal, offset, asymmetry, 0, float("nan"))
+        return MidPlane(normal, offset, asymmetry, 0)
     # the first band may have been beside the fissure
     middle = fissure_points(mesh, *fitted)
     fitted = _plane_through(middle, *fitted) or fitted
     count, scatter = _scatter(middle, *fitted)
     before, by_symmetry = _scatter(middle, normal, offset)
     if before > 0.95 * count and by_symmetry < scatter + CLEARLY_BETTER_MM:
-        return MidPlane(normal, offset, asymmetry, before, by_symmetry)
-    return MidPlane(*fitted, asymmetry, count, scatter)
+        return MidPlane(normal, offset, asymmetry, before)
+    return MidPlane(*fitted, asymmetry, count)
 
 
 def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
@@ -165,18 +163,22 @@ def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
     return motion(turn, centre - turn @ centre), angle
 
 
-def _symmetry_planes(sample: Floats, tree: cKDTree, search_deg: float) -> list[tuple[Floats, float, float]]:
+def _symmetry_planes(sample: Floats, tree: cKDTree) -> list[tuple[Floats, float, float]]:
     centre = sample.mean(axis=0)
     # a Fibonacci lattice on the cap of directions around x
     index = np.arange(DIRECTIONS) + 0.5
-    along = 1.0 - (1.0 - np.cos(np.radians(search_deg))) * index / DIRECTIONS
+    along = 1.0 - (1.0 - np.cos(np.radians(SEARCH_DEG))) * index / DIRECTIONS
     turn = np.pi * (1.0 + 5.0**0.5) * index
     radius = np.sqrt(1.0 - along**2)
     directions = np.stack([along, radius * np.cos(turn), radius * np.sin(turn)], axis=1)
     scores = np.array([_mirror_distance(n, float(n @ centre), sample[::3], tree) for n in directions])
+    starts: list[Floats] = []
+    for one in directions[np.argsort(scores)]:
+        if len(starts) < STARTS and all(abs(one @ other) < np.cos(np.radians(20.0)) for other in starts):
+            starts.append(one)
     planes = []
-    for start in _apart(directions, scores):
-        base, aside = directions[start], np.linalg.svd(directions[start][None])[2][1:]
+    for base in starts:
+        aside = np.linalg.svd(base[None])[2][1:]
         best = minimize(
             lambda x, *frame: _mirror_distance(*_plane_near(x, *frame), sample, tree),
             np.zeros(3),
@@ -198,16 +200,6 @@ def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]
     distance = points @ normal - offset
     near = distance[np.abs(distance) < 3.0]
     return len(near), float(np.sqrt(np.mean(near**2))) if len(near) else float("inf")
-
-
-def _apart(directions: Floats, scores: Floats) -> list[int]:
-    chosen: list[int] = []
-    for number in np.argsort(scores):
-        if all(abs(directions[number] @ directions[other]) < np.cos(np.radians(20.0)) for other in chosen):
-            chosen.append(int(number))
-        if len(chosen) == STARTS:
-            break
-    return chosen
 
 
 def _mirror_distance(normal: Floats, offset: float, sample: Floats, tree: cKDTree) -> float:
@@ -310,14 +302,14 @@ def between(walls: TriangleMesh, start: Fissure) -> Fissure:
 
 
 def open_fissure(
-    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask | None = None
+    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask
 ) -> NDArray[np.float32]:
     """Return the smoothed (i, j, k) mask with the fissure at least `gap_mm` wide down to what joins the hemispheres.
 
     Small fetal brains have no CSF label between their medial walls: there the cortex labels of both sides touch and
     hide the fissure. It lies half-way between the tissue inside the cortex (`core`) of the two sides, and ends where
-    that tissue crosses the mid-surface (corpus callosum, deep grey matter, ventricles). With `hidden`, what
-    `Fissure.hidden` returns, it is opened there only: what labels of CSF show is as wide as they say.
+    that tissue crosses the mid-surface (corpus callosum, deep grey matter, ventricles). It is opened only where it is
+    `hidden`, as `Fissure.hidden` returns: what labels of CSF show is as wide as they say.
     """
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
     # the mid-surface, seen flat: where is the core, where is the brain
@@ -327,7 +319,7 @@ def open_fissure(
     depth = ndimage.distance_transform_edt(~core_there) * SPACING_MM - FLOOR_MM
     number, _ = ndimage.label(depth > 0)
     reached = np.isin(number, np.setdiff1d(number[~brain_there], 0))
-    if hidden is not None and not hidden.all():
+    if not hidden.all():
         reached &= hidden
         depth = np.minimum(depth, ndimage.distance_transform_edt(hidden) * SPACING_MM)
     if not reached.any():
@@ -382,8 +374,7 @@ def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
     normal = axes[:, 0]
     heights = (transform_points(np.argwhere(near), affine) - centre) @ normal
     normal = normal * np.sign(np.corrcoef(heights, side[near])[0, 1])
-    scatter = float(np.sqrt(np.mean(((places - centre) @ normal) ** 2)))
-    return MidPlane(normal, float(normal @ centre), float("nan"), len(places), scatter)
+    return MidPlane(normal, float(normal @ centre), float("nan"), len(places))
 
 
 def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fissure:

@@ -12,7 +12,7 @@ from scipy import ndimage
 from ..errors import InputError
 from ..parameters.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import COMPARABLE, Floats, Mask, main_parts, without_stalks
+from .extraction import COMPARABLE, PAD_VOXELS, Floats, Mask, crop, main_parts, shifted_affine, without_stalks
 
 log = logging.getLogger(__name__)
 
@@ -49,15 +49,25 @@ CLOSING_MM = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Cerebrum:
-    """What of a label volume is the cerebrum.
+    """What of a label volume is the cerebrum, cut to that with a margin of `PAD_VOXELS`.
 
-    `tissue` (i, j, k) are the labels, with 0 in what of the cerebrum's labels is no part of it; the report has volumes
-    and what was left out, in plain values for JSON.
+    `mask` (i, j, k) is where it is, `tissue` are the labels, with 0 in what of the cerebrum's labels is no part of it;
+    the (4, 4) affine is that of the cut volume. The report has volumes and what was left out, in plain values for JSON.
     """
 
+    mask: Mask
     tissue: Labels
+    affine: Floats
     report: dict[str, Any]
     warnings: list[str]
+
+    @property
+    def volume_mm3(self) -> float:
+        return float(self.mask.sum() * abs(np.linalg.det(self.affine[:3, :3])))
+
+    @property
+    def extents_mm(self) -> Floats:
+        return np.linalg.norm(self.affine[:3, :3], axis=0) * (np.array(self.mask.shape) - 2 * PAD_VOXELS)
 
 
 def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cortex: float = 0.0) -> Cerebrum:
@@ -103,14 +113,17 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
             warnings.append(said)
         else:
             log.info(said)
-    fluid = (kept & np.isin(labels, scheme.ventricles)) | (kept & unlabelled)
+    fluid = kept & (np.isin(labels, scheme.ventricles) | unlabelled)
     volumes = {"cerebrum": kept}
     if scheme.cortex:
         volumes |= {"cortex": outer, "inside_cortex": kept & ~fluid & ~outer}
     if scheme.ventricles or unlabelled.any():
         volumes |= {"tissue": kept & ~fluid, "ventricles": fluid}
     report["label_volumes_mL"] = {name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()}
-    return Cerebrum(tissue, report, warnings)
+    report["border_share"] = border_share(kept)
+    box, first = crop(kept)
+    cut, labelled = np.pad(kept[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS)
+    return Cerebrum(cut, labelled, shifted_affine(affine, first), report, warnings)
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
@@ -293,17 +306,11 @@ def _seen(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
     return seen[1:-1, 1:-1, 1:-1]
 
 
-def border_share(mask: Mask) -> tuple[float, list[str]]:
-    """Return the part of a mask's surface at the border of its volume, beyond which it is cut, and what is told."""
+def border_share(mask: Mask) -> float:
+    """Return the part of a mask's surface that is at the border of its volume, beyond which it is cut."""
     surface = mask & ~ndimage.binary_erosion(mask, border_value=1)
-    ends = [np.moveaxis(mask, axis, 0)[end] for axis in range(3) for end in (0, -1)]
-    at_border = int(sum(end.sum() for end in ends))
-    share = at_border / max(at_border + int(surface.sum()), 1)
-    cut = (
-        f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface: what "
-        "lies beyond is missing, and the surface is flat there"
-    )
-    return share, [cut] if at_border and share > REPORTED_LOSS else []
+    at_border = int(sum(np.moveaxis(mask, axis, 0)[end].sum() for axis in range(3) for end in (0, -1)))
+    return at_border / max(at_border + int(surface.sum()), 1)
 
 
 def _named(numbers: Iterable[int], scheme: LabelScheme) -> str:

@@ -16,26 +16,22 @@ from ..geometry.triangles import (
     area,
     corners,
     euler_number,
-    mean_edge_length,
     merged,
     signed_volume,
     transformed,
 )
 from ..parameters.schemes import LabelScheme
-from ..parameters.terms import SIDES
+from ..parameters.terms import SIDES, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .extraction import (
     COMPARABLE,
     LEVEL,
-    PAD_VOXELS,
     Floats,
     Mask,
-    crop,
     isosurface,
     main_parts,
     refine,
     remove_bridges,
-    shifted_affine,
     smooth_mask,
     unambiguous,
 )
@@ -64,7 +60,6 @@ from .labels import (
     REPORTED_LOSS,
     SMALLEST_HEMISPHERE,
     Labels,
-    border_share,
     read_cerebrum,
     require_sides,
 )
@@ -93,7 +88,6 @@ from .repair import make_sound, pieces, require_sound, sound_pieces, surface_of_
 log = logging.getLogger(__name__)
 
 Coordinates = Literal["auto", "ras", "lps"]
-Side = Literal["left", "right"]
 
 # slits this near to the mid-surface belong to the fissure
 FISSURE_REACH_MM = 3.0
@@ -151,15 +145,25 @@ def from_labels(
     InputError for labels that don't fit the scheme or the week, for one hemisphere alone without `side`, and for a
     whole brain or labels of the other hemisphere with it. MeshError where the surface stays tangled.
     """
-    cerebrum, pose, warnings = _posed_cerebrum(labels, affine, scheme, side, week)
-    mask, affine, report = cerebrum.mask, cerebrum.affine, cerebrum.report
+    # the wall of a hemisphere towards the side that is not there may have no cortex
+    cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else LEAST_CORTEX_OUTSIDE)
+    mask, tissue, report = cerebrum.mask, cerebrum.tissue, {"scheme": scheme.name, **cerebrum.report}
+    warnings = logged(cerebrum.warnings)
+    pose = Pose() if side else pose_of_labels(labels, affine, scheme)
+    if side:
+        _require_no_other(tissue, scheme, side)
+    sides = 2.0 if side else 1.0
+    warnings += logged(require_plausible_size(sides * cerebrum.volume_mm3, cerebrum.extents_mm, week))
+    if (share := report["border_share"]) > REPORTED_LOSS:
+        cut = f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface"
+        warnings += logged([f"{cut}: what lies beyond is missing, and the surface is flat there"])
     field = smooth_mask(mask, smoothing_voxels)
     if not side:
-        warnings += logged(_require_both(cerebrum.tissue, scheme, field, affine, report["border_share"]))
+        warnings += logged(_require_both(tissue, scheme, field, cerebrum.affine, report["border_share"]))
     if pose is None:
-        pose = _pose_by_shape(field, affine, scheme)
-        warnings += logged(pose.warnings)
-        affine = pose.world @ affine
+        pose = _pose_by_shape(field, cerebrum.affine, scheme)
+    warnings += logged(pose.warnings)
+    affine = pose.world @ cerebrum.affine
     if side:
         even = surface_of_mask(field, affine, cerebrum.volume_mm3, smoothing_iterations, edge_length_mm)
         require_one(even.mesh)
@@ -168,10 +172,10 @@ def from_labels(
         warnings += logged([*even.warnings, *pose.warnings])
         return _single_hemisphere(even.mesh, side, pose, week, report, warnings)
     grid, opened_ml = affine, 0.0
-    core = mask & ~np.isin(cerebrum.tissue, scheme.cortex)
+    core = mask & ~np.isin(tissue, scheme.cortex)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
     walls = isosurface(smooth_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
-    fissure, to_right, doubts = _fissure_of_labels(cerebrum.tissue, mask, walls, scheme, affine)
+    fissure, to_right, doubts = _fissure_of_labels(tissue, mask, walls, scheme, affine)
     warnings += logged(doubts)
     opens = bool(scheme.cortex) and fissure_mm > 0
     # what smoothing would shut, and reopened slits leave shut, is not shown
@@ -200,42 +204,6 @@ def from_labels(
     heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
     report = {"source": "labels", **report, **even.report}
     return _upright(mesh, left_faces(mesh, heights), fissure.plane, pose, week, report, warnings)
-
-
-@dataclass(frozen=True, eq=False)
-class _Voxels:
-    """A cerebrum's (i, j, k) mask and its tissue's labels, cut to their contents and padded, in the posed world."""
-
-    mask: Mask
-    tissue: Labels
-    affine: Floats
-    volume_mm3: float
-    report: dict[str, Any]
-
-
-def _posed_cerebrum(
-    labels: Labels, affine: Floats, scheme: LabelScheme, side: Side | None, week: float
-) -> tuple[_Voxels, Pose | None, list[str]]:
-    """Return the voxels of the cerebrum, its pose by the labels, None where they do not show it, and warnings."""
-    # the wall of a hemisphere towards the side that is not there may have no cortex
-    cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else LEAST_CORTEX_OUTSIDE)
-    warnings, tissue = logged(cerebrum.warnings), cerebrum.tissue
-    pose = Pose() if side else pose_of_labels(labels, affine, scheme)
-    if side:
-        _require_no_other(tissue, scheme, side)
-    if pose is not None:
-        warnings += logged(pose.warnings)
-        affine = pose.world @ affine
-    mask = np.isin(tissue, scheme.cerebrum)
-    volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
-    box, first = crop(mask)
-    extents = np.linalg.norm(affine[:3, :3], axis=0) * [along.stop - along.start for along in box]
-    warnings += logged(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
-    share, cut = border_share(mask)
-    warnings += logged(cut)
-    report = {"scheme": scheme.name, **cerebrum.report, "mask_volume_mL": volume * ML_PER_MM3, "border_share": share}
-    mask, tissue, affine = np.pad(mask[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS), shifted_affine(affine, first)
-    return _Voxels(mask, tissue, affine, volume, report), pose, warnings
 
 
 def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:
@@ -405,7 +373,6 @@ def _pial_surface(
         "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
         "vertices": len(whole.vertices),
         "faces": len(whole.faces),
-        "mean_edge_mm": mean_edge_length(whole),
         "pieces": len(pieces(whole)),
         "euler_number": euler_number(whole),
         "warnings": list(warnings),
@@ -444,12 +411,7 @@ def _upright(
         )
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
         doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
-    facts = {
-        "rotation_deg": angle,
-        "fissure_points": plane.fissure_points,
-        "fissure_scatter_mm": plane.scatter_mm,
-        "asymmetry_mm": plane.asymmetry_mm,
-    }
+    facts = {"rotation_deg": angle, "fissure_points": plane.fissure_points, "asymmetry_mm": plane.asymmetry_mm}
     warnings = [*warnings, *logged(doubts)]
     return _pial_surface(whole, left, right, fissure_x, pose.then(matrix), week, {**report, **facts}, warnings)
 

@@ -26,7 +26,6 @@ from ..geometry.triangles import (
     corners,
     edges,
     euler_number,
-    face_areas,
     face_components,
     flipped,
     is_closed,
@@ -37,7 +36,7 @@ from ..geometry.triangles import (
     vertex_normals,
 )
 from ..parameters.terms import MOST_HOLE_MM
-from ..units import CM2_PER_MM2, ML_PER_MM3
+from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
 from .extraction import EDGE_SLOPE, Floats, isosurface, make_simple, without_stalks
 from .labels import REPORTED_LOSS
@@ -138,17 +137,16 @@ def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: fl
     """Return the surface smoothed and remeshed, each piece a sphere that does not cut itself.
 
     Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length. The report has
-    what `make_even` says as "mesh", and what `rebuild` says as "remade".
+    what `rebuild` says as "remade". MeshError where that stays tangled.
     """
-    smooth, report = make_even(mesh, smoothing_iterations, edge_length_mm)
-    remade: dict[str, Any] = {}
-    warnings = []
-    if remaining := faults(smooth):
-        warnings.append(f"the surface was rebuilt through voxels, since it had {remaining}")
-        mesh, remade["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
-        smooth, report = make_even(mesh, smoothing_iterations, edge_length_mm)
+    smooth, cutting = make_even(mesh, smoothing_iterations, edge_length_mm)
+    report: dict[str, Any] = {"self_intersections": cutting}
+    if not (remaining := faults(smooth)):
+        return Sound(smooth, report, [])
+    mesh, report["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
+    smooth, _ = make_even(mesh, smoothing_iterations, edge_length_mm)
     require_sound(smooth)
-    return Sound(smooth, {"mesh": report} | remade, warnings)
+    return Sound(smooth, report, [f"the surface was rebuilt through voxels, since it had {remaining}"])
 
 
 def require_sound(mesh: TriangleMesh) -> None:
@@ -173,30 +171,18 @@ def faults(mesh: TriangleMesh) -> str:
     return ", ".join(fault for fault in problems if fault)
 
 
-def smooth_taubin(mesh: TriangleMesh, iterations: int) -> TriangleMesh:
-    """Return the surface after Taubin smoothing, which keeps volume (Taubin 1995, λ = 0.5, μ = −0.53)."""
-    if iterations == 0:
-        return mesh
-    document = in_meshlab(mesh)
-    document.apply_coord_taubin_smoothing(stepsmoothnum=iterations)
-    return from_meshlab(document)
+def make_even(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> tuple[TriangleMesh, int]:
+    """Return the surface smoothed, remeshed and untangled, and the number of faces that cut others before that.
 
-
-def make_even(
-    mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float
-) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Return the surface smoothed, remeshed and untangled, and the number of cutting faces before and after."""
-    even = remesh(smooth_taubin(mesh, smoothing_iterations), edge_length_mm)
-    before = int(self_intersecting_faces(even).sum())
-    if before:
-        even = untangle(even)
-    after = int(self_intersecting_faces(even).sum()) if before else 0
-    return even, {
-        "smoothing_iterations": smoothing_iterations,
-        "edge_length_mm": edge_length_mm,
-        "self_intersections_before": before,
-        "self_intersections_after": after,
-    }
+    Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53).
+    """
+    if smoothing_iterations > 0:
+        document = in_meshlab(mesh)
+        document.apply_coord_taubin_smoothing(stepsmoothnum=smoothing_iterations)
+        mesh = from_meshlab(document)
+    even = remesh(mesh, edge_length_mm)
+    cutting = int(self_intersecting_faces(even).sum())
+    return untangle(even) if cutting else even, cutting
 
 
 def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
@@ -217,22 +203,13 @@ def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[st
     inward = [signed_volume(piece) < 0 for piece in parts]
     mesh = merged(*(flipped(piece) if turn else piece for piece, turn in zip(parts, inward, strict=True)))
     if not is_closed(mesh):
-        _, counts = edges(mesh)
         raise MeshError(
             "the surface cannot be closed",
-            found=f"{int((counts != 2).sum())} edges without exactly two faces after repair",
+            found=f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair",
             expected="a closed surface",
         )
-    turned = {"pieces_turned_outward": int(sum(inward))}
-    return mesh, {
-        **doubles,
-        "faces_that_cut_others": cutting,
-        "vertices_moved_back": spikes,
-        **opened,
-        **dropped,
-        **holes,
-        **turned,
-    }
+    counts = {"faces_that_cut_others": cutting, "vertices_moved_back": spikes, "pieces_turned_outward": sum(inward)}
+    return mesh, doubles | opened | dropped | holes | counts
 
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
@@ -253,7 +230,6 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
         "degenerate_faces_removed": int(flat.sum()),
         "double_faces_removed": len(faces) - len(first),
         "duplicate_vertices_joined": max(used - len(kept), 0),
-        "zero_area_faces": int((face_areas(result) < 1e-10).sum()),
     }
 
 
@@ -356,18 +332,14 @@ def surface_of_mask(
     field, topology = make_simple(field, smallest)
     rough = isosurface(field, affine)
     even = make_sound(rough, smoothing_iterations, edge_length_mm)
-    mesh, smoothing = with_volume(even.mesh, after_repairs(volume_mm3, topology, affine) - taken_mm3, area(rough))
+    voxels = sum(topology[f"voxels_{key}"] for key in ("filled", "filled_in_tunnels"))
+    voxels -= sum(topology[f"voxels_{key}"] for key in ("dropped", "cut_from_bridges"))
+    repaired_mm3 = volume_mm3 + voxels * float(abs(np.linalg.det(affine[:3, :3])))
+    mesh, smoothing = with_volume(even.mesh, repaired_mm3 - taken_mm3, area(rough))
     warnings = list(even.warnings)
     if abs(change := smoothing["volume_change"]) > KEPT:
         warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it")
     return Sound(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)
-
-
-def after_repairs(mask_mm3: float, topology: dict[str, Any], affine: Floats) -> float:
-    """Return the volume in mm³ of a mask after the repairs of its topology, with voxels of a (4, 4) affine."""
-    voxels = sum(topology[f"voxels_{key}"] for key in ("filled", "filled_in_tunnels"))
-    voxels -= sum(topology[f"voxels_{key}"] for key in ("dropped", "cut_from_bridges"))
-    return mask_mm3 + voxels * float(abs(np.linalg.det(affine[:3, :3])))
 
 
 def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
@@ -385,7 +357,6 @@ def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple
         "volume_expected_mL": volume_mm3 * ML_PER_MM3,
         "volume_change": change,
         "volume_change_before_correction": before,
-        "area_before_cm2": area_mm2 * CM2_PER_MM2,
         "area_change": area(moved) / area_mm2 - 1.0,
     }
     log.info("volume changed by %.2f %%, area by %.2f %% through smoothing", 100 * change, 100 * report["area_change"])
@@ -436,7 +407,7 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
     signed = np.where(inside, distance.reshape(shape), -distance.reshape(shape))
     field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)
     field, report = make_simple(field)
-    return isosurface(field, affine), {"remade_with_voxels_mm": voxel_mm} | report
+    return isosurface(field, affine), report
 
 
 def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> Floats:

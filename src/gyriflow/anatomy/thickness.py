@@ -16,17 +16,7 @@ from ..geometry.poses import Pose
 from ..geometry.triangles import TriangleMesh, merged, transformed, vertex_areas
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import SIDES
-from .extraction import (
-    LEVEL,
-    PAD_VOXELS,
-    Floats,
-    Mask,
-    crop,
-    isosurface,
-    main_parts,
-    shifted_affine,
-    smooth_mask,
-)
+from .extraction import LEVEL, Floats, Mask, isosurface, main_parts, smooth_mask
 from .fissure import sample
 from .labels import Labels, read_cerebrum
 
@@ -116,21 +106,14 @@ def thickness_from_labels(
 
     `surface` is the whole one, posed by `pose`; the scheme has to separate cortex from the tissue inside.
     """
-    cerebrum, cortex, affine = layers(labels, pose.world @ affine, scheme)
-    thickness = cortical_thickness(surface, cerebrum, cortex, affine, smoothing_voxels)
+    cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
+    cortex = np.isin(cerebrum.tissue, scheme.cortex)
+    thickness = cortical_thickness(surface, cerebrum.mask, cortex, cerebrum.affine, smoothing_voxels)
     suggested = thickness.report["suggested_thickness_mm"]
     log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
     if not USUAL_MM[0] <= suggested <= USUAL_MM[1]:
         log.warning("the cortex is %.1f mm thick on average: is it cortex that the scheme calls so?", suggested)
     return thickness
-
-
-def layers(labels: Labels, affine: Floats, scheme: LabelScheme) -> tuple[Mask, Mask, Floats]:
-    """Return the (i, j, k) masks of the cerebrum and of its cortex, cut to their contents, and their (4, 4) affine."""
-    tissue = read_cerebrum(labels, affine, scheme).tissue
-    box, first = crop(np.isin(tissue, scheme.cerebrum))
-    tissue = np.pad(tissue[box], PAD_VOXELS)
-    return np.isin(tissue, scheme.cerebrum), np.isin(tissue, scheme.cortex), shifted_affine(affine, first)
 
 
 def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:

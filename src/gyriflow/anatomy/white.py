@@ -10,9 +10,9 @@ from ..parameters.schemes import LabelScheme
 from ..parameters.terms import Side
 from .extraction import COMPARABLE, Floats, smooth_mask
 from .fissure import cut_sides, nearer_left
-from .labels import SMALLEST_HEMISPHERE, Labels
+from .labels import SMALLEST_HEMISPHERE, Labels, read_cerebrum
 from .repair import make_sound, sound_pieces, surface_of_mask
-from .thickness import layers, posed_whites
+from .thickness import posed_whites
 
 
 def white_from_labels(
@@ -31,12 +31,12 @@ def white_from_labels(
     It is made as `pial.from_labels` makes the pial one of these labels, and lies where that does. Where the cerebrum
     has no cortex, as on the medial wall, both are one. MeshError where it stays tangled.
     """
-    cerebrum, cortex, affine = layers(labels, pose.world @ affine, scheme)
-    core = cerebrum & ~cortex
+    cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
+    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     smallest = SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE
-    volume = float(core.sum() * abs(np.linalg.det(affine[:3, :3])))
+    volume = float(core.sum() * abs(np.linalg.det(cerebrum.affine[:3, :3])))
     field = smooth_mask(core, smoothing_voxels)
-    even = surface_of_mask(field, affine, volume, smoothing_iterations, edge_length_mm, smallest=smallest)
+    even = surface_of_mask(field, cerebrum.affine, volume, smoothing_iterations, edge_length_mm, smallest=smallest)
     return _sides(even.mesh, pial)
 
 

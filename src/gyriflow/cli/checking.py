@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
 
-import numpy as np
-
 from ..anatomy.labels import LEAST_CORTEX_OUTSIDE, read_cerebrum
 from ..anatomy.plausible import require_plausible_size
 from ..config import load
@@ -196,10 +194,7 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
     cerebrum = read_cerebrum(read.labels, read.affine, scheme, LEAST_CORTEX_OUTSIDE if whole else 0.0)
     yield from cerebrum.warnings
     if whole:
-        inside = np.isin(cerebrum.tissue, scheme.cerebrum)
-        size = inside.sum() * abs(np.linalg.det(read.affine[:3, :3]))
-        extents = np.ptp(np.argwhere(inside), axis=0) * np.linalg.norm(read.affine[:3, :3], axis=0)
-        yield from require_plausible_size(float(size), extents, brain.week)
+        yield from require_plausible_size(cerebrum.volume_mm3, cerebrum.extents_mm, brain.week)
 
 
 def _needs(

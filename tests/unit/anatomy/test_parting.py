@@ -84,7 +84,7 @@ def test_a_bend_of_more_than_5_mm_is_followed():
     outer = [np.stack([np.full(y.shape, x), y, z], axis=-1).reshape(-1, 3) for x in (-35.0, 35.0)]
     sheets = [(walls[0], faces), (walls[1], faces[:, ::-1]), (outer[0], faces[:, ::-1]), (outer[1], faces)]
     mesh = merged(*(TriangleMesh(points, corner) for points, corner in sheets))
-    plane = MidPlane(np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0, 0.0)
+    plane = MidPlane(np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0)
     fissure = fissure_between(mesh, plane)
     for at in (-30.0, -12.0, 0.0, 12.0):
         place = np.array([[9.0 * np.exp(-((at / 15.0) ** 2)), at, 0.0]])

@@ -77,7 +77,7 @@ def require_sound(surface, surfaces=1):
 def test_phantom_surface_is_sound_and_of_the_masks_volume(phantom):
     require_sound(phantom)
     report = phantom.report
-    expected = report["mask_volume_mL"] - report["fissure_opened_mL"]
+    expected = report["label_volumes_mL"]["cerebrum"] - report["fissure_opened_mL"]
     assert report["volume_mL"] == pytest.approx(expected, rel=0.015)
     assert report["volume_mL"] == pytest.approx(signed_volume(phantom.whole) / 1e3)
     assert phantom.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
@@ -273,7 +273,7 @@ def test_real_atlas_labels_give_sound_surfaces(week):
     surface = from_labels(volume.labels, volume.affine, ATLAS, week=float(week), edge_length_mm=1.2)
     require_sound(surface)
     report = surface.report
-    expected = report["mask_volume_mL"] - report["fissure_opened_mL"]
+    expected = report["label_volumes_mL"]["cerebrum"] - report["fissure_opened_mL"]
     assert report["volume_mL"] == pytest.approx(expected, rel=0.01)
     # tissue across the open fissure would be a filled tunnel
     assert report["topology"]["voxels_filled_in_tunnels"] < 10

@@ -8,7 +8,7 @@ from phantoms import CENTRE_MM
 from shapes import phantom, rigid, sphere
 
 from gyriflow.anatomy.pial import from_labels
-from gyriflow.anatomy.repair import after_repairs, with_volume
+from gyriflow.anatomy.repair import with_volume
 from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
@@ -105,13 +105,3 @@ def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
     assert 0 < still.mean() < 0.2
     # at the place where the balls nearly touch
     assert np.abs(balls.vertices[still, 0] - shift[0] / 2).max() < 5.0
-
-
-def test_repairs_count_for_the_volume():
-    topology = {
-        "voxels_filled": 4,
-        "voxels_filled_in_tunnels": 3,
-        "voxels_dropped": 5,
-        "voxels_cut_from_bridges": 1,
-    }
-    assert after_repairs(100.0, topology, np.diag([2.0, 1.0, 1.0, 1.0])) == 102.0
