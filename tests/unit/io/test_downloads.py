@@ -62,29 +62,24 @@ def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     assert server.asked == []
 
 
-@pytest.mark.fault(40)
-def test_of_a_connection_that_stays_broken_nothing_is_kept(tmp_path, server):
-    server.broken_after[LONG] = [150_000] * downloads.TRIES
-    with pytest.raises(StorageError, match="cannot be fetched"):
-        fetched(tmp_path, server, LONG)
-    assert files_in(tmp_path) == {}
+BROKEN = [150_000] * downloads.TRIES
 
 
 @pytest.mark.fault(40)
-def test_another_checksum_is_refused_and_nothing_kept(tmp_path, server):
-    with pytest.raises(StorageError, match="something else than the file; found the SHA-256") as caught:
-        fetched(tmp_path, server, LONG, sha256="0" * 64)
-    assert f"{sha256(LABELS)} instead of {'0' * 64}" in str(caught.value)
-    assert f"{server.url}/{LONG}" in str(caught.value)
-    assert caught.value.exit_code == 5
-    assert files_in(tmp_path) == {}
-
-
-@pytest.mark.fault(40)
-@pytest.mark.parametrize("name", [LONG, SHORT])
-def test_a_page_in_the_place_of_a_file_is_refused(tmp_path, server, name):
-    server.files[name] = b"<!DOCTYPE html><title>Log in</title>"
-    with pytest.raises(StorageError, match="the server sent something else than the file; found no whole") as caught:
+@pytest.mark.parametrize(
+    ("name", "content", "broken", "said"),
+    [
+        (LONG, LABELS, BROKEN, "cannot be fetched"),
+        (LONG, LABELS, [], rf"something else than the file; found the SHA-256 {sha256(LABELS)} instead of 0{{64}}"),
+        (LONG, b"<!DOCTYPE html><title>Log in</title>", [], "found no whole.* it begins with b'<!DOCTYPE html>"),
+        (SHORT, b"<!DOCTYPE html><title>Log in</title>", [], "found no whole.* it begins with b'<!DOCTYPE html>"),
+    ],
+    ids=["broken", "checksum", "page for an image", "page for a surface"],
+)
+def test_what_is_not_the_file_is_refused_and_nothing_is_kept(tmp_path, server, name, content, broken, said):
+    server.files[name], server.broken_after[name] = content, list(broken)
+    with pytest.raises(StorageError, match=said) as caught:
         fetched(tmp_path, server, name, sha256="0" * 64)
-    assert "it begins with b'<!DOCTYPE html>" in str(caught.value)
+    assert f"{server.url}/{name}" in str(caught.value)
+    assert caught.value.exit_code == 5
     assert files_in(tmp_path) == {}

@@ -79,19 +79,6 @@ def tried(tmp_path, name, data, read):
 
 
 @pytest.mark.parametrize(
-    ("name", "read"),
-    [("a.surf.gii", read_surface), ("a.stl", read_surface), ("a.ply", read_surface), ("lh.pial", read_surface),
-     ("a.nii", read_label_volume), ("a.nii.gz", read_volume_map), ("a.shape.gii", read_vertex_maps),
-     ("a.label.gii", read_vertex_labels), ("a.h5", read_maps)],
-)  # fmt: skip
-def test_missing_foreign_and_truncated_files_are_named(tmp_path, wholes, name, read):
-    whole = gzip.compress(wholes["a.nii"]) if name == "a.nii.gz" else wholes[name]
-    assert outcome(read, tmp_path / name) is None
-    for content in (b"of another kind", *(whole[: int(kept * len(whole))] for kept in (0.05, 0.5, 0.95))):
-        assert tried(tmp_path, name, content, read) is None
-
-
-@pytest.mark.parametrize(
     ("name", "read", "header"),
     [
         ("a.nii", read_label_volume, 352), ("a.mgh", read_label_volume, 284), ("a.nii.gz", read_volume_map, 16),

@@ -19,11 +19,11 @@ def both_kinds(folder, weeks):
     ("growth", "brains"),
     [({}, ["a", "b", "c"]), ({"brains": ["c", "a"]}, ["a", "c"]), ({"brains": None}, ["a", "b", "c"])],
 )
-def test_growth_is_series_all_brains_or_those_named(growth, brains):
+def test_growth_is_of_all_brains_or_those_named(growth, brains):
     assert series_of(resolve(load(study(labelled(21, 22, 22), growth=growth)))) == {"volume": brains}
 
 
-def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_series(tmp_path):
+def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_followed(tmp_path):
     raw = both_kinds(tmp_path, (21, 22))
     found = resolve(load(raw, tmp_path))
     assert series_of(found) == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
