@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 
 from gyriflow.compare.placement import drawn_patches
-from gyriflow.compare.prediction import endpoints, scaled_to, with_skill
-from gyriflow.compare.shapes import Shape, ready
+from gyriflow.compare.prediction import endpoints, with_skill
+from gyriflow.compare.shapes import Shape, ready, scaled_to
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume
 from gyriflow.io.files import write_table

@@ -64,7 +64,6 @@ def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], 
 
 
 def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
-    """Multiply the values of a curve, {week: value} or {weeks: {week: value}, …}."""
     if "weeks" in curve:
         return dict(curve) | {"weeks": _scaled(curve["weeks"], factor)}
     return {week: factor * value for week, value in curve.items()}

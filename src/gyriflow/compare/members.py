@@ -14,8 +14,6 @@ MODES = "weyl_number"
 """The metric that says at how many modes the spectrum of a hemisphere is cut."""
 COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
-NOT_RESOLVED = "not resolved by the mesh"
-ENDS = "at the end of the range"
 
 
 def distances_to(
@@ -68,7 +66,6 @@ def _size_rows(real: str, metrics: pd.DataFrame) -> Iterator[tuple]:
 
 
 def _pairs(table: pd.DataFrame, real: str, keys: list[str]) -> pd.DataFrame:
-    """Join the rows of the simulated brain with those of the real one, whose columns end in _real."""
     measured = table["run"] == MEASURED
     of_real = table[measured & (table["subject"] == real)]
     return table[~measured].merge(of_real, on=keys, suffixes=("", "_real"))
@@ -90,7 +87,7 @@ def member_row(
         "thickness_mm": params["thickness_mm"],
         "shear_modulus_cortex_pa": params["shear_modulus_cortex_pa"],
         "elements_through_cortex": through,
-        "resolution": "ok" if fine else NOT_RESOLVED,
+        "resolution": "ok" if fine else "not resolved by the mesh",
         "outcome": "finished" if summary.get("diverged") is None else "diverged",
         "reached_week": summary.get("reached_week", params["end_week"]),
         "cause": summary.get("diverged") or "",
@@ -133,5 +130,5 @@ def _flags(best: Mapping[Hashable, Any], members: pd.DataFrame, varied: Sequence
     for name in varied:
         values = pd.to_numeric(members[name], errors="coerce")
         if values.min() < values.max() and best[name] in (values.min(), values.max()):
-            flags.append(ENDS)
+            flags.append("at the end of the range")
     return "; ".join(dict.fromkeys(flags)) or "ok"

@@ -111,12 +111,6 @@ def endpoints(
     return row | {"drawn_mm": away}
 
 
-def scaled_to(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
-    """Scale a closed surface to a volume."""
-    factor = (volume_mm3 / signed_volume(mesh)) ** (1 / 3)
-    return transformed(mesh, np.diag([factor] * 3 + [1.0]))
-
-
 def with_skill(rows: pd.DataFrame) -> pd.DataFrame:
     """Add skill = 1 − distance / distance of the best baseline of the week, with its 95 % interval, to a prediction.
 

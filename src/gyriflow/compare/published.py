@@ -93,7 +93,6 @@ def replication(
 
 
 def _study_of(entry: Mapping[str, Any], studies: Sequence[StudyTables]) -> StudyTables | None:
-    """Find the study that varies what an entry of the paper is of, at its week."""
     for study in studies:
         if list(study.varied) == [entry["parameter"]] and study.week == entry["week"]:
             return study
@@ -117,7 +116,6 @@ def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> 
 def _costs(
     published: Mapping[str, Any], summary: Mapping[str, Any], core_power_w: float, carbon_intensity_g_per_kwh: float
 ) -> Iterator[tuple[str, ...]]:
-    """Yield time, energy and emissions of a gestational week."""
     weeks = (summary["reached_week"] - summary["weeks"][0]) or np.nan
     energy_wh = summary["cpu_seconds"] / 3600 * core_power_w / weeks
     here = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * carbon_intensity_g_per_kwh)
@@ -128,7 +126,6 @@ def _costs(
 
 
 def _modes(published: Mapping[str, Any], study: StudyTables | None) -> Iterator[tuple[str, ...]]:
-    """Yield for each hemisphere how many modes the paper takes, and Weyl's numbers of the surfaces compared here."""
     for side in ("right", "left"):
         here, verdict = "–", NOT_RUN
         if study:
@@ -153,7 +150,6 @@ def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]
 
 
 def _finding(check: str, study: StudyTables) -> tuple[str, str]:
-    """Return what is found here in words, and the verdict."""
     if check == "all_come":
         holds = study.members["outcome"].eq("finished")
         return f"{holds.sum()} of {len(holds)} runs", _verdict(holds)
@@ -180,7 +176,6 @@ def _finding(check: str, study: StudyTables) -> tuple[str, str]:
 
 
 def _shares(comparison: pd.DataFrame, end: str) -> pd.DataFrame:
-    """Tabulate the relative powers B4 to B6 of the simulated and the real hemispheres, by brain and hemisphere."""
     bands = {f"relative_power_B{band}{end}": f"B{band}" for band in FOLD_BANDS}
     rows = comparison[comparison["measure"].isin(bands)]
     simulated, real = rows.assign(brain=rows["run"]), rows.assign(brain=REAL + rows["real"], value=rows["real_value"])

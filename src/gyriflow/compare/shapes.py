@@ -61,6 +61,12 @@ class Shape:
         return float(np.sqrt(np.average(self.mean_curvature**2, weights=self.areas)))
 
 
+def scaled_to(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+    """Scale a closed surface to a volume."""
+    factor = (volume_mm3 / signed_volume(mesh)) ** (1 / 3)
+    return transformed(mesh, np.diag([factor] * 3 + [1.0]))
+
+
 def ready(mesh: TriangleMesh, real: TriangleMesh) -> TriangleMesh:
     """Scale a closed surface to the volume of the real brain, remesh it and lay it onto that rigidly.
 
@@ -75,8 +81,7 @@ def ready(mesh: TriangleMesh, real: TriangleMesh) -> TriangleMesh:
         )
     if mesh is real:
         return remesh(real, EDGE_MM)
-    factor = (volumes[1] / volumes[0]) ** (1 / 3)
-    even = remesh(transformed(mesh, np.diag([factor] * 3 + [1.0])), EDGE_MM)
+    even = remesh(scaled_to(mesh, volumes[1]), EDGE_MM)
     return transformed(even, fit_onto(even, real))
 
 

@@ -154,7 +154,6 @@ class Chain:
 
     @property
     def later(self) -> tuple[Brain, ...]:
-        """The brains that follow the start."""
         return self.brains[1:]
 
     @property
@@ -163,12 +162,10 @@ class Chain:
 
     @property
     def surfaces(self) -> list[str]:
-        """The pial surfaces of those that follow the start."""
         return [brain.pial for brain in self.later]
 
     @property
     def reports(self) -> list[str]:
-        """The reports of these surfaces, with their poses."""
         return [brain.report for brain in self.later]
 
 
@@ -210,7 +207,6 @@ class Simulation:
 
     @property
     def week_tags(self) -> list[str]:
-        """The output weeks as they stand in file names."""
         return [week_tag(week) for week in self.weeks]
 
     @property
@@ -288,7 +284,6 @@ class Simulation:
 
     @property
     def measured(self) -> list[Measured]:
-        """The simulated brains of all its weeks."""
         return [self.at(week) for week in self.weeks]
 
     @property
@@ -339,7 +334,6 @@ class Comparison:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """The run, the brain and the varied values of each member."""
         return [{"run": one.run, "subject": one.start.id, "values": dict(values)} for one, values in self.members]
 
     def files(self, run: str, brain: str) -> dict[str, list[str]]:

@@ -1,6 +1,6 @@
 """Resolve a configuration once: which brains, weeks and files stand behind each run and each comparison."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -90,7 +90,6 @@ def comparable(start: Brain, brains: Iterable[Brain]) -> list[Brain]:
 
 
 def _compared_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
-    """Return the weeks after a start brain of the real brains that it may be compared with, one a file name."""
     alike = [brain for brain in comparable(start, brains) if not brain.given.synthetic]
     return list({week_tag(week): week for week in sorted(brain.week for brain in alike) if week > start.week}.values())
 
@@ -123,7 +122,6 @@ class Member:
 def _foldings(
     config: Config, brains: Mapping[str, Brain], left_out: Collection[str] = ()
 ) -> tuple[list[_Folding], dict[str, list[Member]]]:
-    """Return all foldings of `runs`, then of studies, then of the calibration, and the members of each study."""
     ids = [brain.id for brain in config.brains]
     starts = {
         name: [brains[id] for id in starts_of(config.start, run, ids) if id in brains and id not in left_out]
@@ -208,10 +206,12 @@ def _chains(foldings: Sequence[_Folding], series: Series, brains: Iterable[Brain
     for one in foldings:
         ends[one.start] = max(one.settings.end_week, ends.get(one.start, 0.0))
     chains: dict[tuple[str, Origin], Chain] = {}
-    through: dict[Origin, Callable[[Brain, float, Series], list[Brain]]] = {"self": _own_chain, "atlas": _atlas_chain}
     for start, end in ends.items():
-        for origin, chain in through.items():
-            members = chain(start, end, series)
+        through: dict[Origin, list[Brain]] = {
+            "self": _own_chain(start, end, series),
+            "atlas": _atlas_chain(start, end, series),
+        }
+        for origin, members in through.items():
             tags = {week_tag(brain.week) for brain in members[1:]}
             compared = _compared_weeks(start, brains) if origin == "atlas" else []
             chains[start.id, origin] = Chain(
@@ -344,7 +344,6 @@ def _references(
 
 
 def _compared_with(compared: Compared, start: Brain, brains: Iterable[Brain]) -> tuple[Brain, ...]:
-    """Return the brains that the runs of a study or a calibration from a brain are compared with."""
     if compared.compare_with is not None:
         return tuple(brain for brain in brains if brain.id in compared.compare_with)
     of_week = [brain for brain in brains if brain.week == compared.compare_week]
@@ -355,7 +354,6 @@ def _compared_with(compared: Compared, start: Brain, brains: Iterable[Brain]) ->
 def _comparisons(
     config: Config, members: Mapping[str, list[Member]], simulations: Iterable[Simulation], brains: Sequence[Brain]
 ) -> dict[str, Comparison]:
-    """Return the studies that have a run with a start."""
     comparisons = {}
     for name, study in config.studies.items():
         foldings = tuple(

@@ -48,7 +48,6 @@ class Study:
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """The run and the start of each of `folded`."""
         return [(one.run, one.start.id) for one in self.folded]
 
     def files(self, *patterns: str) -> list[str]:
@@ -104,7 +103,6 @@ class Study:
 
     @cached_property
     def validated_carried(self) -> list[Simulation]:
-        """The simulations that are compared, from such starts."""
         return [one for one in self.validated if one.start.id in self.carried]
 
     @cached_property
@@ -159,7 +157,6 @@ class Study:
 
     @property
     def surfaces(self) -> list[str]:
-        """The surfaces of all brains, and their thickness where it is measured."""
         return [
             file.format(brain=brain.id)
             for brain in self.brains.values()
@@ -171,7 +168,6 @@ class Study:
 
     @property
     def folded_surfaces(self) -> list[str]:
-        """The surfaces of all simulated brains, and their thickness."""
         return [
             one.file(file, week=week)
             for one in self.folded
