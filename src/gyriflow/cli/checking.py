@@ -171,7 +171,7 @@ def _check_files(brain: Brain, config: Config) -> Iterator[str]:
     require_checksums({path: config.known_files[path] for path in files})
     volume = brain.label_volume
     if volume is not None and Path(volume).is_file():
-        yield from _check_labels(volume, brain, LabelScheme(**config.scheme(brain)))
+        yield from _check_labels(volume, brain, config.scheme(brain))
     for file in brain.files:
         # files of atlases may be missing yet
         if file != volume and Path(file).is_file():

@@ -2,7 +2,6 @@
 
 import difflib
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +62,9 @@ def participants_brains(
     """
     path = located(folder, settings.file)
     scans = read_scans(path, settings.columns)
-    _refuse_mistyped_columns(path, scans[0].values)
+    for column in scans[0].values:
+        if column not in KNOWN and (near := difflib.get_close_matches(column, KNOWN, n=1, cutoff=ALMOST)):
+            raise InputError("has a column that seems mistyped", path=path, found=column, expected=near[0])
     counts = Counter(scan.id for scan in scans)
     entries: list[dict[str, Any]] = []
     left_out: dict[str, dict[str, Any]] = {}
@@ -85,12 +86,6 @@ def covariates(scan: Scan) -> dict[str, dict[str, str]]:
     known = {*IDS, SESSION, FILES, SIDE, *COLUMNS, scan.age_column}
     others = {key: value for key, value in scan.values.items() if key not in known and value not in NOTHING}
     return {"covariates": others} if others else {}
-
-
-def _refuse_mistyped_columns(path: Path, columns: Mapping[str, str]) -> None:
-    for column in columns:
-        if column not in KNOWN and (near := difflib.get_close_matches(column, KNOWN, n=1, cutoff=ALMOST)):
-            raise InputError("has a column that seems mistyped", path=path, found=column, expected=near[0])
 
 
 def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:

@@ -71,13 +71,12 @@ class Config(Settings):
         self._left_out = rows
         return self
 
-    def scheme(self, brain: Brain) -> dict[str, Any]:
-        """Return the scheme of a brain's labels, the fields of a `LabelScheme`."""
+    def scheme(self, brain: Brain) -> LabelScheme:
+        """Return the scheme of a brain's labels."""
         name = brain.scheme
         assert name is not None
         own = self.schemes.get(name)
-        scheme = SCHEMES[name] if own is None else LabelScheme(name=name, **own.model_dump())
-        return scheme.model_dump()
+        return SCHEMES[name] if own is None else LabelScheme(name=name, **own.model_dump())
 
     @property
     def atlases(self) -> list[UsedAtlas]:

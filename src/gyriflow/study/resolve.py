@@ -11,7 +11,6 @@ from ..config.runs import Compared, Run, changed, starts_of, variants
 from ..errors import InputError
 from ..parameters.folding import output_weeks
 from ..parameters.growth import BEFORE_GW, SIZES
-from ..parameters.schemes import LabelScheme
 from ..parameters.terms import SIDES
 from ..units import week_tag
 from .paths import CURVES
@@ -61,7 +60,7 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
 
 def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain:
     scheme = config.scheme(given) if given.has_labels else None
-    labels = {"labels": str(given.label_volume)} if scheme and LabelScheme(**scheme).cortex else {}
+    labels = {"labels": str(given.label_volume)} if scheme and scheme.cortex else {}
     all_white = config.metrics.white_surfaces == "all"
     whole = len(given.sides) == len(SIDES)
     with_regions = [name for name in config.metrics.regions if name not in refused]
@@ -74,7 +73,7 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
         regions_from = "named"
     return Brain(
         given=given,
-        scheme=scheme,
+        scheme=scheme and scheme.model_dump(),
         thickness_from=labels or given.white_files,
         white_from=given.white_files or (labels if all_white else {}),
         regions_from=regions_from,

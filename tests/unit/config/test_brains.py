@@ -5,7 +5,6 @@ from configurations import LABELLED, keys, problems, study, touched
 
 from gyriflow.config import load
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.parameters.schemes import LabelScheme
 
 MINE = {"cerebrum": [1, 2], "cortex": [2], "known": {9: "outer CSF"}}
 
@@ -100,10 +99,10 @@ def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
 
 def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
     config = load(one(labels="a.nii.gz", scheme="mine") | {"schemes": {"mine": MINE}}, folder)
-    scheme = LabelScheme(**config.scheme(config.brains[0]))
+    scheme = config.scheme(config.brains[0])
     assert (scheme.name, scheme.cerebrum, scheme.cortex, scheme.known) == ("mine", (1, 2), (2,), {9: "outer CSF"})
     plain = load(one(**LABELLED))
-    assert LabelScheme(**plain.scheme(plain.brains[0])) == SCHEMES["spina-bifida-atlas"]
+    assert plain.scheme(plain.brains[0]) == SCHEMES["spina-bifida-atlas"]
 
 
 def test_all_mistakes_in_schemes_are_named_at_once():
