@@ -73,7 +73,7 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
         regions_from = "named"
     return Brain(
         given=given,
-        scheme=scheme and scheme.model_dump(),
+        scheme=scheme.model_dump() if scheme else None,
         thickness_from=labels or given.white_files,
         white_from=given.white_files or (labels if all_white else {}),
         regions_from=regions_from,
