@@ -109,7 +109,7 @@ def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
     surface = "results/brains/far-21/surface/pial.surf.gii"
     refused = workflow.run(surface, "--cores", "1", "--configfile", name)
     assert refused.returncode == 2
-    assert f"{own}: is not the file of far; found another SHA-256" in refused.stderr
+    assert f"{own}: is not the file of far;" in refused.stderr
     assert own.read_bytes() == packed(1000)
 
 
