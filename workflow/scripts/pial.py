@@ -1,7 +1,6 @@
 """The clean pial surface of a brain and of its hemispheres in RAS+ mm, from what the brain is given as."""
 
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, from_surface
-from gyriflow.anatomy.plausible import Limits
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres, read_one_hemisphere, read_surface, write_brain
@@ -20,7 +19,7 @@ with step(snakemake.log[0], *files):
         surface = from_labels(volume.labels, volume.affine, scheme, params.side, **settings)
     elif params.source == "hemispheres":
         left, right, declared = read_hemispheres(*files)
-        settings |= {"coordinates": params.coordinates, "limits": Limits(**params.limits)}
+        settings |= {"coordinates": params.coordinates, **params.limits}
         surface = from_hemispheres(left, right, declared=declared, **settings)
     elif params.source == "shape":
         surface = from_shape(read_surface(files[0]), **settings)

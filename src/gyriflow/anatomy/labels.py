@@ -12,7 +12,17 @@ from scipy import ndimage
 from ..errors import InputError
 from ..parameters.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import COMPARABLE, PAD_VOXELS, Floats, Mask, crop, main_parts, shifted_affine, without_stalks
+from .extraction import (
+    COMPARABLE,
+    PAD_VOXELS,
+    Floats,
+    Mask,
+    crop,
+    main_parts,
+    shifted_affine,
+    smooth_mask,
+    without_stalks,
+)
 
 log = logging.getLogger(__name__)
 
@@ -138,7 +148,7 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
         raise InputError(
             f"the label volume has labels that the scheme {scheme.name!r} does not know",
             found=f"{_listed(unknown)} among {_listed(sorted(present))}",
-            expected=_named(scheme.labels, scheme),
+            expected=_listed(scheme.labels, scheme),
             remedy=f"Choose another scheme ({', '.join(SCHEME_FILES)}), or write one under schemes. Is this an "
             "image? gyriflow does not segment.",
         )
@@ -146,7 +156,7 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
         raise InputError(
             "no voxel belongs to the cerebrum",
             found=f"labels {_listed(sorted(present)) or 'none but 0'}",
-            expected="voxels of " + _named(scheme.cerebrum, scheme),
+            expected="voxels of " + _listed(scheme.cerebrum, scheme),
         )
     inside = scheme.white_matter or tuple(set(scheme.cerebrum) - set(scheme.cortex) if scheme.cortex else ())
     for tissue, numbers in (("cortex", scheme.cortex), ("white matter", inside)):
@@ -154,7 +164,7 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
             raise InputError(
                 f"the {tissue} of the scheme {scheme.name!r} is missing from the label volume",
                 found=f"labels {_listed(sorted(present))}",
-                expected="voxels of " + _named(numbers, scheme),
+                expected="voxels of " + _listed(numbers, scheme),
             )
     return np.isin(labels, scheme.cerebrum)
 
@@ -220,25 +230,19 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     anything else outside is left out: a ventricle that thin tissue leaves open to the outer CSF stays whole.
     """
     fluid = np.isin(labels, scheme.ventricles)
-    nothing = np.zeros(labels.shape, dtype=bool)
     if not fluid.any():
-        return nothing
+        return fluid
     tissue = np.isin(labels, scheme.cerebrum) & ~fluid
     # what labels leave empty inside is looked through as well: choroid plexus, septum
     clear = fluid | (ndimage.binary_fill_holes(tissue | fluid) & ~tissue)
-    seen = ndimage.gaussian_filter(_seen(clear, tissue), SMOOTHING) / np.maximum(
-        ndimage.gaussian_filter(clear.astype(np.float32), SMOOTHING), 1e-6
-    )
-    out = fluid & (seen <= ENCLOSED)
+    out = fluid & (_seen(clear, tissue, SMOOTHING) <= ENCLOSED)
     # crumbs that are cut off behind what is left out go with it
     number, count = ndimage.label(fluid & ~out, EVERY_NEIGHBOUR)
     if count:
         sizes = np.bincount(number.ravel())[1:]
-        crumbs = np.flatnonzero(sizes < CRUMB * sizes.max()) + 1
-        out |= np.isin(number, crumbs) & ndimage.binary_propagation(
-            out, EVERY_NEIGHBOUR, mask=out | np.isin(number, crumbs)
-        )
-    return out & np.isin(*_beside_hindbrain(out, labels, scheme))
+        crumbs = np.isin(number, np.flatnonzero(sizes < CRUMB * sizes.max()) + 1)
+        out = ndimage.binary_propagation(out, EVERY_NEIGHBOUR, mask=out | crumbs)
+    return _beside_hindbrain(out, labels, scheme)
 
 
 def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
@@ -263,8 +267,7 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     closed = ndimage.distance_transform_edt(near, sampling=size) > CLOSING_MM
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
     clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
-    seen = ndimage.gaussian_filter(_seen(clear, tissue & ~np.isin(numbers, scheme.cortex)), 0.5 * SMOOTHING)
-    seen /= np.maximum(ndimage.gaussian_filter(clear.astype(np.float32), 0.5 * SMOOTHING), 1e-6)
+    seen = _seen(clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * SMOOTHING)
     number, _ = ndimage.label(clear & (seen > (ENCLOSED if scheme.cortex else WHOLLY)), EVERY_NEIGHBOUR)
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
     enclosed = np.isin(number, np.flatnonzero(sizes >= max(1, CRUMB * sizes.max())) + 1)
@@ -275,11 +278,11 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     return filled
 
 
-def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> tuple[NDArray[np.int32], list[int]]:
-    number, count = ndimage.label(out, EVERY_NEIGHBOUR)
+def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> Mask:
     hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
     if not hindbrain.any():
-        return number, list(range(1, count + 1))
+        return out
+    number, _ = ndimage.label(out, EVERY_NEIGHBOUR)
     elsewhere = ~hindbrain & ~np.isin(labels, scheme.cerebrum)
     parts = []
     for part, box in enumerate(ndimage.find_objects(number), start=1):
@@ -287,10 +290,11 @@ def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> tuple[N
         around = ndimage.binary_dilation(number[wide] == part, EVERY_NEIGHBOUR)
         if (around & hindbrain[wide]).sum() > (around & elsewhere[wide]).sum():
             parts.append(part)
-    return number, parts
+    return np.isin(number, parts)
 
 
-def _seen(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
+def _seen(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
+    """Return for each clear voxel in how much of 26 directions it looks on tissue, smoothed among these voxels."""
     pad = np.pad(clear, 1), np.pad(tissue, 1)
     start = np.argwhere(pad[0])
     hits = np.zeros(len(start), dtype=np.int32)
@@ -303,7 +307,8 @@ def _seen(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
             places, rows = places[on] + direction, rows[on]
     seen = np.zeros(pad[0].shape, dtype=np.float32)
     seen[tuple(start.T)] = hits / len(DIRECTIONS)
-    return seen[1:-1, 1:-1, 1:-1]
+    smooth = ndimage.gaussian_filter(seen[1:-1, 1:-1, 1:-1], smoothing_voxels)
+    return smooth / np.maximum(smooth_mask(clear, smoothing_voxels), 1e-6)
 
 
 def border_share(mask: Mask) -> float:
@@ -313,12 +318,7 @@ def border_share(mask: Mask) -> float:
     return at_border / max(at_border + int(surface.sum()), 1)
 
 
-def _named(numbers: Iterable[int], scheme: LabelScheme) -> str:
-    chosen = list(numbers)
-    shown = ", ".join(f"{number} {scheme.labels[number]}" for number in chosen[:30])
-    return f"{shown}, … ({len(chosen)} in all)" if len(chosen) > 30 else shown
-
-
-def _listed(numbers: list[int]) -> str:
-    shown = ", ".join(map(str, numbers[:20]))
-    return f"{shown}, … ({len(numbers)} in all)" if len(numbers) > 20 else shown
+def _listed(numbers: Iterable[int], scheme: LabelScheme | None = None) -> str:
+    names = [f"{number} {scheme.labels[number]}" if scheme else str(number) for number in numbers]
+    shown = ", ".join(names[:30])
+    return f"{shown}, … ({len(names)} in all)" if len(names) > 30 else shown

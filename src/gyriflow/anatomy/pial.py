@@ -64,10 +64,7 @@ from .labels import (
     require_sides,
 )
 from .plausible import (
-    DOUBTFUL_BRAIN,
     DOUBTFUL_RATIO,
-    USUAL,
-    Limits,
     doubts_of_proportions,
     narrowness,
     require_common_pose,
@@ -219,9 +216,12 @@ def _fissure_of_labels(
     """Return the fissure between walls or labelled sides, `to_the_right` of these if there are any, and warnings."""
     plane, doubts = mid_plane(walls), []
     to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
-    if to_right is not None and abs(plane.normal @ _between_sides(tissue, scheme, affine)) < SAME_AXIS:
-        plane = plane_between_labels(to_right, affine, mask)
-        doubts.append("the hemispheres are no mirror images of each other: the mid-plane is that of their labels")
+    if to_right is not None:
+        left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
+        apart = affine[:3, :3] @ (right - left)
+        if abs(plane.normal @ (apart / np.linalg.norm(apart))) < SAME_AXIS:
+            plane = plane_between_labels(to_right, affine, mask)
+            doubts.append("the hemispheres are no mirror images of each other: the mid-plane is that of their labels")
     require_sides(tissue, scheme, affine, plane.normal)
     fissure = fissure_between(walls, plane)
     if to_right is not None:
@@ -240,7 +240,8 @@ def from_hemispheres(
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
     max_hole_mm: float = 3.0,
-    limits: Limits = USUAL,
+    max_hemisphere_ratio: float = 1.15,
+    max_asymmetry: float = 0.02,
 ) -> PialSurface:
     """Return the pial surface of a brain from closed surfaces of its hemispheres.
 
@@ -264,14 +265,14 @@ def from_hemispheres(
     else:
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), given), by="configuration")
     length = float(np.ptp(merged(left, right).vertices, axis=0).max())
-    warnings += logged(require_pair(left, right, limits, coordinates))
+    warnings += logged(require_pair(left, right, max_hemisphere_ratio, coordinates))
     if coordinates != "auto":
         warnings += logged(doubts_of_hemispheres(left, right, coordinates))
     even = [make_sound(mesh, smoothing_iterations, edge_length_mm) for mesh in (left, right)]
     warnings += logged(warning for side in even for warning in side.warnings)
     left, right = (side.mesh for side in even)
     plane = mid_plane(merged(left, right), named=coordinates != "auto")
-    require_common_pose(plane.asymmetry_mm, length, limits)
+    require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
     gap, to_right = least_gap(left, right), plane.normal
     left, right, moved = set_apart(left, right, gap_mm, to_right)
     if moved > 0:
@@ -437,12 +438,6 @@ def _require_no_other(tissue: Labels, scheme: LabelScheme, side: Side) -> None:
         )
 
 
-def _between_sides(tissue: Labels, scheme: LabelScheme, affine: Floats) -> Floats:
-    left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
-    vector = affine[:3, :3] @ (right - left)
-    return np.asarray(vector / np.linalg.norm(vector))
-
-
 def _require_both(
     tissue: Labels, scheme: LabelScheme, field: NDArray[np.float32], affine: Floats, border_share: float
 ) -> list[str]:
@@ -454,20 +449,11 @@ def _require_both(
     parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
     cerebrum = isosurface(smooth_mask(parts, 1.0), affine)
     if scheme.left and sum(sides.values()) == 1:
-        side, other = ("left", "right") if sides["left"] else ("right", "left")
-        # as a hemisphere that is alone it would be refused for its width
-        if (shape := narrowness(cerebrum)) > DOUBTFUL_BRAIN:
-            raise InputError(
-                f"a whole brain has labels of the {side} hemisphere only",
-                found=f"a cerebrum whose narrowest extent is {shape:.2f} of its longest",
-                expected=f"labels of the {other} hemisphere's {'cortex' if scheme.cortex else 'cerebrum'} too",
-                remedy="Give each hemisphere its own labels; or choose a scheme without left and right.",
-            )
         raise InputError(
-            "the volume holds one hemisphere only",
-            found=f"labels of the {side} hemisphere",
-            expected="both hemispheres",
-            remedy="Give a volume with both hemispheres; or the only one under hemisphere, with its side.",
+            f"the volume has labels of the {'left' if sides['left'] else 'right'} hemisphere only",
+            found=f"a cerebrum whose narrowest extent is {narrowness(cerebrum):.2f} of its longest",
+            expected="labels of both hemispheres",
+            remedy="Choose a scheme without left and right, or give the only one under hemisphere, with its side.",
         )
     # a brain that the field of view cuts off may be as flat, which has been reported already
     return require_whole(cerebrum, "volume", refuses=border_share <= REPORTED_LOSS)

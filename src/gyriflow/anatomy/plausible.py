@@ -3,8 +3,6 @@
 A size out of all proportion catches files in metres, micrometres or centimetres.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,22 +28,6 @@ DOUBTFUL_RATIO = 1.15
 NARROWEST_BRAIN, DOUBTFUL_BRAIN = 0.5, 0.56
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Bounds beyond which hemispheres are refused: volume of the larger over that of the smaller one, and asymmetry.
-
-    Hemispheres of one fetus differ by a few percent, those of successive weeks by 15 %; unilateral pathology goes
-    further. The asymmetry is the mean distance of the surface from its mirror image, relative to the brain's length.
-    """
-
-    max_hemisphere_ratio: float = 1.15
-    max_asymmetry: float = 0.02
-
-
-USUAL = Limits()
-"""The limits of normal brains."""
-
-
 def expected_volume_ml(week: float) -> float:
     """Return the coarse volume of a cerebrum (mL) at a gestational week, growing exponentially."""
     rate = np.log(LATE[1] / EARLY[1]) / (LATE[0] - EARLY[0])
@@ -64,15 +46,14 @@ def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -
     if LEAST <= share <= MOST:
         if DOUBTFUL_LEAST <= share <= DOUBTFUL_MOST:
             return []
-        return [f"a cerebrum of {volume:.0f} mL has {100 * share:.0f} % of the volume expected at week {week:g}: "
-                "is the week right, and is the file in mm, not in voxel indices?"]  # fmt: skip
+        far = f"a cerebrum of {volume:.0f} mL has {100 * share:.0f} % of the volume expected at week {week:g}"
+        return [f"{far}: is the week right, and is the file in mm, not in voxel indices?"]
     guess = next((u for u, mm in UNITS_MM.items() if LEAST <= volume * mm**3 / expected <= MOST), None)
     raise InputError(
         f"the cerebrum's size is not that of week {week:g}",
         found=f"{volume:.3g} mL, {' x '.join(f'{extent:.3g}' for extent in extents_mm)} mm",
         expected=f"{LEAST * expected:.0f} to {MOST * expected:.0f} mL",
-        remedy=f"The file seems to be in {guess}, or its header names another unit than its numbers have: give it in "
-        "mm, with mm in the header."
+        remedy=f"The file seems to be in {guess}: give it in mm, with mm in the header."
         if guess
         else "Check the file's unit, its week, and which labels make the cerebrum.",
     )
@@ -122,11 +103,12 @@ def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> lis
     return [narrow] if shape < DOUBTFUL_BRAIN else []
 
 
-def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits, coordinates: str) -> list[str]:
+def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coordinates: str) -> list[str]:
     """Return what is doubtful about two surfaces in RAS+ as the left and right hemisphere of one brain.
 
     `coordinates` are those that the user has named, "ras", "lps" or "auto". InputError where their centroids are not in
-    order (left is the smaller x), or their volumes too different.
+    order (left is the smaller x), or their volumes differ by more than a factor: those of one
+    fetus differ by a few percent, those of successive weeks by 15 %; unilateral pathology goes further.
     """
     x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
     if x_left >= x_right:
@@ -138,29 +120,27 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, limits: Limits, coordi
         )
     volumes = signed_volume(left), signed_volume(right)
     ratio = max(volumes) / min(volumes)
-    if ratio > limits.max_hemisphere_ratio:
+    if ratio > max_ratio:
         raise InputError(
             "the hemispheres are too different in size to be of one brain",
             found=f"{volumes[0] / 1e3:.1f} mL (left) and {volumes[1] / 1e3:.1f} mL (right)",
-            expected=f"volumes within {100 * (limits.max_hemisphere_ratio - 1):.0f} % of each other",
-            remedy="Give both hemispheres of the same subject and week; if they are, raise "
-            "surface.max_hemisphere_ratio.",
+            expected=f"volumes within {100 * (max_ratio - 1):.0f} % of each other",
+            remedy="Give both of the same subject and week; if they are, raise surface.max_hemisphere_ratio.",
         )
     if ratio > DOUBTFUL_RATIO:
         return [f"the hemispheres' volumes differ by {100 * (ratio - 1):.0f} %: are they of one brain?"]
     return []
 
 
-def require_common_pose(asymmetry_mm: float, length_mm: float, limits: Limits) -> None:
+def require_common_pose(asymmetry_mm: float, most_mm: float) -> None:
     """Raise InputError where two hemispheres together are no mirror images of each other in any plane.
 
-    `asymmetry_mm` is the mean distance to the mirror image, `length_mm` the brain's length.
+    `asymmetry_mm` is the mean distance to the mirror image.
     """
-    if asymmetry_mm > limits.max_asymmetry * length_mm:
+    if asymmetry_mm > most_mm:
         raise InputError(
             "the hemispheres are not posed as one brain",
             found=f"{asymmetry_mm:.1f} mm between the surface and its mirror image",
-            expected=f"at most {limits.max_asymmetry * length_mm:.1f} mm",
-            remedy="Give both hemispheres of one subject in the same coordinates; if they are so asymmetric, raise "
-            "surface.max_asymmetry.",
+            expected=f"at most {most_mm:.1f} mm",
+            remedy="Give both of one subject in the same coordinates; if they are, raise surface.max_asymmetry.",
         )

@@ -8,7 +8,6 @@ from typing import Any
 import igl
 import igl.embree
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import MeshError
@@ -150,20 +149,6 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     return angles
 
 
-def element_quality(mesh: TetrahedralMesh) -> pd.DataFrame:
-    """Return per element radius_ratio, min_dihedral_deg, max_dihedral_deg, volume_mm3 and jacobian_ratio."""
-    angles = dihedral_angles(mesh)
-    return pd.DataFrame(
-        {
-            "radius_ratio": radius_ratios(mesh),
-            "min_dihedral_deg": angles.min(axis=1),
-            "max_dihedral_deg": angles.max(axis=1),
-            "volume_mm3": signed_volumes(mesh),
-            "jacobian_ratio": jacobian_ratios(mesh),
-        }
-    )
-
-
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
     """Return counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
@@ -172,9 +157,8 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     between nodes. `gap_mm` holds the gaps of both, and `gap_kept` the share of the
     given one's gaps that the mesh leaves open, None where it has none (see `fidelity`).
     """
-    quality = element_quality(mesh)
+    ratios, angles, volumes = radius_ratios(mesh), dihedral_angles(mesh), signed_volumes(mesh)
     boundary, _ = boundary_surface(mesh)
-    volume = quality["volume_mm3"]
     walls = gap_walls(surface)
     return {
         "order": mesh.order,
@@ -188,13 +172,15 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "surface_distance_mm": fidelity(boundary, surface),
         "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(boundary))},
         "gap_kept": gap_kept(walls, boundary),
-        "volume_mm3": float(volume.sum()),
-        "volume_change": float(volume.sum() / signed_volume(surface) - 1),
-        **{f"{name}_radius_ratio": float(quality["radius_ratio"].agg(name)) for name in ("min", "mean", "median")},
-        "min_dihedral_deg": float(quality["min_dihedral_deg"].min()),
-        "max_dihedral_deg": float(quality["max_dihedral_deg"].max()),
-        "min_volume_mm3": float(volume.min()),
-        "min_jacobian_ratio": float(quality["jacobian_ratio"].min()),
+        "volume_mm3": float(volumes.sum()),
+        "volume_change": float(volumes.sum() / signed_volume(surface) - 1),
+        "min_radius_ratio": float(ratios.min()),
+        "mean_radius_ratio": float(ratios.mean()),
+        "median_radius_ratio": float(np.median(ratios)),
+        "min_dihedral_deg": float(angles.min()),
+        "max_dihedral_deg": float(angles.max()),
+        "min_volume_mm3": float(volumes.min()),
+        "min_jacobian_ratio": float(jacobian_ratios(mesh).min()),
     }
 
 
@@ -212,13 +198,11 @@ def refuse_bad_mesh(
     For elements the message has the number of bad ones and the worst place. Faces of the mesh's surface that cross
     each other are always refused. `path` is for the message: where the mesh can be looked at.
     """
-    quality, faults = element_quality(mesh), []
-    limits = {
-        "radius_ratio": ("radius ratio", min_radius_ratio),
-        "jacobian_ratio": ("ratio of Jacobians", MIN_JACOBIAN_RATIO),
-    }
-    for column, (name, least) in limits.items():
-        values = quality[column].to_numpy()
+    faults = []
+    for name, values, least in (
+        ("radius ratio", radius_ratios(mesh), min_radius_ratio),
+        ("ratio of Jacobians", jacobian_ratios(mesh), MIN_JACOBIAN_RATIO),
+    ):
         bad, worst = values < least, values.argmin()
         if bad.any():
             place = np.round(mesh.vertices[mesh.corners[worst]].mean(axis=0), 1).tolist()
