@@ -1,6 +1,6 @@
 """The mid-sagittal plane, the fissure as a curved surface, opened where labels touch, and left and right beside it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import igl
 import numpy as np
@@ -297,7 +297,7 @@ def between(walls: TriangleMesh, start: Fissure) -> Fissure:
         np.add.at(total, index, height[near])
         weight, total = ndimage.gaussian_filter(weight, bend), ndimage.gaussian_filter(total, bend)
         # a weight much below that of one point per cell draws the surface back to where it was
-        fissure = Fissure(plane, axes, corner, (total + 0.02 * start.heights) / (weight + 0.02))
+        fissure = replace(start, heights=(total + 0.02 * start.heights) / (weight + 0.02))
     return fissure
 
 
@@ -383,9 +383,8 @@ def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fi
     Where that is more than 5 mm away, it stays the mid-surface between facing walls, `fissure`. `side` (i, j, k) is
     what `to_the_right` returns, for voxels of the (4, 4) affine.
     """
-    plane = fissure.plane
     steps = np.arange(-FURTHEST_MM, FURTHEST_MM + SPACING_MM, SPACING_MM)
-    line = fissure.places[None] + steps[:, None, None, None] * plane.normal
+    line = fissure.places[None] + steps[:, None, None, None] * fissure.plane.normal
     values = sample(side, affine, line.reshape(-1, 3)).reshape(line.shape[:3])
     crossing = (values[:-1] < 0) & (values[1:] >= 0)
     share = -values[:-1] / np.where(crossing, values[1:] - values[:-1], 1.0)
@@ -396,7 +395,7 @@ def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fi
     bend = 0.25 * BEND_MM / SPACING_MM
     weight = ndimage.gaussian_filter(crossed.astype(float), bend)
     total = ndimage.gaussian_filter(np.where(crossed, move, 0.0), bend)
-    return Fissure(plane, fissure.axes, fissure.corner, fissure.heights + total / (weight + 0.02))
+    return replace(fissure, heights=fissure.heights + total / (weight + 0.02))
 
 
 def doubts_of_shift(fissure: Fissure) -> list[str]:

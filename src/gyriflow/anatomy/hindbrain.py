@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from ..errors import InputError
 from ..geometry.alignment import CUBE_ROTATIONS, angle_deg
 from ..geometry.poses import CONVENTIONS, Pose, turned
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, unit
 from ..parameters.schemes import LabelScheme
 
 # from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over weeks 21 to 34 of the example atlas
@@ -49,29 +49,31 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     hindbrain = {name: centres[name] - centres["cerebrum"] for name in EXPECTED if name in centres}
     voxels = np.isin(labels, scheme.cerebrum).sum()
     _require_outside(hindbrain, float(np.cbrt(voxels * abs(np.linalg.det(affine[:3, :3])))), scheme)
-    sides = _unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None
+    sides = unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None
     rotation = _turn_of_hindbrain(hindbrain)
     if sides is not None and hindbrain:
         rotation = _turn_of_sides(hindbrain, sides, rotation)
     if rotation is None:
         return None
     by = " and ".join([*hindbrain, *(["the labelled sides"] if sides is not None else [])])
-    return judged_turn(rotation, by, by, sides is not None)
+    return judged_turn(rotation, by, sides is not None)
 
 
-def judged_turn(rotation: Floats, witness: str, by: str, sided: bool) -> Pose:
+def judged_turn(rotation: Floats, witness: str, sided: bool) -> Pose:
     """Return the pose of a volume that seems to need a (3, 3) rotation about its origin to lie in RAS+.
 
     Turns of 60° and more are made, by quarters where these are near; smaller ones are only warned of from 15° on.
-    `witness` says so in warnings, `by` in the pose; `sided` is whether labels say which side is which.
+    `witness` says so in warnings and in the pose; `sided` is whether labels say which side is which.
     """
-    rotation = _turn_by_quarters(rotation)
+    quarters = _nearest_quarters(rotation)
+    if angle_deg(rotation @ quarters.T) < QUARTERS_DEG:
+        rotation = quarters
     angle = angle_deg(rotation)
     say = "says" if witness.startswith("the shape") else "say"
     if angle >= LEAST_TURN_DEG:
         what = witness.replace("the shape", "its shape")
         warning = f"the brain was turned by {angle:.0f}°, as {what} {say}: its affine has other axes"
-        return turned(rotation, by, "ras", warning if sided else f"{warning}; {OR_MIRRORED}")
+        return turned(rotation, witness.removeprefix("the "), "ras", warning if sided else f"{warning}; {OR_MIRRORED}")
     doubt = f"{witness} {say} that the brain is turned by about {angle:.0f}°: {PITCH_KEPT}"
     return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
 
@@ -90,14 +92,14 @@ def _turn_of_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
     if len(hindbrain) < 2:
         return None
     theirs, ours = (
-        (np.cross(*pair), _unit(pair[0] + pair[1]))
-        for pair in ([_unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
+        (np.cross(*pair), unit(pair[0] + pair[1]))
+        for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
     )
     # the brainstem is in front of the cerebellum, so that the cross product points to the right; where both lie in
     # one direction, they say nothing of the turn about it
     if np.linalg.norm(theirs[0]) < LEAST_SPREAD:
         return None
-    return _turn_onto([(_unit(theirs[0]), _unit(ours[0])), (theirs[1], ours[1])])
+    return _turn_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
 
 
 def _turn_of_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
@@ -105,7 +107,7 @@ def _turn_of_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats
 
     InputError where they fit mirrored only: against the `rotation` that the hindbrain shows, or by themselves.
     """
-    below = [(_unit(way), EXPECTED[name]) for name, way in hindbrain.items()]
+    below = [(unit(way), EXPECTED[name]) for name, way in hindbrain.items()]
     turn, mirrored = (_turn_onto([(one, TO_RIGHT), *below]) for one in (sides, -sides))
     if _is_mirrored(turn, mirrored) if rotation is None else (rotation @ sides)[0] < 0:
         raise InputError(
@@ -137,12 +139,3 @@ def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
 
 def _nearest_quarters(rotation: Floats) -> Floats:
     return np.asarray(min(CUBE_ROTATIONS, key=lambda turn: angle_deg(rotation @ turn.T)).round())
-
-
-def _turn_by_quarters(rotation: Floats) -> Floats:
-    nearest = _nearest_quarters(rotation)
-    return nearest if angle_deg(rotation @ nearest.T) < QUARTERS_DEG else rotation
-
-
-def _unit(vector: Floats) -> Floats:
-    return np.asarray(vector / np.linalg.norm(vector))

@@ -4,13 +4,10 @@ A size out of all proportion catches files in metres, micrometres or centimetres
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.triangles import TriangleMesh, signed_volume
+from ..geometry.triangles import Floats, TriangleMesh, signed_volume
 from ..units import ML_PER_MM3
-
-Floats = NDArray[np.float64]
 
 # cerebral volume (mL) at 25.4 and 36.6 GW: the atlas of Fidon et al. 2021 (doi 10.5281/zenodo.5524312) and the growth
 # by 230 % between these weeks found by Clouchoux et al. 2012 (doi 10.1016/j.ajog.2011.10.002)

@@ -16,6 +16,7 @@ from ..geometry.triangles import Floats, TriangleMesh, transformed
 from ..parameters.terms import SIDES
 from .hindbrain import LEAST_TURN_DEG, judged_turn
 from .template import (
+    DEEPEST,
     MIRROR,
     Shape,
     brains,
@@ -24,7 +25,6 @@ from .template import (
     register,
     register_from_all_sides,
     shape_of,
-    shape_of_brain,
 )
 
 # the next best pose has to fit worse by this factor: 1.01 in ellipsoids, 1.3 and more in hemispheres of atlases of 21
@@ -257,7 +257,7 @@ def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
     Named coordinates are kept, with a warning where the shape clearly contradicts them. InputError where the pose
     must come from the shape and is ambiguous.
     """
-    shape = shape_of_brain(mesh)
+    shape = shape_of(mesh, deepest=DEEPEST)
     fit, confidence = register_from_all_sides(shape, brains())
     one = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
     angles = _angles(one.rotation)
@@ -284,7 +284,7 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
         pose = pose_of_surface(mesh, "auto")
     except InputError:
         return unchecked
-    return unchecked if pose.by == "default" else judged_turn(pose.of_file()[:3, :3], "the shape", "shape", sided)
+    return unchecked if pose.by == "default" else judged_turn(pose.of_file()[:3, :3], "the shape", sided)
 
 
 def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:

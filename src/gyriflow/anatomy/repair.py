@@ -79,11 +79,7 @@ class Sound:
 
 def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> Sound:
     """Return a surface of one piece or two, or its largest piece, repaired and without parts that hang on stalks."""
-    mesh, repairs = clean(mesh, max_hole_mm)
-    if one:
-        mesh, *others = pieces(mesh)
-        dropped = repairs["area_dropped_mm2"] + sum(area(piece) for piece in others)
-        repairs |= {"pieces": 1, "pieces_dropped": repairs["pieces_dropped"] + len(others), "area_dropped_mm2": dropped}
+    mesh, repairs = clean(mesh, max_hole_mm, one=one)
     warnings, dropped, kept = [], repairs["area_dropped_mm2"], area(mesh)
     if dropped > REPORTED_LOSS * kept:
         warnings.append(
@@ -185,19 +181,20 @@ def make_even(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: flo
     return untangle(even) if cutting else even, cutting
 
 
-def clean(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def clean(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:
     """Return the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
     Equal vertices are joined, degenerate and double faces removed, vertices far off the surface set between their
     neighbours, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small
-    pieces and pieces inside others dropped. MeshError for larger holes and for surfaces that stay open.
+    pieces and pieces inside others dropped, and all but the largest where there is to be `one`. MeshError for larger
+    holes and for surfaces that stay open.
     """
     mesh, doubles = _drop_doubles(mesh)
     # not before: faces that meet in several copies of a vertex would count
     cutting = int(self_intersecting_faces(mesh).sum())
     mesh, spikes = without_spikes(mesh)
     mesh, opened = _make_manifold(mesh)
-    mesh, dropped = _main_pieces(mesh)
+    mesh, dropped = _main_pieces(mesh, one)
     mesh, holes = _fill_holes(mesh, max_hole_mm)
     parts = pieces(mesh)
     inward = [signed_volume(piece) < 0 for piece in parts]
@@ -251,13 +248,13 @@ def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     }
 
 
-def _main_pieces(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
+def _main_pieces(mesh: TriangleMesh, one: bool) -> tuple[TriangleMesh, dict[str, Any]]:
     parts = pieces(mesh)
     areas = [area(piece) for piece in parts]
     kept = [parts[0]]
     for piece, size in zip(parts[1:], areas[1:], strict=True):
         inside = np.median(np.abs(igl.fast_winding_number(parts[0].vertices, parts[0].faces, piece.vertices))) > 0.5
-        if size >= COMPARABLE * areas[0] and not inside:
+        if size >= COMPARABLE * areas[0] and not (inside or one):
             kept.append(piece)
     dropped = {"pieces_dropped": len(parts) - len(kept), "area_dropped_mm2": sum(areas) - sum(map(area, kept))}
     return merged(*kept), {"pieces": len(kept)} | dropped

@@ -1,14 +1,11 @@
 """Spheres and ellipsoids as closed surfaces in mm, RAS+ around the origin: what a folding model is tried on."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.remeshing import remesh
-from ..geometry.triangles import TriangleMesh, convex_hull, unit
+from ..geometry.triangles import Floats, TriangleMesh, convex_hull, unit
 from ..parameters.synthetic import ShapeSettings
-
-Floats = NDArray[np.float64]
 
 REMESHING_ROUNDS = 10
 # the edges of a finely sampled curved face are far less sharp

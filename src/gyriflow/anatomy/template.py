@@ -66,7 +66,8 @@ class Shape:
 def shape_of(mesh: TriangleMesh, *, deepest: float = np.inf) -> Shape:
     """Return the shape of a closed, outward surface, by points drawn at random in proportion to area.
 
-    Those `deepest` sizes and more below the convex hull are left out.
+    Those `deepest` sizes and more below the convex hull are left out: of whole brains the depth of the fissure, which
+    may be open or shut.
     """
     triangles, areas = corners(mesh), face_areas(mesh)
     volumes = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0
@@ -83,11 +84,6 @@ def shape_of(mesh: TriangleMesh, *, deepest: float = np.inf) -> Shape:
     return Shape(points, normals, centre, size)
 
 
-def shape_of_brain(mesh: TriangleMesh) -> Shape:
-    """Return the shape of a whole brain without the depth of its fissure, which may be open or shut."""
-    return shape_of(mesh, deepest=DEEPEST)
-
-
 @cache
 def hemispheres() -> tuple[Shape, ...]:
     """Return the right hemispheres of the template."""
@@ -97,7 +93,7 @@ def hemispheres() -> tuple[Shape, ...]:
 @cache
 def brains() -> tuple[Shape, ...]:
     """Return the template's brains, of two hemispheres each."""
-    return tuple(shape_of_brain(merged(transformed(right, MIRROR), right)) for right in _surfaces())
+    return tuple(shape_of(merged(transformed(right, MIRROR), right), deepest=DEEPEST) for right in _surfaces())
 
 
 def _surfaces() -> list[TriangleMesh]:
