@@ -339,7 +339,6 @@ def open_fissure(
 
 
 def _index(places: Floats, affine: Floats) -> Floats:
-    """Return the (3, …) indices of voxels at (…, 3) places in mm."""
     return np.moveaxis(transform_points(places, np.linalg.inv(affine)), -1, 0)
 
 

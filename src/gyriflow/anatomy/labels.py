@@ -62,12 +62,15 @@ class Cerebrum:
     """What of a label volume is the cerebrum, cut to that with a margin of `PAD_VOXELS`.
 
     `mask` (i, j, k) is where it is, `tissue` are the labels, with 0 in what of the cerebrum's labels is no part of it;
-    the (4, 4) affine is that of the cut volume. The report has volumes and what was left out, in plain values for JSON.
+    the (4, 4) affine is that of the cut volume. Parts below `smallest_part` of the largest are none of it: where labels
+    say which side is which, a hemisphere may be far smaller than the other one. The report has volumes and what was
+    left out, in plain values for JSON.
     """
 
     mask: Mask
     tissue: Labels
     affine: Floats
+    smallest_part: float
     report: dict[str, Any]
     warnings: list[str]
 
@@ -104,7 +107,8 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
         )
     open_fluid = outside_ventricles(labels, scheme)
     whole, stalks = without_stalks((mask & ~open_fluid) | unlabelled, affine)
-    kept, parts, apart = main_parts(whole, SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE)
+    smallest = SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE
+    kept, parts, apart = main_parts(whole, smallest)
     if apart > REPORTED_LOSS * kept.sum():
         lost_parts = f"{apart * voxel_ml:.2f} mL, {100 * apart / kept.sum():.1f} % of it"
         warnings.append(f"{parts} parts apart from the brain were dropped: {lost_parts}")
@@ -133,7 +137,7 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
     report["border_share"] = border_share(kept)
     box, first = crop(kept)
     cut, labelled = np.pad(kept[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS)
-    return Cerebrum(cut, labelled, shifted_affine(affine, first), report, warnings)
+    return Cerebrum(cut, labelled, shifted_affine(affine, first), smallest, report, warnings)
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
@@ -294,7 +298,6 @@ def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> Mask:
 
 
 def _seen(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
-    """Return for each clear voxel in how much of 26 directions it looks on tissue, smoothed among these voxels."""
     pad = np.pad(clear, 1), np.pad(tissue, 1)
     start = np.argwhere(pad[0])
     hits = np.zeros(len(start), dtype=np.int32)

@@ -24,7 +24,6 @@ from ..parameters.schemes import LabelScheme
 from ..parameters.terms import SIDES, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .extraction import (
-    COMPARABLE,
     LEVEL,
     Floats,
     Mask,
@@ -58,7 +57,7 @@ from .hindbrain import pose_of_labels
 from .labels import (
     LEAST_CORTEX_OUTSIDE,
     REPORTED_LOSS,
-    SMALLEST_HEMISPHERE,
+    Cerebrum,
     Labels,
     read_cerebrum,
     require_sides,
@@ -156,7 +155,7 @@ def from_labels(
         warnings += logged([f"{cut}: what lies beyond is missing, and the surface is flat there"])
     field = smooth_mask(mask, smoothing_voxels)
     if not side:
-        warnings += logged(_require_both(tissue, scheme, field, cerebrum.affine, report["border_share"]))
+        warnings += logged(_require_both(cerebrum, scheme, field))
     if pose is None:
         pose = _pose_by_shape(field, cerebrum.affine, scheme)
     warnings += logged(pose.warnings)
@@ -184,15 +183,13 @@ def from_labels(
     if opens:
         field, affine, opened_ml = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
         report["fissure_opened_mL"] = opened_ml
-    # where labels say which side is which, a hemisphere may be far smaller than the other one
-    smallest = COMPARABLE if to_right is None else SMALLEST_HEMISPHERE
     even = surface_of_mask(
         field,
         affine,
         cerebrum.volume_mm3,
         smoothing_iterations,
         edge_length_mm,
-        smallest=smallest,
+        smallest=cerebrum.smallest_part,
         taken_mm3=opened_ml / ML_PER_MM3,
     )
     mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
@@ -213,7 +210,6 @@ def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelSche
 def _fissure_of_labels(
     tissue: Labels, mask: Mask, walls: TriangleMesh, scheme: LabelScheme, affine: Floats
 ) -> tuple[Fissure, Floats | None, list[str]]:
-    """Return the fissure between walls or labelled sides, `to_the_right` of these if there are any, and warnings."""
     plane, doubts = mid_plane(walls), []
     to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
     if to_right is not None:
@@ -438,25 +434,23 @@ def _require_no_other(tissue: Labels, scheme: LabelScheme, side: Side) -> None:
         )
 
 
-def _require_both(
-    tissue: Labels, scheme: LabelScheme, field: NDArray[np.float32], affine: Floats, border_share: float
-) -> list[str]:
+def _require_both(cerebrum: Cerebrum, scheme: LabelScheme, field: NDArray[np.float32]) -> list[str]:
     sides = {
-        name: bool(np.isin(tissue, np.intersect1d(numbers, scheme.cortex or scheme.cerebrum)).any())
+        name: bool(np.isin(cerebrum.tissue, np.intersect1d(numbers, scheme.cortex or scheme.cerebrum)).any())
         for name, numbers in (("left", scheme.left), ("right", scheme.right))
     }
     # a part that is left out below, for its size, makes no second hemisphere
-    parts, _, _ = main_parts(field > LEVEL, SMALLEST_HEMISPHERE if scheme.left else COMPARABLE)
-    cerebrum = isosurface(smooth_mask(parts, 1.0), affine)
+    parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
+    surface = isosurface(smooth_mask(parts, 1.0), cerebrum.affine)
     if scheme.left and sum(sides.values()) == 1:
         raise InputError(
             f"the volume has labels of the {'left' if sides['left'] else 'right'} hemisphere only",
-            found=f"a cerebrum whose narrowest extent is {narrowness(cerebrum):.2f} of its longest",
+            found=f"a cerebrum whose narrowest extent is {narrowness(surface):.2f} of its longest",
             expected="labels of both hemispheres",
             remedy="Choose a scheme without left and right, or give the only one under hemisphere, with its side.",
         )
     # a brain that the field of view cuts off may be as flat, which has been reported already
-    return require_whole(cerebrum, "volume", refuses=border_share <= REPORTED_LOSS)
+    return require_whole(surface, "volume", refuses=cerebrum.report["border_share"] <= REPORTED_LOSS)
 
 
 def _with_fissure(

@@ -8,9 +8,9 @@ from ..geometry.poses import Pose
 from ..geometry.triangles import TriangleMesh
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import Side
-from .extraction import COMPARABLE, Floats, smooth_mask
+from .extraction import Floats, smooth_mask
 from .fissure import cut_sides, nearer_left
-from .labels import SMALLEST_HEMISPHERE, Labels, read_cerebrum
+from .labels import Labels, read_cerebrum
 from .repair import make_sound, sound_pieces, surface_of_mask
 from .thickness import posed_whites
 
@@ -33,10 +33,11 @@ def white_from_labels(
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
-    smallest = SMALLEST_HEMISPHERE if scheme.left and scheme.right else COMPARABLE
     volume = float(core.sum() * abs(np.linalg.det(cerebrum.affine[:3, :3])))
     field = smooth_mask(core, smoothing_voxels)
-    even = surface_of_mask(field, cerebrum.affine, volume, smoothing_iterations, edge_length_mm, smallest=smallest)
+    even = surface_of_mask(
+        field, cerebrum.affine, volume, smoothing_iterations, edge_length_mm, smallest=cerebrum.smallest_part
+    )
     return _sides(even.mesh, pial)
 
 
