@@ -14,9 +14,9 @@ WEEK = 24.0
 
 
 @cache
-def atlas_labels() -> tuple[np.ndarray, np.ndarray]:
-    """Returns the (i, j, k) labels of 24 GW in voxels of 1.6 mm, and their (4, 4) affine."""
-    path = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA24_notoperated" / "parcellation.nii.gz"
+def atlas_labels(week: float = WEEK) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the (i, j, k) labels of an unoperated week in voxels of 1.6 mm, and their (4, 4) affine."""
+    path = SHIPPED / "atlases" / "spina-bifida" / f"fetal_SB_atlas_GA{week:g}_notoperated" / "parcellation.nii.gz"
     volume = read_label_volume(path)
     return volume.labels[::2, ::2, ::2], volume.affine @ np.diag([2.0, 2.0, 2.0, 1.0])
 
