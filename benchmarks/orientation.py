@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.pial import PialSurface, from_hemispheres
-from gyriflow.anatomy.plausible import Limits, expected_volume_ml
+from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import GyriflowError
 from gyriflow.geometry.triangles import Floats, TriangleMesh, euler_number, is_closed, signed_volume
@@ -25,7 +25,7 @@ Files = tuple[Path, Path]
 
 SIDES = ("left", "right")
 WEEKS = np.arange(18.0, 45.5, 0.5)
-LIMITS = Limits(max_asymmetry=0.05)
+MAX_ASYMMETRY = 0.05
 
 
 def main() -> None:
@@ -56,7 +56,7 @@ def posed(brain: Files) -> PialSurface:
     """Returns the pial surface of two files, coarse, as the workflow makes it."""
     left, right, declared = read_hemispheres(*brain)
     edge = max(1.2, abs(signed_volume(left)) ** (1 / 3) / 25)
-    settings = {"week": _week(left), "edge_length_mm": edge, "limits": LIMITS}
+    settings = {"week": _week(left), "edge_length_mm": edge, "max_asymmetry": MAX_ASYMMETRY}
     return from_hemispheres(left, right, coordinates="auto", declared=declared, **settings)
 
 
