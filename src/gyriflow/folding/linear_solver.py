@@ -70,10 +70,9 @@ class TwoLevelPreconditioner:
         self._part = shared_out(domain.positions, count)[self._vertex]
         self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.owned)
         self._made_at = -LIFETIME
-        self._set_diagonal()
 
     def renew(self) -> None:
-        """Takes over the tangent's diagonal, and its coarse level where that has served its time."""
+        """Takes over the tangent's diagonal, and its coarse level where that has served its time: before each use."""
         self._set_diagonal()
         if self._tangent.elastic.assembled >= self._made_at + LIFETIME:
             self._made_at = self._tangent.elastic.assembled

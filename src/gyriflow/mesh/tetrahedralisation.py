@@ -106,9 +106,10 @@ def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
     MeshError where it cuts itself.
     """
     even = remesh(surface, edge_mm)
-    if crossing_faces(even):
-        even = untangle(even)
     crossing = crossing_faces(even)
+    if crossing:
+        even = untangle(even)
+        crossing = crossing_faces(even)
     log.info("surface remeshed to %d faces, edges of %.3f mm, %d faces cross", len(even.faces), edge_mm, crossing)
     if crossing:
         raise MeshError(
