@@ -144,7 +144,7 @@ def study(checkout_copy, tmp_path_factory):
     makers = GOOD | {name: make for name, (make, _) in BAD.items()} | {"crossing": CROSSING}
     makers["hemispherectomy"] = HEMISPHERECTOMY
     brains = [{"id": name, "week": 24} | make(workflow.directory, name) for name, make in makers.items()]
-    surface = {"edge_length_mm": 2.5, "max_hemisphere_ratio": 1.4, "max_asymmetry": 0.05}
+    surface = {"edge_length_mm": 2.5, "asymmetric": True}
     metrics = {"curvature_radius_mm": 7.0, "spangy_modes": 50}
     config = {"brains": brains, "start": "plain", "surface": surface, "metrics": metrics, "folding": {"end_week": 25}}
     thickness = [f"results/brains/{name}/surface/thickness.shape.gii" for name in ("freesurfer", "crossing")]

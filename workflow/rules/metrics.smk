@@ -47,7 +47,6 @@ for suffix, sides in PARTS_OF_BRAINS.items():
             # exchanged files are the same inputs to Snakemake
             source=from_brain("white_from"),
             surface=surface_settings(
-                "smoothing_voxels",
                 "edge_length_mm",
                 "smoothing_iterations",
                 "max_hole_mm",

@@ -21,7 +21,6 @@ rule study_resources:
             for job in takewhile(lambda job: job.name != "study_resources", workflow.rules)
             if job.benchmark
         },
-        power=CONFIG.report.power,
         folded=study.pairs,
     script:
         "../scripts/study_resources.py"

@@ -65,7 +65,6 @@ rule replication:
             if name in study.comparisons
         },
         run=next(iter(study.pairs), None),
-        power=CONFIG.report.power,
     script:
         "../scripts/replication.py"
 

@@ -1,8 +1,10 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
 from gyriflow.cli.cost import surface_memory_mib
 
-# how unequal and how asymmetric hemispheres may be
-LIMITS = CONFIG.surface.model_dump(include={"max_hemisphere_ratio", "max_asymmetry"})
+# how unequal and how asymmetric hemispheres may be, besides what is usual
+LIMITS = (
+    dict.fromkeys(("max_hemisphere_ratio", "max_asymmetry"), float("inf")) if CONFIG.surface.asymmetric else {}
+)
 
 
 def surface_memory(wildcards):
@@ -23,9 +25,7 @@ def pial_settings(wildcards):
     if given.source == "shape":
         return {}
     names = ["edge_length_mm", "smoothing_iterations"]
-    if given.has_labels:
-        names += ["smoothing_voxels"] + (["fissure_mm"] if given.hemisphere is None else [])
-    else:
+    if not given.has_labels:
         names += ["max_hole_mm"]
     return surface_settings(*names)
 
@@ -83,7 +83,6 @@ for name, source in (
             given=from_brain("thickness_from"),
             affine_from=from_brain("given.affine_from"),
             scheme=from_brain("scheme"),
-            settings=(surface_settings("smoothing_voxels") if source == "labels" else {}),
         script:
             "../scripts/thickness.py"
 

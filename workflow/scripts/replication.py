@@ -19,7 +19,7 @@ with step(snakemake.log[0]):
     }
     published = read_yaml(files.published)
     displacement, summary = read_table(files.displacement[0]), read_json(files.summary[0])
-    table = replication(published, displacement, list(studies.values()), summary, params.power)
+    table = replication(published, displacement, list(studies.values()), summary)
     write_table(snakemake.output.csv, table)
     said = [
         f"Displacements and cost are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}."

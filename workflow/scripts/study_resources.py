@@ -17,6 +17,6 @@ with step(snakemake.log[0]):
         names.get((run, brain)) if rule == "simulate" else None
         for rule, run, brain in zip(jobs["rule"], jobs["run"], jobs["brain"], strict=True)
     ]
-    table = resources(jobs, **params.power)
+    table = resources(jobs)
     write_table(output.csv, table)
     write_html(output.table, html_table(table))

@@ -14,7 +14,7 @@ with step(snakemake.log[0], *params.given.values()):
     if labels := params.given.get("labels"):
         volume, scheme = read_label_volume(labels, affine_from=params.affine_from, cropped=True), params.scheme
         known = volume.labels, volume.affine, LabelScheme(**scheme), surface, pose
-        thickness = thickness_from_labels(*known, **params.settings)
+        thickness = thickness_from_labels(*known)
     else:
         whites = {
             side: read_one_hemisphere(path, side) if side in SIDES else read_surface(path)

@@ -20,11 +20,11 @@ files, output, params = snakemake.input, snakemake.output, snakemake.params
 source, settings = params.source, dict(params.surface)
 with step(snakemake.log[0], *source.values()):
     pial, pose = {side: read_surface(files[side]) for side in SIDES if files.get(side)}, read_pose(files.report)
-    max_hole_mm, smoothing_voxels = settings.pop("max_hole_mm"), settings.pop("smoothing_voxels")
+    max_hole_mm = settings.pop("max_hole_mm")
     if "labels" in source:
         volume = read_label_volume(source["labels"], affine_from=params.affine_from, cropped=True)
         of_labels = volume.labels, volume.affine, LabelScheme(**params.scheme)
-        sides = white_from_labels(*of_labels, pial, pose, smoothing_voxels=smoothing_voxels, **settings)
+        sides = white_from_labels(*of_labels, pial, pose, **settings)
     else:
         whites = {
             name: read_one_hemisphere(path, name) if name in SIDES else read_surface(path)

@@ -122,7 +122,7 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coor
             "the hemispheres are too different in size to be of one brain",
             found=f"{volumes[0] / 1e3:.1f} mL (left) and {volumes[1] / 1e3:.1f} mL (right)",
             expected=f"volumes within {100 * (max_ratio - 1):.0f} % of each other",
-            remedy="Give both of the same subject and week; if they are, raise surface.max_hemisphere_ratio.",
+            remedy="Give both of the same subject and week; if they are, set surface.asymmetric to true.",
         )
     if ratio > DOUBTFUL_RATIO:
         return [f"the hemispheres' volumes differ by {100 * (ratio - 1):.0f} %: are they of one brain?"]
@@ -139,5 +139,5 @@ def require_common_pose(asymmetry_mm: float, most_mm: float) -> None:
             "the hemispheres are not posed as one brain",
             found=f"{asymmetry_mm:.1f} mm between the surface and its mirror image",
             expected=f"at most {most_mm:.1f} mm",
-            remedy="Give both of one subject in the same coordinates; if they are, raise surface.max_asymmetry.",
+            remedy="Give both of one subject in the same coordinates; if they are, set surface.asymmetric to true.",
         )

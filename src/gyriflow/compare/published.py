@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..parameters.terms import FOLD_BANDS
+from ..parameters.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, FOLD_BANDS
 from .members import MODES
 
 
@@ -68,12 +68,11 @@ def replication(
     displacement: pd.DataFrame,
     studies: Sequence[StudyTables],
     summary: Mapping[str, Any],
-    power: Mapping[str, float],
 ) -> pd.DataFrame:
     """Return each result of the paper beside the same here: result, place, paper, here, verdict.
 
     Displacement has the rows of one run, in the columns from_week, to_week, nodes, max_mm, mean_mm; `summary` is that
-    run's, and `power` has core_power_w and carbon_intensity_g_per_kwh. Where the paper's study is not among `studies`,
+    run's. Where the paper's study is not among `studies`,
     the verdict is `NOT_RUN`. Bands are cut at Weyl's number, here each surface's own and in the paper the largest of
     all compared, and stand in whole beside it.
     """
@@ -88,7 +87,7 @@ def replication(
         study = _study_of(entry, studies)
         here, verdict = _finding(entry["check"], study) if study else ("–", NOT_RUN)
         rows.append((entry["finding"], entry["place"], "stated", here, verdict))
-    rows += _costs(published["cost"], summary, **power)
+    rows += _costs(published["cost"], summary)
     return pd.DataFrame(rows, columns=["result", "place", "paper", "here", "verdict"])
 
 
@@ -113,12 +112,10 @@ def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> 
             yield f"{name} displacement, {week}-{week + 1} GW (mm)", published["place"], f"{paper:.2f}", here, verdict
 
 
-def _costs(
-    published: Mapping[str, Any], summary: Mapping[str, Any], core_power_w: float, carbon_intensity_g_per_kwh: float
-) -> Iterator[tuple[str, ...]]:
+def _costs(published: Mapping[str, Any], summary: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     weeks = (summary["reached_week"] - summary["weeks"][0]) or np.nan
-    energy_wh = summary["cpu_seconds"] / 3600 * core_power_w / weeks
-    here = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * carbon_intensity_g_per_kwh)
+    energy_wh = summary["cpu_seconds"] / 3600 * CORE_POWER_W / weeks
+    here = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * CARBON_INTENSITY_G_PER_KWH)
     of_run = f"{summary['tets']} elements, {summary['ranks']} ranks"
     for entry, value in zip(published["rows"], here, strict=True):
         paper = f"{entry['value']:g} ({published['machine']})"

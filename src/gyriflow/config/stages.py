@@ -12,21 +12,15 @@ from .brains import GivenRegions
 class SurfaceSettings(Settings):
     """How label volumes and surface files become clean pial surfaces."""
 
-    smoothing_voxels: float = Field(1.0, ge=0, le=5)
-    """Standard deviation of the Gaussian that smooths labels before the surface is extracted. [voxels]"""
     edge_length_mm: float = Field(1.0, gt=0.1, le=5)
     """Edge length of the remeshed surface, on which metrics are measured. [mm]"""
     smoothing_iterations: int = Field(10, ge=0, le=200)
     """Iterations of Taubin smoothing."""
     max_hole_mm: float = Field(3.0, ge=0, le=MOST_HOLE_MM)
     """Largest hole that is closed; a larger one is an error. [mm]"""
-    fissure_mm: float = Field(1.5, ge=0, le=5)
-    """Width to which the fissure is opened where labels show none; 0: not at all. [mm]"""
-    max_hemisphere_ratio: float = Field(1.15, ge=1, le=20)
-    """Largest accepted ratio of the volumes of two hemisphere surfaces."""
-    max_asymmetry: float = Field(0.02, gt=0, le=0.5)
-    """Largest accepted mean distance of two hemisphere surfaces from their mirror image, over the brain's
-    length."""
+    asymmetric: bool = False
+    """Whether hemisphere surfaces may differ in size and shape, as with unilateral pathology; else those that do
+    are refused as of two brains."""
 
 
 class MeshSettings(Settings):
@@ -89,12 +83,3 @@ class ReportSettings(Settings):
 
     dpi: int = Field(300, ge=50, le=1200)
     """Resolution of PNG figures; journals ask for 300 to 600. [dots per inch]"""
-    core_power_w: float = Field(12.0, gt=0, le=1000)
-    """Power of a busy core, for the estimate of energy: the processor's over its cores. [W]"""
-    carbon_intensity_g_per_kwh: float = Field(475.0, ge=0, le=5000)
-    """CO₂ emitted for electricity; 475 is the world's average of 2019 (IEA). [g/kWh]"""
-
-    @property
-    def power(self) -> dict[str, float]:
-        """What energy and emissions are estimated with."""
-        return self.model_dump(include={"core_power_w", "carbon_intensity_g_per_kwh"})

@@ -97,6 +97,12 @@ STIFFNESS_RATIO = "stiffness_ratio"
 """The parameter that sets the shear modulus of the cortex to a multiple of that of the core."""
 
 
+CORE_POWER_W = 12.0
+"""Power of a busy core: a processor's over its cores."""
+CARBON_INTENSITY_G_PER_KWH = 475.0
+"""CO₂ emitted for electricity, the world's average of 2019 (IEA)."""
+
+
 def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
     """Return what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
     pairs = [(run, brain) for run, brain in folded]

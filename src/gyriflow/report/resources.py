@@ -2,10 +2,12 @@
 
 import pandas as pd
 
+from ..parameters.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W
+
 SECONDS_PER_HOUR = 3600
 
 
-def resources(jobs: pd.DataFrame, core_power_w: float, carbon_intensity_g_per_kwh: float) -> pd.DataFrame:
+def resources(jobs: pd.DataFrame) -> pd.DataFrame:
     """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
 
     A job keeps one core busy at least, so its energy is the longer of wall and CPU time times the power of a core.
@@ -14,8 +16,6 @@ def resources(jobs: pd.DataFrame, core_power_w: float, carbon_intensity_g_per_kw
     ----------
     jobs : columns rule, run, wall_s, cpu_s, memory_MiB
         NaN where Snakemake could not measure; such jobs are counted and add nothing.
-    core_power_w, carbon_intensity_g_per_kwh
-        Power of a busy core in W, and CO₂ emitted for electricity.
 
     Returns
     -------
@@ -29,5 +29,5 @@ def resources(jobs: pd.DataFrame, core_power_w: float, carbon_intensity_g_per_kw
     stages = stages.rename(columns={"rule": "stage"}).sort_values("core_hours", ascending=False, kind="stable")
     whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(of_all)}])
     table = pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
-    table["energy_Wh"] = core_power_w * table["core_hours"]
-    return table.assign(co2e_g=carbon_intensity_g_per_kwh / 1000 * table["energy_Wh"])
+    table["energy_Wh"] = CORE_POWER_W * table["core_hours"]
+    return table.assign(co2e_g=CARBON_INTENSITY_G_PER_KWH / 1000 * table["energy_Wh"])

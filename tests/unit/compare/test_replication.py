@@ -11,7 +11,6 @@ from gyriflow.io.yaml_files import read_yaml
 PUBLISHED = read_yaml(Path(__file__).parents[3] / "workflow" / "published" / "fetalfoldsim.yaml")
 SIDES = ("left", "right")
 SUMMARY = {"weeks": [21.0, 23.0], "reached_week": 23.0, "seconds": 3600, "cpu_seconds": 7200, "tets": 9, "ranks": 2}
-POWER = {"core_power_w": 10.0, "carbon_intensity_g_per_kwh": 400.0}
 
 
 def moves(**largest: float) -> pd.DataFrame:
@@ -45,7 +44,7 @@ SHARES = {("thin", "left"): (0.5, 0.2), ("thin", "right"): (0.6, 0.3), ("thick",
 
 
 def verdicts(displacement: pd.DataFrame, *studies: StudyTables) -> dict[str, tuple[str, str]]:
-    table = replication(PUBLISHED, displacement, studies, SUMMARY, POWER)
+    table = replication(PUBLISHED, displacement, studies, SUMMARY)
     assert list(table) == ["result", "place", "paper", "here", "verdict"]
     return {row["result"]: (row["here"], row["verdict"]) for row in table.to_dict("records")}
 
@@ -61,9 +60,9 @@ def test_displacements_agree_by_all_nodes_or_by_the_surface():
 def test_energy_and_emissions_are_those_of_a_week_of_the_run():
     found = verdicts(moves())
     assert found["hours a gestational week"][0] == "0.5 (9 elements, 2 ranks)"
-    # 2 h of a core of 10 W in two weeks
-    assert found["energy (Wh) a gestational week"][0] == "10 (9 elements, 2 ranks)"
-    assert found["emissions (g CO2e) a gestational week"][0] == "4 (9 elements, 2 ranks)"
+    # 2 h of a core of 12 W in two weeks
+    assert found["energy (Wh) a gestational week"][0] == "12 (9 elements, 2 ranks)"
+    assert found["emissions (g CO2e) a gestational week"][0] == "5.7 (9 elements, 2 ranks)"
 
 
 def test_findings_of_a_study_are_checked_one_by_one():

@@ -20,16 +20,16 @@ JOBS = pd.DataFrame(
 
 
 def test_energy_is_that_of_the_busy_cores_and_the_last_row_has_the_sum():
-    table = resources(JOBS, core_power_w=10.0, carbon_intensity_g_per_kwh=400.0)
+    table = resources(JOBS)
     rows = table.set_index(["stage", "run"])
     assert table["stage"].tolist() == ["simulate", "simulate", "pial_from_labels", "lost", "all"]
-    assert rows.loc[("simulate", "thin")].tolist() == [1, 1.0, 4.0, 2000.0, 40.0, 16.0]
+    assert rows.loc[("simulate", "thin")].tolist() == pytest.approx([1, 1.0, 4.0, 2000.0, 48.0, 22.8])
     # a job keeps a core busy all the time, however little of it was sampled
-    assert rows.loc[("pial_from_labels", "")].tolist() == pytest.approx([2, 0.02, 0.02, 300.0, 0.2, 0.08])
-    assert rows.loc[("all", "")].tolist() == pytest.approx([5, 1.52, 6.02, 2000.0, 60.2, 24.08])
+    assert rows.loc[("pial_from_labels", "")].tolist() == pytest.approx([2, 0.02, 0.02, 300.0, 0.24, 0.114])
+    assert rows.loc[("all", "")].tolist() == pytest.approx([5, 1.52, 6.02, 2000.0, 72.24, 34.314])
 
 
 def test_a_job_without_a_time_is_counted_and_adds_nothing():
-    lost = resources(JOBS.iloc[4:], 10.0, 400.0).iloc[0]
+    lost = resources(JOBS.iloc[4:]).iloc[0]
     assert (lost["jobs"], lost["energy_Wh"]) == (1, 0.0)
     assert np.isnan(lost["memory_MiB"])
