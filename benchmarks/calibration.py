@@ -80,9 +80,7 @@ def main() -> None:
             "parameters": BOUNDS,
             "score": {"size": 1.0, "shape_index": 1.0},
             "compare_week": 22,
-            "first_runs": arguments.runs,
-            "rounds": arguments.rounds,
-            "runs_per_round": 4,
+            "rounds": [arguments.runs, *[4] * arguments.rounds],
         },
     }
     call(folder / "search", search, "calibrate", arguments.cores)

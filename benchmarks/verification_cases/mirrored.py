@@ -94,8 +94,8 @@ def parameters(**changes) -> FoldingParameters:
         "core_growth_rate_per_s": 1e-7,
         "contact": {"kind": "planes", "gap_mm": GAP_MM},
         # clamped below, so that growth pushes the hemispheres against the planes
-        "no_growth": {"shift_y": 0.0, "shift_z": -0.5, "semi_axes": [0.6, 0.45, 0.25]},
-        "solver": {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10},
+        "no_growth": {"shift": [0.0, -0.5], "semi_axes": [0.6, 0.45, 0.25]},
+        "solver": {"newton_tolerance": 1e-12},
     }
     return parameters_from(values | changes)
 

@@ -90,7 +90,7 @@ class Waved:
             "support": "box",
             "contact": {"kind": "none"},
             "no_growth": {"kind": "none"},
-            "solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-6},
+            "solver": {"newton_tolerance": 1e-11},
         }
         return parameters_from(values)
 

@@ -57,7 +57,7 @@ def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
 @pytest.mark.slow
 @pytest.mark.one_rank
 def test_a_run_goes_on_in_the_middle_of_contact_as_if_it_had_not_stopped():
-    tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
+    tight = {"solver": {"newton_tolerance": 1e-11}}
     folding, state = closing_sulcus("global", **tight)
     middle = after_steps(folding, state, 9)
     assert middle.rows[-1]["contact_pairs"] > 0
@@ -160,7 +160,7 @@ def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_t
 
 @pytest.mark.slow
 def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
-    tight = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
+    tight = {"solver": {"newton_tolerance": 1e-11}}
     state = after_steps(*closing_sulcus("global", **tight), 10)
     assert state.rows[-1]["contact_pairs"] > 0
     for alone in (COMM.rank == 0, COMM.rank == COMM.size - 1):

@@ -9,7 +9,7 @@ import yaml
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.simulation import Folding
 
-TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
+TIGHT = {"newton_tolerance": 1e-12}
 WEEK = {
     "start_week": 21.0,
     "end_week": 21.5,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from contact_bodies import after_steps, closing_sulcus
 
-TIGHT = {"solver": {"newton_tolerance": 1e-9, "krylov_tolerance": 1e-3}}
+TIGHT = {"solver": {"newton_tolerance": 1e-9}}
 
 
 def counted(monkeypatch, problem):

@@ -20,7 +20,7 @@ from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic, signed_volumes
 from gyriflow.units import M_PER_MM, MM_PER_M
 
-TIGHT = {"newton_tolerance": 1e-12, "krylov_tolerance": 1e-10}
+TIGHT = {"newton_tolerance": 1e-12}
 RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0], "solver": TIGHT}
 
 

@@ -21,7 +21,7 @@ from gyriflow.units import M_PER_MM, MM_PER_M
 
 DAY_S = 86_400.0
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
-TIGHT = {"solver": {"newton_tolerance": 1e-11, "krylov_tolerance": 1e-8}}
+TIGHT = {"solver": {"newton_tolerance": 1e-11}}
 
 
 def bent(week):

@@ -72,14 +72,14 @@ def both_sides(left, right, *, white_mm=None, **more):
     """Writes hemispheres as FreeSurfer does, and white surfaces inside the pial ones."""
 
     def made(folder, name):
-        entry = {}
+        entry, white = {}, []
         for side, mesh in (("left", left), ("right", right)):
             write_geometry(folder / f"{name}.{side}.pial", mesh.vertices, mesh.faces)
             entry[side] = f"{name}.{side}.pial"
             if white_mm is not None:
                 write_surface(folder / f"{name}.{side}.white.stl", inner(mesh, white_mm))
-                entry.setdefault("white", {})[side] = f"{name}.{side}.white.stl"
-        return {"hemispheres": entry, "coordinates": "ras"} | more
+                white.append(f"{name}.{side}.white.stl")
+        return {"hemispheres": entry, "coordinates": "ras"} | ({"white": white} if white else {}) | more
 
     return made
 

@@ -30,7 +30,7 @@ STUDY = {
     "folding": {"end_week": 23},
     "runs": {
         "expected": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1},
-        "smooth": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1, "growth": {"smoothing_mm": 4}},
+        "weekly": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1, "step_s": 604800},
     },
 }
 

@@ -86,9 +86,7 @@ def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(wor
         "parameters": {"growth_rate_per_s": [0.5e-7, 4.0e-7]},
         "score": {"size": 1.0, "surface_distance": 0.1},
         "compare_week": 22,
-        "first_runs": 3,
-        "rounds": 1,
-        "runs_per_round": 1,
+        "rounds": [3, 1],
     }
     study = {key: value for key, value in STUDY.items() if key != "studies"} | {"runs": {"reference": {}}}
     name = workflow.write("study.yaml", study | {"calibrate": search})

@@ -170,6 +170,8 @@ def _growing(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[s
 def _absolute(value: object, folder: Path) -> object:
     if isinstance(value, dict):
         return {key: _absolute(item, folder) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_absolute(item, folder) for item in value]
     if isinstance(value, str) and (folder / value).is_file():
         return str((folder / value).resolve())
     return value

@@ -125,9 +125,11 @@ def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recog
         pair: dict[str, Any] = {name: str(sides[name]) for name in ("left", "right") if name in sides}
         first, file = next(iter(pair.items()))
         white = surfaces.get((rest, "white"), {})
-        if len(pair) == 2 and len(white) == 2:
-            pair["white"] = {name: str(white[name]) for name in ("left", "right")}
-        source = {"hemispheres": pair} if len(sides) == 2 else {"hemisphere": {"file": file, "side": first}}
+        source: dict[str, Any] = {"hemispheres": pair}
+        if len(pair) == 1:
+            source = {"hemisphere": {"file": file, "side": first}}
+        elif len(white) == 2:
+            source["white"] = [str(white["left"]), str(white["right"])]
         yield _recognised(Path(file), scans, source)
 
 

@@ -182,8 +182,6 @@ class AtlasSettings(Settings):
     folder: str | None = None
     """Folder where files are found by name, at any depth, and missing ones are put; `null`:
     `resources/atlases/NAME` in the working directory."""
-    url: str | None = Field(None, pattern="^https?://")
-    """A mirror with the same paths."""
     accept_licence: bool = False
     """Whether you accept the licence, where the `atlas.yaml` asks for it."""
 
@@ -264,7 +262,7 @@ class UsedAtlas:
 
     def _files_of(self, name: str) -> Iterator[AtlasFile]:
         series = self.atlas.series[name]
-        root = (self.settings.url or self.atlas.url or "").rstrip("/")
+        root = (self.atlas.url or "").rstrip("/")
         for week in self._weeks_of(name):
             for key in series.files if self.settings.images else series.needed:
                 path = series.files[key].format(week=int(week) if week == int(week) else week)

@@ -8,7 +8,7 @@ from ..parameters.schemes import Label
 from ..parameters.settings import InputFile, Problem, Settings
 from ..parameters.synthetic import ShapeSettings
 from ..parameters.terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
-from ..parameters.varying import Week
+from ..parameters.varying import FileOrPair, Week, files_of
 
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """The keys of which a brain has exactly one."""
@@ -22,19 +22,10 @@ OF_SURFACES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
 MEANINGS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("scheme", "image", "affine_from"), OF_LABELS),
     "coordinates": OF_SURFACES,
-    "white": ("pial", HEMISPHERE_SURFACE),
+    "white": OF_SURFACES,
     "population": (*OF_LABELS, *OF_SURFACES),
 }
 """Keys that make sense only with some sources."""
-
-
-class WhiteFiles(Settings):
-    """The white surfaces of both hemispheres: the inner border of the cortex."""
-
-    left: InputFile
-    """File of the left hemisphere."""
-    right: InputFile
-    """File of the right hemisphere."""
 
 
 class HemisphereFiles(Settings):
@@ -44,8 +35,6 @@ class HemisphereFiles(Settings):
     """File of the left hemisphere."""
     right: InputFile
     """File of the right hemisphere."""
-    white: WhiteFiles | None = None
-    """White surfaces in the same coordinates, for the cortical thickness."""
 
 
 class OneHemisphere(Settings):
@@ -87,8 +76,9 @@ class Brain(Settings):
     """The only hemisphere, as a surface or as labels."""
     pial: InputFile | None = None
     """Closed surface of the whole brain."""
-    white: InputFile | None = None
-    """White surface of `pial` or `hemisphere`, in the same coordinates, for the cortical thickness."""
+    white: FileOrPair | None = None
+    """White surface in the same coordinates, for the cortical thickness: a file, with `hemispheres` a list of the
+    left and the right one."""
     coordinates: Coordinates = "auto"
     """Axes of surface files; `auto` finds any pose."""
     shape: ShapeSettings | None = None
@@ -129,9 +119,8 @@ class Brain(Settings):
 
     @property
     def white_files(self) -> dict[str, str]:
-        pair = self.hemispheres.white if self.hemispheres else None
-        sides = {} if pair is None else {"left": pair.left, "right": pair.right}
-        return sides if self.white is None else {"whole": self.white}
+        files = files_of(self.white)
+        return dict(zip(SIDES if len(files) == 2 else ("whole",), files, strict=False))
 
     @property
     def _kind(self) -> str:
@@ -151,6 +140,9 @@ class Brain(Settings):
             for key, kinds in MEANINGS.items():
                 if key in self.model_fields_set and self._kind not in kinds:
                     yield Problem(f"has no meaning with {self._kind}; only with {' or '.join(kinds)}", (key,))
+            pair = self._kind == "hemispheres"
+            if self.white is not None and self._kind in OF_SURFACES and ("left" in self.white_files) != pair:
+                yield Problem("should have as many files as there are pial surfaces", ("white",))
             if self._kind in OF_LABELS and self.scheme is None:
                 yield Problem("is missing; it says what the labels mean", ("scheme",))
 

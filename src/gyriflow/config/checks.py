@@ -148,13 +148,12 @@ def metrics(config: Config) -> Iterator[Problem]:
     """Yield brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
     given = config.metrics
     yield from _unknown(given.norm_reference or (), config, ("metrics", "norm_reference"))
-    yield from _unknown(given.regions, config, ("metrics", "regions"))
+    with_regions = given.regions if isinstance(given.regions, dict) else {}
+    yield from _unknown(with_regions, config, ("metrics", "regions"))
     yield from _unknown([given.template] if given.template else (), config, ("metrics", "template"))
     # the carrying of regions and their asymmetry are of both sides
-    if wrong := [brain.id for brain in config.brains if brain.id in given.regions and brain.hemisphere is not None]:
+    if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:
         yield Problem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
-    if given.named_sulci and given.regions:
-        yield Problem("found true beside regions; expected one of the two", ("metrics", "named_sulci"))
     scans = Counter((brain.subject, brain.week) for brain in config.brains if brain.subject is not None)
     for (subject, week), count in scans.items():
         if count > 1:

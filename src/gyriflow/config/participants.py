@@ -12,10 +12,7 @@ from ..parameters.settings import Settings, beside, located
 from .brains import SOURCES, VOLUME_SUFFIXES
 from .scans import AGE, IDS, NOTHING, SESSION, UNIT_OF_AGE, Scan, read_scans
 
-PATHS = (
-    *("labels", "image", "pial", "white", "hemispheres.left", "hemispheres.right", "hemispheres.white.left"),
-    *("hemispheres.white.right", "hemisphere.file"),
-)
+PATHS = ("labels", "image", "pial", "white", "hemispheres.left", "hemispheres.right", "hemisphere.file")
 """The columns that are keys of brains with paths, inner keys with dots."""
 COLUMNS = (*PATHS, "population", "subject", "scheme", "affine_from", "coordinates", "hemisphere.side")
 """All columns that are keys of brains, besides those of who it is and of the age."""
@@ -31,9 +28,10 @@ class ParticipantsSettings(Settings):
 
     Columns are `participant_id` (or `id`); the gestational age, `gestational_age` or `week`, as `24.3`, `24+2` or
     `24w2d` (or `age_weeks`, `age_days`, or `age` with its unit in the sidecar); and keys of brains, inner ones with a
-    dot (`hemispheres.left`). Instead of keys, `files` may name labels, a pial surface, or left and right surfaces with
-    a semicolon between; with `side`, one hemisphere. `n/a` is no value. Other columns are covariates. A participant
-    with a `sub-01/sub-01_sessions.tsv` beside the table has a brain for each of its sessions, with that one's age.
+    dot (`hemispheres.left`), two `white` surfaces with a semicolon between. Instead of keys, `files` may name labels, a
+    pial surface, or left and right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is no value.
+    Other columns are covariates. A participant with a `sub-01/sub-01_sessions.tsv` beside the table has a brain for
+    each of its sessions, with that one's age.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
@@ -102,12 +100,12 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
     for column in values:
         if column not in COLUMNS:
             continue
-        value = values[column]
+        value: Any = values[column]
         if column in PATHS:
-            place = beside(folder, value).resolve()
-            if not place.is_file():
-                return {}, f"{column}: no such file: {place}"
-            value = str(place)
+            places = [beside(folder, part.strip()).resolve() for part in value.split(";")]
+            if lost := [place for place in places if not place.is_file()]:
+                return {}, f"{column}: no such file: {lost[0]}"
+            value = str(places[0]) if len(places) == 1 else list(map(str, places))
         *outer, last = column.split(".")
         section = entry
         for key in outer:

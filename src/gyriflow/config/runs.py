@@ -45,7 +45,6 @@ PRESETS: dict[str, dict[str, Any]] = {
         "growth": {"model": "rates"},
         "allow_negative_growth": False,
         "thickness_mm": 1.5,
-        "thickness_growth_mm_per_gw": 0.0,
         "shear_modulus_cortex_pa": 1500.0,
         "shear_modulus_core_pa": 300.0,
         "material": "neo-hookean",
@@ -56,7 +55,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
         "contact": {"kind": "planes", "gap_mm": 2.5},
-        "no_growth": {"kind": "ellipsoid", "shift_y": 0.05, "shift_z": -0.15, "semi_axes": [0.35, 0.40, 0.50]},
+        "no_growth": {"kind": "ellipsoid", "shift": [0.05, -0.15], "semi_axes": [0.35, 0.40, 0.50]},
     },
     # growth that takes the brain to its measured shapes
     "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},
@@ -163,7 +162,7 @@ NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields
 CURVES = tuple(f"growth.{size}" for size in SIZES)
 """Further curves than those of parameters that may vary."""
 MOST_PARAMETERS = 3
-MOST_RUNS = 40
+LEAST_FIRST_RUNS, MOST_RUNS = 3, 40
 """Of a calibration."""
 
 
@@ -202,8 +201,8 @@ class Study(Compared):
 class Calibration(Compared):
     """A search for the parameters whose brain is nearest to the real one of a week.
 
-    The first runs are spread over the bounds (a scrambled Sobol sequence); rounds follow, of runs where a Gaussian
-    process through the scores expects the most. Runs that diverge count as worse than all others.
+    The runs of the first round are spread over the bounds (a scrambled Sobol sequence), those of later ones where a
+    Gaussian process through the scores expects the most. Runs that diverge count as worse than all others.
     """
 
     parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
@@ -212,20 +211,17 @@ class Calibration(Compared):
     scales the base run's curve of KEY."""
     score: dict[Score, Annotated[float, Field(gt=0)]]
     """What is minimised: the weights of one or more measures (docs/metrics.md)."""
-    first_runs: int = Field(12, ge=3, le=MOST_RUNS)
-    """Runs of the first round."""
-    rounds: int = Field(3, ge=0, le=20)
-    """Rounds after the first."""
-    runs_per_round: int = Field(4, ge=1, le=MOST_RUNS)
-    """Runs of each of these rounds."""
+    rounds: tuple[Annotated[int, Field(ge=1, le=MOST_RUNS)], ...] = (12, 4, 4, 4)
+    """How many runs each round has, the first at least 3, all together at most 40."""
     seed: int = Field(0, ge=0)
     """Seed of the sequence and of the Gaussian process."""
 
     def problems(self) -> Iterator[Problem]:
         if not 1 <= len(self.parameters) <= MOST_PARAMETERS:
             yield Problem(f"found {len(self.parameters)}; expected 1 to {MOST_PARAMETERS}", ("parameters",))
-        if (total := len(self.runs)) > MOST_RUNS:
-            yield Problem(f"first_runs and rounds make {total} runs; expected at most {MOST_RUNS}", ("rounds",))
+        if not self.rounds or self.rounds[0] < LEAST_FIRST_RUNS or sum(self.rounds) > MOST_RUNS:
+            found = f"found {list(self.rounds)}; expected {LEAST_FIRST_RUNS} runs or more in the first round"
+            yield Problem(f"{found} and at most {MOST_RUNS} in all", ("rounds",))
         for key, bounds in self.parameters.items():
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 yield Problem(f"found {list(bounds)}; expected the lowest and the highest value", ("parameters", key))
@@ -235,8 +231,7 @@ class Calibration(Compared):
     @property
     def runs(self) -> dict[str, int]:
         # the round of each run by its name
-        sizes = [self.first_runs, *[self.runs_per_round] * self.rounds]
-        rounds = [number for number, size in enumerate(sizes) for _ in range(size)]
+        rounds = [number for number, size in enumerate(self.rounds) for _ in range(size)]
         return {f"calibration-{index:02d}": number for index, number in enumerate(rounds)}
 
 

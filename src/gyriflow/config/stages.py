@@ -54,6 +54,12 @@ Modes = Annotated[
 ]
 
 
+Regions = Annotated[
+    Annotated[dict[str, GivenRegions], Tag("(table)")] | Annotated[Literal["named_sulci"], Tag("(word)")],
+    Discriminator(lambda value: "(word)" if isinstance(value, str) else "(table)"),
+]
+
+
 class MetricsSettings(Settings):
     """How curvature and the spectra of gyrification (SpAnGy) are measured, on real and simulated brains alike."""
 
@@ -66,16 +72,13 @@ class MetricsSettings(Settings):
     """Ids of the measured brains that others are compared with in tables of centiles. `null`: all real ones (of
     several populations, the start brain's). Brains with other hemispheres than
     the first start brain are left out."""
-    regions: dict[str, GivenRegions] = Field({})
-    """Regions of the cortex, by the id of the brain on which they are given. Registration carries them to other
-    brains, and the tissue to simulated ones."""
+    regions: Regions = Field({})
+    """Regions of the cortex, by the id of the brain on which they are given, or `named_sulci`, drawn on a brain of
+    the spina bifida atlas. Registration carries them to other brains, and the tissue to simulated ones."""
     white_surfaces: Literal["given", "all"] = "given"
     """White surfaces that are measured: those given, or `all`, also the inner border of cortex in labels."""
     template: str | None = None
     """Id of a measured brain. The target `export` then has all maps at its vertices, too, by registration."""
-    named_sulci: bool = False
-    """Without `regions`: whether named sulci are the regions, as drawn on a brain of the spina bifida atlas and
-    carried to others by registration. The weeks in which sulci begin have their names always."""
 
 
 class ReportSettings(Settings):

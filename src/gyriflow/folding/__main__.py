@@ -20,7 +20,7 @@ from ..io.tetmeshes import read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
 from ..parameters.folding import FoldingParameters, parameters_from, require_maps
 from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
-from ..parameters.varying import Maps
+from ..parameters.varying import Maps, value_at
 from ..step import record_exit_code
 from .checks import refuse_impossible, stiffness_warning, zone_report, zone_warnings
 from .output import ZONES, log_event, say, warn, write_events
@@ -86,7 +86,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     maps: Maps = comm.bcast(read_maps(arguments.maps) if comm.rank == 0 and arguments.maps else {}, root=0)
     if comm.rank == 0:
         require_maps(parameters, maps, len(mesh.vertices))
-        report = zone_report(mesh, zones, float(np.median(parameters.thickness_at(parameters.start_week, maps))))
+        thickness = value_at(parameters.thickness_mm, parameters.start_week, maps)
+        report = zone_report(mesh, zones, float(np.median(thickness)))
         memory = predicted_memory_mib(len(mesh.tets), comm.size, parameters.contact.kind, mesh.order)
         size = f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks"
         facts = {"elements": len(mesh.tets), "unknowns": 3 * len(mesh.vertices), "ranks": comm.size}

@@ -15,7 +15,7 @@ from ..geometry.triangles import Floats
 from ..io.frames import write_frame
 from ..mechanics.materials import MATERIALS
 from ..parameters.folding import FoldingParameters
-from ..parameters.varying import Maps
+from ..parameters.varying import Maps, value_at
 from ..units import MM_PER_M, week_tag
 from .growth import increments_at
 from .layers import PialSearch, cortical_weight, shear_modulus
@@ -94,7 +94,7 @@ def layer_fields(
     """
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
-    weight = cortical_weight(distance, parameters.thickness_at(week, maps))
+    weight = cortical_weight(distance, value_at(parameters.thickness_mm, week, maps))
     if log_growth is None:
         increments = increments_at(parameters, weight, zones.growth, maps, week, parameters.step_s)
         growth = dict(zip(("tangential_growth_per_step", "radial_growth_per_step"), increments, strict=True))

@@ -12,7 +12,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..parameters.folding import FoldingParameters, require_maps
-from ..parameters.varying import Maps, value_range
+from ..parameters.varying import Maps, value_at, value_range
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import SelfContact, contact_settings
@@ -76,7 +76,7 @@ class Folding:
             settings = contact_settings(p, self.maps)
             self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, settings)
             self.problem.contributions.append(self.contact)
-        newton = NewtonSettings(p.solver.newton_tolerance, p.solver.krylov_tolerance, p.solver.max_newton)
+        newton = NewtonSettings(p.solver.newton_tolerance)
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
         floor = 1e-11 * stiffest * edge**2 * math.sqrt(len(mesh.vertices))
@@ -101,7 +101,8 @@ class Folding:
         u = self.domain.gathered(self.problem.displacement[: self.domain.owned])
         positions = state.positions + u
         size = self.inputs.size(positions * MM_PER_M)
-        left, thickness = None, self.parameters.thickness_at(growth.start.week(self.parameters, 0.5), self.maps)
+        thickness = value_at(self.parameters.thickness_mm, growth.start.week(self.parameters, 0.5), self.maps)
+        left = None
         if self.parameters.stress_memory_gw > 0:
             left = self.domain.gathered_cells(packed(left_stretch(self.problem.outcome("elastic"))))
         row = {
@@ -136,8 +137,8 @@ class Folding:
             PialSearch(domain.positions, self.zones.cortex_facets),
             self._growing,
             self._local_maps,
-            lambda maps: p.thickness_at(week, maps),
-            float(np.max(p.thickness_at(week, self.maps))),
+            lambda maps: value_at(p.thickness_mm, week, maps),
+            float(np.max(value_at(p.thickness_mm, week, self.maps))),
         )
         self.problem.set_shear_modulus(tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week)))
         part = domain.part

@@ -115,7 +115,7 @@ def free_growth(p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs
 
     A (2, 2) array for unit rates of cortex and core, and the (2,) rates in 1/s without either.
     """
-    zones, thickness = inputs.zones, p.thickness_at(week, inputs.maps)
+    zones, thickness = inputs.zones, value_at(p.thickness_mm, week, inputs.maps)
     distance = PialSearch(positions_mm, zones.cortex_facets).distance(positions_mm, WEIGHT_REACH * np.max(thickness))
     weight, volumes = cortical_weight(distance, thickness), volumes_between(positions_mm, inputs.pieces)
 

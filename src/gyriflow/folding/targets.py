@@ -23,6 +23,8 @@ MOST_STRAIN = 0.3
 """Largest logarithmic growth in any direction in a step: more belongs to elements that the target folds over."""
 SMALL = 0.12
 """Largest entry of FᵀF − 1 for which the logarithm is taken by its series."""
+SMOOTHING_MM = 1.5
+"""Standard deviation that growth is smoothed with in space."""
 SMOOTHED_TO = 1e-5
 """Relative tolerance of smoothing; the next step makes up for what is left."""
 SOON_GW = 1e-6
@@ -54,14 +56,12 @@ class TargetGrowth(Growth):
 class GrowthToTargets:
     """The model of growth towards shapes of the whole mesh at later weeks.
 
-    `targets` are the (n, 3) positions of all vertices in mm by week, of which only the shape counts, not the pose;
-    `smoothing_mm` is the standard deviation that growth is smoothed with.
+    `targets` are the (n, 3) positions of all vertices in mm by week, of which only the shape counts, not the pose.
     """
 
     parameters: FoldingParameters
     inputs: GrowthInputs
     targets: Mapping[float, Floats]
-    smoothing_mm: float
 
     @classmethod
     def of(cls, p: FoldingParameters, inputs: GrowthInputs) -> "GrowthToTargets":
@@ -75,7 +75,7 @@ class GrowthToTargets:
                 found=f"shapes up to {max(targets):g} GW and a run to {p.end_week:g} GW",
                 remedy="End the run earlier, or add brains of later weeks.",
             )
-        return cls(p, inputs, targets, p.growth.smoothing_mm)
+        return cls(p, inputs, targets)
 
     def growth(self, start: StepStart) -> Growth:
         """Returns the growth of a step: its part of what is left to the next target.
@@ -96,7 +96,7 @@ class GrowthToTargets:
             before = laid(self.targets[since], places)
         share = min(1.0, (end - since) / max(ahead[0] - since, SOON_GW))
         aim = before + share * (laid(self.targets[ahead[0]], before) - before)
-        strain = log_growth(places, self.inputs.pieces, aim - places, self.smoothing_mm)
+        strain = log_growth(places, self.inputs.pieces, aim - places, SMOOTHING_MM)
         away = float(np.sqrt(np.average((missing**2).sum(axis=1), weights=sizes)))
         growing = self.inputs.zones.growth[:, None]
         return TargetGrowth(self.parameters, start, (strain * growing).T, away)

@@ -119,7 +119,7 @@ def _wall_anchors(vertices: Floats, wall: NDArray[np.int64]) -> tuple[NDArray[np
 def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats) -> NDArray[np.bool_]:
     """Returns which vertices lie in the ellipsoid of no growth of a brain with (3,) ends `low` and `high`."""
     extent = high - low
-    centre = (low + high) / 2 + np.array([0.0, ellipsoid.shift_y, ellipsoid.shift_z]) * extent
+    centre = (low + high) / 2 + np.array([0.0, *ellipsoid.shift]) * extent
     return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(axis=1) <= 1
 
 

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
 from ..errors import InputError
@@ -20,10 +19,8 @@ from .varying import (
     bounds_of,
     map_of,
     require_bounds,
-    value_at,
     value_range,
     varying,
-    weeks_within,
 )
 
 
@@ -46,6 +43,7 @@ Memory = Annotated[
     BeforeValidator(_memory, json_schema_input_type=Annotated[float, Field(ge=0)] | Literal["infinite"]),
     PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
 ]
+Share = Annotated[float, Field(ge=-1, le=1)]
 Fraction = Annotated[float, Field(gt=0, le=2)]
 AXES = ("x", "y", "z")
 """Which end the names of the maps of positions."""
@@ -70,10 +68,8 @@ class NoGrowth(Settings):
 
     kind: Literal["ellipsoid", "none"] = "ellipsoid"
     """`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`: all tissue grows."""
-    shift_y: float = Field(0.05, ge=-1, le=1)
-    """Anterior shift of its centre from the middle. [Y-extent]"""
-    shift_z: float = Field(-0.15, ge=-1, le=1)
-    """Superior shift of its centre from the middle. [Z-extent]"""
+    shift: tuple[Share, Share] = (0.05, -0.15)
+    """Shift of its centre from the middle, anterior and superior. [extents along Y, Z]"""
     semi_axes: tuple[Fraction, Fraction, Fraction] = (0.35, 0.40, 0.50)
     """Semi-axes along X, Y, Z. [extents]"""
 
@@ -83,8 +79,6 @@ class Solver(Settings):
 
     newton_tolerance: float = Field(1e-4, gt=0, lt=1)
     """Residual at which Newton stops, over its value at u = 0."""
-    krylov_tolerance: float = Field(1e-3, gt=0, lt=1)
-    """Relative tolerance of the linear solver."""
     max_newton: int = Field(20, ge=1, le=200)
     """Newton iterations without progress before a step is halved."""
     max_halvings: int = Field(6, ge=0, le=30)
@@ -107,9 +101,7 @@ class FoldingSettings(Settings):
     step_s: float = Field(43200.0, gt=0, le=604800)
     """Time step; shortened where an output week comes first. [s]"""
     thickness_mm: VaryingNumber = varying(1.5, gt=0, le=10)
-    """Cortical thickness H₀ at the start. [mm]"""
-    thickness_growth_mm_per_gw: float = Field(0.0, ge=-1, le=1)
-    """Growth rate β of the thickness: H = H₀ + β·t. [mm/GW]"""
+    """Cortical thickness. [mm]"""
     shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, gt=0, le=1e7)
     """Shear modulus of the cortex. [Pa]"""
     shear_modulus_core_pa: VaryingNumber = varying(300.0, gt=0, le=1e7)
@@ -196,20 +188,11 @@ class FoldingParameters(FoldingSettings):
         varying = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
         return varying | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
 
-    def thickness_at(self, week: float, maps: Maps) -> float | Floats:
-        """Return the cortical thickness in mm at a week, H = H₀ + β·t, at all vertices where it has a map."""
-        return thickness_at(self, self.start_week, week, maps)
-
     def problems(self) -> Iterator[Problem]:
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
             yield Problem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
         yield from value_problems(self, self.start_week, {})
-
-
-def thickness_at(p: FoldingSettings, start_week: float, week: float, maps: Maps) -> float | Floats:
-    """Return the cortical thickness in mm of a run from a week at another week, at all vertices where it has a map."""
-    return value_at(p.thickness_mm, week, maps) + p.thickness_growth_mm_per_gw * (week - start_week)
 
 
 def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[Problem]:
@@ -227,14 +210,10 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
         for key in VARYING
         if not (isinstance(value := getattr(p, key), Varying) and value.map not in (None, *maps))
     }
-    for week in weeks_within(values["thickness_mm"], start_week, end) if "thickness_mm" in values else ():
-        if (reached := float(np.min(thickness_at(p, start_week, week, maps)))) <= 0:
-            yield Problem(f"reaches {reached:g} mm at {week:g} GW; it should stay above 0", ("thickness_mm",))
-            break
     ranges = {key: value_range(value, maps, start_week, end) for key, value in values.items()}
-    for key in ("shear_modulus_cortex_pa", "shear_modulus_core_pa"):
+    for key, unit in (("thickness_mm", "mm"), ("shear_modulus_cortex_pa", "Pa"), ("shear_modulus_core_pa", "Pa")):
         if key in ranges and (least := ranges[key][0]) <= 0:
-            yield Problem(f"reaches {least:g} Pa; it should stay above 0", (key,))
+            yield Problem(f"reaches {least:g} {unit}; it should stay above 0", (key,))
     rates = {key: ranges[key] for key in GROWTH_RATES if key in ranges}
     for key, (least, _) in rates.items():
         if least < 0 and not p.allow_negative_growth:

@@ -18,7 +18,6 @@ SIZES = ("area_cm2", "volume_ml")
 """Keys of the sizes that growth can follow."""
 MODELS_OF_KEY = {
     "of": ("shapes",),
-    "smoothing_mm": ("shapes",),
     "thickness_mm": ("sizes", "shapes"),
     **dict.fromkeys(SIZES, ("sizes", "shapes")),
 }
@@ -38,8 +37,6 @@ class Growth(Settings):
     of: Literal["self", "atlas"] = "self"
     """With `shapes`, whose these are: of the start's own later brains (`self`), or what the growth of another
     population, such as an `atlas`, would make of the start: a prediction."""
-    smoothing_mm: float = Field(1.5, ge=1, le=50)
-    """With `shapes`, standard deviation of the Gaussian that smooths growth in space. [mm]"""
     area_cm2: SizeCurve = "measured"
     """With `sizes`, pial area of both hemispheres by week, as `{21: 99, 30: 252}`; `measured`: a smooth curve through
     the brains of the start's growth series. [cm²]"""

@@ -63,7 +63,8 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
     labels = {"labels": str(given.label_volume)} if scheme and scheme.cortex else {}
     all_white = config.metrics.white_surfaces == "all"
     whole = len(given.sides) == len(SIDES)
-    with_regions = [name for name in config.metrics.regions if name not in refused]
+    regions = config.metrics.regions
+    with_regions = [name for name in regions if name not in refused] if isinstance(regions, dict) else []
     regions_from: Literal["given", "carried", "named"] | None = None
     if whole and given.id in with_regions:
         regions_from = "given"
@@ -77,7 +78,7 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
         thickness_from=labels or given.white_files,
         white_from=given.white_files or (labels if all_white else {}),
         regions_from=regions_from,
-        has_regions=bool(regions_from) and (bool(with_regions) or config.metrics.named_sulci),
+        has_regions=bool(regions_from) and (bool(with_regions) or regions == "named_sulci"),
         checksums={path: config.known_files[path] for path in given.files if path in config.known_files},
     )
 

@@ -58,7 +58,7 @@ def test_runs_of_studies_and_calibrations_cost_what_runs_do():
         "studies": {"thick": {"base": "reference", "vary": {"thickness_mm": [2.0, 3.0]}, "compare_week": 25}},
         "calibrate": {
             "base": "reference", "compare_week": 23, "parameters": {"thickness_mm": [1.0, 3.0]},
-            "score": {"size": 1.0}, "first_runs": 3,
+            "score": {"size": 1.0}, "rounds": [3],
         },
     }  # fmt: skip
     resolved = resolve(load(study))

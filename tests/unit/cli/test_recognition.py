@@ -51,12 +51,12 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
         "hemispheres": {
             "left": "fetal.week22.left.pial.surf.gii",
             "right": "fetal.week22.right.pial.surf.gii",
-            "white": {"left": "fetal.week22.left.wm.surf.gii", "right": "fetal.week22.right.wm.surf.gii"},
         },
+        "white": ["fetal.week22.left.wm.surf.gii", "fetal.week22.right.wm.surf.gii"],
     }
     assert alone["hemisphere"] == {"file": "fetal.week23.left.pial.surf.gii", "side": "left"}
     assert (second["id"], second["week"], second["covariates"]) == ("sub-07", 27.3, {"sex": "F"})
-    assert second["hemispheres"]["white"] == {"left": "sub-07/surf/lh.white", "right": "sub-07/surf/rh.white"}
+    assert second["white"] == ["sub-07/surf/lh.white", "sub-07/surf/rh.white"]
 
 
 def test_an_age_is_read_from_a_name_that_says_week_or_ga(tmp_path):

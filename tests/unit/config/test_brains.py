@@ -22,7 +22,7 @@ def test_files_are_found_beside_the_configuration(folder):
     pair = {"left": "l.gii", "right": "r.gii"}
     brains = [
         {"id": "a", "week": 21, "labels": "a.nii.gz", "scheme": "binary", "image": "t2w.nii.gz"},
-        {"id": "b", "week": 21, "hemispheres": pair | {"white": {"left": "lw.gii", "right": "rw.gii"}}},
+        {"id": "b", "week": 21, "hemispheres": pair, "white": ["lw.gii", "rw.gii"]},
         {"id": "c", "week": 22, "pial": "all.stl", "white": "white.stl"},
         {"id": "d", "week": 22, "hemisphere": {"file": "l.gii", "side": "left"}},
         {"id": "e", "week": 22, "hemisphere": {"file": "a.nii.gz", "side": "right"}, "scheme": "binary"},
@@ -52,7 +52,7 @@ REGIONS = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
         ({"image": "t2w.nii.gz"}, "brains[0].image: gyriflow does not segment images"),
         ({"pial": "lost.stl"}, "brains[0].pial: no such file: {folder}/lost.stl"),
         ({"hemispheres": {"left": "l.gii"}}, "brains[0].hemispheres.right: Field required"),
-        ({"hemispheres": {"left": "l.gii", "right": "r.gii"}, "white": "white.stl"}, "brains[0].white: has no meaning"),
+        ({"hemispheres": {"left": "l.gii", "right": "r.gii"}, "white": "white.stl"}, "brains[0].white: should have as"),
         ({"hemisphere": HEMISPHERE}, "brains[0].scheme: is missing"),
         ({"hemisphere": HEMISPHERE, "scheme": "binary", "coordinates": "ras"}, "brains[0].coordinates: has no meaning"),
         ({"hemisphere": HEMISPHERE | {"file": "l.gii"}, "scheme": "binary"}, "brains[0].scheme: has no meaning"),
@@ -137,7 +137,6 @@ def test_all_mistakes_in_schemes_are_named_at_once():
         ({"regions": {"a": {"left": {"labels": "l.gii", "surface": "l.gii"}}}}, "metrics.regions.a.right: is missing"),
         ({"regions": {"q": REGIONS["a"]}}, "metrics.regions: found 'q', which is no brain; known are a"),
         ({"norm_reference": ["x"]}, "metrics.norm_reference: found 'x', which is no brain"),
-        ({"regions": REGIONS, "named_sulci": True}, "metrics.named_sulci: found true beside regions"),
     ],
 )
 def test_what_is_wrong_with_regions_and_references_is_said(folder, metrics, wrong):

@@ -102,11 +102,11 @@ def test_a_growth_model_has_its_own_keys(growth, told):
 
 
 def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
-    runs = {"smooth": {"growth": {"smoothing_mm": 3}}, "sizes": {"growth": "sizes"}, "same": {"growth": "shapes"}}
-    config = load(study({"preset": "expected", "growth": {"smoothing_mm": 2}}, runs=runs))
+    runs = {"thin": {"growth": {"thickness_mm": {21: 3}}}, "sizes": {"growth": "sizes"}, "same": {"growth": "shapes"}}
+    config = load(study({"preset": "expected", "growth": {"thickness_mm": {21: 2}}}, runs=runs))
     found = {name: config.runs[name].growth for name in runs}
-    assert [(growth.model, growth.of, growth.smoothing_mm) for growth in found.values()] == [
-        ("shapes", "atlas", 3),
-        ("sizes", "self", 1.5),
-        ("shapes", "atlas", 2),
+    assert [(growth.model, growth.of, growth.thickness_mm) for growth in found.values()] == [
+        ("shapes", "atlas", {21: 3}),
+        ("sizes", "self", None),
+        ("shapes", "atlas", {21: 2}),
     ]

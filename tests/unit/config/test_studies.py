@@ -120,7 +120,7 @@ def test_folders_of_results_are_no_names_of_studies():
 
 
 def test_a_calibration_knows_its_runs_beforehand():
-    found = config(calibrate=CALIBRATION | {"first_runs": 3, "rounds": 2, "runs_per_round": 1}).calibrate.runs
+    found = config(calibrate=CALIBRATION | {"rounds": [3, 1, 1]}).calibrate.runs
     assert found == {
         "calibration-00": 0, "calibration-01": 0, "calibration-02": 0, "calibration-03": 1, "calibration-04": 2
     }  # fmt: skip
@@ -135,7 +135,7 @@ def test_a_calibration_knows_its_runs_beforehand():
         ({"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}}, "growth_rate_per_s is no curve in the base run"),
         ({"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}, "growth.area_cm2 is no curve in the base run"),
         ({"parameters": {"stiffness_ratio": [0, 2]}}, "above 0"),
-        ({"rounds": 8}, "at most 40"),
+        ({"rounds": [30, 11]}, "at most 40"),
         ({"score": {}}, "calibrate.score: found nothing"),
         ({"score": {"beauty": 1}}, "beauty"),
         ({"compare_week": 24}, "calibrate.compare_week: found 24"),

@@ -22,13 +22,13 @@ from gyriflow.parameters.terms import (
 )
 
 OPEN = {"contact": False}
-DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift_y": 0.05, "shift_z": -0.15, "semi_axes": (0.35, 0.40, 0.50)}
-ELLIPSOID = NoGrowth(**{key: DEFAULTS[key] for key in ("shift_y", "shift_z", "semi_axes")})
+DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
+ELLIPSOID = NoGrowth(**{key: DEFAULTS[key] for key in ("shift", "semi_axes")})
 
 
 def find_zones(mesh, *, gap_mm, contact, grows_everywhere=False, fissure_x_mm, **given):
     """Returns the zones of a run by the settings that decide them."""
-    no_growth = {key: given.pop(key) for key in ("shift_y", "shift_z", "semi_axes")}
+    no_growth = {key: given.pop(key) for key in ("shift", "semi_axes")}
     values = {
         "contact": {"gap_mm": gap_mm, "kind": "planes" if contact else "none"},
         "no_growth": no_growth | {"kind": "none" if grows_everywhere else "ellipsoid"},

@@ -343,7 +343,7 @@ def test_a_study_is_compared_at_its_week_and_its_members_are_measured_there(real
 
 
 def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
-    rounds = {"first_runs": 3, "rounds": 1, "runs_per_round": 1}
+    rounds = {"rounds": [3, 1]}
     search = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
     found = study(real, calibrate=search | rounds).calibration
     assert (found.runs_of(1), found.scores_before(0)) == (["calibration-03"], [])
@@ -376,7 +376,7 @@ def test_named_sulci_are_those_of_real_whole_brains_and_name_what_begins(real):
     assert [one.regions for one in found.measured.values()] == [{}] * len(found.measured)
     onset = found.onset_files("reference", "b21")
     assert onset["left_regions"] == "results/brains/b24/metrics/left.regions.label.gii"
-    everywhere = study([*real, sphere], metrics={"named_sulci": True}).brains.values()
+    everywhere = study([*real, sphere], metrics={"regions": "named_sulci"}).brains.values()
     assert [brain.has_regions for brain in everywhere] == [True] * 4 + [False]
 
 
