@@ -35,11 +35,6 @@ folding:
 runs:
   reference: {{}}{measured}
 """
-QUICK = """
-# Minutes on a laptop: coarse, to see that all goes well. Without these lines the mesh is fine enough to be trusted.
-surface: {edge_length_mm: 1.5}
-mesh: {mesher: tetgen, order: 1, surface_edge_mm: 1.5, core_edge_mm: 4}
-"""
 MEASURED = """
   measured: {preset: measured}"""
 SHIPPED_ATLAS = "spina-bifida"
@@ -47,7 +42,7 @@ SUBJECT = "subject"
 """Id and population of the brain of a prediction."""
 
 
-def write_configuration(folder: Path, path: Path, force: bool, quick: bool = False) -> Iterator[str]:
+def write_configuration(folder: Path, path: Path, force: bool) -> Iterator[str]:
     """Write a configuration for the brains of a folder; yield what was recognised, a line a kind.
 
     InputError where nothing was recognised, or a configuration is there and `force` is not set.
@@ -65,7 +60,7 @@ def write_configuration(folder: Path, path: Path, force: bool, quick: bool = Fal
     end = f"{weeks[-1] if len(weeks) > 1 else weeks[0] + 1:g}" if weeks else UNSET
     # brains of unknown weeks come last
     rest = REST.format(start=brains[0].entry["id"], end=end, measured=MEASURED if len(weeks) > 1 else "")
-    write_text(path, HEAD + "".join(lines) + rest + (QUICK if quick else ""))
+    write_text(path, HEAD + "".join(lines) + rest)
     for brain in brains:
         kind = f"labels, {brain.entry['scheme']}" if "labels" in brain.entry else "surfaces"
         yield f"{brain.entry['id']}: {kind}, week {brain.entry['week']}"

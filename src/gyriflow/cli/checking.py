@@ -47,13 +47,10 @@ class PlannedJob:
     reason: str
 
 
-def check_study(
-    path: Path, directory: Path, cores: int, stages: Sequence[str] = (), price: float | None = None
-) -> Iterator[tuple[str, bool]]:
+def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, bool]]:
     """Yield lines on a study and its files, and on what would run up to some stages, each with whether it is a problem.
 
-    With a price of a core hour they say what the study costs, too. InputError for a configuration that is not valid,
-    with all its problems.
+    InputError for a configuration that is not valid, with all its problems.
     """
     config = load(read_keys(path), path.resolve().parent)
     study = resolve(config)
@@ -67,11 +64,11 @@ def check_study(
     if missing := sum(len(atlas.missing) for atlas in config.atlases):
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
     if not bad:
-        yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], price=price)
+        yield from work_of(path, directory, cores, ["--cores", str(cores), *stages])
 
 
 def work_of(
-    path: Path, directory: Path, cores: int, further: Sequence[str], *, price: float | None = None, show: bool = False
+    path: Path, directory: Path, cores: int, further: Sequence[str], *, show: bool = False
 ) -> Iterator[tuple[str, bool]]:
     """Yield lines on what would run and what it takes, each with whether that is more than what is there.
 
@@ -89,7 +86,7 @@ def work_of(
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     study = resolve(load(read_keys(path), path.resolve().parent))
-    yield from _needs(making, study, directory, cores, price)
+    yield from _needs(making, study, directory, cores)
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
@@ -197,9 +194,7 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
         yield from require_plausible_size(cerebrum.volume_mm3, cerebrum.extents_mm, brain.week)
 
 
-def _needs(
-    jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int, price: float | None
-) -> Iterator[tuple[str, bool]]:
+def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
     foldings = [
         (job, folding_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
         for job in jobs
@@ -213,8 +208,6 @@ def _needs(
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
     yield f"time    about {as_duration(seconds)} on {on}, within a factor of {ERROR:g}", False
     yield f"work    about {hours:.2g} core hours, {folding_s / 3600 / hours:.0%} of them folding", False
-    if price is not None:
-        yield f"cost    about {hours * price:.2g} at {price:g} a core hour", False
     side_by_side = sorted((needs.memory_mib for _, needs in foldings), reverse=True)
     memory = sum(side_by_side[: max(cores // max((job.threads for job, _ in foldings), default=1), 1)])
     disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)

@@ -1,6 +1,5 @@
 """The commands of `gyriflow`, thin: each reads its arguments, calls one function and prints what it returns."""
 
-import json
 import os
 import shlex
 import shutil
@@ -105,8 +104,7 @@ def main() -> None:
 @click.argument("folder", type=THERE)
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
 @click.option("--force", is_flag=True, help="Replace a configuration that is there.")
-@click.option("--quick", is_flag=True, help="With a coarse mesh: minutes on a laptop, to see that all goes well.")
-def init(folder: Path, output: Path | None, force: bool, quick: bool) -> None:
+def init(folder: Path, output: Path | None, force: bool) -> None:
     """Write a configuration from the files of a FOLDER.
 
     It knows tissue label volumes (their scheme is found from the labels), hemisphere surfaces, and ages from
@@ -115,7 +113,7 @@ def init(folder: Path, output: Path | None, force: bool, quick: bool) -> None:
     from .beginning import write_configuration
 
     path = output or folder / CONFIG
-    for line in write_configuration(folder, path, force, quick):
+    for line in write_configuration(folder, path, force):
         click.echo(line)
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
 
@@ -125,8 +123,7 @@ def init(folder: Path, output: Path | None, force: bool, quick: bool) -> None:
 @directory_option
 @cores_option
 @stages_option
-@click.option("--price", type=click.FloatRange(0), metavar="PRICE", help="Price of a core hour, for the study's cost.")
-def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str], price: float | None) -> None:
+def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str]) -> None:
     """Check a configuration and its files; say what will run and what it will take.
 
     Nothing is run or written. CONFIG is gyriflow.yaml where none is named.
@@ -134,7 +131,7 @@ def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str
     from .checking import check_study
 
     problems = 0
-    for line, bad in check_study(_chosen(config, directory), directory, cores, stages, price):
+    for line, bad in check_study(_chosen(config, directory), directory, cores, stages):
         click.echo(line)
         problems += bad
     if problems:
@@ -246,13 +243,12 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
 
 @main.command()
 @click.argument("directory", type=FOLDER, default=Path())
-@click.option("--json", "as_json", is_flag=True, help="As JSON, for programs.")
-def status(directory: Path, as_json: bool) -> None:
+def status(directory: Path) -> None:
     """How far a study is: done, running, time left, failed and why."""
     from . import status as module
 
-    study = module.status(directory)
-    click.echo(json.dumps(study, indent=2, ensure_ascii=False) if as_json else "\n".join(module.as_text(study)))
+    for line in module.status(directory):
+        click.echo(line)
 
 
 @main.command()

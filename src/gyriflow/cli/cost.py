@@ -33,24 +33,23 @@ class Needs(NamedTuple):
 
 def linear_elements(week: float, mesh: MeshSettings) -> float:
     """Return how many linear elements a brain of a week has: cubes of the wanted edge below its surface and inside."""
-    volume_ml = expected_volume_ml(week)
-    volume, area = volume_ml / ML_PER_MM3, 9900 * (volume_ml / 51) ** 0.74
-    edge = mesh.surface_edge_mm
-    graded = 1 / edge**2 - 1 / mesh.core_edge_mm**2
-    cubes = area * (2.5 / edge**2 + max(graded, 0)) + volume / mesh.core_edge_mm**3
+    volume_ml, edge = expected_volume_ml(week), mesh.surface_edge_mm
+    area_mm2, graded = 9900 * (volume_ml / 51) ** 0.74, 1 / edge**2 - 1 / mesh.core_edge_mm**2
+    cubes = area_mm2 * (2.5 / edge**2 + max(graded, 0)) + volume_ml / ML_PER_MM3 / mesh.core_edge_mm**3
     return ELEMENTS_PER_CUBE[mesh.mesher] * cubes
 
 
 def folding_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     """Return what a folding takes."""
-    run, week, order = simulation.settings, simulation.start.week, mesh.order
+    run, week = simulation.settings, simulation.start.week
     elements = linear_elements(week, mesh)
     steps = max((run.end_week - week) * SECONDS_PER_GW / run.step_s, 1.0)
-    memory = predicted_memory_mib(round(elements / (8 if order == 2 else 1)), run.ranks, run.contact.kind, order)
-    weeks = (run.end_week - week) / run.output_every_gw + 1
-    # positions and fields of each week, by a quarter as many nodes
-    disk = weeks * elements / 4 * (24 + 12 * len(run.fields)) / 2**20
-    return Needs(SECONDS_PER_ELEMENT_AND_STEP[order] * elements * steps, memory, disk)
+    memory = predicted_memory_mib(
+        round(elements / (8 if mesh.order == 2 else 1)), run.ranks, run.contact.kind, mesh.order
+    )
+    # positions and fields of each output week, by a quarter as many nodes
+    disk = ((run.end_week - week) / run.output_every_gw + 1) * elements / 4 * (24 + 12 * len(run.fields)) / 2**20
+    return Needs(SECONDS_PER_ELEMENT_AND_STEP[mesh.order] * elements * steps, memory, disk)
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:
@@ -61,10 +60,9 @@ def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:
 
 
 def surface_memory_mib(labels: str, week: float) -> int:
-    """Return the memory in MiB that the surface of a label volume may take, from its header and its week.
+    """Return the memory in MiB that the surface of a label volume may take: 16 bytes a voxel, and 800 one of the brain.
 
-    It takes 16 bytes for each voxel of the file and 800 for each of the brain. A file that is not there yet is a usual
-    one.
+    A file that is not there yet is a usual one.
     """
     try:
         voxels, voxel_mm3 = voxels_of(labels)

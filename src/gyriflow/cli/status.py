@@ -23,37 +23,34 @@ STATE = Path(".snakemake", "gyriflow-run.json")
 REPORT = Path("results", "report", "report.html")
 OF_BRAINS = {"surface": "surface/pial.surf.gii", "mesh": "mesh/brain.xdmf", "metrics": "metrics/metrics.csv"}
 OF_RUNS = {
-    "surfaces": "surfaces/week-*/pial.surf.gii", "metrics": "metrics/week-*/metrics.csv", "figures": "figures/*.png"
-}  # fmt: skip
+    "surfaces": "surfaces/week-*/pial.surf.gii",
+    "metrics": "metrics/week-*/metrics.csv",
+    "figures": "figures/*.png",
+}
 NOT_YET = "-"
 
 
-def status(directory: Path) -> dict[str, Any]:
-    """Return how far the study in a working directory is; InputError where there is none.
-
-    Under "run" are lines on the live or last run, under "brains" and "runs" rows of what is there, and "report" is the
-    path of the report, empty where there is none.
-    """
-    results = directory / "results"
-    state = None
+def status(directory: Path) -> Iterator[str]:
+    """Yield lines on how far the study in a working directory is; InputError where there is none."""
+    results, state = directory / "results", None
     with suppress(InputError):
         state = read_json(directory / STATE)
     configured = _configured(directory)
     if not results.is_dir() and state is None and not configured:
         raise InputError("holds no study", path=directory.resolve(), expected=f"results/ or {CONFIG} in it")
+    yield from _lines(state, is_live(directory))
+    brains = [
+        {"brain": folder.name}
+        | {name: "done" if (folder / file).is_file() else NOT_YET for name, file in OF_BRAINS.items()}
+        for folder in _folders(results / "brains")
+    ]
     begun = {(run.name, folder.name) for run in _folders(results / "runs") for folder in _folders(run)}
-    return {
-        "run": list(_lines(state, is_live(directory))),
-        "brains": [
-            {"brain": folder.name} | {name: "done" if (folder / file).is_file() else NOT_YET
-                                      for name, file in OF_BRAINS.items()}
-            for folder in _folders(results / "brains")
-        ],
-        "runs": [
-            _row(run, results / "runs" / run / brain) for run, brain in [*configured, *sorted(begun - set(configured))]
-        ],
-        "report": str(directory / REPORT) if (directory / REPORT).is_file() else "",
-    }  # fmt: skip
+    runs = [_row(run, results / "runs" / run / brain) for run, brain in [*configured, *sorted(begun - set(configured))]]
+    for rows in (brains, runs):
+        if rows:
+            yield "\n" + tabulate(rows, headers="keys", tablefmt="plain", disable_numparse=True)
+    if (directory / REPORT).is_file():
+        yield f"\nreport: {(directory / REPORT).absolute()}"
 
 
 def as_duration(seconds: float) -> str:
@@ -80,16 +77,6 @@ def is_live(directory: Path) -> bool:
                 return True
             lock.close()
     return False
-
-
-def as_text(study: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a status."""
-    yield from study["run"]
-    for rows in (study["brains"], study["runs"]):
-        if rows:
-            yield "\n" + tabulate(rows, headers="keys", tablefmt="plain", disable_numparse=True)
-    if study["report"]:
-        yield f"\nreport: {Path(study['report']).absolute()}"
 
 
 def report_of(directory: Path) -> Path:
