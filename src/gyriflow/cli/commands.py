@@ -156,26 +156,24 @@ def run(
     named = bool(further) and further[0].endswith((".yaml", ".yml", ".json"))
     config = _chosen(Path(further[0]) if named else None, directory)
     # an option of one value stands before the targets
-    arguments = ["--verbose"] if verbose else []
+    options = ["--verbose"] if verbose else []
     # the cores of this machine are no limit to a cluster, whose profile says how many jobs it may have
     default = click.get_current_context().get_parameter_source("cores") == ParameterSource.DEFAULT
     if not (default and any(argument.partition("=")[0] in ELSEWHERE for argument in further)):
-        arguments += ["--cores", str(cores)]
-    targets = [*stages, *further[int(named) :]]
+        options += ["--cores", str(cores)]
+    sys.exit(_run(config, directory, cores, dry_run, options, *stages, *further[int(named) :]))
+
+
+def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list[str], *targets: str) -> int:
     if dry_run:
         from .checking import work_of
 
-        for line, _ in work_of(config, directory, cores, [*arguments, *targets], show=verbose):
+        for line, _ in work_of(config, directory, cores, [*options, *targets], show="--verbose" in options):
             click.echo(line)
-    else:
-        from .launch import main as launch
+        return 0
+    from .launch import main as launch
 
-        sys.exit(launch(["--configfile", str(config.resolve()), *arguments, "--directory", str(directory), *targets]))
-
-
-def _run(directory: Path, cores: int, dry_run: bool, *further: str) -> None:
-    context = click.get_current_context()
-    context.invoke(run, directory=directory, cores=cores, stages=(), dry_run=dry_run, verbose=False, further=further)
+    return launch(["--configfile", str(config.resolve()), *options, "--directory", str(directory), *targets])
 
 
 @main.command()
@@ -201,7 +199,7 @@ def predict(
 
     for line in write_prediction(directory / CONFIG, labels, (week, until), **settings):
         click.echo(line)
-    _run(directory, cores, dry_run, str(directory / CONFIG))
+    sys.exit(_run(directory / CONFIG, directory, cores, dry_run, ["--cores", str(cores)]))
 
 
 @main.command()
@@ -223,19 +221,14 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     """
     from ..io.exports import hand_over
     from .beginning import write_bids
-    from .launch import main as launch
 
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
     brains = write_bids(data, config, **selection)
     click.echo(f"{len(brains)} scans: {', '.join(brains)}; {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
-    if dry_run:
-        _run(work, cores, True, str(config), *targets)
-        return
-    options = ["--cores", str(cores), "--keep-going", "--directory", str(work)]
-    code = launch(["--configfile", str(config.resolve()), *options, *targets])
-    if (exported / "dataset_description.json").is_file():
+    code = _run(config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets)
+    if not dry_run and (exported / "dataset_description.json").is_file():
         hand_over(exported, out, data, brains, whole=level == "group")
         click.echo(f"derivatives: {out}")
     sys.exit(code)

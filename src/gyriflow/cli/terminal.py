@@ -54,10 +54,9 @@ class RunDisplay:
         self.console = Console(file=stream, markup=False, highlight=False, soft_wrap=True)
         self.live = self.console.is_terminal and not self.console.is_dumb_terminal
         percent, running = TextColumn("{task.percentage:3.0f} %"), TextColumn("{task.description}", markup=False)
-        self.bar = Progress(
-            percent, BarColumn(20), TimeRemainingColumn(), running,
-            console=self.console, transient=True, disable=not self.live, get_time=clock, speed_estimate_period=1e6,
-        )  # fmt: skip
+        columns = percent, BarColumn(20), TimeRemainingColumn(), running
+        self.bar = Progress(*columns, console=self.console, transient=True, disable=not self.live, get_time=clock)
+        self.bar.speed_estimate_period = 1e6
         self.bar.add_task("", total=None)
         (self.task,) = self.bar.tasks
         self.clock, self.details = clock, details
@@ -151,12 +150,10 @@ class RunDisplay:
             words = f"{as_duration(left)} left  " if left else ""
             self.console.print(f"{self.task.percentage:3.0f} %  {words}{'; '.join(now)}")
         if self.total:
-            state: dict[str, Any] = {
-                "began": f"{self.began:%F %T}",
-                "ended": f"{self.ended:%F %T}" if self.ended else None,
-            }
-            state |= {"done": self.done, "total": self.total, "left_s": left, "running": now, "failed": self.failed}
-            state |= {"interrupted": self.interrupted, "details": str(self.details)}
+            ended = f"{self.ended:%F %T}" if self.ended else None
+            state: dict[str, Any] = {"began": f"{self.began:%F %T}", "ended": ended, "left_s": left, "running": now}
+            state |= {"done": self.done, "total": self.total, "failed": self.failed, "interrupted": self.interrupted}
+            state["details"] = str(self.details)
             # a full disk is the steps' to report
             with suppress(StorageError):
                 write_json(self.state_file, state)

@@ -42,8 +42,6 @@ class MeshSettings(Settings):
     """Largest distance of the mesh's surface from the pial surface (`pytetwild`). [mm]"""
     min_radius_ratio: float = Field(0.02, ge=0, lt=1)
     """Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
-    max_volume_change: float = Field(0.01, gt=0, lt=1)
-    """Largest accepted relative difference of the mesh's volume from the pial surface's."""
     max_surface_distance_mm: float = Field(0.1, gt=0, le=5)
     """Distance from mesh to pial surface, and back, within which 99 % of either must lie. [mm]"""
 

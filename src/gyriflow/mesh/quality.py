@@ -190,8 +190,8 @@ def refuse_bad_mesh(
     path: str | PathLike[str] | None = None,
     *,
     min_radius_ratio: float,
-    max_volume_change: float,
     max_surface_distance_mm: float,
+    max_volume_change: float = 0.01,
 ) -> None:
     """Raise MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
 
@@ -211,7 +211,7 @@ def refuse_bad_mesh(
     change, distance = summary["volume_change"], summary["surface_distance_mm"]["hausdorff99"]
     if abs(change) > max_volume_change:
         found = f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} % against the surface's"
-        faults.append((found, f"at most {100 * max_volume_change:g} % (mesh.max_volume_change)"))
+        faults.append((found, f"at most {100 * max_volume_change:g} %"))
     if distance > max_surface_distance_mm:
         found = f"a surface {distance:.3f} mm from the one that was filled (99 % of it is nearer)"
         faults.append((found, f"at most {max_surface_distance_mm:g} mm (mesh.max_surface_distance_mm)"))
