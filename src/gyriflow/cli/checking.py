@@ -8,9 +8,9 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import chdir
-from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
+from typing import NamedTuple
 
 from ..anatomy.labels import LEAST_CORTEX_OUTSIDE, read_cerebrum
 from ..anatomy.plausible import require_plausible_size
@@ -36,14 +36,12 @@ THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1):
 FOLDINGS = ("simulate", "simulate_member")
 
 
-@dataclass(frozen=True)
-class PlannedJob:
-    """A job of a dry run, with Snakemake's reason to run it; targets have no outputs."""
+class PlannedJob(NamedTuple):
+    """A job of a dry run, with Snakemake's reason to run it."""
 
     rule: str
     wildcards: dict[str, str]
     threads: int
-    output: list[str]
     reason: str
 
 
@@ -74,23 +72,23 @@ def work_of(
 
     `further` are arguments of Snakemake's. With `show`, it lists every job on the terminal first.
     """
-    making = [job for job in plan(path, directory, further, show=show) if job.output]
-    if not making:
+    jobs = plan(path, directory, further, show=show)
+    if not jobs:
         yield "nothing to run: all results that this asks for are up to date", False
         return
-    yield f"to run: {len(making)} step{'s' if len(making) > 1 else ''}", False
+    yield f"to run: {len(jobs)} step{'s' if len(jobs) > 1 else ''}", False
     rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
-    for job in making:
+    for job in jobs:
         rules_by_reason[job.reason.partition(":")[0]][job.rule] += 1
     for reason, rules in rules_by_reason.items():
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     study = resolve(load(read_keys(path), path.resolve().parent))
-    yield from _needs(making, study, directory, cores)
+    yield from _needs(jobs, study, directory, cores)
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
-    """Return the jobs that Snakemake would run; with `show` it lists them on the terminal.
+    """Return the jobs that Snakemake would run, without targets; with `show` it lists them on the terminal.
 
     Ends the program as Snakemake does where it refuses.
     """
@@ -98,9 +96,8 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
 
     def take(record: logging.LogRecord) -> bool:
         job = vars(record)
-        if job.get("event") == "job_info":
-            wildcards, output = dict(job["wildcards"] or {}), list(job["output"])
-            jobs.append(PlannedJob(job["rule_name"], wildcards, job["threads"], output, job["reason"]))
+        if job.get("event") == "job_info" and job["output"]:
+            jobs.append(PlannedJob(job["rule_name"], dict(job["wildcards"] or {}), job["threads"], job["reason"]))
         return show or record.levelno >= logging.ERROR
 
     # Snakemake makes folders even where it only looks
@@ -214,7 +211,6 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     # the memory of this machine says nothing of a cluster's
     here = cores <= (os.cpu_count() or 1)
     yield from _fits("memory", memory or LEAST_SURFACE_MIB / 4, _memory_mib() if here else None)
-    # of the folder, or of the first one around it that exists
     there = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
     yield from _fits("disk", disk, shutil.disk_usage(there).free / 2**20)
 

@@ -12,8 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..anatomy.labels import cerebrum_mask, require_cortex_outside
-from ..config.participants import covariates
-from ..config.scans import Scan, read_scans
+from ..config.participants import Scan, covariates, read_scans
 from ..errors import InputError
 from ..io.files import files_in, read_json
 from ..io.volumes import read_label_volume

@@ -8,18 +8,14 @@ SIDES: tuple[Side, ...] = get_args(Side)
 STRUCTURES: dict[Side, Literal["CortexLeft", "CortexRight"]] = {"left": "CortexLeft", "right": "CortexRight"}
 """What GIFTI files call the cortex of each side."""
 
-VertexField = Literal[
-    "displacement", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal", "zones",
-    "contact_pressure",
-]  # fmt: skip
+RegionField = Literal["zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal"]
+VertexField = Literal["displacement", RegionField, "contact_pressure"]
 """Fields that a run can write for ParaView with values per vertex."""
 ElementField = Literal["stress", "strain", "volume_ratio"]
 """Fields with values per element (up to four arrays each)."""
 FieldName = Literal[VertexField, ElementField]
 ELEMENT_FIELDS: tuple[ElementField, ...] = get_args(ElementField)
-REGION_FIELDS: tuple[VertexField, ...] = (
-    *("zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal"),
-)
+REGION_FIELDS: tuple[RegionField, ...] = get_args(RegionField)
 """Fields written with the regions, before the solve."""
 
 Mesher = Literal["pytetwild", "tetgen"]

@@ -133,15 +133,12 @@ def value_at(value: float | Varying, week: float, maps: Maps) -> float | Floats:
     return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
 
 
-def weeks_within(value: float | Varying, start: float, end: float) -> list[float]:
-    """Return start, end, and the weeks of the curve between them: where its extremes lie."""
-    return [start, *(week for week in weeks_of(value) if start < week < end), end]
-
-
 def value_range(value: float | Varying, maps: Maps, start: float, end: float) -> tuple[float, float]:
     """Return the smallest and the largest value of a parameter from a week to a week, over all places."""
     name = map_of(value)
     places = np.ones(1) if name is None else maps[name]
-    curve = [curve_at(value, week) for week in weeks_within(value, start, end)]
+    # the extremes of a curve lie at its weeks, or at the ends
+    weeks = [start, *(week for week in weeks_of(value) if start < week < end), end]
+    curve = [curve_at(value, week) for week in weeks]
     products = np.outer(curve, [places.min(), places.max()])
     return float(products.min()), float(products.max())

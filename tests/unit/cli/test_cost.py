@@ -50,23 +50,6 @@ def test_a_folding_takes_as_long_as_measured_ones_within_the_error(elements, ste
     assert seconds / ERROR < predicted < ERROR * seconds
 
 
-def test_runs_of_studies_and_calibrations_cost_what_runs_do():
-    later = [{"id": f"w{week}", "week": week, "shape": {"semi_axes_mm": [22, 22, 22]}} for week in (23, 25)]
-    study = STUDY | {
-        "brains": [*STUDY["brains"], *later],
-        "runs": {"reference": {}},
-        "studies": {"thick": {"base": "reference", "vary": {"thickness_mm": [2.0, 3.0]}, "compare_week": 25}},
-        "calibrate": {
-            "base": "reference", "compare_week": 23, "parameters": {"thickness_mm": [1.0, 3.0]},
-            "score": {"size": 1.0}, "rounds": [3],
-        },
-    }  # fmt: skip
-    resolved = resolve(load(study))
-    usual, *others, calibrated = (folding_needs(one, resolved.config.mesh) for one in resolved.simulations.values())
-    assert usual in others
-    assert calibrated.seconds == pytest.approx(usual.seconds / 2)
-
-
 def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
     # a small one has what every job needs
     asked = reference(STUDY)

@@ -12,6 +12,7 @@ from configurations import keys, labelled, problems, refusal, study
 from gyriflow.config import load
 from gyriflow.config.atlas import Atlas
 from gyriflow.config.root import Config
+from gyriflow.config.stages import MeshSettings
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import output_weeks, parameters_from
 from gyriflow.study import resolve
@@ -73,6 +74,7 @@ def test_what_is_allowed_by_name_or_missing():
     assert problems(study(folding={"end_week": 24, "growth_rate_per_s": -1e-8, "allow_negative_growth": True})) == []
     assert problems({}) == ["folding.end_week: Field required"]
     assert keys({"folding": {"end_week": 24}}) == ["brains", "start"]
+    assert load(study(mesh=None)).mesh == MeshSettings()
 
 
 def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
