@@ -18,7 +18,7 @@ LEFT, RIGHT = hemisphere(-1), hemisphere(1)
 # mm between the hemispheres, which are 3 mm apart, once the right one was moved
 GAP_MM, OVERLAP_MM = 1.0, 3.0
 MESHING = {
-    "surface_edge_mm": 2.0,
+    "surface_edge_mm": 4.0,
     "core_edge_mm": 10.0,
     "envelope_mm": 0.1,
     "max_surface_distance_mm": 1.0,

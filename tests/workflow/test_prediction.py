@@ -30,7 +30,7 @@ STUDY = {
     "folding": {"end_week": 23},
     "runs": {
         "expected": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1},
-        "weekly": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1, "step_s": 604800},
+        "compressible": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1, "poisson_ratio": 0.4},
     },
 }
 

@@ -56,12 +56,10 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     problems = list(input_problems(config))
     yield from ((f"  {line}", bad) for line, bad in problems)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
-    bad = any(bad for _, bad in problems)
-    if not bad:
-        yield "  input files: all can be read and fit their schemes", False
     if missing := sum(len(atlas.missing) for atlas in config.atlases):
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
-    if not bad:
+    if not any(bad for _, bad in problems):
+        yield "  input files: all can be read and fit their schemes", False
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages])
 
 
@@ -205,8 +203,8 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
     yield f"time    about {as_duration(seconds)} on {on}, within a factor of {ERROR:g}", False
     yield f"work    about {hours:.2g} core hours, {folding_s / 3600 / hours:.0%} of them folding", False
-    side_by_side = sorted((needs.memory_mib for _, needs in foldings), reverse=True)
-    memory = sum(side_by_side[: max(cores // max((job.threads for job, _ in foldings), default=1), 1)])
+    at_once = max(cores // max((job.threads for job, _ in foldings), default=1), 1)
+    memory = sum(sorted((needs.memory_mib for _, needs in foldings), reverse=True)[:at_once])
     disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
     # the memory of this machine says nothing of a cluster's
     here = cores <= (os.cpu_count() or 1)

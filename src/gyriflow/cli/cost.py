@@ -16,9 +16,8 @@ ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 SECONDS_PER_ELEMENT_AND_STEP = {1: 14e-6, 2: 48e-6}
 """By order; from foldings of 31 k, 156 k and 506 k linear elements over 14 to 63 steps, met within a factor of 1.5. A
 quadratic element counts as the eight linear ones that have as many nodes."""
-SECONDS_PER_JOB = 4.0
-"""What other jobs take, from the demo."""
-ERROR = 2.0
+SECONDS_PER_JOB, ERROR = 4.0, 2.0
+"""What other jobs take, from the demo; the factor by which predictions may be wrong."""
 LEAST_MIB, LEAST_MINUTES, LEAST_SURFACE_MIB = 2000, 60, 4000
 """What any job needs: Python, dolfinx, compiled forms, slow processors."""
 

@@ -98,9 +98,7 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
 def refuse_bad_configfiles(files: Sequence[Path], directory: Path) -> None:
     """Raise InputError where a configuration file, named or found here, is missing, no YAML, or has a key twice."""
     own = directory / "config" / "config.yaml"
-    if not files and own.is_file():
-        read_keys(own)
-    for file in files:
+    for file in files or ([own] if own.is_file() else []):
         try:
             read_keys(file)
         except InputError as error:
