@@ -59,7 +59,8 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     else:
         problems += _lines([(problem.key, problem.text) for problem in problems_between(config)])
     if not problems:
-        return config.leave_out(left_out)
+        config.left_out.update(left_out)
+        return config
     if left_out and not keep_going:
         hints.append("with --keep-going, rows that can't be used are left out")
     counted = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"

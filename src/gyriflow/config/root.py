@@ -66,11 +66,6 @@ class Config(Settings):
         """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
         return self._left_out
 
-    def leave_out(self, rows: dict[str, dict[str, Any]]) -> "Config":
-        """Return the configuration with rows of `participants` that can't be used."""
-        self._left_out = rows
-        return self
-
     def scheme(self, brain: Brain) -> LabelScheme:
         """Return the scheme of a brain's labels."""
         name = brain.scheme
