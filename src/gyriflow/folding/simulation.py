@@ -76,7 +76,7 @@ class Folding:
             settings = contact_settings(p, self.maps)
             self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, settings)
             self.problem.contributions.append(self.contact)
-        newton = NewtonSettings(p.solver.newton_tolerance)
+        newton = NewtonSettings(p.solver.newton_tolerance, max_newton=p.solver.max_newton)
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
         floor = 1e-11 * stiffest * edge**2 * math.sqrt(len(mesh.vertices))
